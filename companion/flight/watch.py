@@ -109,7 +109,7 @@ class Watch:
         if phase.monitored and self._context.loop.offboard_active:
             self._judge_snapshot(now)
         if phase.allowed_roles:
-            self._judge_heartbeat()
+            self._judge_heartbeat(now)
 
     def on_current_mode(self, phase: Phase) -> None:
         """Check a CURRENT_MODE, which comes twice a second and at once after a status change.
@@ -169,17 +169,26 @@ class Watch:
         self._stopped_in_control |= verdict.stream is not Stream.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
-    def _judge_heartbeat(self) -> None:
-        state, now = self._context.link.state, self._clock()
-        loop = self._context.loop
+    def _judge_heartbeat(self, now: float) -> None:
+        """Judge the age of the mode and of the heartbeat at `now`, the time of this judgement.
+
+        Unless we are in control, our own stalls do not count: what came meanwhile is read after
+        them, and a vehicle that takes off must not be left for a stall of ours.
+        """
+        state, loop = self._context.link.state, self._context.loop
         # While taking over, it may obey the first setpoint although no heartbeat has told so.
         in_control = loop.offboard_active or loop.taking_over or self._stopped_in_control
         exit_ = Exit.LISTEN if in_control else Exit.RELEASE
-        if now - state.mode_received > self._context.heartbeat_limit:
+
+        def age(received: float) -> float:
+            stalled = self._context.snapshot_builder.counters.stall_time(since=received)
+            return now - received - (0.0 if in_control else stalled)
+
+        if age(state.mode_received) > self._context.heartbeat_limit:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )
-        if state.heartbeat is None or outdated(state.heartbeat.received, now):
+        if state.heartbeat is None or outdated(now - age(state.heartbeat.received), now):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so whether it is armed is not known any more",
                 exit_,

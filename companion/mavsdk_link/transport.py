@@ -92,6 +92,7 @@ class MavsdkTransport:
         self._receive = receive
         # A listening UDP port knows no address to send to before it has received a frame.
         self._has_peer = not url.startswith(_SCHEMES[UdpIn])
+        self._is_open = True
         self._waiting: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
         self._loop = asyncio.get_running_loop()
         self._wakeup = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
@@ -107,14 +108,22 @@ class MavsdkTransport:
         watch(self._loop, self._wakeup, self._read)
 
     def send(self, frame: bytes) -> bool:
-        """Have MAVSDK forward one frame, once; return False if the vehicle was not heard yet."""
-        if not self._has_peer:
+        """Have MAVSDK forward one frame, once.
+
+        Returns:
+            False if the vehicle was not heard yet, or after `close`: MAVSDK's library would then
+            end this process by a segmentation fault.
+        """
+        if not (self._has_peer and self._is_open):
             return False
         self._mavsdk.pass_received_raw_bytes(frame)
         return True
 
     def close(self) -> None:
-        """Stop MAVSDK with all its threads."""
+        """Stop MAVSDK with all its threads; a second call does nothing."""
+        if not self._is_open:
+            return
+        self._is_open = False
         unwatch(self._loop, self._wakeup)
         self._mavsdk.destroy()
         os.close(self._wakeup)

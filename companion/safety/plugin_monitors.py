@@ -84,7 +84,7 @@ class GuardedJudge:
         try:
             with naming_user_code("judge", self._judge):
                 breach = self._judge(snapshot, raised)
-                if breach is not None and not isinstance(breach, str):
+                if breach is not None and not (isinstance(breach, str) and breach.strip()):
                     raise TypeError(f"it returned {breach!r}, which is neither a text nor None")
                 return breach
         except UserCodeError as error:

@@ -34,6 +34,7 @@ class SnapshotBuilder:
 
     Attributes:
         echo: takes each ATTITUDE_TARGET.
+        counters: the counters of the last second, and our own stalls.
         fence_centre_ned: centre of the fence in the frame without estimator resets, m NED; None:
             not known. It is where control began, unless `begin` got another centre.
 
@@ -49,7 +50,7 @@ class SnapshotBuilder:
     ) -> None:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
         self.echo = SetpointEcho(loop.record.sent)
-        self._window = CounterWindow(link, loop.record, real_time=real_time)
+        self.counters = CounterWindow(link, loop.record, real_time=real_time)
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
@@ -79,7 +80,7 @@ class SnapshotBuilder:
         resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
-        self._window.clear()
+        self.counters.clear()
         self.echo.begin(self._link.autopilot)
 
     @property
@@ -102,7 +103,7 @@ class SnapshotBuilder:
         if frames != self._frames_heard:
             self._frames_heard, self._heard_at = frames, now
         self._loop.resets.on_counter(self._link.state.reset_counter, now)
-        self._window.read(now)
+        self.counters.read(now)
 
     def snapshot(self, now: float) -> Snapshot:
         """The snapshot at `now`, s of event-loop time; call `listen` before."""
@@ -131,7 +132,7 @@ class SnapshotBuilder:
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.changes == self._clock_changes else clock.last_change,
-                self._window.stall_time(since=record.last_answer),
+                self.counters.stall_time(since=record.last_answer),
             ),
             self._health(now),
             self._resets(now),
@@ -162,7 +163,7 @@ class SnapshotBuilder:
     def _health(self, now: float) -> Health:
         since = max(self._began_at, now - _GAP_COUNTING_TIME)
         timesync = self._link.timesync
-        return self._window.health()._replace(
+        return self.counters.health()._replace(
             round_trip=timesync.round_trip_s,
             gaps=sum(at > since for at in self._loop.record.gaps),
             uplink=timesync.uplink,

@@ -23,6 +23,8 @@ _MAX_TEXT_LENGTH = 200
 """Number of characters after which a text is cut."""
 _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
+_MAX_ANSWERS = 10
+"""Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`; texts may contain its numbers."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 
@@ -66,7 +68,10 @@ class Component:
                 self._to_vehicle(message)
 
     def answer(self, client: Client, text: str, severity: int = WARNING) -> None:
-        """Send a text to one client, such as the reason of a refusal, but not twice within 5 s."""
+        """Send a text to one client, such as the reason of a refusal.
+
+        Within 5 s a text is not sent twice, and not more than ten texts are sent.
+        """
         if self._note_unless_repeated(client, text):
             for message in self._text_messages(text, severity):
                 self._network.send_to(client, self._frame(message))
@@ -97,12 +102,13 @@ class Component:
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
     def _note_unless_repeated(self, client: Client | None, text: str) -> bool:
-        """Note a text as sent now; return False if it was sent within the last 5 s."""
+        """Note a text as sent now; return False if it, or too many, were within the last 5 s."""
         now = self._loop.time()
         self._sent_at = {
             key: sent for key, sent in self._sent_at.items() if now - sent < _TEXT_REPEAT_PERIOD
         }
-        if (client, text) in self._sent_at:
+        count = sum(receiver is client for receiver, _ in self._sent_at)
+        if (client, text) in self._sent_at or (client is not None and count >= _MAX_ANSWERS):
             return False
         self._sent_at[client, text] = now
         return True

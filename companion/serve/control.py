@@ -5,6 +5,7 @@ import asyncio
 from companion.config import Config
 from companion.mavlink.framing import Frame
 from companion.preflight.session import wanted_rates
+from companion.serve import refusals
 from companion.serve.component import Component
 from companion.serve.flights import ServedFlights
 from companion.serve.mode_requests import (
@@ -23,9 +24,6 @@ from companion.serve.setpoints.understand import SETPOINTS, decode_setpoint
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
-
-_ENDING_TEXT = "control is ending and the vehicle is held; request control again when it has ended"
-_ON_GROUND_TEXT = "take off first: setpoints are flown only in the air"
 
 
 class ServedControl:
@@ -71,9 +69,9 @@ class ServedControl:
             return False
         if steers_in_our_mode(frame, autopilot):
             self._component.answer(client, f"refused: {owner} is in control; change the mode first")
-            self._answer(client, frame, REJECTED)
+            self._component.acknowledge(client, frame, REJECTED, self._autopilot)
         elif reduces_telemetry(frame, wanted_rates(self._config, self._link)):
-            self._answer(client, frame, ACCEPTED)
+            self._component.acknowledge(client, frame, ACCEPTED, self._autopilot)
         else:
             if isinstance(owner, Program) and owner.client is client and leaves_control(frame):
                 flight.expect_release()
@@ -116,7 +114,7 @@ class ServedControl:
             flight.give(request)
         self._programs.keep(owner, request)
         if flight is not None and flight.is_ending:
-            return _ENDING_TEXT
+            return refusals.ENDING
         if flight is None and self._give_control(owner, now):
             self._flights.begin(owner, request, None, from_ground=False)
         return None
@@ -134,7 +132,7 @@ class ServedControl:
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
         if not state.flying:
-            self._component.answer(program.client, _ON_GROUND_TEXT)
+            self._component.answer(program.client, refusals.ON_GROUND)
             return False
         if not self._ownership.has_stream(program, now):
             return False
@@ -147,24 +145,21 @@ class ServedControl:
         """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.sender_of(client, frame)
         flight, on_ground = self._flights.current, not self._link.state.flying
-        refusal = self._ownership.request_control(owner, now)
-        if refusal is None and flight is not None and flight.is_ending:
-            refusal = _ENDING_TEXT
-        elif refusal is None and flight is None:
-            refusal = self._flights.fence_refusal()
-            if refusal is None and on_ground:
-                refusal = self._keeper.takeoff_refusal(self._programs.newest(owner))
+        request, refusal = self._programs.newest(owner), self._ownership.request_control(owner, now)
+        if refusal is None and flight is not None:
+            refusal = refusals.ENDING if flight.is_ending else None
+        elif refusal is None:
+            refusal = self._flights.fence_refusal() if request is not None else refusals.FORGOTTEN
+            if refusal is None and request is not None and on_ground:
+                refusal = self._keeper.takeoff_refusal(request)
+        result = ACCEPTED if self._flights.in_control else IN_PROGRESS
         if refusal is not None:
             if flight is None:
                 self._ownership.release()
             self._component.answer(client, f"control refused: {refusal}")
-            self._answer(client, frame, REJECTED)
-        elif flight is None:
+            result = REJECTED
+        elif flight is None and request is not None:
             command = ControlRequest(client, frame)
-            self._flights.begin(owner, self._programs.newest(owner), command, from_ground=on_ground)
-        else:
-            self._answer(client, frame, ACCEPTED if flight.in_control else IN_PROGRESS)
-
-    def _answer(self, client: Client, frame: Frame, result: int) -> None:
-        """Answer a client's frame to the autopilot, in the autopilot's name."""
+            self._flights.begin(owner, request, command, from_ground=on_ground)
+            return
         self._component.acknowledge(client, frame, result, self._autopilot)

@@ -34,13 +34,9 @@ class Programs:
         while len(self._newest) > _MAX_PROGRAMS:
             del self._newest[next(iter(self._newest))]
 
-    def newest(self, program: Program) -> Request:
-        """The newest request of a program.
-
-        Raises:
-            KeyError: the program has sent none, or was forgotten.
-        """
-        return self._newest[program]
+    def newest(self, program: Program) -> Request | None:
+        """The newest request of a program; None if it has sent none, or was forgotten."""
+        return self._newest.get(program)
 
     def sender_of(self, client: Client, frame: Frame) -> Program:
         """The program that sent a command.

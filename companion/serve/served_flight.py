@@ -86,14 +86,12 @@ class ServedFlight:
         self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
         self._link, self._component, self._ownership = link, component, ownership
-        self._changes = changes
-        self._environment = environment
-        self._clock = asyncio.get_running_loop().time
-        self._release_commanded_at = -inf
-        settings = link.settings
-        self._autopilot = Address(settings.target_system, settings.target_component)
-        motion = commanded_motion(changes.wanted)
-        self._source = ServedSource(name, motion, ownership, self._heading)
+        self._changes, self._clock = changes, asyncio.get_running_loop().time
+        self._autopilot = Address(link.settings.target_system, link.settings.target_component)
+        self._owner, self._release_commanded_at = name, -inf
+        self._source = ServedSource(
+            name, commanded_motion(changes.wanted), ownership, self._heading
+        )
         self._assembled = assemble(
             config,
             link,
@@ -199,22 +197,21 @@ class ServedFlight:
     def _released_by(self) -> str:
         """Name of the owner if it has just commanded another mode, else an empty text."""
         lately = self._clock() - self._release_commanded_at <= _RELEASE_TIME
-        return self._source.name if lately else ""
+        return self._owner if lately else ""
 
     def _tell_alarm(self, text: str) -> None:
         self._note_alarm(text)
         self._component.tell(text, WARNING)
 
     def _tell_end(self, command: ControlRequest | None, result: str) -> None:
-        name = self._source.name
-        if self._source.start_pose is not None:
-            released = self._assembled.flight.failed_in is not None
-            normal_end = "released by the client" if released else "handed back"
-            ended = normal_end if result == "ok" else result
-            self._component.tell(f"control by {name} has ended: {ended}")
+        if self._source.start_pose is None:
+            self._component.tell(f"control was not given to {self._owner}: {result}")
+            self._answer(command, REJECTED)
             return
-        self._component.tell(f"control was not given to {name}: {result}")
-        self._answer(command, REJECTED)
+        if result == "ok":
+            released = self._assembled.flight.failed_in is not None
+            result = "released by the client" if released else "handed back"
+        self._component.tell(f"control by {self._owner} has ended: {result}")
 
     async def _answer_and_tell(self, command: ControlRequest | None) -> None:
         """Answer the client until control begins; then tell all clients when it falls silent."""
@@ -222,12 +219,15 @@ class ServedFlight:
             self._answer(command, IN_PROGRESS)
             await asyncio.sleep(_PROGRESS_PERIOD)
         self._answer(command, ACCEPTED)
-        self._component.tell(f"{self._source.name} is in control")
-        reported = ControlState.LIVE
+        told, reported = "", ControlState.LIVE
         while True:
             now = self._ownership.state(self._clock())
-            if now is not reported and now in (ControlState.LIVE, ControlState.HOLDING):
-                self._component.tell(f"{self._source.name}: {now.value}")
+            self._owner = str(self._ownership.owner or self._owner)
+            if self._owner != told:  # also when another client goes on for a silent one
+                told, reported = self._owner, ControlState.LIVE
+                self._component.tell(f"{told} is in control")
+            elif now is not reported and now in (ControlState.LIVE, ControlState.HOLDING):
+                self._component.tell(f"{self._owner}: {now.value}")
                 reported = now
             await asyncio.sleep(_CHECK_PERIOD)
 

@@ -130,6 +130,7 @@ class ServeSession:
         if self._config.serve.control:
             keeper = SituationKeeper(link, network)
             control = self._control(link, component, keeper)
+            network.flown = SETPOINTS
             background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
         gate = _FrameInterceptor(
             permission, component, control, network.routing, link.settings.target_system

@@ -27,7 +27,8 @@ _MAX_TELEMETRY_AGE = 0.5
 _MAX_PAIR_INTERVAL = 0.3
 """Largest time between a local and a global position of a pair, s."""
 _NEW_ORIGIN_WEIGHT = 0.05
-"""Weight of a new pair of positions; each pair is off by some centimetres."""
+"""Weight of a new pair of positions; each pair is off by some centimetres. The altitude of home is
+exact in each message, and is not averaged."""
 _NEW_ORIGIN_DISTANCE = 2.0
 """An origin this far from the estimate counts as newly set, m."""
 
@@ -139,9 +140,11 @@ class OriginEstimate:
         # The average must not go half round the earth where the longitude changes its sign.
         turns = round((measured.longitude - estimate.longitude) / 360.0)
         measured = measured._replace(longitude=measured.longitude - 360.0 * turns)
-        self.origin = Origin(
+        averaged = Origin(
             *(a + _NEW_ORIGIN_WEIGHT * (b - a) for a, b in zip(estimate, measured, strict=True))
         )
+        # Arming or a station may set another home; an average would be wrong for seconds.
+        self.origin = averaged._replace(home_altitude=measured.home_altitude)
 
 
 def _distance(a: Origin, b: Origin) -> float:

@@ -12,14 +12,14 @@ from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
 
 
-def stalled(autopilot, seconds):
+def stalled(autopilot, seconds, phase="maneuvers"):
     """A hover in which the program stands still; what is on the wire then, it reads first."""
     with mock_vehicle(autopilot=autopilot, delay_s=0.015) as mock:
 
         def stall():
             asyncio.get_running_loop().clock.now += seconds
 
-        summary = fly(mock, None, When("maneuvers", stall, after=1.0), hover={"duration_s": 9.0})
+        summary = fly(mock, None, When(phase, stall, after=1.0), hover={"duration_s": 9.0})
         return summary, mock.state()
 
 
@@ -36,6 +36,13 @@ def test_px4_that_its_failsafe_has_taken_and_landed_in_a_stall_is_not_taken_back
     assert summary.result.startswith("this program did not run for"), summary.events
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
     assert summary.events[-1][1].endswith("disarmed in OFFBOARD: nothing is commanded")
+
+
+def test_a_stall_during_the_take_off_does_not_leave_the_vehicle_in_the_air():
+    """The heartbeats of the stall are read after it: the vehicle was not silent, we were."""
+    summary, truth = stalled("ardupilot", 1.5, "takeoff")
+    assert summary.result == "ok", summary.events
+    assert (truth["armed"], truth["landed"]) == (False, True)
 
 
 def test_ardupilot_that_obeyed_the_first_setpoint_before_a_stall_is_asked_to_hold():

@@ -220,3 +220,13 @@ def test_nothing_that_is_not_finite_or_in_range_gets_to_mavsdk(rates, thrust):
 def test_before_the_vehicle_is_heard_nothing_is_sent():
     asked = lambda link: link.send_setpoint(1, BodyRates(0.0, 0.0, 0.0), 0.5)  # noqa: E731
     assert opened(f"udpin://127.0.0.1:{free_port()}", asked) is False
+
+
+def test_after_its_end_nothing_is_given_to_mavsdk():
+    """Its library ended the whole process by a segmentation fault."""
+    transport = opened("udpout://127.0.0.1:9", lambda link: link._outbox.transport)
+    given = []
+    transport._mavsdk.pass_received_raw_bytes = given.append
+    assert transport.send(bytes(20)) is False
+    transport.close()
+    assert given == []

@@ -17,6 +17,7 @@ from tests.test_extending import block
 
 CODE = """
 
+import asyncio
 import sys
 from companion.safety.actions import Stream
 
@@ -36,6 +37,13 @@ def leaving(config):
             sys.exit(1)
     return made(config, judge)
 
+def blocking(config):
+    times = [1.5]
+    def judge(snapshot, raised):
+        if times and snapshot.motion.height is not None and snapshot.motion.height > 1.0:
+            asyncio.get_running_loop().clock.now += times.pop()
+    return made(config, judge)
+
 def silent(config):
     return made(config, lambda snapshot, raised: None, stream=Stream.STOPS)
 
@@ -44,6 +52,9 @@ def raising(config):
 
 def counting(config):
     return made(config, lambda snapshot, raised: 5)
+
+def wordless(config):
+    return made(config, lambda snapshot, raised: "")
 
 def releasing(config):
     return made(config, lambda snapshot, raised: None, Action.RELEASE)
@@ -54,8 +65,8 @@ def unmade(config):
 def nothing(config):
     return None
 """
-NAMES = ("sinking", "high", "leaving", "silent", "raising", "counting", "releasing", "unmade",
-         "nothing")  # fmt: skip
+NAMES = ("sinking", "high", "leaving", "blocking", "silent", "raising", "counting", "wordless",
+         "releasing", "unmade", "nothing")  # fmt: skip
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -114,6 +125,14 @@ def test_a_judge_that_raises_hands_the_vehicle_back_and_is_named(autopilot, name
     assert not any("internal error" in text for _, text in summary.events)
 
 
+def test_a_judge_that_blocks_is_not_taken_for_a_silent_vehicle():
+    vehicle = QuickVehicle("ardupilot", lockstep=False, delay_s=0.015)
+    config = merged(QUICK_FLIGHT, {"safety": {"monitors": ["blocking"]}})
+    summary = fly(config, vehicle)
+    assert summary.result.startswith("this program did not run for 1.5 s"), summary.events
+    assert vehicle.state()["mode"] == "BRAKE"
+
+
 def test_a_judge_that_raises_is_asked_once_and_stops_no_other_monitor():
     ladder = SafetyLadder(monitors(configured("high")), 3.0)
     rolled = Snapshot(
@@ -138,6 +157,7 @@ def test_it_can_only_choose_among_the_actions():
     [
         ("raising", "cannot be used where a value is not known: .* raised TypeError: unsupported"),
         ("counting", "it returned 5, which is neither a text nor None"),
+        ("wordless", "it returned '', which is neither a text nor None"),
         ("releasing", "its action must be WARN, HOLD, HAND_BACK or LAND"),
         ("unmade", "the monitor unmade of the module my_monitors raised OSError: no file"),
         ("nothing", "made no companion.safety.monitor.Monitor but None"),

@@ -250,6 +250,29 @@ def test_a_commanded_climb_is_limited_as_guidance_limits_it(down, flown):
     assert np.abs(velocities[:, 2]).max() < abs(flown) + 1e-6
 
 
+@pytest.mark.parametrize("velocity", [None, 0.5])
+@pytest.mark.parametrize(("down", "limit"), [(90.0, DESCENT), (-90.0, -CLIMB)])
+def test_a_vertical_acceleration_does_not_lead_beyond_the_vertical_limits(down, limit, velocity):
+    """A vehicle that follows it at once fell at four times limits.max_descent_m_s."""
+    motion, vehicle, fastest = begun(), STILL, 0.0
+    sideways = (0.0, 0.0)
+    for number in range(150):
+        now = 0.02 * number
+        commanded = None if velocity is None else (*sideways, math.copysign(velocity, down))
+        changing = request(velocity=commanded, acceleration=(*sideways, down + 1e-3 * number))
+        motion.command(changing, now, vehicle)
+        reference = motion.reference(now + 0.01)
+        assert abs(reference.acceleration_ned[2]) <= 6.0
+        speed = vehicle.velocity_ned[2] + 0.02 * reference.acceleration_ned[2]
+        vehicle = VehicleMotion(reference.position_ned, (*sideways, speed))
+        fastest = max(fastest, speed / limit, reference.velocity_ned[2] / limit)
+    assert fastest < (1.05 if velocity is None else 1.5)
+    assert velocity is not None or fastest > 0.9
+    braking = request(acceleration=(*sideways, -0.5 * math.copysign(1.0, down)))
+    motion.command(braking, now, vehicle)
+    assert motion.reference(now).acceleration_ned[2] * down < 0.0, "it may always be slowed down"
+
+
 def test_an_acceleration_beside_a_repeated_velocity_ends_with_the_timeout():
     motion, moving = begun(), VehicleMotion(ORIGIN, (3.0, 0.0, 0.0))
     frozen = request(velocity=(3.0, 0.0, 0.0), acceleration=(2.0, 0.0, 0.0))

@@ -312,3 +312,13 @@ def test_the_origin_is_averaged_across_the_date_line():
         longitude = (180.0 + (east - 5.0) * metre + 180.0) % 360.0 - 180.0
         estimate.note((0.0, east, 0.0), math.degrees(0.3), longitude, 100.0, 0.0)
         assert estimate.origin.longitude == pytest.approx(180.0 - 5.0 * metre, abs=1e-3 * metre)
+
+
+def test_a_home_that_is_set_elsewhere_counts_at_once():
+    """Its altitude was averaged over 4 s: "2 m above home" after arming on a roof was inside."""
+    estimate = OriginEstimate()
+    for home in (488.0, 498.0):
+        for _ in range(3):
+            estimate.note((0.0, 0.0, -5.0), 47.0, 8.0, 493.0, 493.0 - home)
+        assert estimate.origin.home_altitude == pytest.approx(home)
+        assert estimate.origin.altitude == pytest.approx(488.0)

@@ -25,6 +25,8 @@ class ClientStats:
     """Frames passed to the kernel."""
     dropped: int = 0
     """Frames not sent, because the client or its connection is too slow."""
+    flooded: int = 0
+    """Datagrams of the client that were not read, because it sent too many."""
 
 
 class ClientListener(Protocol):
@@ -120,14 +122,26 @@ class FloodDetector:
     """Length of the window in which frames are counted, and of a pause in reading, s."""
     _MAX_COUNT = 64
     """Largest number of frames or datagrams in one window."""
+    _BYTES_PER_COUNT = 64
+    """So many bytes count as a frame: to search noise for frames costs time, too."""
 
     def __init__(self) -> None:
         self._window_start = 0.0
         self._count = 0
 
-    def count(self, number: int, now: float) -> bool:
-        """Count `number` frames received at `now`, s; return whether reading must pause."""
+    def count(self, number: int, size: int, now: float) -> bool:
+        """Count what was received; return whether it is too much.
+
+        Args:
+            number: number of frames or datagrams.
+            size: number of bytes.
+            now: event-loop time, s.
+        """
         if now - self._window_start > self.WINDOW:
             self._window_start, self._count = now, 0
-        self._count += number
+        self._count += max(number, size // self._BYTES_PER_COUNT)
         return self._count > self._MAX_COUNT
+
+    def is_flood(self, now: float) -> bool:
+        """Whether too much was received already in the window of `now`, s."""
+        return now - self._window_start <= self.WINDOW and self._count > self._MAX_COUNT

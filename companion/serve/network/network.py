@@ -25,6 +25,7 @@ from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
 from companion.serve.network.routing import Routing
 from companion.serve.network.serial_line import SerialLine
+from companion.serve.network.setpoint_limit import SetpointLimit
 from companion.serve.network.tcp import TcpPort, open_tcp_client, open_tcp_server
 from companion.serve.network.udp import UdpPort, open_udp
 from companion.serve.network.uplink import UplinkQueue, uplink_rate
@@ -58,6 +59,7 @@ class Network:
         attitude_payload: of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
         attitude_at: event-loop time at which that payload arrived, s.
         overflowed: frames of the vehicle that were dropped because the queue was full.
+        flown: ids of the messages that are flown here; `SetpointLimit` bounds them.
 
     Raises:
         EndpointError: an endpoint cannot be parsed, or (entering the block) cannot be opened.
@@ -81,6 +83,8 @@ class Network:
         self.attitude_payload = b""
         self.attitude_at = -inf
         self.overflowed = 0
+        self.flown: frozenset[int] = frozenset()
+        self._limit = SetpointLimit(self._route)
         self._link, self._note_event = link, note
         self._faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
@@ -140,16 +144,13 @@ class Network:
             self._clients.remove(client)
             self.routing.detach(client)
             self.uplink.forget(client)
+            self._limit.forget(client)
 
     def received(self, client: Client, frames: Iterable[Frame]) -> None:
         """A client has sent frames. A frame that causes a fault is dropped; the session goes on."""
         for frame in frames:
-            try:
-                self.routing.from_client(client, frame)
-            except Exception as error:
-                self._note_fault_once(
-                    f"{fault_message(error)}; a frame of {client.name} was dropped"
-                )
+            if frame.message_id not in self.flown or self._limit.admits(client, frame):
+                self._route(client, frame)
         self._flush_later()
 
     def flush(self) -> None:
@@ -179,6 +180,12 @@ class Network:
                 self._flush_handle = self._loop.call_soon(self.flush)
         elif self._timer is None:
             self._timer = self._loop.call_later(_MAX_FORWARDING_DELAY, self.flush)
+
+    def _route(self, client: Client, frame: Frame) -> None:
+        try:
+            self.routing.from_client(client, frame)
+        except Exception as error:
+            self._note_fault_once(f"{fault_message(error)}; a frame of {client.name} was dropped")
 
     def _note_fault_once(self, text: str) -> None:
         if text not in self._faults and len(self._faults) < _MAX_FAULTS:

@@ -18,6 +18,9 @@ _MAX_REMEMBERED_FRAMES = 4096
 """Largest number of remembered frames; in a flood, only the newest are remembered."""
 
 
+_MAX_ADDRESSES = 1024
+"""Largest number of addresses that are learned of one channel: each targeted frame looks at all."""
+
 Intercept = Callable[[Client, Frame], bool]
 """Called with a client's frame before forwarding; returns True if it must not be forwarded."""
 
@@ -88,7 +91,7 @@ class Routing:
             if source == self._own or self._repeats.is_repeat(frame.raw):
                 self.stats.looped += 1
                 return
-            self._heard[self._vehicle].add(source)
+            self._learn(self._vehicle, source)
         target = target_of(frame)
         if target == EVERYBODY:
             receivers = self._clients
@@ -116,7 +119,7 @@ class Routing:
             self.stats.looped += 1
             return
         if source.system != 0:
-            self._heard[client].add(source)
+            self._learn(client, source)
         target = target_of(frame)
         if target == self._own:
             if self.on_own_frame is not None:
@@ -130,6 +133,10 @@ class Routing:
         """Send a frame of our own component to every client."""
         for client in self._clients:
             client.put(frame)
+
+    def _learn(self, channel: Client | UplinkQueue, source: Address) -> None:
+        if len(self._heard[channel]) < _MAX_ADDRESSES:
+            self._heard[channel].add(source)
 
     def _forward(self, origin: Client, raw: bytes, target: Address) -> None:
         others = [each for each in self._clients if each is not origin]

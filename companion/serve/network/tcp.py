@@ -16,6 +16,13 @@ _MAX_UNSENT_BYTES = 65_536
 _KERNEL_BUFFER = 65_536
 """Size of the kernel's buffer for a client, bytes. It is small, because a client that paused must
 read all old bytes in it before it reads anything new."""
+_READ_BYTES = 4096
+"""Largest number of bytes that are read at once; asyncio would read 256 KiB, which costs so long
+that the control loop would stop."""
+_DEAD_TIMEOUT = 60.0
+"""A client that acknowledges nothing, or reads nothing, for this long is gone, s. Linux gives it up
+after 15 minutes. Meanwhile one that connects again and again from a bad network takes all places.
+"""
 _RETRY_PAUSE = 2.0
 """Pause before connecting again, s."""
 _CONNECT_TIMEOUT = 5.0
@@ -98,6 +105,7 @@ class TcpPort:
         sock = transport.get_extra_info("socket")
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _KERNEL_BUFFER)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * _DEAD_TIMEOUT))
         name, host = f"tcp {host_and_port(address)}", plain_host(str(address[0]))
         client = TcpClient(name, host, transport)
         self._open.add(client)
@@ -149,13 +157,14 @@ class TcpClient(Client):
             self.stats.sent += frames
 
 
-class _Connection(asyncio.Protocol):
+class _Connection(asyncio.BufferedProtocol):
     def __init__(self, port: TcpPort) -> None:
         self._port = port
         self._loop = asyncio.get_running_loop()
         self._client: TcpClient | None = None
         self._transport: asyncio.Transport | None = None
         self._flood = FloodDetector()
+        self._buffer = bytearray(_READ_BYTES)
         self.lost = asyncio.Event()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -165,11 +174,15 @@ class _Connection(asyncio.Protocol):
         if self._client is None:
             transport.abort()
 
-    def data_received(self, data: bytes) -> None:
+    def get_buffer(self, sizehint: int) -> bytearray:
+        return self._buffer
+
+    def buffer_updated(self, nbytes: int) -> None:
         if self._client is None or self._transport is None:
             return
-        number = self._port.received(self._client, data)
-        if self._flood.count(number, self._loop.time()) and not self._transport.is_closing():
+        number = self._port.received(self._client, bytes(self._buffer[:nbytes]))
+        too_much = self._flood.count(number, nbytes, self._loop.time())
+        if too_much and not self._transport.is_closing():
             self._transport.pause_reading()
             self._loop.call_later(FloodDetector.WINDOW, self._resume)
 

@@ -102,7 +102,7 @@ class UdpPort:
             except OSError:
                 return  # nothing left, or an ICMP refusal of something sent before
             self._receive(data, address)
-            if self._flood.count(1, self._loop.time()):
+            if self._flood.count(1, 0, self._loop.time()):
                 self._loop.remove_reader(self._socket.fileno())
                 self._resume_timer = self._loop.call_later(FloodDetector.WINDOW, self._resume)
                 return
@@ -121,9 +121,13 @@ class UdpPort:
             if not frames or len(self._by_address) >= _MAX_CLIENTS:
                 return
             self._attach(address, client)
+        elif client.flood.is_flood(self._loop.time()):
+            client.stats.flooded += 1
+            return
         else:
             frames = client.scan(data)
         client.heard_at = self._loop.time()
+        client.flood.count(len(frames), len(data), client.heard_at)
         self._clients.received(client, frames)
 
     def _attach(self, address: Any, client: "UdpClient | None" = None) -> None:
@@ -144,6 +148,8 @@ class UdpClient(Client):
 
     Attributes:
         heard_at: arrival of its last datagram, s.
+        flood: counts what it sends. A client that floods loses datagrams itself, because the socket
+            must be read for the others.
     """
 
     def __init__(self, port: UdpPort, address: Any) -> None:
@@ -151,6 +157,7 @@ class UdpClient(Client):
         super().__init__(f"udp {host_and_port(address)}", host=host, streaming=False)
         self._port, self._address = port, address
         self.heard_at = asyncio.get_running_loop().time()
+        self.flood = FloodDetector()
 
     def _flush(self) -> None:
         while self._waiting:

@@ -4,6 +4,7 @@ from copy import copy
 from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
+from companion.attitude.rotation import clamp
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 from companion.serve.setpoints.approach import AxisLimits, AxisState, UnplannableError
 from companion.serve.setpoints.axes import CommandFollower, Continuity
@@ -80,7 +81,9 @@ class CommandedMotion:
         horizontal, vertical = _by_axes(actual)
         try:
             self._horizontal.command(request.horizontal, now, horizontal)
-            self._vertical.command(self._clamped(request.vertical), now, vertical)
+            (speed,), (reference_speed,) = vertical.velocity, self._vertical.at(now).velocity
+            demand = self._clamped(request.vertical, speed, reference_speed)
+            self._vertical.command(demand, now, vertical)
             self._heading.command(self._heading_demand(request, now), now)
         except UnplannableError:
             self._horizontal, self._vertical, self._heading, self._newest_yaw = before
@@ -100,12 +103,28 @@ class CommandedMotion:
         (heading,), (rate,), _ = self._heading.at(time)
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
-    def _clamped(self, vertical: AxisDemand) -> AxisDemand:
-        """The demand with its velocity clamped to the limits, unless a position is demanded too."""
-        if vertical.velocity is None or vertical.position is not None:
+    def _clamped(self, vertical: AxisDemand, *speeds: float) -> AxisDemand:
+        """The demand within the vertical limits, unless a position is demanded too.
+
+        An acceleration does not lead beyond the limits of the speed either.
+
+        Args:
+            vertical: the demand.
+            speeds: vertical speeds of the vehicle and of the reference, m/s, positive down.
+        """
+        if vertical.position is not None:
             return vertical
-        (down,) = vertical.velocity
-        return vertical._replace(velocity=(min(max(down, -self._climb), self._descent),))
+        if vertical.velocity is not None:
+            (down,) = vertical.velocity
+            vertical = vertical._replace(velocity=(min(max(down, -self._climb), self._descent),))
+        if vertical.acceleration is None:
+            return vertical
+        acceleration = clamp(vertical.acceleration[0], _VERTICAL_ACCELERATION)
+        limit = self._descent if acceleration > 0.0 else -self._climb
+        gained = 0.5 * acceleration * abs(acceleration) / _VERTICAL_JERK  # while it ends
+        if acceleration and any((v + gained - limit) * acceleration >= 0.0 for v in speeds):
+            return AxisDemand(None, vertical.velocity or (limit,), None)
+        return vertical._replace(acceleration=(acceleration,))
 
     def _heading_demand(self, request: MotionRequest, now: float) -> AxisDemand:
         """The demand on the heading: a yaw (by the shorter turn), a yaw rate, or no rotation."""

@@ -1,0 +1,72 @@
+"""Home is set elsewhere in flight, or the ground on which the vehicle stands moves."""
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
+
+
+class Changed:
+    """Changes the messages that a mock vehicle sends, as `change` does in place."""
+
+    def __init__(self, mock, change):
+        self._change = change
+        self._parser, self._packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
+        mock.to_companion = self._datagram
+
+    def _datagram(self, data):
+        sent = b""
+        for message in self._parser.parse_buffer(data) or ():
+            if message.get_type() in ("HOME_POSITION", "LOCAL_POSITION_NED"):
+                self._change(message)
+                self._packer.seq = message.get_seq()
+                sent += message.pack(self._packer)
+            else:
+                sent += message.get_msgbuf()
+        return [bytes(sent)] if sent else []
+
+
+@pytest.mark.parametrize(
+    ("phase", "higher", "result"),
+    [
+        ("maneuvers", 10.0, "m below home, below limits.fence_floor_m"),  # it lands, as it says
+        ("land", -10.0, "ok"),  # on a roof, 10 m above the new home
+    ],
+)
+def test_home_that_is_set_elsewhere_in_flight_leads_to_the_ground(phase, higher, result):
+    moved = 0.0
+
+    def change(message):
+        if message.get_type() == "HOME_POSITION":
+            message.z -= moved
+            message.altitude += round(1e3 * moved)
+
+    def move():
+        nonlocal moved
+        moved = higher
+
+    with mock_vehicle() as mock:
+        Changed(mock, change)
+        summary = fly(mock, None, When(phase, move, after=0.3))
+        truth = mock.state()
+    assert summary.result.endswith(result), summary.events
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
+
+
+def test_a_take_off_from_a_boat_that_moves_is_flown():
+    """As seen from the water, which is where the program sees it from."""
+    with mock_vehicle() as mock:
+
+        def change(message):
+            if message.get_type() == "LOCAL_POSITION_NED":
+                message.x += 2.0 * mock.time
+                message.vx += 2.0
+
+        Changed(mock, change)
+        summary = fly(mock)
+        truth = mock.state()
+    assert summary.result == "ok", summary.events
+    assert summary.tracking()["position_max_m"] < 0.5
+    assert truth["position"][0] < -5.0, "it stood over the water while the boat went on"
+    assert (truth["armed"], truth["crashed"]) == (False, False)
