@@ -209,7 +209,7 @@ def test_shares_and_rates_are_those_of_the_last_second(flight):
     flight.listen(13.28)  # 0.25 s too late, and the second looked at began at 12.26 s
     starved = flight.snapshot(13.28).health.starved
     assert starved == pytest.approx(0.25 / 1.02)
-    assert len(flight.builder._window._readings) <= 52
+    assert len(flight.builder.counters._readings) <= 52
 
 
 def test_shares_are_not_known_before_most_of_a_second_is_seen(flight):
