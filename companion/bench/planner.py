@@ -32,19 +32,16 @@ _STEPS, _STEPS_IN_PYTHON = 4_000, 10  # number of steps of `advance` in a repeat
 
 
 class _Case(NamedTuple):
-    """Code whose run time is measured.
-
-    Attributes:
-        group: key of the group in the result.
-        key: key of the case in its group.
-        timer: runs the case.
-        steps: number of planner steps in one run.
-    """
+    """Code whose run time is measured."""
 
     group: str
+    """Key of the group in the result."""
     key: str
+    """Key of the case in its group."""
     timer: Timer
+    """Runs the case."""
     steps: int
+    """Number of planner steps in one run."""
 
 
 class _Fleet(NamedTuple):

@@ -15,25 +15,23 @@ from companion.nmpc.settings import Settings
 
 
 class Plan(NamedTuple):
-    """The result of one solve, with the first control of the plan.
-
-    Attributes:
-        solved: whether the plan may be flown; if not, the other fields mean nothing.
-        converged: whether the iterations reached the tolerance; a real-time iteration seldom does.
-        iterations: number of SQP iterations.
-        solver_seconds: processor time of the solver alone, s.
-        north, east, heading: target for the planner: coefficients, and heading in rad.
-        thrust: specific thrust, m/s².
-    """
+    """The result of one solve, with the first control of the plan."""
 
     solved: bool
+    """Whether the plan may be flown; if not, the other fields mean nothing."""
     converged: bool
+    """Whether the iterations reached the tolerance; a real-time iteration seldom does."""
     iterations: int
+    """Number of SQP iterations."""
     solver_seconds: float
+    """Processor time of the solver alone, s."""
     north: float
     east: float
     heading: float
+    """`north`, `east` and `heading`: target for the planner: coefficients, and heading in
+    rad."""
     thrust: float
+    """Specific thrust, m/s²."""
 
 
 _NO_PLAN = Plan(False, False, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
