@@ -141,8 +141,6 @@ class Solution(NamedTuple):
     """(x_0, u_0, x_1, …, x_N), as `Program.unknown`."""
     solved: bool
     """Whether the plan may be flown, provided that it is finite."""
-    converged: bool
-    """Whether the iterations reached the tolerance."""
     iterations: int
     """Number of SQP iterations."""
 
@@ -178,11 +176,9 @@ class SqpSolver:
             ubg=program.g_upper,
         )
         stats = self._solver.stats()
-        converged = bool(stats["success"])
         return Solution(
             np.asarray(result["x"], dtype=np.float64).ravel(),
-            converged or stats["unified_return_status"] == _ITERATION_LIMIT,
-            converged,
+            bool(stats["success"]) or stats["unified_return_status"] == _ITERATION_LIMIT,
             int(stats["iter_count"]),
         )
 
