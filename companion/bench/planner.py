@@ -73,7 +73,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
     groups = _best(cases, seconds)
-    flight, batches = groups["flight"], _batches_by_count(groups)
+    flight, batches = groups["flight"], {str(count): groups[str(count)] for count in BATCHES}
     step = groups["advance"]["first-order"]
     figures = {
         "compiled": compiled,
@@ -167,10 +167,6 @@ def _best(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
             best[case.group][case.key] = min(ns, best[case.group].get(case.key, ns))
         if perf_counter() >= end:
             return best
-
-
-def _batches_by_count(groups: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
-    return {str(count): groups[str(count)] for count in BATCHES}
 
 
 def _rounded(group: dict[str, float]) -> dict[str, float]:
