@@ -32,19 +32,16 @@ _STEPS, _STEPS_IN_PYTHON = 4_000, 10  # number of steps of `advance` in a repeat
 
 
 class _Case(NamedTuple):
-    """Code whose run time is measured.
-
-    Attributes:
-        group: key of the group in the result.
-        key: key of the case in its group.
-        timer: runs the case.
-        steps: number of planner steps in one run.
-    """
+    """Code whose run time is measured."""
 
     group: str
+    """Key of the group in the result."""
     key: str
+    """Key of the case in its group."""
     timer: Timer
+    """Runs the case."""
     steps: int
+    """Number of planner steps in one run."""
 
 
 class _Fleet(NamedTuple):
@@ -76,7 +73,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
     groups = _best(cases, seconds)
-    flight, batches = groups["flight"], _batches_by_count(groups)
+    flight, batches = groups["flight"], {str(count): groups[str(count)] for count in BATCHES}
     step = groups["advance"]["first-order"]
     figures = {
         "compiled": compiled,
@@ -170,10 +167,6 @@ def _best(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
             best[case.group][case.key] = min(ns, best[case.group].get(case.key, ns))
         if perf_counter() >= end:
             return best
-
-
-def _batches_by_count(groups: dict[str, dict[str, float]]) -> dict[str, dict[str, float]]:
-    return {str(count): groups[str(count)] for count in BATCHES}
 
 
 def _rounded(group: dict[str, float]) -> dict[str, float]:

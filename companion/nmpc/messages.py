@@ -18,64 +18,53 @@ _ANSWER = struct.Struct("<2q9d")
 
 
 class Vehicle(NamedTuple):
-    """State of the vehicle.
-
-    Attributes:
-        time: time of the state, s.
-        position: m, NED.
-        velocity: m/s, NED.
-        q: attitude, body → world; must be a unit quaternion.
-        body_rates: rad/s, FRD.
-        disturbance: acceleration by wind and other unmodelled forces, m/s², NED.
-        drag: estimated drag.
-        axis_drag: coefficient of `AxisDrag`, 1/m.
-    """
+    """State of the vehicle."""
 
     time: float
+    """Time of the state, s."""
     position: Vector
+    """m, NED."""
     velocity: Vector
+    """m/s, NED."""
     q: Quaternion
+    """Attitude, body → world; must be a unit quaternion."""
     body_rates: BodyRates
+    """rad/s, FRD."""
     disturbance: Vector = (0.0, 0.0, 0.0)
+    """Acceleration by wind and other unmodelled forces, m/s², NED."""
     drag: Drag = NO_DRAG
+    """Estimated drag."""
     axis_drag: float = 0.0
+    """Coefficient of `AxisDrag`, 1/m."""
 
 
 class Input(NamedTuple):
-    """A control input, commanded by predictive control or by linear guidance.
-
-    Attributes:
-        time: when it was commanded, on the clock of `Vehicle.time`, s.
-        north, east: coefficients of the target.
-        heading: heading of the target, rad.
-        thrust: specific thrust, m/s².
-    """
+    """A control input, commanded by predictive control or by linear guidance."""
 
     time: float
+    """When it was commanded, on the clock of `Vehicle.time`, s."""
     north: float
     east: float
+    """`north` and `east`: coefficients of the target."""
     heading: float
+    """Heading of the target, rad."""
     thrust: float
+    """Specific thrust, m/s²."""
 
 
 class Request(NamedTuple):
-    """A problem to solve.
-
-    Attributes:
-        number: number of the request; its answer has the same number.
-        vehicle: state of the vehicle.
-        trajectory_time: time since the trajectory began, at `vehicle.time`, s.
-        start: start of the trajectory.
-        inputs: latest control inputs, in order of time. They must cover the dead time before
-            `vehicle.time`. Before the first input, that input is assumed. If there is no input,
-            attitude and vertical speed are assumed to be held.
-    """
+    """A problem to solve."""
 
     number: int
+    """Number of the request; its answer has the same number."""
     vehicle: Vehicle
     trajectory_time: float
+    """Time since the trajectory began, at `vehicle.time`, s."""
     start: Start
     inputs: tuple[Input, ...]
+    """Latest control inputs, in order of time. They must cover the dead time before `vehicle.time`.
+    Before the first input, that input is assumed. If there is no input, attitude and vertical speed
+    are assumed to be held."""
 
 
 class Status(IntEnum):
@@ -90,33 +79,30 @@ class Status(IntEnum):
 
 
 class Answer(NamedTuple):
-    """Answer to a request.
-
-    Attributes:
-        number: number of the request.
-        status: how the solve ended; unless it is `SOLVED`, target, thrust, `solver_seconds` and
-            `iterations` are 0.
-        computed_at: when the answer was computed, on the computer's monotonic clock, s.
-        time: when to use the answer, on the clock of `Vehicle.time`, s.
-        north, east: coefficients of the target.
-        heading: heading of the target, rad, in (−π, π].
-        thrust: specific thrust, m/s².
-        seconds: wall time of the computation, including prediction and reference, s.
-        solver_seconds: processor time of the solver alone, s.
-        iterations: number of SQP iterations.
-    """
+    """Answer to a request."""
 
     number: int
+    """Number of the request."""
     status: Status
+    """How the solve ended; unless it is `SOLVED`, target, thrust, `solver_seconds` and `iterations`
+    are 0."""
     computed_at: float
+    """When the answer was computed, on the computer's monotonic clock, s."""
     time: float
+    """When to use the answer, on the clock of `Vehicle.time`, s."""
     north: float
     east: float
+    """`north` and `east`: coefficients of the target."""
     heading: float
+    """Heading of the target, rad, in (−π, π]."""
     thrust: float
+    """Specific thrust, m/s²."""
     seconds: float
+    """Wall time of the computation, including prediction and reference, s."""
     solver_seconds: float
+    """Processor time of the solver alone, s."""
     iterations: float
+    """Number of SQP iterations."""
 
 
 def pack_request(request: Request) -> bytes:

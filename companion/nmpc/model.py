@@ -14,44 +14,38 @@ Floats = Sequence[float]
 
 
 class Motion(NamedTuple):
-    """The motion of the vehicle: the state of the `coefficient_model`, in its order.
-
-    Attributes:
-        p_n, p_e, p_d: position, m, NED.
-        v_n, v_e, v_d: velocity, m/s, NED.
-        north, east: acceleration coefficients.
-        heading: tilt-yaw heading, rad.
-        speed_north, speed_east: time derivative of the coefficients, 1/s.
-    """
+    """The motion of the vehicle: the state of the `coefficient_model`, in its order."""
 
     p_n: float
     p_e: float
     p_d: float
+    """`p_n`, `p_e` and `p_d`: position, m, NED."""
     v_n: float
     v_e: float
     v_d: float
+    """`v_n`, `v_e` and `v_d`: velocity, m/s, NED."""
     north: float
     east: float
+    """`north` and `east`: acceleration coefficients."""
     heading: float
+    """tilt-yaw heading, rad."""
     speed_north: float
     speed_east: float
+    """`speed_north` and `speed_east`: time derivative of the coefficients, 1/s."""
 
 
 class Conditions(NamedTuple):
-    """Wind and drag on the vehicle, constant over the horizon.
-
-    Attributes:
-        w_n, w_e, w_d: acceleration by wind and other unmodelled forces, m/s², NED.
-        linear_drag, quadratic_drag: `Drag`, 1/s and 1/m.
-        axis_drag: coefficient of `AxisDrag`, 1/m.
-    """
+    """Wind and drag on the vehicle, constant over the horizon."""
 
     w_n: float
     w_e: float
     w_d: float
+    """`w_n`, `w_e` and `w_d`: acceleration by wind and other unmodelled forces, m/s², NED."""
     linear_drag: float
     quadratic_drag: float
+    """`linear_drag` and `quadratic_drag`: `Drag`, 1/s and 1/m."""
     axis_drag: float
+    """Coefficient of `AxisDrag`, 1/m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,40 +54,38 @@ class Model:
 
     The functions `state_of`, `constants_of`, `aim_of` and `control_of` compute the numbers for the
     symbols.
-
-    Attributes:
-        state: (n,), begins with position and velocity.
-        control: (m,), ends with the specific thrust.
-        constants: (c,), constant over the horizon; begins with `Conditions`.
-        derivative: (n,), ẋ.
-        aim: (k,), values of the reference at a node, with which heading and attitude rate are
-            compared.
-        heading_error: heading (in studies also yaw) of `state` minus that of `aim`, rad; a smooth
-            approximation in the quaternion model, 0 in a model of constant yaw.
-        turning_error: commanded attitude rate (of coefficients and heading, of the body, or of
-            Euler angles) minus that of `aim`.
-        target: (4,), coefficients, tilt-yaw heading and specific thrust to send to the planner for
-            `control`.
-        bounded: terms that must be between −1 and 1 at every control.
-        state_of: a motion → `state`.
-        constants_of: the conditions and the motion at the start of the horizon → `constants`.
-        aim_of: a node of the reference → `aim`.
-        control_of: a node of the reference → the `control` that keeps the vehicle on the reference.
     """
 
     state: ca.SX
+    """(n,), begins with position and velocity."""
     control: ca.SX
+    """(m,), ends with the specific thrust."""
     constants: ca.SX
+    """(c,), constant over the horizon; begins with `Conditions`."""
     derivative: ca.SX
+    """(n,), ẋ."""
     aim: ca.SX
+    """(k,), values of the reference at a node, with which heading and attitude rate are
+    compared."""
     heading_error: ca.SX
+    """Heading (in studies also yaw) of `state` minus that of `aim`, rad; a smooth approximation in
+    the quaternion model, 0 in a model of constant yaw."""
     turning_error: ca.SX
+    """Commanded attitude rate (of coefficients and heading, of the body, or of Euler angles) minus
+    that of `aim`."""
     target: ca.SX
+    """(4,), coefficients, tilt-yaw heading and specific thrust to send to the planner for
+    `control`."""
     bounded: ca.SX
+    """Terms that must be between −1 and 1 at every control."""
     state_of: Callable[[Motion], Floats]
+    """A motion → `state`."""
     constants_of: Callable[[Conditions, Motion], Floats]
+    """The conditions and the motion at the start of the horizon → `constants`."""
     aim_of: Callable[[Node], Floats]
+    """A node of the reference → `aim`."""
     control_of: Callable[[Node], Floats]
+    """A node of the reference → the `control` that keeps the vehicle on the reference."""
 
 
 def constants_symbols(own: int = 0) -> ca.SX:

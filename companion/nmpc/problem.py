@@ -29,26 +29,23 @@ _SQP_OPTIONS: dict[str, Any] = {
 
 
 class Program(NamedTuple):
-    """The program min ½·|r(w, p)|² with bounds on w and on g(w, p); n states, m controls, N steps.
-
-    Attributes:
-        unknown: w, (x_0, u_0, x_1, u_1, …, x_N).
-        parameters: p; `parameters_of` computes its numbers.
-        residual: r.
-        constraints: g: for each step the gap to the next state, then `Model.bounded`. HPIPM
-            requires this order.
-        lower, upper: bounds on w; the caller sets the first n to the state at the start.
-        g_lower, g_upper: bounds on g.
-    """
+    """Minimise ½·|r(w, p)|² with bounds on w and on g(w, p); n states, m controls, N steps."""
 
     unknown: ca.SX
+    """w, (x_0, u_0, x_1, u_1, …, x_N)."""
     parameters: ca.SX
+    """p; `parameters_of` computes its numbers."""
     residual: ca.SX
+    """r."""
     constraints: ca.SX
+    """g: for each step the gap to the next state, then `Model.bounded`. HPIPM requires this
+    order."""
     lower: Floats
     upper: Floats
+    """`lower` and `upper`: bounds on w; the caller sets the first n to the state at the start."""
     g_lower: Floats
     g_upper: Floats
+    """`g_lower` and `g_upper`: bounds on g."""
 
 
 def transcribe(model: Model, settings: Settings) -> Program:
@@ -138,19 +135,14 @@ def _bounds_of_constraints(model: Model, settings: Settings) -> tuple[Floats, Fl
 
 
 class Solution(NamedTuple):
-    """Result of one solve.
-
-    Attributes:
-        unknown: (x_0, u_0, x_1, …, x_N), as `Program.unknown`.
-        solved: whether the plan may be flown, provided that it is finite.
-        converged: whether the iterations reached the tolerance.
-        iterations: number of SQP iterations.
-    """
+    """Result of one solve."""
 
     unknown: Floats
+    """(x_0, u_0, x_1, …, x_N), as `Program.unknown`."""
     solved: bool
-    converged: bool
+    """Whether the plan may be flown, provided that it is finite."""
     iterations: int
+    """Number of SQP iterations."""
 
 
 class SqpSolver:
@@ -184,11 +176,9 @@ class SqpSolver:
             ubg=program.g_upper,
         )
         stats = self._solver.stats()
-        converged = bool(stats["success"])
         return Solution(
             np.asarray(result["x"], dtype=np.float64).ravel(),
-            converged or stats["unified_return_status"] == _ITERATION_LIMIT,
-            converged,
+            bool(stats["success"]) or stats["unified_return_status"] == _ITERATION_LIMIT,
             int(stats["iter_count"]),
         )
 

@@ -52,17 +52,13 @@ Report = Callable[[Trouble, str], None]
 
 
 class _Pending(NamedTuple):
-    """The request that has no answer yet.
-
-    Attributes:
-        number: number of the request.
-        sent_at: when it was sent, on the computer's monotonic clock, s.
-        longest_target: largest |c| that its answer may have.
-    """
+    """The request that has no answer yet."""
 
     number: int
     sent_at: float
+    """When it was sent, on the computer's monotonic clock, s."""
     longest_target: float
+    """Largest |c| that its answer may have."""
 
 
 class Solver:

@@ -15,28 +15,19 @@ from companion.nmpc.settings import Settings
 
 
 class Plan(NamedTuple):
-    """The result of one solve, with the first control of the plan.
+    """The result of one solve, with the first control of the plan."""
 
-    Attributes:
-        solved: whether the plan may be flown; if not, the other fields mean nothing.
-        converged: whether the iterations reached the tolerance; a real-time iteration seldom does.
-        iterations: number of SQP iterations.
-        solver_seconds: processor time of the solver alone, s.
-        north, east, heading: target for the planner: coefficients, and heading in rad.
-        thrust: specific thrust, m/s².
-    """
-
-    solved: bool
-    converged: bool
     iterations: int
+    """Number of SQP iterations."""
     solver_seconds: float
+    """Processor time of the solver alone, s."""
     north: float
     east: float
     heading: float
+    """`north`, `east` and `heading`: target for the planner: coefficients, and heading in
+    rad."""
     thrust: float
-
-
-_NO_PLAN = Plan(False, False, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    """Specific thrust, m/s²."""
 
 
 class RecedingHorizon:
@@ -65,8 +56,8 @@ class RecedingHorizon:
 
     def solve(
         self, time: float, motion: Motion, nodes: Sequence[Node], conditions: Conditions
-    ) -> Plan:
-        """Solve for a plan that begins at `motion`.
+    ) -> Plan | None:
+        """Solve for a plan that begins at `motion`; None if there is none that may be flown.
 
         Args:
             time: time of `motion`, s. The solve starts from the previous plan, shifted to this
@@ -83,19 +74,17 @@ class RecedingHorizon:
         parameters = parameters_of(constants, nodes, [model.aim_of(node) for node in nodes])
         if not (np.isfinite(start).all() and np.isfinite(parameters).all()):
             self.forget()
-            return _NO_PLAN
+            return None
         began = thread_time()
         solution = self._solver.solve(guess, parameters)
         seconds = thread_time() - began
         if not (solution.solved and np.isfinite(solution.unknown).all()):
             self.forget()
-            return _NO_PLAN
+            return None
         self._previous, self._previous_time = solution.unknown, time
         control = solution.unknown[len(start) : len(start) + model.control.numel()]
         target = np.asarray(self._target(start, control, constants), dtype=np.float64).ravel()
-        return Plan(
-            True, solution.converged, solution.iterations, seconds, *(float(v) for v in target)
-        )
+        return Plan(solution.iterations, seconds, *(float(v) for v in target))
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
         """The first guess: the previous plan shifted to `time`, or the reference."""

@@ -12,40 +12,34 @@ _LEAST_LIFT = 0.2
 
 
 class Node(NamedTuple):
-    """The reference at one node of the horizon.
-
-    Attributes:
-        position: m, NED.
-        velocity: m/s, NED.
-        north, east: acceleration coefficients.
-        speed_north, speed_east: their time derivative, 1/s.
-        thrust: specific thrust, m/s².
-        heading: tilt-yaw heading, rad; unwrapped, so that it does not jump between nodes.
-        heading_rate: rad/s.
-    """
+    """The reference at one node of the horizon."""
 
     position: Vector
+    """m, NED."""
     velocity: Vector
+    """m/s, NED."""
     north: float
     east: float
+    """`north` and `east`: acceleration coefficients."""
     speed_north: float
     speed_east: float
+    """`speed_north` and `speed_east`: their time derivative, 1/s."""
     thrust: float
+    """Specific thrust, m/s²."""
     heading: float
+    """tilt-yaw heading, rad; unwrapped, so that it does not jump between nodes."""
     heading_rate: float
+    """rad/s."""
 
 
 class Start(NamedTuple):
-    """Where a trajectory begins, and the angle added to its headings.
-
-    Attributes:
-        position: position where it begins, m, NED.
-        heading_offset: angle added to its headings, rad: the sum of the heading resets; for a
-            trajectory that holds its heading, plus that heading. Positions are not rotated.
-    """
+    """Where a trajectory begins, and the angle added to its headings."""
 
     position: Vector
+    """Position where it begins, m, NED."""
     heading_offset: float = 0.0
+    """Angle added to its headings, rad: the sum of the heading resets; for a trajectory that holds
+    its heading, plus that heading. Positions are not rotated."""
 
 
 def node_of(

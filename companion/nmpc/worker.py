@@ -82,7 +82,7 @@ class Worker:
         except (InvalidQuaternionError, TiltedTooFarError):
             self.forget()
             return _no_answer(request, Status.TILTED_TOO_FAR, use_time, perf_counter() - began)
-        if not plan.solved:
+        if plan is None:
             return _no_answer(request, Status.FAILED, use_time, perf_counter() - began)
         return Answer(
             request.number,
@@ -98,7 +98,7 @@ class Worker:
             plan.iterations,
         )
 
-    def _plan(self, request: Request) -> Plan:
+    def _plan(self, request: Request) -> Plan | None:
         vehicle = request.vehicle
         until = vehicle.time + self._effect_delay
         motion = self._predictor.predict(vehicle, request.inputs, until)

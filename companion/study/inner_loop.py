@@ -29,40 +29,34 @@ ROLL_STEP_S = 0.25
 
 @dataclass(frozen=True, slots=True)
 class InnerLoopFlight:
-    """A flight of n planner samples. Rates are body rates (FRD), rad/s.
-
-    Attributes:
-        time: (n+1,), s from the start.
-        q: (n+1, 4), attitude (w, x, y, z), body → world (NED).
-        body_rates: (n+1, 3), true rates of the vehicle.
-        commanded: (n, 3), rates commanded at each sample, before any delay.
-        tilt_saturated: (n,), whether the rotors could not produce the commanded roll and pitch
-            torque in at least one physics step of the sample.
-        yaw_saturated: (n,), the same for the yaw torque.
-    """
+    """A flight of n planner samples. Rates are body rates (FRD), rad/s."""
 
     time: NDArray[np.float64]
+    """(n+1,), s from the start."""
     q: NDArray[np.float64]
+    """(n+1, 4), attitude (w, x, y, z), body → world (NED)."""
     body_rates: NDArray[np.float64]
+    """(n+1, 3), true rates of the vehicle."""
     commanded: NDArray[np.float64]
+    """(n, 3), rates commanded at each sample, before any delay."""
     tilt_saturated: NDArray[np.bool_]
+    """(n,), whether the rotors could not produce the commanded roll and pitch torque in at least
+    one physics step of the sample."""
     yaw_saturated: NDArray[np.bool_]
+    """(n,), the same for the yaw torque."""
 
 
 @dataclass(frozen=True)
 class InnerLoop:
-    """Rate loop, rotors and rigid body between commanded body rates and attitude.
-
-    Attributes:
-        airframe: body and rotors; by default those of PX4's simulated quadrotor.
-        rate_loop: the body-rate controller; by default tuned to the measured response of PX4.
-        transport_delay: delay of every setpoint (rates and thrust) before it reaches the rate loop,
-            s, rounded to a physics step.
-    """
+    """Rate loop, rotors and rigid body between commanded body rates and attitude."""
 
     airframe: AirframeConfig = field(default_factory=AirframeConfig)
+    """Body and rotors; by default those of PX4's simulated quadrotor."""
     rate_loop: RateLoopConfig = field(default_factory=RateLoopConfig)
+    """The body-rate controller; by default tuned to the measured response of PX4."""
     transport_delay: float = 0.0
+    """Delay of every setpoint (rates and thrust) before it reaches the rate loop, s, rounded to a
+    physics step."""
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float

@@ -18,15 +18,12 @@ STEP_HZ = 1000
 
 
 class LagFlight(NamedTuple):
-    """A flight with a `LagLoop`.
-
-    Attributes:
-        q: (samples + 1, 4), attitude (w, x, y, z).
-        commanded: (samples, 3), commanded body rates, rad/s.
-    """
+    """A flight with a `LagLoop`."""
 
     q: Floats
+    """(samples + 1, 4), attitude (w, x, y, z)."""
     commanded: Floats
+    """(samples, 3), commanded body rates, rad/s."""
 
 
 class LagBody:
@@ -74,15 +71,12 @@ class LagBody:
 
 @dataclass(frozen=True)
 class LagLoop:
-    """The inner loop of a planner that commands a `LagBody`.
-
-    Attributes:
-        lag_ms: τ, ms.
-        dead_time_ms: θ, ms.
-    """
+    """The inner loop of a planner that commands a `LagBody`."""
 
     lag_ms: int
+    """τ, ms."""
     dead_time_ms: int
+    """θ, ms."""
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float

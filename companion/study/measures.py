@@ -84,15 +84,12 @@ def best_and_worst(values: Floats) -> tuple[int, int]:
 
 
 class DelayedSecondOrder(NamedTuple):
-    """A second-order model with a dead time.
-
-    Attributes:
-        model: the model without dead time: natural frequency ω, rad/s, and damping ratio ζ.
-        dead_time: time from the step until the model begins to move, s.
-    """
+    """A second-order model with a dead time."""
 
     model: SecondOrderReference
+    """The model without dead time: natural frequency ω, rad/s, and damping ratio ζ."""
     dead_time: float
+    """Time from the step until the model begins to move, s."""
 
     @property
     def cells(self) -> tuple[float, float, float]:

@@ -14,20 +14,18 @@ class Method(NamedTuple):
 
     The colours are those of Okabe and Ito, for colour-blind readers. Dashes distinguish the methods
     in black and white. A wider line stays visible below a narrower one.
-
-    Attributes:
-        planner: name of the planner.
-        label: name in figures and tables.
-        colour: colour of the line.
-        dashes: lengths of dashes and gaps in line widths; empty: solid.
-        width: line width, points.
     """
 
     planner: str
+    """Name of the planner."""
     label: str
+    """Name in figures and tables."""
     colour: str
+    """Colour of the line."""
     dashes: tuple[float, ...] = ()
+    """Lengths of dashes and gaps in line widths; empty: solid."""
     width: float = 1.6
+    """Line width, points."""
 
     @property
     def line(self) -> Line:

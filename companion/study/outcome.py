@@ -21,19 +21,16 @@ Claimant = Literal["paper", "ours"]
 
 @dataclass(frozen=True)
 class Table:
-    """A table of results, written as CSV and Markdown and shown on the page.
-
-    Attributes:
-        name: name of its files, without the ending.
-        caption: one sentence.
-        columns: titles with units.
-        rows: one cell for each column.
-    """
+    """A table of results, written as CSV and Markdown and shown on the page."""
 
     name: str
+    """Name of its files, without the ending."""
     caption: str
+    """One sentence."""
     columns: tuple[str, ...]
+    """Titles with units."""
     rows: tuple[tuple[Cell, ...], ...]
+    """One cell for each column."""
 
     def as_csv(self) -> str:
         """The table as comma-separated values, with all digits of numbers."""
@@ -72,55 +69,46 @@ def _rounded(cell: Cell) -> str:
 
 @dataclass(frozen=True)
 class Finding:
-    """A statement, and whether the computed numbers support it.
-
-    Attributes:
-        claimant: who claims the statement.
-        statement: one sentence that can be true or false.
-        holds: whether the numbers support it.
-        evidence: the numbers, and the bound with which they were compared.
-    """
+    """A statement, and whether the computed numbers support it."""
 
     claimant: Claimant
+    """Who claims the statement."""
     statement: str
+    """One sentence that can be true or false."""
     holds: bool
+    """Whether the numbers support it."""
     evidence: str
+    """The numbers, and the bound with which they were compared."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """The results of one study.
-
-    Attributes:
-        name: name of its files, without the ending.
-        title: title on the page.
-        conditions: what was flown, in a few sentences.
-        figure: the figure, written as SVG and PNG.
-        caption: description of the figure.
-        tables: tables on the page and in files.
-        findings: findings computed from the numbers of this run.
-        series: further tables, written as CSV only.
-        rows: rows that `--json` prints, if the study supports it.
-    """
+    """The results of one study."""
 
     name: str
+    """Name of its files, without the ending."""
     title: str
+    """Title on the page."""
     conditions: str
+    """What was flown, in a few sentences."""
     figure: Figure
+    """The figure, written as SVG and PNG."""
     caption: str
+    """Description of the figure."""
     tables: tuple[Table, ...]
+    """Tables on the page and in files."""
     findings: tuple[Finding, ...] = ()
+    """Findings computed from the numbers of this run."""
     series: tuple[Table, ...] = ()
+    """Further tables, written as CSV only."""
     rows: tuple[dict[str, Any], ...] = ()
+    """Rows that `--json` prints, if the study supports it."""
 
 
 class Job(NamedTuple):
-    """A study that is ready to run.
-
-    Attributes:
-        run: runs the study; calls its `Tick` before each part.
-        parts: number of parts.
-    """
+    """A study that is ready to run."""
 
     run: Callable[[Tick], Outcome]
+    """Runs the study; calls its `Tick` before each part."""
     parts: int
+    """Number of parts."""

@@ -16,28 +16,25 @@ _PACKAGES = {"study": ("jinja2", "matplotlib", "tabulate"), "nmpc": ("casadi",)}
 
 
 class Study(NamedTuple):
-    """An entry of the table of studies.
-
-    Attributes:
-        name: name on the command line; the names of the study's files begin with it.
-        summary: one line for `companion study --help`.
-        module: module that is imported when the study runs. It has `run(tick) -> Outcome` and
-            `PARTS`, the number of times that `run` calls its tick. With `takes_case` it has
-            `prepare(case) -> Job` instead.
-        extra: extra of the package that the study needs besides `study`; empty: none.
-        in_all: whether `all` includes the study. Such a study takes seconds, and its files are the
-            same on every computer.
-        takes_case: whether the study reads a case from `--case FILE`.
-        prints_json: whether its outcome has rows for `--json`.
-    """
+    """An entry of the table of studies."""
 
     name: str
+    """Name on the command line; the names of the study's files begin with it."""
     summary: str
+    """One line for `companion study --help`."""
     module: str
+    """Module that is imported when the study runs. It has `run(tick) -> Outcome` and `PARTS`, the
+    number of times that `run` calls its tick. With `takes_case` it has `prepare(case) -> Job`
+    instead."""
     extra: str = ""
+    """Extra of the package that the study needs besides `study`; empty: none."""
     in_all: bool = True
+    """Whether `all` includes the study. Such a study takes seconds, and its files are the same on
+    every computer."""
     takes_case: bool = False
+    """Whether the study reads a case from `--case FILE`."""
     prints_json: bool = False
+    """Whether its outcome has rows for `--json`."""
 
 
 _ENTRIES = (

@@ -29,15 +29,12 @@ from companion.study.workers import run_in_workers
 
 
 class RunResults(NamedTuple):
-    """The results of a run of one or all studies.
-
-    Attributes:
-        page: path of the page that shows all studies of the run.
-        rows: rows of all studies, for `--json`.
-    """
+    """The results of a run of one or all studies."""
 
     page: Path
+    """Path of the page that shows all studies of the run."""
     rows: list[dict[str, Any]]
+    """Rows of all studies, for `--json`."""
 
 
 def run(

@@ -20,22 +20,19 @@ ALL_HEADINGS = tuple(k * pi / 36.0 for k in range(-35, 37))
 
 @dataclass(frozen=True)
 class Step:
-    """A step from one steady tilt to another, flown at several headings.
-
-    Attributes:
-        start, target: acceleration coefficients (north, east).
-        gain: p of the planners and of the first-order reference, 1/s.
-        rate_hz: sample rate of the planner.
-        seconds: duration of the response, s.
-        headings: headings of the tilt-yaw decomposition, rad; each is held during one flight.
-    """
+    """A step from one steady tilt to another, flown at several headings."""
 
     start: Coefficients
     target: Coefficients
+    """`start` and `target`: acceleration coefficients (north, east)."""
     gain: float = 5.0
+    """P of the planners and of the first-order reference, 1/s."""
     rate_hz: float = 1000.0
+    """Sample rate of the planner."""
     seconds: float = 2.0
+    """Duration of the response, s."""
     headings: tuple[float, ...] = ALL_HEADINGS
+    """Headings of the tilt-yaw decomposition, rad; each is held during one flight."""
 
     @property
     def samples(self) -> int:
@@ -61,17 +58,14 @@ FIGURE_4 = Step(Coefficients(-0.5, 0.0), Coefficients(0.0, 0.5))
 
 @dataclass(frozen=True)
 class Response:
-    """The response of one planner to a step, sample by sample, at each heading.
-
-    Attributes:
-        step: the step that was flown.
-        coefficients: (samples + 1, 2, headings), acceleration coefficients of the attitude.
-        rates: (samples, 3, headings), commanded body rates, rad/s.
-    """
+    """The response of one planner to a step, sample by sample, at each heading."""
 
     step: Step
+    """The step that was flown."""
     coefficients: Floats
+    """(samples + 1, 2, headings), acceleration coefficients of the attitude."""
     rates: Floats
+    """(samples, 3, headings), commanded body rates, rad/s."""
 
     @property
     def tilt_rate(self) -> Floats:

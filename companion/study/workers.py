@@ -21,15 +21,12 @@ _POLL_S = 0.05
 
 
 class _Channels(NamedTuple):
-    """What a worker shares with the main process.
-
-    Attributes:
-        ticks: queue of (study, part), put by the workers.
-        stop: event, set when the run is interrupted.
-    """
+    """What a worker shares with the main process."""
 
     ticks: Any
+    """Queue of (study, part), put by the workers."""
     stop: Any
+    """Event, set when the run is interrupted."""
 
 
 _shared: list[_Channels] = []

@@ -73,15 +73,12 @@ class FileRefusedError(Exception):
 
 
 class Document(NamedTuple):
-    """A YAML document.
-
-    Attributes:
-        value: the document as plain Python values.
-        node: the document as YAML nodes with line numbers.
-    """
+    """A YAML document."""
 
     value: Any
+    """The document as plain Python values."""
     node: yaml.Node | None
+    """The document as YAML nodes with line numbers."""
 
     def line(self, path: Sequence[str]) -> int | None:
         """Return the line (from 1) of the deepest key of this path that the document contains."""

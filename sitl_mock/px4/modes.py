@@ -52,11 +52,6 @@ def custom_mode(mode: Mode) -> int:
     return main << 16 | sub << 24
 
 
-def mode_of(custom: int) -> Mode | None:
-    """Return the mode of a custom_mode, None if the mock does not have it."""
-    return MODES_BY_COMMAND.get((custom >> 16 & 0xFF, custom >> 24 & 0xFF))
-
-
 def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
     """Return HEARTBEAT.base_mode (recorded): 29 in automatic modes, 81 in those of a pilot.
 

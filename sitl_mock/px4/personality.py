@@ -20,7 +20,7 @@ from sitl_mock.px4.commands import Px4Commands
 from sitl_mock.px4.event_log import Announcer, EventLog
 from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.mode_control import Px4ModeControl
-from sitl_mock.px4.modes import mode_of
+from sitl_mock.px4.modes import MODES_BY_COMMAND
 from sitl_mock.px4.parameters import PX4_PARAMETERS
 from sitl_mock.px4.streams import SLOT_US, Px4Streams
 from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
@@ -112,8 +112,8 @@ class Px4:
         return Px4Streams(rates, random=Random(f"{settings.seed}/{link}") if skips_slots else None)
 
     def mode_of(self, custom_mode: int) -> Mode | None:
-        """Return the mode of a custom_mode, None if there is no such mode."""
-        return mode_of(custom_mode)
+        """Return the mode of a custom_mode (see `modes.custom_mode`), None if there is none."""
+        return MODES_BY_COMMAND.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
 
     def rules(self, parts: VehicleParts) -> Rules:
         """Build PX4's behaviour for one vehicle."""

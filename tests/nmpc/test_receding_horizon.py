@@ -66,8 +66,7 @@ def assert_plans_what_the_reference_takes(make_model, heading_within):
     horizon, ahead = RecedingHorizon(settings, make_model), nodes(settings, STEADY)
     node = ahead[0]
     plan = horizon.solve(0.0, on_circle(STEADY), ahead, CONDITIONS)
-    assert plan.solved
-    assert plan.converged
+    assert plan.iterations < settings.iterations
     # Controls are held for 50 ms, in which the reference moves on by 0.03.
     wanted = node.north + node.speed_north / 5.0, node.east + node.speed_east / 5.0
     assert (plan.north, plan.east) == pytest.approx(wanted, abs=0.03)
@@ -127,7 +126,7 @@ def test_a_single_iteration_from_anywhere_keeps_the_limits():
         motion = Motion(*position, *random.uniform(-6.0, 6.0, 3), *c, heading, *speed)
         horizon.forget()
         plan = horizon.solve(0.0, motion, ahead, CONDITIONS)
-        assert plan.solved
+        assert plan is not None
         asked = 5.0 * np.array([plan.north - c[0], plan.east - c[1]])
         assert hypot(plan.north, plan.east) <= sin(0.6) + 1e-6
         assert tilt_rate(c, asked) <= 1.5 + 1e-3
@@ -145,7 +144,7 @@ def test_tilted_beyond_the_limit_it_comes_back_instead_of_failing():
     c = (0.6, -0.3)
     motion = Motion(*[0.0] * 6, *c, 0.0, 0.0, 0.0)
     plan = horizon_of(settings).solve(0.0, motion, nodes(settings, 0.0), CONDITIONS)
-    assert plan.solved
+    assert plan is not None
     assert hypot(plan.north, plan.east) < hypot(*c)
 
 
@@ -153,8 +152,7 @@ def test_a_shifted_plan_needs_fewer_iterations():
     horizon = horizon_of(SETTINGS)
     cold = horizon.solve(0.0, at_rest(STEADY), nodes(SETTINGS, STEADY), CONDITIONS)
     again = horizon.solve(0.0, at_rest(STEADY), nodes(SETTINGS, STEADY), CONDITIONS)
-    assert cold.converged
-    assert cold.iterations >= 5
+    assert 5 <= cold.iterations < SETTINGS.iterations
     assert again.iterations <= 2
     assert again[4:] == pytest.approx(cold[4:], abs=1e-3)
     horizon.forget()
@@ -177,12 +175,13 @@ def test_a_plan_is_shifted_by_parts_of_a_step():
 def test_a_real_time_iteration_is_one():
     horizon = horizon_of(Settings())
     plan = horizon.solve(0.0, at_rest(STEADY), nodes(SETTINGS, STEADY), CONDITIONS)
-    assert (plan.iterations, plan.converged, plan.solved) == (1, False, True)
+    assert plan.iterations == 1
 
 
 def test_a_number_that_is_none_gives_no_plan_and_is_forgotten():
     horizon = horizon_of(SETTINGS)
     broken = at_rest(STEADY)._replace(p_n=nan)
     ahead = nodes(SETTINGS, STEADY)
-    assert not horizon.solve(0.0, broken, ahead, CONDITIONS).solved
-    assert horizon.solve(0.02, at_rest(STEADY), ahead, CONDITIONS).converged
+    assert horizon.solve(0.0, broken, ahead, CONDITIONS) is None
+    plan = horizon.solve(0.02, at_rest(STEADY), ahead, CONDITIONS)
+    assert plan.iterations < SETTINGS.iterations

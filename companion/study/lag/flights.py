@@ -76,28 +76,22 @@ COMPLETE_DELAYS = RateLoopDelays(
 
 
 class Score(NamedTuple):
-    """How straight and how fast a response is.
-
-    Attributes:
-        cross_track: largest distance of the coefficients (a/T, no unit) from the straight line.
-        settling_time: time from which the distance to the target stays within 5 % of the step, s.
-    """
+    """How straight and how fast a response is."""
 
     cross_track: float
+    """Largest distance of the coefficients (a/T, no unit) from the straight line."""
     settling_time: float
+    """Time from which the distance to the target stays within 5 % of the step, s."""
 
 
 class Comparison(NamedTuple):
-    """Scores with one rate loop at one sample rate.
-
-    Attributes:
-        others: score of each method of `OTHERS`.
-        following: score of model-following for each error of its assumed lag and dead time,
-            `NO_ERROR` included.
-    """
+    """Scores with one rate loop at one sample rate."""
 
     others: dict[Method, Score]
+    """Score of each method of `OTHERS`."""
     following: dict[DelayError, Score]
+    """Score of model-following for each error of its assumed lag and dead time, `NO_ERROR`
+    included."""
 
     @property
     def by_method(self) -> dict[Method, Score]:
@@ -141,29 +135,23 @@ Grid = dict[GridCell, Comparison]
 
 
 class Example(NamedTuple):
-    """The flights with `EXAMPLE_LOOP`.
-
-    Attributes:
-        free: responses of every method by sample rate (Hz), without limits.
-        limited: responses of model-following with tilt rates up to W_M, by sample rate (Hz).
-        following: as in `Comparison`, at the sample rate `EXAMPLE_ERRORS_HZ`.
-    """
+    """The flights with `EXAMPLE_LOOP`."""
 
     free: dict[float, dict[Method, Response]]
+    """Responses of every method by sample rate (Hz), without limits."""
     limited: dict[float, Response]
+    """Responses of model-following with tilt rates up to W_M, by sample rate (Hz)."""
     following: dict[DelayError, Score]
+    """As in `Comparison`, at the sample rate `EXAMPLE_ERRORS_HZ`."""
 
 
 class CompleteLoopFlights(NamedTuple):
-    """The flights with the complete inner loop.
-
-    Attributes:
-        by_rate: comparison at each sample rate (Hz).
-        shown: responses of every method at `SHOWN_RATE_HZ`.
-    """
+    """The flights with the complete inner loop."""
 
     by_rate: dict[float, Comparison]
+    """Comparison at each sample rate (Hz)."""
     shown: dict[Method, Response]
+    """Responses of every method at `SHOWN_RATE_HZ`."""
 
 
 def in_percent(error: float) -> str:

@@ -23,19 +23,16 @@ _START_TIMEOUT = 30.0  # s
 
 
 class State(NamedTuple):
-    """A state of the vehicle from which it should fly the circle at 5 m/s.
-
-    Attributes:
-        position_error: position minus the reference position on the circle, m, NED.
-        velocity: m/s, NED.
-        coefficients: acceleration coefficients (north, east) of its attitude.
-        body_rates: rad/s.
-    """
+    """A state of the vehicle from which it should fly the circle at 5 m/s."""
 
     position_error: Vector
+    """Position minus the reference position on the circle, m, NED."""
     velocity: Vector
+    """m/s, NED."""
     coefficients: Coefficients
+    """Acceleration coefficients (north, east) of its attitude."""
     body_rates: BodyRates
+    """rad/s."""
 
 
 _LEVEL, _STILL = Coefficients(0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
@@ -85,17 +82,14 @@ def _request_from_state(state: State) -> Request:
 
 
 class ProcessTimes(NamedTuple):
-    """Times of the solver process at 50 Hz, for n answers.
-
-    Attributes:
-        answer_ms: (n,), time from before a request is packed until its answer is unpacked, ms.
-        computing_ms: (n,), part of it in `Worker.answer`: prediction, reference and solve, ms.
-        troubles: number of answers that were late, failed or implausible.
-    """
+    """Times of the solver process at 50 Hz, for n answers."""
 
     answer_ms: Floats
+    """(n,), time from before a request is packed until its answer is unpacked, ms."""
     computing_ms: Floats
+    """(n,), part of it in `Worker.answer`: prediction, reference and solve, ms."""
     troubles: int
+    """Number of answers that were late, failed or implausible."""
 
 
 def time_process() -> ProcessTimes:

@@ -39,17 +39,14 @@ UNLIMITED = tuple(model for model in MODELS if model != "limited")
 
 
 class Variant(NamedTuple):
-    """A prediction model and how it is solved.
-
-    Attributes:
-        model: name of the model.
-        iterations: largest number of SQP iterations; 1 is the real-time iteration.
-        knows_dead_time: whether the dead time is compensated by predicting the motion to its end.
-    """
+    """A prediction model and how it is solved."""
 
     model: ModelName
+    """Name of the model."""
     iterations: int = 1
+    """Largest number of SQP iterations; 1 is the real-time iteration."""
     knows_dead_time: bool = True
+    """Whether the dead time is compensated by predicting the motion to its end."""
 
     @property
     def settings(self) -> Settings:
@@ -79,17 +76,14 @@ class Variant(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A trajectory to fly; the vehicle begins at its position, level and at rest.
-
-    Attributes:
-        name: name in tables.
-        trajectory: a trajectory of constant heading.
-        begin: time on the trajectory at which the flight begins, s.
-    """
+    """A trajectory to fly; the vehicle begins at its position, level and at rest."""
 
     name: str
+    """Name in tables."""
     trajectory: Trajectory
+    """A trajectory of constant heading."""
     begin: float
+    """Time on the trajectory at which the flight begins, s."""
 
 
 CIRCLE = Task("circle", circle(5.0, Laps(5.0, laps=4.0)), 5.0)

@@ -28,17 +28,14 @@ Sweep = dict[float, dict[Method, float]]
 
 
 class LoopFlights(NamedTuple):
-    """Flights of every method with one inner loop.
-
-    Attributes:
-        time_63: time until the roll rate reaches 63 % of a step of its setpoint, s.
-        responses: response of each method.
-        fits: second-order model fitted to the response of each method at `worst_heading`.
-    """
+    """Flights of every method with one inner loop."""
 
     time_63: float
+    """Time until the roll rate reaches 63 % of a step of its setpoint, s."""
     responses: dict[Method, Response]
+    """Response of each method."""
     fits: dict[Method, DelayedSecondOrder]
+    """Second-order model fitted to the response of each method at `worst_heading`."""
 
     def worst_heading(self, method: Method) -> int:
         """Index of the heading at which a method has its largest cross-track."""

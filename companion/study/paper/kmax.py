@@ -23,21 +23,18 @@ PARTS = 2
 
 
 class _Row(NamedTuple):
-    """K at one tilt, over all directions.
-
-    Attributes:
-        tilt_deg: tilt, °.
-        largest: largest K.
-        bound: bound of K by the formula of the paper.
-        smallest: smallest K.
-        rate_share: mean body rate / largest body rate.
-    """
+    """K at one tilt, over all directions."""
 
     tilt_deg: int
+    """Tilt, °."""
     largest: float
+    """Largest K."""
     bound: float
+    """Bound of K by the formula of the paper."""
     smallest: float
+    """Smallest K."""
     rate_share: float
+    """Mean body rate / largest body rate."""
 
 
 def scaling_factor(c: Coefficients, direction: float) -> float:

@@ -56,19 +56,16 @@ class PositionError(NamedTuple):
 
 
 class TrackedFlight(NamedTuple):
-    """The result of a flight; the errors of a failed flight are infinite.
-
-    Attributes:
-        result: "ok", or why the flight ended.
-        telemetry: distance of the position that guidance received from the reference.
-        truth: distance of the vehicle's true position from the reference.
-        path: (n, 4), reference north and east, true north and east, m.
-    """
+    """The result of a flight; the errors of a failed flight are infinite."""
 
     result: str
+    """`ok`, or why the flight ended."""
     telemetry: PositionError
+    """Distance of the position that guidance received from the reference."""
     truth: PositionError
+    """Distance of the vehicle's true position from the reference."""
     path: Floats
+    """(n, 4), reference north and east, true north and east, m."""
 
     @property
     def ok(self) -> bool:

@@ -16,17 +16,14 @@ _PLANNERS_IN_WIND = (MODEL_FOLLOWING, FIRST_ORDER)
 
 
 class Course(NamedTuple):
-    """A trajectory at one speed, from rest to rest.
-
-    Attributes:
-        trajectory: `CIRCLE` or `EIGHT`.
-        speed: steady speed on the circle, largest speed on the figure-eight, m/s.
-        laps: number of laps; with these the vehicle holds the speed for a while.
-    """
+    """A trajectory at one speed, from rest to rest."""
 
     trajectory: str
+    """`CIRCLE` or `EIGHT`."""
     speed: float
+    """Steady speed on the circle, largest speed on the figure-eight, m/s."""
     laps: float
+    """Number of laps; with these the vehicle holds the speed for a while."""
 
     def __str__(self) -> str:
         return f"{self.trajectory}, {self.speed:g} m/s"
@@ -41,22 +38,18 @@ class Course(NamedTuple):
 
 
 class Task(NamedTuple):
-    """The conditions of one flight.
-
-    Attributes:
-        course: the trajectory and its speed.
-        planner: name of the planner.
-        guidance: `LINEAR` or `PREDICTIVE`.
-        wind: mean wind with gusts, m/s; 0: still air.
-        lead: whether linear guidance compensates the response of the attitude loop
-            (`guidance.lead`).
-    """
+    """The conditions of one flight."""
 
     course: Course
+    """The trajectory and its speed."""
     planner: str
+    """Name of the planner."""
     guidance: str = LINEAR
+    """`LINEAR` or `PREDICTIVE`."""
     wind: float = CALM
+    """Mean wind with gusts, m/s; 0: still air."""
     lead: bool = True
+    """Whether linear guidance compensates the response of the attitude loop (`guidance.lead`)."""
 
     def __str__(self) -> str:
         wind = f" in {self.wind:g} m/s of wind" if self.wind else ""
