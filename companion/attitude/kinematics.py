@@ -9,6 +9,9 @@ from math import acos, atan, sqrt
 
 from companion.attitude.rotation import first_is_negative
 
+SMALLEST_A = 1e-12
+"""Smallest value used for a = cos(tilt/2); below it the vehicle counts as exactly inverted."""
+
 
 def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """(a², a·x, a·y) of `split`; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (equation 10)."""
@@ -21,7 +24,7 @@ def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, 
     The heading of an exactly inverted attitude (w = z = 0) is undefined; it is taken as zero.
     """
     a = sqrt(w * w + z * z)
-    if a < 1e-12:
+    if a < SMALLEST_A:
         return 0.0, 1.0, x, y, 0.0
     _, ax, ay = tilt_products(w, x, y, z)
     return a, w / a, ax / a, ay / a, z / a
@@ -89,10 +92,6 @@ def heading_of(a: float, w: float, z: float) -> float:
     formula keeps the argument of the arctangent between −1 and 1.
     """
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
-
-
-SMALLEST_A = 1e-12
-"""Smallest value used for a = cos(tilt/2); below it the vehicle counts as exactly inverted."""
 
 
 def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
