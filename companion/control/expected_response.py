@@ -24,25 +24,22 @@ _LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
 
 @dataclass(frozen=True, slots=True)
 class ExpectedResponse:
-    """The response to the largest step of the maneuver `steps`, from −coefficient to coefficient.
-
-    Attributes:
-        coefficient: `steps.coefficient`, at which the step ends.
-        time_constant: time until 63 % of the step is covered, s.
-        time_constants_without: name of a cause of delay -> time constant (s) if this cause changes:
-            with twice the gain, or without the rate limit, the lag or the dead time.
-        gain: gain p of the planner, 1/s.
-        largest_gain: the largest sensible gain, 1/s; None if lag and dead time are not known.
-        shortest_time_constant: time constant with `largest_gain` and without the rate limit, s;
-            None if `largest_gain` is.
-    """
+    """The response to the largest step of `steps`, from −coefficient to coefficient."""
 
     coefficient: float
+    """`steps.coefficient`, at which the step ends."""
     time_constant: float
+    """Time until 63 % of the step is covered, s."""
     time_constants_without: dict[str, float]
+    """Name of a cause of delay -> time constant (s) if this cause changes: with twice the gain, or
+    without the rate limit, the lag or the dead time."""
     gain: float
+    """Gain p of the planner, 1/s."""
     largest_gain: float | None
+    """The largest sensible gain, 1/s; None if lag and dead time are not known."""
     shortest_time_constant: float | None = None
+    """Time constant with `largest_gain` and without the rate limit, s; None if `largest_gain`
+    is."""
 
     @property
     def limited_by(self) -> str:

@@ -8,34 +8,31 @@ from companion.control.heading_frame import HeadingFrame
 
 
 class GuidanceCommand(NamedTuple):
-    """One command from guidance; it holds until the next one.
-
-    Attributes:
-        target: target of the planner; only its heading is in the frame without estimator resets.
-        acceleration_down: acceleration downwards that thrust and gravity shall give, m/s².
-        made_at: when guidance made the command, s of event-loop time.
-        idle: whether zero body rates and zero thrust are sent; only on the ground.
-        is_step: whether this is an open-loop step whose response is measured.
-        body_rates: body rates that replace the planner's, within the limits, rad/s; None: the
-            planner's are sent.
-        thrust: thrust that replaces the one computed from `acceleration_down`, within the limits,
-            0..1; None: the computed thrust is sent.
-        frame: the frame without heading resets when the command was made.
-        later: the target `period` after `made_at`; the target moves there on a straight line and
-            then stays. None: the target is constant.
-        period: period of the guidance loop, s.
-    """
+    """One command from guidance; it holds until the next one."""
 
     target: Target
+    """Target of the planner; only its heading is in the frame without estimator resets."""
     acceleration_down: float
+    """Acceleration downwards that thrust and gravity shall give, m/s²."""
     made_at: float
+    """When guidance made the command, s of event-loop time."""
     idle: bool = False
+    """Whether zero body rates and zero thrust are sent; only on the ground."""
     is_step: bool = False
+    """Whether this is an open-loop step whose response is measured."""
     body_rates: BodyRates | None = None
+    """Body rates that replace the planner's, within the limits, rad/s; None: the planner's are
+    sent."""
     thrust: float | None = None
+    """Thrust that replaces the one computed from `acceleration_down`, within the limits, 0..1;
+    None: the computed thrust is sent."""
     frame: HeadingFrame = HeadingFrame()
+    """The frame without heading resets when the command was made."""
     later: Target | None = None
+    """The target `period` after `made_at`; the target moves there on a straight line and then
+    stays. None: the target is constant."""
     period: float = 0.0
+    """Period of the guidance loop, s."""
 
     def without_turning(self) -> "GuidanceCommand":
         """This command with zero body rates in place of the planner's."""

@@ -8,13 +8,10 @@ from companion.guidance.reference import rotated
 
 
 class HeadingFrame(NamedTuple):
-    """Converts headings, attitudes and targets between the estimator's frame and this one.
-
-    Attributes:
-        offset: heading in the estimator's frame minus heading in this frame, rad.
-    """
+    """Converts headings, attitudes and targets between the estimator's frame and this one."""
 
     offset: float = 0.0
+    """Heading in the estimator's frame minus heading in this frame, rad."""
 
     def heading(self, estimated: float) -> float:
         """The heading in this frame, from the heading in the estimator's frame; rad."""

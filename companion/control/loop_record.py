@@ -68,57 +68,51 @@ _REFUSALS = {
 
 @dataclass(frozen=True, slots=True)
 class Deadlines:
-    """Times, s, after which data are too old or a setpoint is too late.
-
-    Attributes:
-        telemetry_stale: largest age of a sample that is answered.
-        target_stale: largest age of a command from guidance that is used.
-        deadline: longest time from a sample's arrival to its setpoint; a longer one is counted.
-    """
+    """Times, s, after which data are too old or a setpoint is too late."""
 
     telemetry_stale: float
+    """Largest age of a sample that is answered."""
     target_stale: float
+    """Largest age of a command from guidance that is used."""
     deadline: float
+    """Longest time from a sample's arrival to its setpoint; a longer one is counted."""
 
 
 @dataclass(slots=True)
 class LoopRecord:
-    """Counters since the loop was made, and latest times in s of event-loop time.
-
-    Attributes:
-        samples: samples received while the loop was on.
-        setpoints: setpoints sent.
-        missed_deadlines: setpoints sent later than `Deadlines.deadline` after their sample.
-        unanswered: unanswered samples, by reason.
-        reason: why the newest sample is unanswered, or None.
-        latency_ns: time from the arrival of the last answered sample to its setpoint, ns.
-        sent: body rates (rad/s) and thrust of the latest setpoints, the newest last.
-        last_sample: when the newest sample arrived.
-        last_vehicle_time: vehicle time of the newest usable sample, s.
-        last_answer: when the newest answered sample arrived.
-        gap_from: when the present gap without setpoints began: `last_answer`, or inf before the
-            first answer and after `ControlLoop.resume`.
-        gaps: when the first answerable sample after each of the latest gaps arrived. A gap is a
-            time longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is
-            active or requested.
-        setpoint_intervals: time from each setpoint to the next one, without gaps.
-    """
+    """Counters since the loop was made, and latest times in s of event-loop time."""
 
     samples: int = 0
+    """Samples received while the loop was on."""
     setpoints: int = 0
+    """Setpoints sent."""
     missed_deadlines: int = 0
+    """Setpoints sent later than `Deadlines.deadline` after their sample."""
     unanswered: dict[Unanswered, int] = field(default_factory=lambda: dict.fromkeys(Unanswered, 0))
+    """Unanswered samples, by reason."""
     reason: Unanswered | None = None
+    """Why the newest sample is unanswered, or None."""
     latency_ns: int = 0
+    """Time from the arrival of the last answered sample to its setpoint, ns."""
     sent: deque[tuple[BodyRates, float]] = field(
         default_factory=lambda: deque(maxlen=_KEPT_SETPOINTS)
     )
+    """Body rates (rad/s) and thrust of the latest setpoints, the newest last."""
     last_sample: float = -inf
+    """When the newest sample arrived."""
     last_vehicle_time: float = -inf
+    """Vehicle time of the newest usable sample, s."""
     last_answer: float = -inf
+    """When the newest answered sample arrived."""
     gap_from: float = inf
+    """When the present gap without setpoints began: `last_answer`, or inf before the first answer
+    and after `ControlLoop.resume`."""
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
+    """When the first answerable sample after each of the latest gaps arrived. A gap is a time
+    longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is active or
+    requested."""
     setpoint_intervals: IntervalSums = field(default_factory=IntervalSums)
+    """Time from each setpoint to the next one, without gaps."""
 
     def note_arrival(self, sample: AttitudeSample) -> float:
         """Note an arrived sample; return the vehicle time since the last usable one, s."""

@@ -21,32 +21,26 @@ _LONGEST_ANSWER_WAIT = 1.0
 
 
 class Following(NamedTuple):
-    """The trajectory that is followed now.
-
-    Attributes:
-        part: the trajectory as a maneuver.
-        time: time since the maneuver began, s.
-        pose: pose at which the maneuver began.
-    """
+    """The trajectory that is followed now."""
 
     part: Follow
+    """The trajectory as a maneuver."""
     time: float
+    """Time since the maneuver began, s."""
     pose: Pose
+    """Pose at which the maneuver began."""
 
 
 @dataclass
 class PredictiveRecord:
-    """Counters of predictive control in one flight.
-
-    Attributes:
-        flown: number of answers that were flown.
-        troubles: number of answers that were not flown, by cause.
-        seconds: computation time of each flown answer in the solver's process.
-    """
+    """Counters of predictive control in one flight."""
 
     flown: int = 0
+    """Number of answers that were flown."""
     troubles: Counter[Trouble] = field(default_factory=Counter)
+    """Number of answers that were not flown, by cause."""
     seconds: "array[float]" = field(default_factory=lambda: array("d"))
+    """Computation time of each flown answer in the solver's process."""
 
 
 class Predictive:

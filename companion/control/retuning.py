@@ -19,23 +19,20 @@ from companion.guidance.position_correction import CorrectionSettings
 
 
 class Tuning(NamedTuple):
-    """The values of a configuration that may change in flight, computed for the loops.
-
-    Attributes:
-        guidance: settings of linear guidance.
-        observer: settings of the motion observer.
-        correction: settings of the position correction.
-        constants: gains and limits of the planner.
-        limits: limits of body rates that guidance commands.
-        max_tilt: largest tilt in open loop, rad.
-    """
+    """The values of a configuration that may change in flight, computed for the loops."""
 
     guidance: LinearSettings
+    """Settings of linear guidance."""
     observer: ObserverSettings
+    """Settings of the motion observer."""
     correction: CorrectionSettings
+    """Settings of the position correction."""
     constants: Constants
+    """Gains and limits of the planner."""
     limits: Limits
+    """Limits of body rates that guidance commands."""
     max_tilt: float
+    """Largest tilt in open loop, rad."""
 
 
 def tuning(config: Config) -> Tuning:

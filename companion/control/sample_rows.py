@@ -42,44 +42,38 @@ class LoopFlags(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A setpoint that was sent, and its inputs.
-
-    Attributes:
-        rates: body rates, rad/s.
-        thrust: thrust, 0..1.
-        latency_ns: time since the sample's arrival, ns.
-        planner_input: attitude and target that the planner got; None: the planner was not asked,
-            because guidance commanded body rates or idle.
-        planned: the plan in effect at the sample, or None.
-        is_step: see `GuidanceCommand`.
-        idle: see `GuidanceCommand`.
-    """
+    """A setpoint that was sent, and its inputs."""
 
     rates: BodyRates
+    """Body rates, rad/s."""
     thrust: float
+    """Thrust, 0..1."""
     latency_ns: int
+    """Time since the sample's arrival, ns."""
     planner_input: tuple[Quaternion, Target] | None
+    """Attitude and target that the planner got; None: the planner was not asked, because guidance
+    commanded body rates or idle."""
     planned: PlannedTilt | None
+    """The plan in effect at the sample, or None."""
     is_step: bool
+    """See `GuidanceCommand`."""
     idle: bool
+    """See `GuidanceCommand`."""
 
 
 class SampleEntry(NamedTuple):
-    """A sample that reached the control loop.
-
-    Attributes:
-        sample: the sample.
-        reason: why it is unanswered, or None.
-        flags: state of the loop before the answer.
-        checked_at: when its age was checked before sending, s of event-loop time; NaN: it was not.
-        answer: setpoint that was sent, or None.
-    """
+    """A sample that reached the control loop."""
 
     sample: AttitudeSample
+    """The sample."""
     reason: Unanswered | None
+    """Why it is unanswered, or None."""
     flags: LoopFlags
+    """State of the loop before the answer."""
     checked_at: float
+    """When its age was checked before sending, s of event-loop time; NaN: it was not."""
     answer: Answer | None
+    """Setpoint that was sent, or None."""
 
 
 class SampleRows:

@@ -25,75 +25,63 @@ _POSE_EVERY, _SCENE_EVERY = 2, 5
 
 
 class StepFlags(NamedTuple):
-    """State of the vehicle at a guidance step.
-
-    Attributes:
-        fresh: whether the position is fresh.
-        standing: whether the vehicle stands on the ground.
-        may_idle: whether zero thrust is safe.
-        offboard_active: whether the autopilot obeys the setpoints.
-    """
+    """State of the vehicle at a guidance step."""
 
     fresh: bool
+    """Whether the position is fresh."""
     standing: bool
+    """Whether the vehicle stands on the ground."""
     may_idle: bool
+    """Whether zero thrust is safe."""
     offboard_active: bool
+    """Whether the autopilot obeys the setpoints."""
 
 
 class StepInput(NamedTuple):
-    """The telemetry that a step of guidance reads; None: unknown.
-
-    Attributes:
-        time: when the step began, s of event-loop time.
-        position: the newest position.
-        clock_offset: vehicle time minus event-loop time, s.
-        battery: battery of the vehicle.
-        autopilot_thrust: thrust in ATTITUDE_TARGET.
-        height: height above home, m.
-        armed: whether the vehicle is armed.
-        flags: state of the vehicle at the step.
-    """
+    """The telemetry that a step of guidance reads; None: unknown."""
 
     time: float
+    """When the step began, s of event-loop time."""
     position: LocalPosition | None
+    """The newest position."""
     clock_offset: float | None
+    """Vehicle time minus event-loop time, s."""
     battery: Battery | None
+    """Battery of the vehicle."""
     autopilot_thrust: AttitudeTargetThrust | None
+    """Thrust in ATTITUDE_TARGET."""
     height: float | None
+    """Height above home, m."""
     armed: bool | None
+    """Whether the vehicle is armed."""
     flags: StepFlags
+    """State of the vehicle at the step."""
 
 
 class StepOutput(NamedTuple):
-    """The result of a guidance step.
-
-    Attributes:
-        measured_at: when the step began, on the vehicle's clock, s.
-        q: newest attitude.
-        inputs: motion, wind and drag at the step.
-        reference: reference of the step.
-        error: distance from the reference, m, or None.
-    """
+    """The result of a guidance step."""
 
     measured_at: float
+    """When the step began, on the vehicle's clock, s."""
     q: Quaternion
+    """Newest attitude."""
     inputs: GuidanceInput
+    """Motion, wind and drag at the step."""
     reference: Reference
+    """Reference of the step."""
     error: float | None
+    """Distance from the reference, m, or None."""
 
 
 class StepEntry(NamedTuple):
-    """Record of a guidance step.
-
-    Attributes:
-        inputs: the telemetry that the step read.
-        output: its result; None without a fresh position or while idle on the ground.
-        command: the command for the control loop; None: no new command.
-    """
+    """Record of a guidance step."""
 
     inputs: StepInput
+    """The telemetry that the step read."""
     output: StepOutput | None
+    """Its result; None without a fresh position or while idle on the ground."""
     command: GuidanceCommand | None
+    """The command for the control loop; None: no new command."""
 
 
 class StepRows:

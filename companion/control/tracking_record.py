@@ -11,19 +11,16 @@ from companion.recording.trace import FlightTrace
 
 
 class FlownPart(NamedTuple):
-    """The maneuver that is flown now, or the source that another program commands.
-
-    Attributes:
-        name: name to show to the user.
-        elapsed: time since it began, s.
-        duration: its duration, s; None: the source decides when it ends.
-        part: the maneuver or the source itself.
-    """
+    """The maneuver that is flown now, or the source that another program commands."""
 
     name: str
+    """Name to show to the user."""
     elapsed: float
+    """Time since it began, s."""
     duration: float | None
+    """Its duration, s; None: the source decides when it ends."""
     part: object
+    """The maneuver or the source itself."""
 
 
 def flown_part(flown: FlownSource, now: float) -> FlownPart | None:

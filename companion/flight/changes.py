@@ -29,17 +29,14 @@ class ChangeRefusedError(Exception):
 
 
 class Change(NamedTuple):
-    """A change that was made.
-
-    Attributes:
-        time: time when it began, s on our clock.
-        by: who made it, such as "the live page".
-        keys: changed keys.
-    """
+    """A change that was made."""
 
     time: float
+    """Time when it began, s on our clock."""
     by: str
+    """Who made it, such as "the live page"."""
     keys: tuple[Difference, ...]
+    """Changed keys."""
 
     def __str__(self) -> str:
         return f"changed by {self.by}: {', '.join(map(str, self.keys))}"

@@ -39,22 +39,7 @@ _HEARTBEAT_ID = 0.0
 
 @dataclass(slots=True)
 class FlightContext:
-    """The parts of one flight, and the state that its phases share.
-
-    Attributes:
-        known_drag: what was known of the vehicle's drag when the checks ended.
-        detail: what the running phase waits for, shown to the user.
-        setpoint_rate_hz: rate of setpoints over the maneuvers, Hz.
-        heartbeat_limit: largest age of the last report of the mode, s, before it counts as unknown;
-            the checks set this limit from the heartbeat rate.
-        mode_at_checks: the mode when the checks ended; another one before arming is a takeover.
-        must_disarm: whether an end on the ground disarms: we commanded arming or the take-off.
-        fence_centre: centre of the fence in an earlier flight, if the vehicle has not been disarmed
-            since; None: the fence is centred where control begins.
-        released_by: returns the name of a client in control that has just commanded another mode;
-            else "".
-        note: records and shows an event.
-    """
+    """The parts of one flight, and the state that its phases share."""
 
     config: Config
     link: Link
@@ -66,14 +51,25 @@ class FlightContext:
     preflight: PreflightChecks
     same_vehicle: SameVehicle
     known_drag: KnownDrag = field(default_factory=KnownDrag)
+    """What was known of the vehicle's drag when the checks ended."""
     detail: str = ""
+    """What the running phase waits for, shown to the user."""
     setpoint_rate_hz: float = 0.0
+    """Rate of setpoints over the maneuvers, Hz."""
     heartbeat_limit: float = INITIAL_HEARTBEAT_LIMIT
+    """Largest age of the last report of the mode, s, before it counts as unknown; the checks set
+    this limit from the heartbeat rate."""
     mode_at_checks: str | None = None
+    """The mode when the checks ended; another one before arming is a takeover."""
     must_disarm: bool = False
+    """Whether an end on the ground disarms: we commanded arming or the take-off."""
     fence_centre: FenceCentre | None = None
+    """Centre of the fence in an earlier flight, if the vehicle has not been disarmed since; None:
+    the fence is centred where control begins."""
     released_by: Callable[[], str] = lambda: ""
+    """Returns the name of a client in control that has just commanded another mode; else ""."""
     note: Callable[[str], None] = lambda _: None
+    """Records and shows an event."""
 
     def release(self) -> None:
         """Stop answering samples; no setpoint is sent after this."""

@@ -14,20 +14,18 @@ class Environment:
 
     The defaults are those of a real flight. `companion.testing` replaces all of them: its flights
     use no sockets and no wall clock.
-
-    Attributes:
-        open_transport: opens the link's transport.
-        clock_ns: clock for latencies and for the arrival stamps of transports, ns.
-        realtime: True: real time, and the section `realtime` is requested from the operating
-            system. False: a virtual clock.
-        stream: takes the messages that the flight records, in batches, in the recording thread;
-            None: nothing does.
     """
 
     open_transport: OpenTransport = open_transport
+    """Opens the link's transport."""
     clock_ns: Callable[[], int] = perf_counter_ns
+    """Clock for latencies and for the arrival stamps of transports, ns."""
     realtime: bool = True
+    """True: real time, and the section `realtime` is requested from the operating system. False: a
+    virtual clock."""
     stream: SendBatch | None = None
+    """Takes the messages that the flight records, in batches, in the recording thread; None:
+    nothing does."""
 
 
 THIS_COMPUTER = Environment()

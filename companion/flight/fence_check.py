@@ -26,18 +26,15 @@ _MAX_MOMENTS = 4000
 
 @dataclass(frozen=True, slots=True)
 class FenceCheck:
-    """Checks a motion, whose positions are relative to where control begins, against the fence.
-
-    Attributes:
-        fence: the fence that the monitors watch in flight.
-        height: height above home where control begins, m.
-        origin: geographic position where control begins, or None; then a fence in latitude and
-            longitude is not checked.
-    """
+    """Checks a motion, whose positions are relative to where control begins, against the fence."""
 
     fence: Fence
+    """The fence that the monitors watch in flight."""
     height: float
+    """Height above home where control begins, m."""
     origin: Place | None = None
+    """Geographic position where control begins, or None; then a fence in latitude and longitude is
+    not checked."""
 
     def __call__(self, motion: Motion) -> Violation | None:
         """The worst violation, or None; says whether a slower motion would avoid it."""

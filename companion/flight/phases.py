@@ -29,29 +29,26 @@ Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """One phase of a flight.
-
-    Attributes:
-        name: shown to the user.
-        waits_for: the condition it waits for, shown to the user.
-        work: the coroutine of the phase.
-        timeout: time after which the phase has failed, s; may be infinite.
-        on_failure: the exit if the phase fails.
-        on_failure_on_ground: the exit while the vehicle is on the ground; None: `on_failure`.
-        allowed_roles: roles of the allowed modes; a mode without one of them is a takeover, and so
-            is an unknown mode. Empty: any mode.
-        monitored: whether the safety monitors may end the phase. An exit is not monitored, because
-            the breach that caused it would end it too.
-    """
+    """One phase of a flight."""
 
     name: str
+    """Shown to the user."""
     waits_for: str
+    """The condition it waits for, shown to the user."""
     work: Work
+    """The coroutine of the phase."""
     timeout: float
+    """Time after which the phase has failed, s; may be infinite."""
     on_failure: Exit = Exit.LEAVE
+    """The exit if the phase fails."""
     on_failure_on_ground: Exit | None = None
+    """The exit while the vehicle is on the ground; None: `on_failure`."""
     allowed_roles: frozenset[Role] = frozenset()
+    """Roles of the allowed modes; a mode without one of them is a takeover, and so is an unknown
+    mode. Empty: any mode."""
     monitored: bool = False
+    """Whether the safety monitors may end the phase. An exit is not monitored, because the breach
+    that caused it would end it too."""
 
     def exit_on_failure(self, *, standing: bool) -> Exit:
         """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""

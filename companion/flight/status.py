@@ -27,53 +27,49 @@ _MAX_TELEMETRY_AGE = 1.0
 
 
 class FlightStatus(NamedTuple):
-    """The state of a flight at one time; None: unknown, or does not apply.
-
-    Attributes:
-        time: time since the flight began, s.
-        airborne: time since the vehicle left the ground, s.
-        phase: name of the phase.
-        detail: what the phase waits for.
-        elapsed: time in this phase, s.
-        timeout: timeout of this phase, s; may be infinite.
-        maneuver: name of the maneuver that is flown.
-        maneuver_elapsed: time in this maneuver, s.
-        maneuver_duration: duration of this maneuver, s; None: another program ends it.
-        height: height above home, m.
-        speed: speed, m/s.
-        tilt: tilt, rad.
-        error: distance from the reference, m.
-        rate: rate of setpoints, Hz.
-        latency: time from the last answered sample to its setpoint, s; None in lockstep, and while
-            the control loop is off.
-        missed: deadlines missed so far; None in lockstep.
-        battery: battery of the vehicle.
-        monitored: whether the safety monitors are active.
-        alarms: names of the safety monitors whose alarm is raised.
-        view: values for a picture, such as attitude, target, motion and reference; see
-            `flight.view`.
-    """
+    """The state of a flight at one time; None: unknown, or does not apply."""
 
     time: float
+    """Time since the flight began, s."""
     airborne: float | None
+    """Time since the vehicle left the ground, s."""
     phase: str
+    """Name of the phase."""
     detail: str
+    """What the phase waits for."""
     elapsed: float
+    """Time in this phase, s."""
     timeout: float
+    """Timeout of this phase, s; may be infinite."""
     maneuver: str | None = None
+    """Name of the maneuver that is flown."""
     maneuver_elapsed: float = 0.0
+    """Time in this maneuver, s."""
     maneuver_duration: float | None = None
+    """Duration of this maneuver, s; None: another program ends it."""
     height: float | None = None
+    """Height above home, m."""
     speed: float | None = None
+    """Speed, m/s."""
     tilt: float | None = None
+    """Tilt, rad."""
     error: float | None = None
+    """Distance from the reference, m."""
     rate: float | None = None
+    """Rate of setpoints, Hz."""
     latency: float | None = None
+    """Time from the last answered sample to its setpoint, s; None in lockstep, and while the
+    control loop is off."""
     missed: int | None = None
+    """Deadlines missed so far; None in lockstep."""
     battery: Battery | None = None
+    """Battery of the vehicle."""
     monitored: bool = False
+    """Whether the safety monitors are active."""
     alarms: tuple[str, ...] = ()
+    """Names of the safety monitors whose alarm is raised."""
     view: Mapping[str, Any] = MappingProxyType({})
+    """Values for a picture, such as attitude, target, motion and reference; see `flight.view`."""
 
 
 class StatusReporter:

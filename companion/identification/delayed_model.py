@@ -86,30 +86,27 @@ def frequency_damping(shape: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True, slots=True)
 class SecondOrderFit:
-    """A second-order fit: ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ.
-
-    Attributes:
-        frequency: natural frequency ω, rad/s.
-        damping: damping ratio ζ.
-        dead_time: dead time, s.
-        gain: measured per commanded rate.
-        slew: slew limit of the command, per second; None: no sign of a limit.
-        explained: R².
-        misfit: RMS of the part of the residual that the commands explain, as a share of the
-            standard deviation of the measurements.
-        dead_time_error: standard error of the dead time due to noise, s.
-        lag_error: standard error of the property `lag` due to noise, s.
-    """
+    """A second-order fit: ÿ = ω²·(gain·u(t − dead time) − y) − 2ζω·ẏ."""
 
     frequency: float
+    """Natural frequency ω, rad/s."""
     damping: float
+    """Damping ratio ζ."""
     dead_time: float
+    """Dead time, s."""
     gain: float
+    """Measured per commanded rate."""
     slew: float | None
+    """Slew limit of the command, per second; None: no sign of a limit."""
     explained: float
+    """R²."""
     misfit: float
+    """RMS of the part of the residual that the commands explain, as a share of the standard
+    deviation of the measurements."""
     dead_time_error: float
+    """Standard error of the dead time due to noise, s."""
     lag_error: float
+    """Standard error of the property `lag` due to noise, s."""
 
     @property
     def lag(self) -> float:

@@ -55,49 +55,42 @@ _NEIGHBOUR_DISTANCE = 0.005
 
 @dataclass(frozen=True, slots=True)
 class FitQuality:
-    """Quality of a fit.
-
-    Attributes:
-        explained: R², share of the measurements' variance that the model explains.
-        misfit: error of the model: RMS of the part of the residual that the commands explain, as a
-            share of the standard deviation of the measurements. It does not contain noise.
-        dead_time_error: standard error of the dead time due to noise, s.
-        lag_error: standard error of the lag due to noise, s.
-        span: largest minus smallest command, after the slew limit, in the unit of the
-            commands.
-        excited: number of samples at which the model differs from the command by more than 2 %
-            of the span; only these contain information on lag and dead time.
-    """
+    """Quality of a fit."""
 
     explained: float
+    """R², share of the measurements' variance that the model explains."""
     misfit: float
+    """Error of the model: RMS of the part of the residual that the commands explain, as a share of
+    the standard deviation of the measurements. It does not contain noise."""
     dead_time_error: float
+    """Standard error of the dead time due to noise, s."""
     lag_error: float
+    """Standard error of the lag due to noise, s."""
     span: float
+    """Largest minus smallest command, after the slew limit, in the unit of the commands."""
     excited: int
+    """Number of samples at which the model differs from the command by more than 2 % of the span;
+    only these contain information on lag and dead time."""
 
 
 @dataclass(frozen=True, slots=True)
 class LagFit:
-    """Result of a fit, in s and the units of commands and measurements.
-
-    Attributes:
-        dead_time: dead time, s.
-        lag: lag, s.
-        gain: measured per commanded value; fitted anew if lag and dead time are for a given one.
-        offset: measurement at a command of zero.
-        slew: slew limit of the command, per second; None: no sign of a limit.
-        quality: quality of the fit.
-        second_order: second-order fit, if it is clearly better; else None.
-    """
+    """Result of a fit, in s and the units of commands and measurements."""
 
     dead_time: float
+    """Dead time, s."""
     lag: float
+    """Lag, s."""
     gain: float
+    """Measured per commanded value; fitted anew if lag and dead time are for a given one."""
     offset: float
+    """Measurement at a command of zero."""
     slew: float | None
+    """Slew limit of the command, per second; None: no sign of a limit."""
     quality: FitQuality
+    """Quality of the fit."""
     second_order: SecondOrderFit | None = None
+    """second-order fit, if it is clearly better; else None."""
 
 
 def fit_lag(

@@ -26,19 +26,16 @@ _ACCEPTED_DAMPINGS = 0.3, 10.0
 
 
 class AxisValues(NamedTuple):
-    """The configuration values of one axis.
-
-    Attributes:
-        lag: lag, ms.
-        dead_time: dead time, ms.
-        slew: slew limit, °/s²; None: no limit.
-        damping: damping ratio ζ of a second-order lag; None: first order.
-    """
+    """The configuration values of one axis."""
 
     lag: float
+    """Lag, ms."""
     dead_time: float
+    """Dead time, ms."""
     slew: float | None
+    """Slew limit, °/s²; None: no limit."""
     damping: float | None = None
+    """Damping ratio ζ of a second-order lag; None: first order."""
 
     def described(self) -> str:
         """The values in one line."""

@@ -19,17 +19,14 @@ _LARGEST_EXPONENT = 500.0
 
 
 class Knots(NamedTuple):
-    """A piecewise linear command, with possible jumps between the pieces.
-
-    Attributes:
-        time: (n,), start of each piece, s, not decreasing.
-        value: (n,), value at the start of each piece.
-        slope: (n,), slope of each piece, per second.
-    """
+    """A piecewise linear command, with possible jumps between the pieces."""
 
     time: Floats
+    """(n,), start of each piece, s, not decreasing."""
     value: Floats
+    """(n,), value at the start of each piece."""
     slope: Floats
+    """(n,), slope of each piece, per second."""
 
 
 def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Knots:

@@ -24,20 +24,17 @@ plus the longest slew-limited change of command that is searched."""
 
 
 class Stretch(NamedTuple):
-    """A part of a record without a pause: n commands, each held until the next, and m samples.
-
-    Attributes:
-        time: (n,), times of the commands, s.
-        commanded: (n,), the commands.
-        measured_time: (m,), times of the samples, s, from `LONGEST_DEAD_TIME` after the first
-            command to the last command. For each, the command is thus known at every dead time.
-        measured: (m,), the samples, in the unit of the commands.
-    """
+    """A part of a record without a pause: n commands, each held until the next, and m samples."""
 
     time: Floats
+    """(n,), times of the commands, s."""
     commanded: Floats
+    """(n,), the commands."""
     measured_time: Floats
+    """(m,), times of the samples, s, from `LONGEST_DEAD_TIME` after the first command to the last
+    command. For each, the command is thus known at every dead time."""
     measured: Floats
+    """(m,), the samples, in the unit of the commands."""
 
 
 def stretches(

@@ -22,15 +22,12 @@ _SAMPLES_PER_DELAY = 8
 
 
 class Residuals(NamedTuple):
-    """Result of `analyse_residual`: misfit of a fit, and standard errors of its unknowns.
-
-    Attributes:
-        misfit: RMS of the part that the commands explain, in the unit of the measurements.
-        errors: (k,), standard errors of the unknowns.
-    """
+    """Result of `analyse_residual`: misfit of a fit, and standard errors of its unknowns."""
 
     misfit: float
+    """RMS of the part that the commands explain, in the unit of the measurements."""
     errors: Floats
+    """(k,), standard errors of the unknowns."""
 
 
 def analyse_residual(

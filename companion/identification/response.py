@@ -16,24 +16,21 @@ class BadFitError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class FitNeeds:
-    """Requirements that a fit must meet to be used; see `FitQuality`.
-
-    Attributes:
-        misfit: largest misfit.
-        error: largest standard error of lag and dead time, s.
-        relative_error: largest standard error as a share of lag + dead time; the larger of the
-            limits `error` and `relative_error` counts.
-        span: smallest span of the commands, rad/s.
-        excited: smallest number of excited samples.
-        gain: smallest and largest gain; that of a working rate loop is about 1.
-    """
+    """Requirements that a fit must meet to be used; see `FitQuality`."""
 
     misfit: float = 0.3
+    """Largest misfit."""
     error: float = 0.003
+    """Largest standard error of lag and dead time, s."""
     relative_error: float = 0.1
+    """Largest standard error as a share of lag + dead time; the larger of the limits `error` and
+    `relative_error` counts."""
     span: float = 0.2
+    """Smallest span of the commands, rad/s."""
     excited: int = 20
+    """Smallest number of excited samples."""
     gain: tuple[float, float] = (0.8, 1.2)
+    """Smallest and largest gain; that of a working rate loop is about 1."""
 
 
 DEFAULT_NEEDS = FitNeeds()
@@ -42,24 +39,21 @@ _EDGE_TOLERANCE = 1e-6  # s
 
 @dataclass(frozen=True, slots=True)
 class RateResponse:
-    """First order with dead time: lag·ω̇(t) = gain·ω_command(t − dead_time) + offset − ω(t).
-
-    Attributes:
-        dead_time: time from a sample to the first effect of its command, s; NaN if not found.
-        lag: time constant, s; NaN if not found.
-        gain: steady rate per commanded rate; NaN if not found. It is fitted even if lag and dead
-            time are for a given gain. If there is a second-order fit, the gain is that of this fit.
-        slew: slew limit of the commanded rate, before the lag, rad/s²; None if none was found.
-        fit: quality of the fit.
-        second_order: second-order fit, if it is clearly better; else None.
-    """
+    """First order with dead time: lag·ω̇(t) = gain·ω_command(t − dead_time) + offset − ω(t)."""
 
     dead_time: float
+    """Time from a sample to the first effect of its command, s; NaN if not found."""
     lag: float
+    """Time constant, s; NaN if not found."""
     gain: float
+    """Steady rate per commanded rate; NaN if not found. It is fitted even if lag and dead time are
+    for a given gain. If there is a second-order fit, the gain is that of this fit."""
     slew: float | None
+    """Slew limit of the commanded rate, before the lag, rad/s²; None if none was found."""
     fit: FitQuality
+    """Quality of the fit."""
     second_order: SecondOrderFit | None = None
+    """second-order fit, if it is clearly better; else None."""
 
     def flaw(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
         """Why this fit must not be used, a sentence without full stop; None if it may be used."""

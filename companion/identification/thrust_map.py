@@ -20,21 +20,18 @@ _LARGEST_DELAY = 0.5
 
 @dataclass(frozen=True, slots=True)
 class ThrustMap:
-    """Specific thrust T = slope·u + offset, which follows the normalised thrust u with a lag.
-
-    Attributes:
-        slope: m/s² per unit of normalised thrust.
-        offset: specific thrust at u = 0, by extrapolation, m/s².
-        lag: lag of the rotors, s.
-        dead_time: time from a sample to the first effect of its command on the thrust, s.
-        explained: R².
-    """
+    """Specific thrust T = slope·u + offset, which follows the normalised thrust u with a lag."""
 
     slope: float
+    """m/s² per unit of normalised thrust."""
     offset: float
+    """Specific thrust at u = 0, by extrapolation, m/s²."""
     lag: float
+    """Lag of the rotors, s."""
     dead_time: float
+    """Time from a sample to the first effect of its command on the thrust, s."""
     explained: float
+    """R²."""
 
     def normalised(self, specific_thrust: float) -> float:
         """The normalised thrust that gives a specific thrust in m/s²."""

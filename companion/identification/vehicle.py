@@ -18,19 +18,16 @@ AXES = ("roll", "pitch", "yaw")
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedVehicle:
-    """The fitted response of a vehicle; each fit says whether it may be used.
-
-    Attributes:
-        roll: response of the roll rate.
-        pitch: response of the pitch rate.
-        yaw: response of the yaw rate.
-        thrust: the thrust map; None if thrust never changed or was hardly measured.
-    """
+    """The fitted response of a vehicle; each fit says whether it may be used."""
 
     roll: RateResponse
+    """Response of the roll rate."""
     pitch: RateResponse
+    """Response of the pitch rate."""
     yaw: RateResponse
+    """Response of the yaw rate."""
     thrust: ThrustMap | None
+    """The thrust map; None if thrust never changed or was hardly measured."""
 
     @property
     def axes(self) -> dict[str, RateResponse]:

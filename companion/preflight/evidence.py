@@ -31,43 +31,37 @@ class Stage(Enum):
 
 
 class Identity(NamedTuple):
-    """AUTOPILOT_VERSION; all `None` if it was not received.
-
-    Attributes:
-        version: Version of the flight software, such as 4.7.0-dev.
-        capabilities: MAV_PROTOCOL_CAPABILITY.
-        uid: Hardware id in hexadecimal digits; `None` if the hardware has none.
-    """
+    """AUTOPILOT_VERSION; all `None` if it was not received."""
 
     version: str | None = None
+    """Version of the flight software, such as 4.7.0-dev."""
     capabilities: int | None = None
+    """MAV_PROTOCOL_CAPABILITY."""
     uid: str | None = None
+    """Hardware id in hexadecimal digits; `None` if the hardware has none."""
 
 
 class LinkQuality(NamedTuple):
-    """Quality of the link while we listened.
-
-    Attributes:
-        frames: Number of accepted frames.
-        lost: Number of frames missing in the vehicle's sequence numbers.
-        damaged: Number of frames with a wrong checksum.
-        not_finite: Messages refused for a NaN or infinity.
-        reconnects: Number of times that the connection was opened again.
-        round_trip: Shortest recent TIMESYNC round trip, s; `None` if none was answered.
-        jitter: Range of the round trips, s.
-        other_clock: Whether TIMESYNC uses another clock than the samples' stamps.
-        notices: Messages of the link about signatures and the peer.
-    """
+    """Quality of the link while we listened."""
 
     frames: int
+    """Number of accepted frames."""
     lost: int
+    """Number of frames missing in the vehicle's sequence numbers."""
     damaged: int
+    """Number of frames with a wrong checksum."""
     not_finite: int
+    """Messages refused for a NaN or infinity."""
     reconnects: int
+    """Number of times that the connection was opened again."""
     round_trip: float | None
+    """Shortest recent TIMESYNC round trip, s; `None` if none was answered."""
     jitter: float | None
+    """Range of the round trips, s."""
     notices: tuple[str, ...] = ()
+    """Messages of the link about signatures and the peer."""
     other_clock: bool = False
+    """Whether TIMESYNC uses another clock than the samples' stamps."""
 
     @property
     def loss(self) -> float:
@@ -76,83 +70,74 @@ class LinkQuality(NamedTuple):
 
 
 class SampleTimes(NamedTuple):
-    """Times of the attitude samples received, by both clocks.
-
-    Attributes:
-        received: Number of samples.
-        longest_pause: Longest time between two samples by our clock, s.
-        not_newer: Number of samples stamped no later than the one before.
-        clock_rate: Vehicle seconds per second of ours; `None` for too few samples.
-        age: Median age of the samples at arrival, s; `None`: unknown (`VehicleClock`).
-        clock_change: Description of a jump or restart of the vehicle's clock; empty: none.
-        unusable: Number of samples that are not a unit quaternion or not finite.
-        rate: Effective rate, Hz, lowered by bursts (`IntervalSums`); `None` for too few samples.
-    """
+    """Times of the attitude samples received, by both clocks."""
 
     received: int = 0
+    """Number of samples."""
     longest_pause: float = 0.0
+    """Longest time between two samples by our clock, s."""
     not_newer: int = 0
+    """Number of samples stamped no later than the one before."""
     clock_rate: float | None = None
+    """Vehicle seconds per second of ours; `None` for too few samples."""
     age: float | None = None
+    """Median age of the samples at arrival, s; `None`: unknown (`VehicleClock`)."""
     clock_change: str = ""
+    """Description of a jump or restart of the vehicle's clock; empty: none."""
     unusable: int = 0
+    """Number of samples that are not a unit quaternion or not finite."""
     rate: float | None = None
+    """Effective rate, Hz, lowered by bursts (`IntervalSums`); `None` for too few samples."""
 
 
 class OtherNodes(NamedTuple):
-    """Other nodes on the link.
-
-    Attributes:
-        sources: (system, component) of every node that was heard.
-        companions: Nodes whose heartbeat has the type onboard controller.
-        steering: Nodes that sent setpoints.
-        foreign_target: Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed,
-            so that another node must have sent setpoints.
-    """
+    """Other nodes on the link."""
 
     sources: frozenset[tuple[int, int]] = frozenset()
+    """(system, component) of every node that was heard."""
     companions: frozenset[tuple[int, int]] = frozenset()
+    """Nodes whose heartbeat has the type onboard controller."""
     steering: frozenset[tuple[int, int]] = frozenset()
+    """Nodes that sent setpoints."""
     foreign_target: bool = False
+    """Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed, so that another
+    node must have sent setpoints."""
 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """All evidence of one session.
-
-    Attributes:
-        autopilot: The kind of autopilot.
-        state: The vehicle's newest telemetry.
-        survey: The parameters that matter to a flight.
-        streams: Rates requested, granted and counted, by message.
-        received: Number of messages since the link was opened, for each message of `streams`.
-        window: Time over which messages were counted, s.
-        link: Quality of the link.
-        samples: Times of the attitude samples.
-        other_nodes: Other nodes on the link.
-        resets: Number of estimator resets.
-        identity: The autopilot's version and hardware.
-        stage: The next step of the vehicle.
-        warnings: The autopilot's texts of severity warning or worse.
-        maneuvers: The planned maneuvers; `None`: no maneuvers.
-        known_drag: What is known of this vehicle's drag.
-    """
+    """All evidence of one session."""
 
     autopilot: Autopilot
+    """The kind of autopilot."""
     state: VehicleState
+    """The vehicle's newest telemetry."""
     survey: Survey
+    """The parameters that matter to a flight."""
     streams: Mapping[str, StreamRate]
+    """Rates requested, granted and counted, by message."""
     received: Mapping[str, int]
+    """Number of messages since the link was opened, for each message of `streams`."""
     window: float
+    """Time over which messages were counted, s."""
     link: LinkQuality
+    """Quality of the link."""
     samples: SampleTimes
+    """Times of the attitude samples."""
     other_nodes: OtherNodes
+    """Other nodes on the link."""
     resets: int
+    """Number of estimator resets."""
     identity: Identity
+    """The autopilot's version and hardware."""
     stage: Stage = Stage.GROUND
+    """The next step of the vehicle."""
     warnings: tuple[str, ...] = ()
+    """The autopilot's texts of severity warning or worse."""
     maneuvers: ManeuverSequence | None = None
+    """The planned maneuvers; `None`: no maneuvers."""
     known_drag: KnownDrag = field(default_factory=KnownDrag)
+    """What is known of this vehicle's drag."""
 
     @property
     def awaits_position(self) -> bool:

@@ -59,42 +59,36 @@ class Key(StrEnum):
 
 
 class ParameterChange(NamedTuple):
-    """A parameter to set.
-
-    Attributes:
-        parameter: Name of the parameter in this autopilot.
-        old: Present value.
-        new: Proposed value.
-        reboot: Whether the change takes effect only after the autopilot restarts.
-    """
+    """A parameter to set."""
 
     parameter: str
+    """Name of the parameter in this autopilot."""
     old: float
+    """Present value."""
     new: float
+    """Proposed value."""
     reboot: bool
+    """Whether the change takes effect only after the autopilot restarts."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Result of one check.
-
-    Attributes:
-        key: A `Key`, the newest name of a parameter, or the key of a message rate.
-        result: Severity of the finding.
-        found: The fact, as a clause.
-        because: The consequence, or the effect of the parameter; may be empty.
-        fix: What the user should do; empty if there is nothing to do.
-        source: Source of the fact: a MAVLink message, a reference, a measurement.
-        change: The parameter to set, if that fixes it.
-    """
+    """Result of one check."""
 
     key: str
+    """A `Key`, the newest name of a parameter, or the key of a message rate."""
     result: CheckResult
+    """Severity of the finding."""
     found: str
+    """The fact, as a clause."""
     because: str = ""
+    """The consequence, or the effect of the parameter; may be empty."""
     fix: str = ""
+    """What the user should do; empty if there is nothing to do."""
     source: str = ""
+    """Source of the fact: a MAVLink message, a reference, a measurement."""
     change: ParameterChange | None = None
+    """The parameter to set, if that fixes it."""
 
     def sentence(self) -> str:
         """The finding without its source, for the user."""

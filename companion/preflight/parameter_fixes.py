@@ -118,15 +118,12 @@ Ask = Callable[[Finding], Awaitable[Answer]]
 
 
 class ChangeOutcome(NamedTuple):
-    """The outcome of a change.
-
-    Attributes:
-        change: The change.
-        refusal: Why it was not made; empty if it was made.
-    """
+    """The outcome of a change."""
 
     change: ParameterChange
+    """The change."""
     refusal: str = ""
+    """Why it was not made; empty if it was made."""
 
 
 class VehicleArmedError(LinkError):

@@ -16,15 +16,12 @@ _MAX_OPEN_REQUESTS = 8
 
 
 class RetryPolicy(NamedTuple):
-    """How often and at which interval a parameter is requested.
-
-    Attributes:
-        timeout_s: Time until a request is repeated, s.
-        tries: Number of requests for each of the parameter's names.
-    """
+    """How often and at which interval a parameter is requested."""
 
     timeout_s: float
+    """Time until a request is repeated, s."""
     tries: int
+    """Number of requests for each of the parameter's names."""
 
 
 _FIRST_ROUND = RetryPolicy(0.5, 3)
@@ -38,20 +35,17 @@ the first three requests, and 0.01 % get none after six more.
 
 
 class Survey(NamedTuple):
-    """The parameters that were read, without those that the autopilot lacks.
-
-    Attributes:
-        values: Values by newest name.
-        names: Name of each parameter in this autopilot, by newest name.
-        unread: Newest names of the parameters without a value that the autopilot may have: it did
-            not report them as unknown.
-        lossy: Whether the link lost frames during the survey, in either direction.
-    """
+    """The parameters that were read, without those that the autopilot lacks."""
 
     values: Values
+    """Values by newest name."""
     names: Mapping[str, str]
+    """Name of each parameter in this autopilot, by newest name."""
     unread: frozenset[str] = frozenset()
+    """Newest names of the parameters without a value that the autopilot may have: it did not report
+    them as unknown."""
     lossy: bool = False
+    """Whether the link lost frames during the survey, in either direction."""
 
 
 async def survey(

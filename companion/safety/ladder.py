@@ -9,17 +9,14 @@ from companion.safety.snapshot import Snapshot
 
 
 class Verdict(NamedTuple):
-    """The action that the flight must take now.
-
-    Attributes:
-        action: HOLD, or one that ends the flight.
-        reason: description of the breach.
-        stream: what becomes of the setpoints if `action` ends control.
-    """
+    """The action that the flight must take now."""
 
     action: Action
+    """HOLD, or one that ends the flight."""
     reason: str
+    """Description of the breach."""
     stream: Stream = Stream.CONTINUES
+    """What becomes of the setpoints if `action` ends control."""
 
 
 class SafetyLadder:

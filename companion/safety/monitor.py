@@ -29,25 +29,22 @@ def minimum_with_hysteresis(limit: float, raised: bool) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Monitor:
-    """One monitor: a row of `companion.safety.table`.
-
-    Attributes:
-        name: name in the documentation and in messages.
-        judge: see `Judge`; it has no clock and no memory.
-        action: action that a breach leads to.
-        lasts: time that a breach must last before the alarm is raised, s.
-        calm: time without the breach before the alarm ends, s.
-        then: action that follows if a hold does not end the breach.
-        stream: what becomes of the setpoints if the breach ends control.
-    """
+    """One monitor: a row of `companion.safety.table`."""
 
     name: str
+    """Name in the documentation and in messages."""
     judge: Judge
+    """See `Judge`; it has no clock and no memory."""
     action: Action
+    """Action that a breach leads to."""
     lasts: float = 0.0
+    """Time that a breach must last before the alarm is raised, s."""
     calm: float = 1.0
+    """Time without the breach before the alarm ends, s."""
     then: Action = Action.LAND
+    """Action that follows if a hold does not end the breach."""
     stream: Stream = Stream.CONTINUES
+    """What becomes of the setpoints if the breach ends control."""
 
 
 class Alarm:

@@ -27,120 +27,105 @@ class Autopilot(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion of the vehicle, in the frame without estimator resets.
-
-    Attributes:
-        q: attitude (w, x, y, z) as the autopilot reports it, with estimator resets, or None.
-        body_rates: measured rates about the body axes, rad/s.
-        offset: position relative to the fence's centre, which is usually where control began, m, or
-            None.
-        velocity: m/s.
-        height: height above home, m, or None; in the autopilot's frame, with estimator resets.
-        tracking_error: distance from the reference, m; None without a reference.
-        thrust: thrust last sent, 0..1; None while idle on the ground and without a command.
-        origin: latitude and longitude of the fence's centre, or None if they are unknown.
-        acceleration: estimated horizontal acceleration, m/s², NED.
-    """
+    """Motion of the vehicle, in the frame without estimator resets."""
 
     q: Quaternion | None = None
+    """Attitude (w, x, y, z) as the autopilot reports it, with estimator resets, or None."""
     body_rates: Vector = (0.0, 0.0, 0.0)
+    """Measured rates about the body axes, rad/s."""
     offset: Vector | None = None
+    """Position relative to the fence's centre, which is usually where control began, m, or None."""
     velocity: Vector = (0.0, 0.0, 0.0)
+    """m/s."""
     height: float | None = None
+    """Height above home, m, or None; in the autopilot's frame, with estimator resets."""
     tracking_error: float | None = None
+    """Distance from the reference, m; None without a reference."""
     thrust: float | None = None
+    """Thrust last sent, 0..1; None while idle on the ground and without a command."""
     origin: Place | None = None
+    """Latitude and longitude of the fence's centre, or None if they are unknown."""
     acceleration: Horizontal = (0.0, 0.0)
+    """Estimated horizontal acceleration, m/s², NED."""
 
 
 class Control(NamedTuple):
     """When data last arrived, which sample was last answered, and why the newest one is not.
 
     Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
-
-    Attributes:
-        last_answer: arrival of the last answered sample.
-        last_sample: arrival of the last usable attitude sample.
-        attitude_not_finite: whether the newest attitude was refused for a NaN or infinity.
-        reason: why the newest sample is unanswered, or None.
-        last_position: arrival of the last position that was newer than all before.
-        position_not_finite: whether the newest position was refused for a NaN or infinity.
-        last_heard: when the arrival of a frame of any kind from the vehicle was last noticed.
-        position_fresh: whether the newest position is fresh.
-        clock_change: latest jump, stop or restart of the vehicle's clock since control began, in
-            words, or None.
-        stalled: time for which this program did not run since the last answer, s.
     """
 
     last_answer: float = inf
+    """Arrival of the last answered sample."""
     last_sample: float = inf
+    """Arrival of the last usable attitude sample."""
     attitude_not_finite: bool = False
+    """Whether the newest attitude was refused for a NaN or infinity."""
     reason: Unanswered | None = None
+    """Why the newest sample is unanswered, or None."""
     last_position: float = inf
+    """Arrival of the last position that was newer than all before."""
     position_not_finite: bool = False
+    """Whether the newest position was refused for a NaN or infinity."""
     last_heard: float = inf
+    """When the arrival of a frame of any kind from the vehicle was last noticed."""
     position_fresh: bool = True
+    """Whether the newest position is fresh."""
     clock_change: str | None = None
+    """Latest jump, stop or restart of the vehicle's clock since control began, in words, or
+    None."""
     stalled: float = 0.0
+    """Time for which this program did not run since the last answer, s."""
 
 
 class Health(NamedTuple):
-    """Link and computer over the last second; None: unknown.
-
-    Attributes:
-        lost: share of the vehicle's frames that were lost.
-        round_trip: round trip of TIMESYNC, s.
-        missed: share of setpoints that missed their deadline; None in lockstep.
-        starved: share of the time by which the program's timer was late.
-        answer_rate: effective rate of setpoints, Hz (`IntervalSums`).
-        gaps: number of gaps in the setpoints within the last 5 s.
-        position_rate: rate of positions, Hz.
-        foreign: number of reports of the last 5 s in which the autopilot obeyed another program's
-            setpoint (`SetpointEcho`).
-        uplink: the way to the vehicle, over the last moments.
-    """
+    """Link and computer over the last second; None: unknown."""
 
     lost: float | None = None
+    """Share of the vehicle's frames that were lost."""
     round_trip: float | None = None
+    """Round trip of TIMESYNC, s."""
     missed: float | None = None
+    """Share of setpoints that missed their deadline; None in lockstep."""
     starved: float | None = None
+    """Share of the time by which the program's timer was late."""
     answer_rate: float | None = None
+    """Effective rate of setpoints, Hz (`IntervalSums`)."""
     gaps: int = 0
+    """Number of gaps in the setpoints within the last 5 s."""
     position_rate: float | None = None
+    """Rate of positions, Hz."""
     uplink: Uplink = Uplink()
+    """The way to the vehicle, over the last moments."""
     foreign: int = 0
+    """Number of reports of the last 5 s in which the autopilot obeyed another program's setpoint
+    (`SetpointEcho`)."""
 
 
 class Resets(NamedTuple):
-    """Estimator resets since control began.
-
-    Attributes:
-        recent: number of resets within the last 30 s.
-        shift: length of the vector sum of the position jumps, m.
-        heading: sum of the heading jumps, with their signs, rad.
-        tilt: largest jump of the thrust axis, rad.
-    """
+    """Estimator resets since control began."""
 
     recent: int = 0
+    """Number of resets within the last 30 s."""
     shift: float = 0.0
+    """Length of the vector sum of the position jumps, m."""
     heading: float = 0.0
+    """Sum of the heading jumps, with their signs, rad."""
     tilt: float = 0.0
+    """Largest jump of the thrust axis, rad."""
 
 
 class Snapshot(NamedTuple):
-    """The state of vehicle, link and computer at one time.
-
-    Attributes:
-        now: time of the snapshot, s of event-loop time.
-        had_gps: whether GPS has had a 3D fix.
-        good_flags: ESTIMATOR_STATUS flags that were set when control began.
-    """
+    """The state of vehicle, link and computer at one time."""
 
     now: float
+    """Time of the snapshot, s of event-loop time."""
     autopilot: Autopilot = Autopilot()
     motion: Motion = Motion()
     control: Control = Control()
     health: Health = Health()
     resets: Resets = Resets()
     had_gps: bool = False
+    """Whether GPS has had a 3D fix."""
     good_flags: int = 0
+    """ESTIMATOR_STATUS flags that were set when control began."""

@@ -27,49 +27,41 @@ class Disturbances:
     """Disturbances of the vehicle on each horizontal axis.
 
     Densities are one-sided amplitude spectral densities.
-
-    Attributes:
-        gust: standard deviation of the gusts, m/s; drag turns them into an acceleration.
-        gust_time: correlation time of the gusts, s.
-        velocity_error: standard deviation of the slow error of the estimated velocity on a path,
-            m/s.
-        acceleration_error: standard deviation of the slow error of the predicted acceleration on a
-            path, m/s².
-        path_time: correlation time of `velocity_error` and `acceleration_error`, s.
-        velocity_density: density of the error of the estimated velocity in hover, m/s/√Hz.
-        acceleration_density: density of the acceleration that tilt and drag do not explain,
-            m/s²/√Hz.
-        position_noise: standard deviation of the noise of a single position estimate, m.
-        velocity_noise: standard deviation of the noise of a single velocity estimate, m/s.
-        source: source of the two densities and two noises, as text for the user.
     """
 
     gust: float = 0.5
+    """Standard deviation of the gusts, m/s; drag turns them into an acceleration."""
     gust_time: float = 2.0
+    """Correlation time of the gusts, s."""
     velocity_error: float = 0.03
+    """Standard deviation of the slow error of the estimated velocity on a path, m/s."""
     acceleration_error: float = 0.1
+    """Standard deviation of the slow error of the predicted acceleration on a path, m/s²."""
     path_time: float = 1.0
+    """Correlation time of `velocity_error` and `acceleration_error`, s."""
     velocity_density: float = 0.01
+    """Density of the error of the estimated velocity in hover, m/s/√Hz."""
     acceleration_density: float = 0.02
+    """Density of the acceleration that tilt and drag do not explain, m/s²/√Hz."""
     position_noise: float = 0.003
+    """Standard deviation of the noise of a single position estimate, m."""
     velocity_noise: float = 0.005
+    """Standard deviation of the noise of a single velocity estimate, m/s."""
     source: str = "typical of a multirotor"
+    """Source of the two densities and two noises, as text for the user."""
 
 
 class Errors(NamedTuple):
-    """Expected standard deviations of the horizontal position error and of the commanded rate.
-
-    Attributes:
-        gusts: position error due to gusts, m.
-        path: position error on a path at 5 m/s, m.
-        noise: position error due to the noise of the estimate, m.
-        rate: commanded roll-pitch rate √(p² + q²) due to gusts, path and noise, rad/s.
-    """
+    """Expected standard deviations of the horizontal position error and of the commanded rate."""
 
     gusts: float
+    """Position error due to gusts, m."""
     path: float
+    """Position error on a path at 5 m/s, m."""
     noise: float
+    """Position error due to the noise of the estimate, m."""
     rate: float
+    """Commanded roll-pitch rate √(p² + q²) due to gusts, path and noise, rad/s."""
 
     @property
     def position(self) -> float:
@@ -79,22 +71,18 @@ class Errors(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Expectation:
-    """The expected behaviour of a configuration.
-
-    Attributes:
-        whole: margins of the loop opened at the commanded body rate.
-        outer: margins of the loop opened at the commanded acceleration.
-        errors: expected position errors and commanded rate.
-        peak: largest position error after a gust that changes the velocity by 1 m/s at once, m.
-        settling: time from the gust until its position error stays below 5 % of `peak`, s; at most
-            10 s.
-    """
+    """The expected behaviour of a configuration."""
 
     whole: Margins
+    """Margins of the loop opened at the commanded body rate."""
     outer: Margins
+    """Margins of the loop opened at the commanded acceleration."""
     errors: Errors
+    """Expected position errors and commanded rate."""
     peak: float
+    """Largest position error after a gust that changes the velocity by 1 m/s at once, m."""
     settling: float
+    """Time from the gust until its position error stays below 5 % of `peak`, s; at most 10 s."""
 
     @property
     def margins(self) -> Margins:

@@ -16,16 +16,14 @@ class Feedback(NamedTuple):
     """Frequency responses of the commanded coefficient to the measurements, with opposite sign.
 
     The command is −(tilt·c + velocity·v + position·x), before it is held for a guidance period.
-
-    Attributes:
-        tilt: (n,), per measured coefficient c.
-        velocity: (n,), per measured velocity v, m/s.
-        position: (n,), per measured position x, m.
     """
 
     tilt: Complex
+    """(n,), per measured coefficient c."""
     velocity: Complex
+    """(n,), per measured velocity v, m/s."""
     position: Complex
+    """(n,), per measured position x, m."""
 
 
 def hold_element(s: Complex, period: float) -> Complex:

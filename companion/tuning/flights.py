@@ -38,17 +38,14 @@ _QUICK_TAKEOFF_AND_LANDING = {
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """A trajectory to fly, and the wind.
-
-    Attributes:
-        name: name for the user.
-        trajectory: name of a file in `configs/trajectories`.
-        wind: section `wind` of the mock vehicle.
-    """
+    """A trajectory to fly, and the wind."""
 
     name: str
+    """Name for the user."""
     trajectory: str
+    """Name of a file in `configs/trajectories`."""
     wind: Mapping[str, float]
+    """Section `wind` of the mock vehicle."""
 
 
 CIRCLE = Course("circle at 5 m/s", "circle5.yaml", {})

@@ -30,17 +30,14 @@ _USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
 
 @dataclass(frozen=True, slots=True)
 class ModelError:
-    """Difference between the real rate loop and the configured one.
-
-    Attributes:
-        time_factor: factor on lag and dead time.
-        delay: additional dead time, s.
-        gain: factor on the body rates.
-    """
+    """Difference between the real rate loop and the configured one."""
 
     time_factor: float = 1.0
+    """Factor on lag and dead time."""
     delay: float = 0.0
+    """Additional dead time, s."""
     gain: float = 1.0
+    """Factor on the body rates."""
 
 
 EXACT = ModelError()
@@ -48,28 +45,25 @@ EXACT = ModelError()
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Frequency responses of the loop and of its parts, each (n,).
-
-    Attributes:
-        s: frequencies, rad/s.
-        whole: loop gain with the loop opened at the commanded body rate; includes all feedback.
-        outer: loop gain with the loop opened at the commanded acceleration; the attitude loop stays
-            closed.
-        rates: coefficient per commanded body rate, s.
-        command: coefficient per coefficient that guidance commands, without feedback.
-        velocity: commanded coefficient per measured velocity, s/m, with the opposite sign.
-        position: commanded coefficient per measured position, 1/m, with the opposite sign.
-        drag: linear drag, 1/s.
-    """
+    """Frequency responses of the loop and of its parts, each (n,)."""
 
     s: Complex
+    """Frequencies, rad/s."""
     whole: Complex
+    """Loop gain with the loop opened at the commanded body rate; includes all feedback."""
     outer: Complex
+    """Loop gain with the loop opened at the commanded acceleration; the attitude loop stays
+    closed."""
     rates: Complex
+    """Coefficient per commanded body rate, s."""
     command: Complex
+    """Coefficient per coefficient that guidance commands, without feedback."""
     velocity: Complex
+    """Commanded coefficient per measured velocity, s/m, with the opposite sign."""
     position: Complex
+    """Commanded coefficient per measured position, 1/m, with the opposite sign."""
     drag: float
+    """Linear drag, 1/s."""
 
     def by_acceleration(self) -> tuple[Complex, Complex]:
         """Position (m) and commanded body rate (rad/s) per disturbing acceleration, m/s²."""

@@ -27,21 +27,17 @@ def frequencies() -> Complex:
 
 
 class Margins(NamedTuple):
-    """Stability margins of one loop.
-
-    Attributes:
-        gain_db: gain margin, dB: the smaller of the rise and the fall of the gain that the loop
-            tolerates; infinite if the phase never crosses -180°.
-        phase_deg: phase margin, degrees; infinite if the gain never crosses 1.
-        delay: delay margin, s; infinite if the gain never crosses 1.
-        stable: whether the closed loop is stable; if not, the margins say how far it is from
-            stability.
-    """
+    """Stability margins of one loop."""
 
     gain_db: float
+    """Gain margin, dB: the smaller of the rise and the fall of the gain that the loop tolerates;
+    infinite if the phase never crosses -180°."""
     phase_deg: float
+    """Phase margin, degrees; infinite if the gain never crosses 1."""
     delay: float
+    """Delay margin, s; infinite if the gain never crosses 1."""
     stable: bool
+    """Whether the closed loop is stable; if not, the margins say how far it is from stability."""
 
     def sentence(self) -> str:
         """The margins in a sentence for the user."""

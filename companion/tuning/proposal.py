@@ -15,28 +15,25 @@ _ANALYSED_MANEUVERS = ("hover",)
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A proposed configuration, and what to expect of it.
-
-    Attributes:
-        untuned: configuration before.
-        tuned: configuration with the proposal.
-        design: the proposed values.
-        before: expectation of `untuned`.
-        after: expectation of `tuned`.
-        with_errors: model errors of lag and dead time, each with the margins of `tuned` then.
-        disturbances: disturbances of the vehicle.
-        aims: requirements of the search. The margins without model error reach at least 95 % of
-            them; the other requirements may be missed a little.
-    """
+    """A proposed configuration, and what to expect of it."""
 
     untuned: Config
+    """Configuration before."""
     tuned: Config
+    """Configuration with the proposal."""
     design: Design
+    """The proposed values."""
     before: Expectation
+    """Expectation of `untuned`."""
     after: Expectation
+    """Expectation of `tuned`."""
     with_errors: tuple[tuple[ModelError, Margins], ...]
+    """Model errors of lag and dead time, each with the margins of `tuned` then."""
     disturbances: Disturbances
+    """Disturbances of the vehicle."""
     aims: Aims
+    """Requirements of the search. The margins without model error reach at least 95 % of them; the
+    other requirements may be missed a little."""
 
     @property
     def changes(self) -> dict[str, dict[str, float]]:

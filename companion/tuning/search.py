@@ -21,41 +21,35 @@ its natural logarithm."""
 
 @dataclass(frozen=True, slots=True)
 class Aims:
-    """Requirements for a proposal; the search adds a penalty for each one that is missed.
-
-    Attributes:
-        gain_db: smallest gain margin, dB.
-        phase_deg: smallest phase margin, degrees.
-        mismatch: factor by which real lag and dead time may be larger or smaller than configured.
-        mismatch_gain_db: smallest gain margin with this mismatch, dB. With the delay of a rate loop
-            at its slew limit, half of this margin and half of `mismatch_phase_deg` are enough.
-        mismatch_phase_deg: smallest phase margin with this mismatch, degrees.
-        rate_share: three standard deviations of the commanded roll-pitch rate may be at most this
-            share of the rate limit.
-    """
+    """Requirements for a proposal; the search adds a penalty for each one that is missed."""
 
     gain_db: float = 7.0
+    """Smallest gain margin, dB."""
     phase_deg: float = 31.0
+    """Smallest phase margin, degrees."""
     mismatch: float = 1.3
+    """Factor by which real lag and dead time may be larger or smaller than configured."""
     mismatch_gain_db: float = 3.0
+    """Smallest gain margin with this mismatch, dB. With the delay of a rate loop at its slew limit,
+    half of this margin and half of `mismatch_phase_deg` are enough."""
     mismatch_phase_deg: float = 15.0
+    """Smallest phase margin with this mismatch, degrees."""
     rate_share: float = 1.0
+    """Three standard deviations of the commanded roll-pitch rate may be at most this share of the
+    rate limit."""
 
 
 class Design(NamedTuple):
-    """The values of the configuration that are searched.
-
-    Attributes:
-        gain: p of the planner, 1/s.
-        position: weight of the position in guidance, 1/s⁴.
-        velocity: weight of the velocity in guidance, 1/s².
-        bandwidth: bandwidth of the motion observer, rad/s.
-    """
+    """The values of the configuration that are searched."""
 
     gain: float
+    """P of the planner, 1/s."""
     position: float
+    """Weight of the position in guidance, 1/s⁴."""
     velocity: float
+    """Weight of the velocity in guidance, 1/s²."""
     bandwidth: float
+    """Bandwidth of the motion observer, rad/s."""
 
     def applied(self, config: Config) -> Config:
         """The configuration with these values."""

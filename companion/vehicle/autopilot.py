@@ -28,19 +28,16 @@ class Role(Enum):
 
 
 class Readiness(NamedTuple):
-    """Telemetry that decides whether a vehicle can be armed and flown; `None`: not known now.
-
-    Attributes:
-        prearm_good: The autopilot's own pre-arm checks pass.
-        estimator_flags: ESTIMATOR_STATUS_FLAGS.
-        position: A finite local position was received in the last 5 s.
-        home: The home position was received.
-    """
+    """Telemetry that decides whether a vehicle can be armed and flown; `None`: not known now."""
 
     prearm_good: bool | None
+    """The autopilot's own pre-arm checks pass."""
     estimator_flags: int | None
+    """ESTIMATOR_STATUS_FLAGS."""
     position: bool
+    """A finite local position was received in the last 5 s."""
     home: bool
+    """The home position was received."""
 
 
 class ControlEntry(Enum):
@@ -51,17 +48,14 @@ class ControlEntry(Enum):
 
 
 class OffboardLossFailsafe(NamedTuple):
-    """What the autopilot does when setpoints stop.
-
-    Attributes:
-        parameter: Name of the parameter that sets how long it holds the last body rates, s.
-        action: What it does after that time, in words.
-        brakes: Whether it then brakes the vehicle to a stop.
-    """
+    """What the autopilot does when setpoints stop."""
 
     parameter: str
+    """Name of the parameter that sets how long it holds the last body rates, s."""
     action: str
+    """What it does after that time, in words."""
     brakes: bool
+    """Whether it then brakes the vehicle to a stop."""
 
 
 FLIGHT_RATES: Mapping[str, float] = MappingProxyType(

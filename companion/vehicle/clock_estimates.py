@@ -89,17 +89,14 @@ class DelayUnknown(Enum):
 
 
 class _Exchange(NamedTuple):
-    """A TIMESYNC exchange.
-
-    Attributes:
-        at: Event-loop time of the answer, s.
-        first_error: Largest error of the delay at that time, s.
-        delay: TIMESYNC's offset minus the quickest sample's, s.
-    """
+    """A TIMESYNC exchange."""
 
     at: float
+    """Event-loop time of the answer, s."""
     first_error: float
+    """Largest error of the delay at that time, s."""
     delay: float
+    """TIMESYNC's offset minus the quickest sample's, s."""
 
     def error(self, now: float) -> float:
         """Largest error of the delay at the event-loop time `now`, s."""

@@ -28,32 +28,26 @@ class Misfit(Enum):
 
 
 class SampleTiming(NamedTuple):
-    """Vehicle time and age of one sample.
-
-    Attributes:
-        vehicle_time: Time on the vehicle's clock, s, without the clock's jumps and restarts.
-        age: Age at arrival, s, never negative; relative to the quickest sample while the delay is
-            not known; NaN for a misfit.
-        misfit: Why the sample must not be used, or None.
-    """
+    """Vehicle time and age of one sample."""
 
     vehicle_time: float
+    """Time on the vehicle's clock, s, without the clock's jumps and restarts."""
     age: float
+    """Age at arrival, s, never negative; relative to the quickest sample while the delay is not
+    known; NaN for a misfit."""
     misfit: Misfit | None = None
+    """Why the sample must not be used, or None."""
 
 
 class Stamp(NamedTuple):
-    """One sample's time by the vehicle's clock and by the event loop's.
-
-    Attributes:
-        time: Vehicle time, s.
-        ahead: Vehicle time minus event-loop time at its arrival, s; its offset less its delay.
-        received: Event-loop time of its arrival, s.
-    """
+    """One sample's time by the vehicle's clock and by the event loop's."""
 
     time: float
+    """Vehicle time, s."""
     ahead: float
+    """Vehicle time minus event-loop time at its arrival, s; its offset less its delay."""
     received: float
+    """Event-loop time of its arrival, s."""
 
 
 class MisfitRun:

@@ -33,18 +33,15 @@ _MESSAGE_NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class FlightLog:
-    """Setpoints and measurements of one flight; times are in s since the vehicle's boot.
-
-    Attributes:
-        setpoints: Setpoints that the autopilot obeyed: (time of the sample to which the setpoint
-            responds, roll, pitch, yaw rate in rad/s, thrust 0..1).
-        rates: Measured rates: (time, roll, pitch, yaw rate in rad/s).
-        specific_thrust: The accelerometer's −z axis (body FRD): (time, m/s²).
-    """
+    """Setpoints and measurements of one flight; times are in s since the vehicle's boot."""
 
     setpoints: list[Row]
+    """Setpoints that the autopilot obeyed: (time of the sample to which the setpoint responds,
+    roll, pitch, yaw rate in rad/s, thrust 0..1)."""
     rates: list[Row]
+    """Measured rates: (time, roll, pitch, yaw rate in rad/s)."""
     specific_thrust: list[Row]
+    """The accelerometer's −z axis (body FRD): (time, m/s²)."""
 
 
 def read_flight_log(path: Path | str) -> FlightLog:
@@ -78,21 +75,18 @@ def read_flight_log(path: Path | str) -> FlightLog:
 
 @dataclass(slots=True)
 class _Reader:
-    """Collects setpoints and measurements from messages, taken in the order of their recording.
-
-    Attributes:
-        vehicle: system and component of the autopilot, from its first heartbeat.
-        obeyed: setpoints that the autopilot obeyed.
-        rates_with_quaternion: body rates from ATTITUDE_QUATERNION.
-        rates_with_euler: body rates from ATTITUDE.
-        specific_thrust: from the accelerometer.
-    """
+    """Collects setpoints and measurements from messages, taken in the order of their recording."""
 
     vehicle: tuple[int, int] | None = None
+    """System and component of the autopilot, from its first heartbeat."""
     obeyed: list[Row] = field(default_factory=list)
+    """Setpoints that the autopilot obeyed."""
     rates_with_quaternion: list[Row] = field(default_factory=list)
+    """Body rates from ATTITUDE_QUATERNION."""
     rates_with_euler: list[Row] = field(default_factory=list)
+    """Body rates from ATTITUDE."""
     specific_thrust: list[Row] = field(default_factory=list)
+    """From the accelerometer."""
     _autopilot: Autopilot | None = None
     _obeying: bool = False
     _unconfirmed: list[Row] = field(default_factory=list)

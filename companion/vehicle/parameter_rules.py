@@ -15,32 +15,29 @@ Values = Mapping[str, float]
 
 
 class CompanionSettings(NamedTuple):
-    """The part of the configuration with which the autopilot's parameters must agree.
-
-    Attributes:
-        source_system: System id of `companion`.
-        attitude_rate_hz: Rate of attitude samples that is requested, Hz.
-        silence_limit: Time without setpoints after which `companion` releases control, s.
-        hover_thrust: Configured collective thrust at hover, 0..1.
-        curve_factor: Factor of the thrust curve that `companion` compensates; 0: none.
-        battery_exponent: Exponent of the voltage that `companion` compensates; 0: none.
-        autopilot_compensates_tilt: Whether the autopilot is expected to divide thrust by cos(tilt).
-        acceleration_limits: Angular acceleration limits of `roll`, `pitch` and `yaw` that the
-            planner assumes, rad/s²; `None`: no limit.
-        max_tilt: Largest tilt of a target, rad.
-        signing: Whether message signing is configured.
-    """
+    """The part of the configuration with which the autopilot's parameters must agree."""
 
     source_system: int
+    """System id of `companion`."""
     attitude_rate_hz: float
+    """Rate of attitude samples that is requested, Hz."""
     silence_limit: float
+    """Time without setpoints after which `companion` releases control, s."""
     hover_thrust: float
+    """Configured collective thrust at hover, 0..1."""
     curve_factor: float
+    """Factor of the thrust curve that `companion` compensates; 0: none."""
     battery_exponent: float
+    """Exponent of the voltage that `companion` compensates; 0: none."""
     autopilot_compensates_tilt: bool
+    """Whether the autopilot is expected to divide thrust by cos(tilt)."""
     acceleration_limits: Mapping[str, float | None]
+    """Angular acceleration limits of `roll`, `pitch` and `yaw` that the planner assumes, rad/s²;
+    `None`: no limit."""
     max_tilt: float
+    """Largest tilt of a target, rad."""
     signing: bool
+    """Whether message signing is configured."""
 
 
 class CheckResult(Enum):
@@ -58,18 +55,15 @@ class CheckResult(Enum):
 
 
 class Problem(NamedTuple):
-    """What is wrong with the value of a parameter.
-
-    Attributes:
-        result: Severity.
-        because: Consequence of the value, one sentence.
-        set_to: Value to which the parameter should be set. `None`: only the user can know it, or
-            the configuration must change; `because` then says which key.
-    """
+    """What is wrong with the value of a parameter."""
 
     result: CheckResult
+    """Severity."""
     because: str
+    """Consequence of the value, one sentence."""
     set_to: float | None = None
+    """Value to which the parameter should be set. `None`: only the user can know it, or the
+    configuration must change; `because` then says which key."""
 
 
 Check = Callable[[float, Values, CompanionSettings], Problem | None]
@@ -78,29 +72,26 @@ Check = Callable[[float, Values, CompanionSettings], Problem | None]
 
 @dataclass(frozen=True, slots=True)
 class ParameterRule:
-    """A rule for one parameter.
-
-    Attributes:
-        names: Names of the parameter, the newest first; older versions use the others.
-        meaning: What the parameter decides, one clause.
-        check: Judges the value; returns `None` if the value is right.
-        source: Where this rule comes from.
-        vital: Without the parameter it is unknown what a setpoint does, or how long it is held. A
-            vehicle that does not send it is not flown.
-        universal: Every supported version has the parameter, and some of its values are unsafe. If
-            it was not received on a link that loses frames, it may have such a value.
-        instead: Name of the rule for the parameter that other versions have in its place.
-        reboot: A change takes effect only after the autopilot restarts.
-    """
+    """A rule for one parameter."""
 
     names: tuple[str, ...]
+    """Names of the parameter, the newest first; older versions use the others."""
     meaning: str
+    """What the parameter decides, one clause."""
     check: Check
+    """Judges the value; returns `None` if the value is right."""
     source: str
+    """Where this rule comes from."""
     vital: bool = False
+    """Without the parameter it is unknown what a setpoint does, or how long it is held. A vehicle
+    that does not send it is not flown."""
     universal: bool = False
+    """Every supported version has the parameter, and some of its values are unsafe. If it was not
+    received on a link that loses frames, it may have such a value."""
     instead: str = ""
+    """Name of the rule for the parameter that other versions have in its place."""
     reboot: bool = False
+    """A change takes effect only after the autopilot restarts."""
 
     @property
     def name(self) -> str:
@@ -114,22 +105,19 @@ _NO_NUMBER = Problem(
 
 
 class ParameterFinding(NamedTuple):
-    """The result of one rule.
-
-    Attributes:
-        rule: The rule.
-        value: The autopilot's value.
-        result: Severity.
-        because: Consequence of the value; empty if it is safe.
-        set_to: Value to which the parameter should be set; `None` if the value is safe, only the
-            user can know a better one, or the configuration must change.
-    """
+    """The result of one rule."""
 
     rule: ParameterRule
+    """The rule."""
     value: float
+    """The autopilot's value."""
     result: CheckResult
+    """Severity."""
     because: str = ""
+    """Consequence of the value; empty if it is safe."""
     set_to: float | None = None
+    """Value to which the parameter should be set; `None` if the value is safe, only the user can
+    know a better one, or the configuration must change."""
 
 
 def judge(

@@ -26,123 +26,102 @@ GPS_FIX_3D = 3
 
 
 class AttitudeSample(NamedTuple):
-    """One ATTITUDE_QUATERNION. All numbers are finite; the norm of `q` has not been checked.
-
-    Attributes:
-        time_boot_ms: The vehicle's time stamp as received, ms since its boot.
-        vehicle_time: The time stamp in s, without jumps and restarts of the vehicle's clock. The
-            control laws use it.
-        received: Event-loop time of arrival, s. The watchdogs use it.
-        received_ns: `time.perf_counter_ns()` of arrival, to measure latency. Over UDP it is the
-            time at which the kernel received the datagram, otherwise the time of reading.
-        q: Attitude (w, x, y, z), body FRD -> world NED.
-        body_rates: Measured rates about body x, y, z, rad/s.
-        age: Age at arrival by `VehicleClock`, s; NaN for a misfit.
-        misfit: Why the sample does not fit the vehicle's clock and must not be used, or None.
-        age_known: Whether `age` is absolute; see `VehicleClock.age_known`.
-    """
+    """One ATTITUDE_QUATERNION. All numbers are finite; the norm of `q` has not been checked."""
 
     time_boot_ms: int
+    """The vehicle's time stamp as received, ms since its boot."""
     vehicle_time: float
+    """The time stamp in s, without jumps and restarts of the vehicle's clock. The control laws use
+    it."""
     received: float
+    """Event-loop time of arrival, s. The watchdogs use it."""
     received_ns: int
+    """`time.perf_counter_ns()` of arrival, to measure latency. Over UDP it is the time at which the
+    kernel received the datagram, otherwise the time of reading."""
     q: Quaternion
+    """Attitude (w, x, y, z), body FRD -> world NED."""
     body_rates: BodyRates
+    """Measured rates about body x, y, z, rad/s."""
     age: float = 0.0
+    """Age at arrival by `VehicleClock`, s; NaN for a misfit."""
     misfit: Misfit | None = None
+    """Why the sample does not fit the vehicle's clock and must not be used, or None."""
     age_known: bool = False
+    """Whether `age` is absolute; see `VehicleClock.age_known`."""
 
 
 class Heartbeat(NamedTuple):
-    """HEARTBEAT of the autopilot.
-
-    Attributes:
-        received: Event-loop time, s.
-        autopilot: MAV_AUTOPILOT.
-        mode: The autopilot's name for the mode.
-        custom_mode: The autopilot's number for the mode.
-        armed: Whether the vehicle is armed.
-        system_status: MAV_STATE: 3 standby, 4 active; 5 critical, 6 emergency, 8 termination.
-    """
+    """HEARTBEAT of the autopilot."""
 
     received: float
+    """Event-loop time, s."""
     autopilot: int
+    """MAV_AUTOPILOT."""
     mode: str
+    """The autopilot's name for the mode."""
     custom_mode: int
+    """The autopilot's number for the mode."""
     armed: bool
+    """Whether the vehicle is armed."""
     system_status: int
+    """MAV_STATE: 3 standby, 4 active; 5 critical, 6 emergency, 8 termination."""
 
 
 class CurrentMode(NamedTuple):
-    """CURRENT_MODE of the autopilot.
-
-    Attributes:
-        received: Event-loop time, s.
-        mode: The autopilot's name for the mode.
-        intended: The mode that the user commanded last; it differs while a failsafe acts.
-    """
+    """CURRENT_MODE of the autopilot."""
 
     received: float
+    """Event-loop time, s."""
     mode: str
+    """The autopilot's name for the mode."""
     intended: str
+    """The mode that the user commanded last; it differs while a failsafe acts."""
 
 
 class LocalPosition(NamedTuple):
-    """LOCAL_POSITION_NED.
-
-    Attributes:
-        received: Event-loop time, s.
-        vehicle_time: The vehicle's time stamp, s, on the clock of `AttitudeSample.vehicle_time`.
-        position_ned: m.
-        velocity_ned: m/s.
-    """
+    """LOCAL_POSITION_NED."""
 
     received: float
+    """Event-loop time, s."""
     vehicle_time: float
+    """The vehicle's time stamp, s, on the clock of `AttitudeSample.vehicle_time`."""
     position_ned: Vector
+    """M."""
     velocity_ned: Vector
+    """m/s."""
 
 
 class LandedState(NamedTuple):
-    """EXTENDED_SYS_STATE.
-
-    Attributes:
-        received: Event-loop time, s.
-        state: MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing.
-    """
+    """EXTENDED_SYS_STATE."""
 
     received: float
+    """Event-loop time, s."""
     state: int
+    """MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing."""
 
 
 class GlobalPosition(NamedTuple):
-    """GLOBAL_POSITION_INT.
-
-    Attributes:
-        received: Event-loop time, s.
-        latitude_deg: WGS84.
-        longitude_deg: WGS84.
-    """
+    """GLOBAL_POSITION_INT."""
 
     received: float
+    """Event-loop time, s."""
     latitude_deg: float
+    """WGS84."""
     longitude_deg: float
+    """WGS84."""
 
 
 class Battery(NamedTuple):
-    """SYS_STATUS or BATTERY_STATUS; a value that the vehicle does not know is `None`.
-
-    Attributes:
-        received: Event-loop time, s.
-        voltage_v: Voltage of the whole battery, V.
-        remaining: Remaining charge, 0..1.
-        charge_received: Event-loop time at which a charge was last received, s.
-    """
+    """SYS_STATUS or BATTERY_STATUS; a value that the vehicle does not know is `None`."""
 
     received: float
+    """Event-loop time, s."""
     voltage_v: float | None
+    """Voltage of the whole battery, V."""
     remaining: float | None
+    """Remaining charge, 0..1."""
     charge_received: float | None = None
+    """Event-loop time at which a charge was last received, s."""
 
     def replaced_by(self, newer: "Battery") -> "Battery":
         """The newer record; a charge that it lacks is taken from this one.
@@ -158,43 +137,34 @@ class Battery(NamedTuple):
 
 
 class AttitudeTargetThrust(NamedTuple):
-    """ATTITUDE_TARGET: the thrust setpoint of the autopilot, whatever its source.
-
-    Attributes:
-        received: Event-loop time, s.
-        thrust: Collective thrust, 0..1.
-    """
+    """ATTITUDE_TARGET: the thrust setpoint of the autopilot, whatever its source."""
 
     received: float
+    """Event-loop time, s."""
     thrust: float
+    """Collective thrust, 0..1."""
 
 
 class AttitudeTarget(NamedTuple):
-    """ATTITUDE_TARGET: the attitude along whose axes the autopilot takes body rates.
-
-    Attributes:
-        time_boot_ms: The vehicle's time stamp as received, ms since its boot.
-        q: Attitude (w, x, y, z), body FRD -> world NED, of unit norm.
-    """
+    """ATTITUDE_TARGET: the attitude along whose axes the autopilot takes body rates."""
 
     time_boot_ms: int
+    """The vehicle's time stamp as received, ms since its boot."""
     q: Quaternion
+    """Attitude (w, x, y, z), body FRD -> world NED, of unit norm."""
 
 
 class Gps(NamedTuple):
-    """GPS_RAW_INT.
-
-    Attributes:
-        received: Event-loop time, s.
-        fix_type: GPS_FIX_TYPE; 3 or more is a 3D fix.
-        satellites: Number of satellites; `None`: unknown.
-        altitude_m: Altitude above mean sea level, m.
-    """
+    """GPS_RAW_INT."""
 
     received: float
+    """Event-loop time, s."""
     fix_type: int
+    """GPS_FIX_TYPE; 3 or more is a 3D fix."""
     satellites: int | None
+    """Number of satellites; `None`: unknown."""
     altitude_m: float
+    """Altitude above mean sea level, m."""
 
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
@@ -205,42 +175,33 @@ def gps_fault(gps: Gps | None, now: float) -> str | None:
 
 
 class Prearm(NamedTuple):
-    """SYS_STATUS: the autopilot's own pre-arm checks.
-
-    Attributes:
-        received: Event-loop time, s.
-        good: Whether the checks pass.
-    """
+    """SYS_STATUS: the autopilot's own pre-arm checks."""
 
     received: float
+    """Event-loop time, s."""
     good: bool
+    """Whether the checks pass."""
 
 
 class Home(NamedTuple):
-    """HOME_POSITION.
-
-    Attributes:
-        received: Event-loop time, s.
-        latitude_deg: WGS84.
-        longitude_deg: WGS84.
-        altitude_m: Altitude above mean sea level, m.
-        down: Down coordinate in the frame of LOCAL_POSITION_NED, m.
-    """
+    """HOME_POSITION."""
 
     received: float
+    """Event-loop time, s."""
     latitude_deg: float
+    """WGS84."""
     longitude_deg: float
+    """WGS84."""
     altitude_m: float
+    """Altitude above mean sea level, m."""
     down: float
+    """Down coordinate in the frame of LOCAL_POSITION_NED, m."""
 
 
 class Estimator(NamedTuple):
-    """ESTIMATOR_STATUS (PX4) or EKF_STATUS_REPORT (ArduPilot), whose flags mean the same.
-
-    Attributes:
-        received: Event-loop time, s.
-        flags: ESTIMATOR_STATUS_FLAGS.
-    """
+    """ESTIMATOR_STATUS (PX4) or EKF_STATUS_REPORT (ArduPilot), whose flags mean the same."""
 
     received: float
+    """Event-loop time, s."""
     flags: int
+    """ESTIMATOR_STATUS_FLAGS."""

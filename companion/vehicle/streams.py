@@ -20,20 +20,17 @@ _ROUNDING = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not l
 
 
 class StreamRate(NamedTuple):
-    """The rate of one message, as requested, granted and measured, Hz.
-
-    Attributes:
-        asked: Requested rate; 0 requests that the message stops.
-        granted: Rate that the autopilot accepted; 0 if it refused all rates.
-        achieved: Measured rate. It may differ from `granted`: PX4 accepts requests (other than for
-            HEARTBEAT) at any rate, and sends as often as its loops allow.
-        refusal: Result of the last refused request if all were refused, otherwise empty.
-    """
+    """The rate of one message, as requested, granted and measured, Hz."""
 
     asked: float
+    """Requested rate; 0 requests that the message stops."""
     granted: float
+    """Rate that the autopilot accepted; 0 if it refused all rates."""
     achieved: float
+    """Measured rate. It may differ from `granted`: PX4 accepts requests (other than for HEARTBEAT)
+    at any rate, and sends as often as its loops allow."""
     refusal: str = ""
+    """Result of the last refused request if all were refused, otherwise empty."""
 
 
 async def set_rates(

@@ -32,17 +32,14 @@ _KEPT_REQUESTS = 16
 
 
 class Uplink(NamedTuple):
-    """Present delay and loss on the link to the vehicle.
-
-    Attributes:
-        round_trip: Shortest round trip of the probes answered in the last 0.7 s, s; None: none was,
-            or fewer than six were sent.
-        unanswered: Number of probes sent since the newest request that was answered, at most 16;
-            None: the vehicle has not answered any TIMESYNC request.
-    """
+    """Present delay and loss on the link to the vehicle."""
 
     round_trip: float | None = None
+    """Shortest round trip of the probes answered in the last 0.7 s, s; None: none was, or fewer
+    than six were sent."""
     unanswered: int | None = None
+    """Number of probes sent since the newest request that was answered, at most 16; None: the
+    vehicle has not answered any TIMESYNC request."""
 
 
 class _Requests:

@@ -16,19 +16,16 @@ _MAX_COUNT = 10
 
 @dataclass
 class _Window:
-    """The setpoints of one client in its present window.
-
-    Attributes:
-        begins: when the window begins, s of event-loop time.
-        count: number of setpoints that were handled in it.
-        newest: the newest setpoint that was not, or None.
-        timer: hands on `newest` at the end of the window.
-    """
+    """The setpoints of one client in its present window."""
 
     begins: float
+    """When the window begins, s of event-loop time."""
     count: int = 0
+    """Number of setpoints that were handled in it."""
     newest: Frame | None = None
+    """The newest setpoint that was not, or None."""
     timer: asyncio.TimerHandle | None = None
+    """Hands on `newest` at the end of the window."""
 
 
 class SetpointLimit:

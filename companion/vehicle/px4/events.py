@@ -55,17 +55,14 @@ _FAILSAFE_CAUSES = {
 
 
 class _Template(NamedTuple):
-    """Template of the text of an event.
-
-    Attributes:
-        text: The text with ``{}`` for each value.
-        layout: `struct` format of the values in the event's arguments.
-        meanings: For each value, the words for each number; None shows the number itself.
-    """
+    """Template of the text of an event."""
 
     text: str
+    """The text with ``{}`` for each value."""
     layout: str = ""
+    """`struct` format of the values in the event's arguments."""
     meanings: tuple[dict[int, str] | None, ...] = ()
+    """For each value, the words for each number; None shows the number itself."""
 
 
 _EVENTS = {
