@@ -18,7 +18,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from companion import demo
 from companion.attitude import BodyRates
 from companion.campaign.loading import load as load_campaign
 from companion.cli import command_line, flying
@@ -110,7 +109,7 @@ def ready_to_fly(options: Namespace) -> None:
     bundled = options.run == "flights.demo" or getattr(options, "bundled", None) is not None
     path = getattr(options, "bundled", None) or options.config
     if path in (None, Path()):
-        path = demo.default_config()
+        path = shipped("mock-px4.yaml")
     if bundled:
         options.endpoint, options.arm = "udpin://127.0.0.1:14540", True
     planner = None

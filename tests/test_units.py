@@ -42,5 +42,6 @@ def test_what_is_not_known_of_an_axis_stays_unknown():
     roll, pitch = known.axes["roll"], known.axes["pitch"]
     assert (roll.lag, roll.dead_time, roll.acceleration_limit) == (0.04, 0.02, None)
     assert pitch == roll
-    assert known.response == {"lag": 0.04, "dead_time": 0.02}
+    axes = {f"{axis}{key}" for axis in ("", "pitch_", "yaw_") for key in ("lag", "dead_time")}
+    assert known.response.keys() == axes
     assert Config().vehicle.response == {}

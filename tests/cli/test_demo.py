@@ -11,6 +11,7 @@ import yaml
 from companion import demo
 from companion.cli.flying import write_flight_page
 from companion.cli.main import main
+from companion.config.files import shipped
 from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import LOOP_HZ, QUICK_MOCK, QUICK_PARAMETERS, merged
 from tests.flight.programs import Program
@@ -25,16 +26,17 @@ def folder(tmp_path, monkeypatch):
 
 def quick_demo(folder: Path) -> str:
     """The configuration that ships, flown with short steps by a vehicle that wastes no time."""
-    shipped = yaml.safe_load(demo.default_config().read_text())
+    file = shipped("mock-px4.yaml")
+    content = yaml.safe_load(file.read_text())
     mine = {
-        "include": str(demo.default_config().with_name(shipped["include"])),
+        "include": str(file.with_name(content["include"])),
         "steps": {"duration_s": 0.5, "settle_s": 0.5},
         "flight": {"takeoff_height_m": 2.0},
         "link": {"attitude_rate_hz": float(LOOP_HZ)},
         "mock": {**QUICK_MOCK, "parameters": QUICK_PARAMETERS["px4"]},
     }
     path = folder / "quick.yaml"
-    path.write_text(yaml.safe_dump(merged(shipped, mine)))
+    path.write_text(yaml.safe_dump(merged(content, mine)))
     return str(path)
 
 
@@ -63,7 +65,7 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
     monkeypatch.setattr(demo, "free_port", lambda *_: port)
     (folder / "log").mkdir()
     wire = demo.udp_wire()
-    with demo.bundled_vehicle(demo.default_config(), wire, folder / "log" / "a", lockstep=True):
+    with demo.bundled_vehicle(shipped("mock-px4.yaml"), wire, folder / "log" / "a", lockstep=True):
         assert main(["demo", "--lockstep"]) == 1
     assert f"UDP port {port + 40}" in " ".join(capsys.readouterr().err.split())
 
@@ -72,7 +74,7 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
 def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, capsys):
     wire = demo.udp_wire()
     (folder / "mine.yaml").write_text(f"link: {{endpoint: '{wire.endpoint}'}}")
-    with demo.bundled_vehicle(demo.default_config(), wire, folder / "log", lockstep=False):
+    with demo.bundled_vehicle(shipped("mock-px4.yaml"), wire, folder / "log", lockstep=False):
         code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
     assert code == 1
     assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())

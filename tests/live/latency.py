@@ -16,7 +16,7 @@ import numpy as np
 import psutil
 
 from companion import demo
-from companion.config.files import changed, load
+from companion.config.files import changed, load, shipped
 from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
 from companion.live.addresses import open_page_socket
@@ -52,7 +52,7 @@ def main() -> None:
 
 def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
     """Latencies in µs, and the memory of this process after `_FIRST` seconds, MB."""
-    path = demo.default_config()
+    path = shipped("mock-px4.yaml")
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         wire = stack.enter_context(demo.wire_like("udpin://127.0.0.1:1"))

@@ -192,7 +192,7 @@ def test_more_programs_than_are_remembered_do_not_end_control_for_ever():
         async with serving(vehicle, "px4", notes) as session:
             await airborne(session, vehicle, "px4")
             script, crowd = (MemoryClient(name).connect(session) for name in ("script", "crowd"))
-            home = session.control._link.state.position.position_ned
+            home = session.network._link.state.position.position_ned
             script.local(ALL, home)
             for number in range(40):
                 crowd.packer.srcSystem = 100 + number
@@ -200,7 +200,7 @@ def test_more_programs_than_are_remembered_do_not_end_control_for_ever():
                 await asyncio.sleep(0.003)
             assert await script.offboard() == REJECTED
             assert any("too many programs" in text for text in script.texts())
-            assert session.control.ownership.owner is None
+            assert session.flights.ownership.owner is None
             await begin_control(session, script, "px4", lambda *_: script.local(ALL, home))
         assert not [text for text in notes if "internal error" in text]
 
@@ -218,7 +218,7 @@ def test_a_client_that_goes_on_for_a_silent_one_is_named():
                 MemoryClient(name, ids).connect(session)
                 for name, ids in (("first", (245, 190)), ("second", (246, 190)))
             )
-            home = session.control._link.state.position.position_ned
+            home = session.network._link.state.position.position_ned
             await begin_control(session, first, "px4", lambda *_: first.local(ALL, home))
             await asyncio.sleep(0.7)
             await stream(0.3, lambda _: second.local(ALL, home))

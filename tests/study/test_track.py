@@ -15,9 +15,9 @@ import psutil
 import pytest
 import yaml
 
-from companion import demo
 from companion.attitude import PLANNER_NAMES
 from companion.cli.main import main
+from companion.config.files import shipped
 from companion.files.yaml_file import ConfigError
 from companion.study.track import flights, study
 from companion.study.track.findings import find
@@ -41,12 +41,13 @@ def vehicle(tmp_path, monkeypatch):
     """Makes the vehicle that ships another one."""
 
     def changed(**mock):
-        shipped = yaml.safe_load(demo.default_config().read_text())
-        shipped["include"] = str(demo.default_config().with_name(shipped["include"]))
-        shipped["mock"] |= mock
+        file = shipped("mock-px4.yaml")
+        content = yaml.safe_load(file.read_text())
+        content["include"] = str(file.with_name(content["include"]))
+        content["mock"] |= mock
         path = tmp_path / "other.yaml"
-        path.write_text(yaml.safe_dump(shipped))
-        monkeypatch.setattr(demo, "default_config", lambda: path)
+        path.write_text(yaml.safe_dump(content))
+        monkeypatch.setattr(flights, "shipped", lambda _: path)
 
     return changed
 
