@@ -85,7 +85,7 @@ class Refused(Exception):  # noqa: N818 - a refusal is not an error of this prog
 
 
 class SettingResult(NamedTuple):
-    """One setting that was requested."""
+    """A requested setting, and whether it was granted."""
 
     name: str
     """Its key in the section `realtime`."""

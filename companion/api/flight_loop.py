@@ -1,4 +1,7 @@
-"""The event loop of a program's flight: a loop in a thread of its own; in lockstep the program's.
+"""The event loop in which a program's flight runs: a loop in its own thread, or the program's.
+
+The flight runs in the program's loop if the vehicle waits for each answer, as in lockstep.
+
 
 With a thread for the flight, a program that computes, blocks or never yields delays only its own
 commands. The flight continues to answer samples, notices the missing commands, and hands the
@@ -110,11 +113,11 @@ class OwnThreadLoop:
             self._program.call_soon_threadsafe(callback, *args)
 
     def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
-        """Register `end`; the flight's loop awaits it before this thread ends."""
+        """Set `end`, which the flight's loop awaits before the flight's thread ends."""
         self._end_flight = end
 
     def close(self, *, wait: bool) -> None:
-        """End the flight if it still runs, and the thread; with `wait`, return after both."""
+        """End the flight if it still runs, and its thread; with `wait`, return after both."""
         self.post(self._closing.set)
         if wait:
             self._thread.join()

@@ -19,8 +19,9 @@ def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float,
 
 
 def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float]:
-    """Split a unit quaternion into (a, b, x, y, z) of tilt ⊗ yaw (equation 9).
+    """Split a unit quaternion into tilt (a, x, y, 0) ⊗ yaw (b, 0, 0, z); return (a, b, x, y, z).
 
+    This is equation 9. The x and y of the tilt and the z of the yaw are not those of the argument.
     The heading of an exactly inverted attitude (w = z = 0) is undefined; it is taken as zero.
     """
     a = sqrt(w * w + z * z)

@@ -1,4 +1,7 @@
-"""Converts attitudes to coefficients and heading and back; checks a planner's input."""
+"""Converts attitudes to coefficients and heading and back; checks a planner's input.
+
+Equations are those of the paper (`companion.attitude`); a, b, x, y, z are the fields of `TiltYaw`.
+"""
 
 from math import atan2, inf, pi, sqrt
 
@@ -55,7 +58,7 @@ def wrap_angle(angle: float) -> float:
 
 
 def decompose(q: Quaternion) -> TiltYaw:
-    """Split an attitude into tilt ⊗ yaw (equation 9).
+    """Split an attitude into tilt ⊗ yaw (paper, equation 9).
 
     Raises:
         InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.
@@ -64,7 +67,9 @@ def decompose(q: Quaternion) -> TiltYaw:
 
 
 def coefficients(q: Quaternion) -> Coefficients:
-    """Acceleration coefficients (−2ay, +2ax) of an attitude (equation 10); |c| = sin(tilt).
+    """Acceleration coefficients (−2ay, +2ax) of an attitude, with a, x, y of `decompose`.
+
+    Their norm is sin(tilt) (paper, equation 10).
 
     Raises:
         InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.
@@ -74,7 +79,7 @@ def coefficients(q: Quaternion) -> Coefficients:
 
 
 def heading(q: Quaternion) -> float:
-    """Tilt-yaw heading 2·atan2(z, b) in rad, in (−π, π].
+    """Tilt-yaw heading 2·atan2(z, b) in rad, in (−π, π], with z and b of `decompose`.
 
     When level, it equals the Euler yaw that an autopilot reports; tilted, it differs in general.
 

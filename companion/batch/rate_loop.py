@@ -1,7 +1,9 @@
-"""One vehicle behind its rate loop: dead time, slew limit and lag of each axis, compiled.
+"""Flies one vehicle with a model of its rate loop, compiled.
 
-Unlike `companion.batch.loops`, this loop goes through the samples of one vehicle. Each vehicle may
-have its own limits, gains and rate loop, and the memory does not grow with the number of vehicles.
+The model has a dead time, a slew limit and a lag for each axis. `companion.batch.loops` steps all
+vehicles together, with an ideal rate loop and the same gains and limits. Here a call flies a single
+vehicle from beginning to end. So each vehicle may have its own limits, gains and rate loop, and the
+memory does not grow with the number of vehicles.
 """
 
 from collections.abc import Callable, Sequence

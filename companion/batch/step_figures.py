@@ -92,9 +92,10 @@ def _four_figures(
 
 
 def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, float]:
-    """Time constants of the best fits north and east, s, by golden-section search; NaN: no step.
+    """Time constants of the first-order models that fit north and east best, s; NaN: no step.
 
-    Both searches run together, because a processor computes two models in the time of one.
+    The golden-section searches for north and east run together, because a processor computes two
+    models in about the time of one.
     """
     low, high = np.full(2, _SHORTEST_LOG), np.full(2, _LONGEST_LOG)
     left, right, new_point, largest = np.empty(2), np.empty(2), np.empty(2), np.zeros(2)

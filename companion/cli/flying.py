@@ -70,7 +70,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
 
 
 def invocation(options: argparse.Namespace) -> Invocation:
-    """The command line of this call, for messages."""
+    """The command line of this run, for messages."""
     program = Path(sys.argv[0])
     if program.name != "companion":  # `python -m companion`
         name = f"{sys.executable} -m companion"
@@ -92,7 +92,7 @@ def fly(
         config: configuration of the flight.
         folder: folder for the flight's files.
         console: console for messages.
-        invocation: this call, for the suggested next command; None: no suggestion.
+        invocation: command line of this run, to suggest the next command; None: no suggestion.
         helper: helper process that watches a file or serves the live page, or None.
 
     Raises:

@@ -54,8 +54,8 @@ class SafetyConfig(Section):
     battery_action: Literal["warn", "hand_back", "land"] = "land"
     """Action if the battery is below limits.min_battery_percent, or not reported for 5 s."""
     position_action: Ending = "land"
-    """Action if GPS is lost, the estimator loses attitude, velocity or position, or either is not
-    reported for 5 s."""
+    """Action if GPS is lost, if the estimator loses attitude, velocity or position, or if GPS or
+    the estimator's status is not reported for 5 s."""
     max_reset_m: Annotated[float, Field(ge=0.01, le=20.0)] = 1.0
     """Largest sum of the estimator's position jumps in a flight. References move with each jump."""
     max_reset_deg: Annotated[float, Field(gt=0.0, le=120.0)] = 45.0
@@ -65,7 +65,7 @@ class SafetyConfig(Section):
     max_resets: Annotated[int, Field(ge=0, le=30)] = 3
     """Largest number of estimator resets within 30 s."""
     reset_action: Ending = "land"
-    """Action if the estimator resets more often or by more."""
+    """Action if max_resets, max_reset_m or max_reset_deg is exceeded."""
     tilt_margin_deg: Annotated[float, Field(ge=1.0, le=60.0)] = 20.0
     """Tilt beyond limits.max_tilt_deg that is tolerated."""
     max_body_rate_deg_s: Annotated[float, Field(ge=10.0, le=1800.0)] = 400.0
@@ -75,13 +75,13 @@ class SafetyConfig(Section):
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=60.0)] = 15.0
     """Largest speed in any direction."""
     speed_action: AnyAction = "hold"
-    """Action if the vehicle is faster for 0.3 s."""
+    """Action if max_speed_m_s is exceeded for 0.3 s."""
     max_tracking_error_m: Annotated[float, Field(ge=0.05, le=100.0)] = 5.0
     """Largest distance from the reference. After open-loop steps the monitor waits until the
     vehicle has returned, at most 10 s.
     """
     tracking_action: AnyAction = "hold"
-    """Action if the distance is larger for 1 s."""
+    """Action if the distance from the reference exceeds max_tracking_error_m for 1 s."""
     thrust_action: AnyAction = "hold"
     """Action if thrust stays at limits.min_thrust or limits.max_thrust for 2 s."""
     max_loss: AlarmShare = 0.4
@@ -89,7 +89,7 @@ class SafetyConfig(Section):
     max_round_trip_ms: Annotated[float, Field(ge=1.0, le=2000.0)] = 150.0
     """Largest round-trip time of the link."""
     link_action: AnyAction = "warn"
-    """Action if the loss is larger for 2 s, or the round trip for 5 s."""
+    """Action if max_loss is exceeded for 2 s, or max_round_trip_ms for 5 s."""
     max_missed: AlarmShare = 0.25
     """Largest share of setpoints that miss deadman.deadline_ms, over a second."""
     max_starved: AlarmShare = 0.5

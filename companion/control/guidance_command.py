@@ -27,7 +27,7 @@ class GuidanceCommand(NamedTuple):
     """Thrust that replaces the one computed from `acceleration_down`, within the limits, 0..1;
     None: the computed thrust is sent."""
     frame: HeadingFrame = HeadingFrame()
-    """The frame without heading resets when the command was made."""
+    """The frame without estimator resets, as it was when the command was made."""
     later: Target | None = None
     """The target `period` after `made_at`; the target moves there on a straight line and then
     stays. None: the target is constant."""

@@ -105,8 +105,8 @@ class LoopRecord:
     last_answer: float = -inf
     """When the newest answered sample arrived."""
     gap_from: float = inf
-    """When the present gap without setpoints began: `last_answer`, or inf before the first answer
-    and after `ControlLoop.resume`."""
+    """Beginning of the present time without setpoints: `last_answer`. It is inf, so that no gap is
+    counted, before the first answer and after `ControlLoop.resume`."""
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
     """When the first answerable sample after each of the latest gaps arrived. A gap is a time
     longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is active or

@@ -65,9 +65,12 @@ class Retuning:
         self._loop, self._guidance_loop = loop, guidance_loop
 
     @contextmanager
-    def stepped_by(self, step: Callable[[float], None]) -> Iterator[None]:
-        """Call `step` at the beginning of each guidance step while the block runs."""
-        self._guidance_loop.before_step = step
+    def stepped_by(self, before_step: Callable[[float], None]) -> Iterator[None]:
+        """Call `before_step` with the time, s, at the beginning of each guidance step.
+
+        This ends with the block.
+        """
+        self._guidance_loop.before_step = before_step
         try:
             yield
         finally:

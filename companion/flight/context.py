@@ -60,7 +60,8 @@ class FlightContext:
     """Largest age of the last report of the mode, s, before it counts as unknown; the checks set
     this limit from the heartbeat rate."""
     mode_at_checks: str | None = None
-    """The mode when the checks ended; another one before arming is a takeover."""
+    """The mode when the checks ended. If the mode differs before we command arming, the pilot or
+    another station has changed it, and the flight ends."""
     must_disarm: bool = False
     """Whether an end on the ground disarms: we commanded arming or the take-off."""
     fence_centre: FenceCentre | None = None
@@ -79,7 +80,8 @@ class FlightContext:
     def end_stream(self) -> None:
         """Stop answering samples; if the autopilot obeys us, the last answer has zero body rates.
 
-        Call this if we end the control. After a takeover or with doubtful data, call `release`.
+        Call this if we end the control. If the pilot has taken over, or data are doubtful, call
+        `release`.
         """
         self.loop.end_stream()
         self.guidance_loop.stand_by()

@@ -82,8 +82,9 @@ async def decline_landing() -> bool:
 class EventRecorder:
     """An observer that records phases and events, and passes everything to another observer.
 
-    A fault in the other observer must not cost control of the vehicle. So after an exception that
-    observer receives nothing more; after an exception in its `status`, only no more states.
+    A fault in the other observer must not cost control of the vehicle. After an exception in its
+    `status`, that observer receives no more states, but everything else. After any other exception
+    it receives nothing more.
 
     Attributes:
         phases: (begin in s on our clock, name) of each phase.

@@ -42,10 +42,10 @@ def check_control(config: Config) -> None:
 
 
 def require_extras(config: Config) -> None:
-    """Check that the optional packages are installed that a flight needs.
+    """Check that the optional packages that a flight needs are installed.
 
     Raises:
-        MissingExtraError: one is not.
+        MissingExtraError: a package is not installed.
     """
     if config.guidance.kind == "nmpc":
         require("casadi", "nmpc", "guidance.kind: nmpc")

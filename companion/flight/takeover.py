@@ -1,4 +1,4 @@
-"""The takeover, and the checks before it of a vehicle that somebody else armed."""
+"""Checks a vehicle that somebody else armed, and takes over a vehicle that flies."""
 
 import asyncio
 from collections.abc import Callable

@@ -168,7 +168,7 @@ class FrameScanner:
 
 
 def _is_plausible(data: bytes, start: int) -> bool:
-    """Whether this may be a version 2 header: no compatibility flags, message id below 65536."""
+    """Whether this may be a version 2 header: compat_flags 0, message id below 65536."""
     return data[start] == V2 and data[start + 3] == 0 and data[start + 9] == 0
 
 

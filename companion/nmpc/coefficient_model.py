@@ -31,11 +31,14 @@ def coefficient_model(settings: Settings) -> Model:
     specific thrust T. With drag d(v) and wind w, v̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] −
     d(v) + w and τ·c̈ + ċ = p·(c_d − c). The heading responds in first order.
 
+    p is the gain of the planner, 1/s, and τ the lag of its response, s: `Settings.gain`, `lag`.
+
     Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
-    p·(c_d − c) is within W_M; the heading rate is within its own limit. The discs are replaced by
-    polygons inside them, so the constraints are linear in the control at a given state. Therefore
-    the first control, the only one that is flown, satisfies them after a single iteration from any
-    guess. The dead time is not part of the model: `Predictor` integrates the motion to its end.
+    p·(c_d − c) is at most `max_tilt_rate`; the heading rate is within its own limit. The first two
+    limits are discs, of c_d and of the tilt rate. A polygon inside each disc replaces it, so the
+    constraints are linear in the control at a given state. Therefore the first control, the only
+    one that is flown, satisfies them after a single iteration from any guess. The dead time is not
+    part of the model: `Predictor` integrates the motion to the end of the dead time.
     """
     symbols = Symbols(size=11, own_constants=1)
     rates, turning = symbols.state[9:11], symbols.turning(settings)

@@ -21,7 +21,7 @@ class RetryPolicy(NamedTuple):
     timeout_s: float
     """Time until a request is repeated, s."""
     tries: int
-    """Number of requests for each of the parameter's names."""
+    """Number of requests for each name; a parameter may have an old name, too."""
 
 
 _FIRST_ROUND = RetryPolicy(0.5, 3)

@@ -48,7 +48,7 @@ class SpooledFile:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def read(self, width: int) -> NDArray[np.float64]:
-        """(N · width,), the doubles of all rows one after the other, without an incomplete row."""
+        """(N · width,), the doubles of all rows in order; an incomplete last row is left out."""
         if self._file is None:
             return np.empty(0)
         self._file.seek(0)

@@ -12,7 +12,7 @@ class Verdict(NamedTuple):
     """The action that the flight must take now."""
 
     action: Action
-    """HOLD, or one that ends the flight."""
+    """HOLD, or an action that ends the flight."""
     reason: str
     """Description of the breach."""
     stream: Stream = Stream.CONTINUES

@@ -10,7 +10,7 @@ from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
 _MOTION_LIMITS = frozenset(
     {"limits.max_climb_m_s", "limits.max_descent_m_s", "limits.max_yaw_rate_deg_s"}
 )
-"""Configuration keys of limits that `CommandedMotion` takes over when control begins."""
+"""Configuration keys of the limits that `CommandedMotion` is given once, when control begins."""
 
 
 def commanded_motion(config: Config) -> CommandedMotion:

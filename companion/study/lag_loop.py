@@ -18,7 +18,7 @@ STEP_HZ = 1000
 
 
 class LagFlight(NamedTuple):
-    """A flight with a `LagLoop`."""
+    """Attitudes and commanded rates of a simulated flight with a `LagLoop`."""
 
     q: Floats
     """(samples + 1, 4), attitude (w, x, y, z)."""

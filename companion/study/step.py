@@ -1,4 +1,7 @@
-"""A step of the target coefficients, and the response of a planner to it."""
+"""A step of the target coefficients, and the response of a planner to it.
+
+The paper is Xu & Pei; see `companion.attitude`.
+"""
 
 from dataclasses import dataclass
 from math import pi
@@ -15,7 +18,7 @@ from companion.attitude.reference import FirstOrderReference
 Floats = NDArray[np.float64]
 
 ALL_HEADINGS = tuple(k * pi / 36.0 for k in range(-35, 37))
-"""The headings of the paper's figure 3, every π/36; rad."""
+"""Headings of figure 3 of the paper (Xu & Pei), every π/36; rad."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class Response:
 
 
 class LoopFlight(Protocol):
-    """A flight with an inner loop at one heading."""
+    """Result of a flight with an inner loop, at one heading of the step."""
 
     @property
     def q(self) -> Floats:
@@ -102,7 +105,7 @@ class Loop(Protocol):
 
 
 def fly(planner: LawPlanner, step: Step) -> Response:
-    """Fly a step with an ideal rate loop: body rates equal the commanded (paper, section 4)."""
+    """Fly a step with an ideal rate loop: body rates equal the commanded ones (section 4)."""
     starts = [attitude(step.start, heading) for heading in step.headings]
     targets = [(*step.target, heading, 0.0) for heading in step.headings]
     history = batch.simulate(

@@ -86,12 +86,15 @@ class Expectation:
 
     @property
     def margins(self) -> Margins:
-        """Each margin the smaller of `whole` and `outer`."""
+        """For each margin the smaller value of `whole` and `outer`."""
         return smaller_margins(self.whole, self.outer)
 
 
 def stability(config: Config, error: ModelError = EXACT) -> Margins:
-    """Margins of a configuration: each the smaller of the two of `Expectation.margins`.
+    """Gain and phase margin of a configuration.
+
+    For each the smaller value of the loop opened at the commanded body rate and of the loop opened
+    at the commanded acceleration.
 
     Args:
         config: the configuration.
@@ -104,7 +107,7 @@ def stability(config: Config, error: ModelError = EXACT) -> Margins:
 
 
 def loop_margins(loop: Loop) -> Margins:
-    """Margins of a loop at `frequencies`: each the smaller of those of `whole` and `outer`."""
+    """Margins of a loop at `frequencies`; for each the smaller value of `whole` and `outer`."""
     return smaller_margins(margins(loop.s, loop.whole), margins(loop.s, loop.outer))
 
 

@@ -55,13 +55,13 @@ class Loop:
     """Loop gain with the loop opened at the commanded acceleration; the attitude loop stays
     closed."""
     rates: Complex
-    """Coefficient per commanded body rate, s."""
+    """Response of the coefficient to the commanded body rate, s."""
     command: Complex
-    """Coefficient per coefficient that guidance commands, without feedback."""
+    """Response of the coefficient to the coefficient that guidance commands, without feedback."""
     velocity: Complex
-    """Commanded coefficient per measured velocity, s/m, with the opposite sign."""
+    """Response of the commanded coefficient to the measured velocity, sign reversed, s/m."""
     position: Complex
-    """Commanded coefficient per measured position, 1/m, with the opposite sign."""
+    """Response of the commanded coefficient to the measured position, sign reversed, 1/m."""
     drag: float
     """Linear drag, 1/s."""
 
@@ -141,7 +141,9 @@ def _slower_axis(config: Config) -> AxisResponse:
 
 
 def _planner_response(config: Config, s: Complex) -> tuple[Complex, float]:
-    """Body rate per target coefficient (n,) and, with opposite sign, per measured one, 1/s.
+    """Responses of the body rate to the target coefficient and to the measured coefficient, 1/s.
+
+    The first is (n,); the second is a number, with its sign reversed.
 
     `model-following` commands the rates that compensate the lag in its reference model, and feeds
     back the difference from this model, one dead time later. All other planners command p times the

@@ -30,10 +30,10 @@ class Aims:
     mismatch: float = 1.3
     """Factor by which real lag and dead time may be larger or smaller than configured."""
     mismatch_gain_db: float = 3.0
-    """Smallest gain margin with this mismatch, dB. With the delay of a rate loop at its slew limit,
-    half of this margin and half of `mismatch_phase_deg` are enough."""
+    """Smallest gain margin when lag and dead time differ by the factor `mismatch`, dB. While the
+    rate loop is at its slew limit, half of this and half of `mismatch_phase_deg` are enough."""
     mismatch_phase_deg: float = 15.0
-    """Smallest phase margin with this mismatch, degrees."""
+    """Smallest phase margin when lag and dead time differ by the factor `mismatch`, degrees."""
     rate_share: float = 1.0
     """Three standard deviations of the commanded roll-pitch rate may be at most this share of the
     rate limit."""

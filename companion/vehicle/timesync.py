@@ -23,10 +23,10 @@ _EXCHANGE_PERIOD_S = 1.0
 _NS_PER_S, _S_PER_NS = 1e9, 1e-9
 _PROBE_PERIOD = 0.1 * _NS_PER_S
 _UPLINK_WINDOW = 0.7 * _NS_PER_S
-"""Only probes answered within this time count, ns. A link that becomes slow is noticed after about
-this time: until then the answers from before still count."""
+"""Window of `Uplink.round_trip`, ns: it uses only probes answered in the last 0.7 s. A link that
+becomes slow is noticed after about this time: until then the answers from before still count."""
 _MIN_PROBES = 6
-"""Fewer probes sent in this time say nothing: probing has just begun, or begun again."""
+"""Fewer probes sent in this window say nothing: probing has just begun, or begun again."""
 _KEPT_REQUESTS = 16
 """Number of unanswered requests of each kind that are kept, and of round trips."""
 

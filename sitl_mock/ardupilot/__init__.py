@@ -1,1 +1,1 @@
-"""ArduCopter, simulated as recorded and measured: its numbers, texts and rules."""
+"""The simulated ArduCopter: its numbers, texts and rules were recorded or measured on ArduPilot."""

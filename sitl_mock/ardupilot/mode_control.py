@@ -53,7 +53,7 @@ class ArduPilotModeControl:
             self._guided.hold()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift the held position and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         self._hold.shift(yaw_step, position_step)
         self._return.height -= position_step[2]
 

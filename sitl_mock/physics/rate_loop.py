@@ -146,7 +146,7 @@ def delayed(ring: Ring, delays: Delays, step: int, setpoint: Vector) -> Vector:
     Args:
         ring: the latest setpoints, longer than any delay. It is changed.
         delays: delays of roll, pitch and yaw, steps.
-        step: number of the step; each call has the next one.
+        step: number of the step, one more with each call.
         setpoint: body rates, rad/s.
     """
     length = len(ring)

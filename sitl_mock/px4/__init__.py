@@ -1,1 +1,1 @@
-"""PX4, simulated as recorded and measured: its numbers, texts and rules."""
+"""The simulated PX4: its numbers, texts and rules were recorded or measured on PX4."""

@@ -147,7 +147,7 @@ class UserTrajectory:
     """A trajectory of a user's program. What its code raises becomes a `UserCodeError`.
 
     Args:
-        trajectory: the user's trajectory, or one of this program that may contain it.
+        trajectory: the user's trajectory, or one of ours that may wrap the user's.
     """
 
     def __init__(self, trajectory: Trajectory) -> None:

@@ -18,7 +18,7 @@ _HEADING_CUTOFF = 2.0
 """Cutoff frequency of every `heading_spline`, Hz: no vehicle follows a faster heading."""
 
 HEADING_CHECK_STEP = 1.0 / (32.0 * _HEADING_CUTOFF)
-"""Longest time between two checks of a trajectory whose heading is a `heading_spline`, s."""
+"""Longest time between two check points of a trajectory whose heading is a `heading_spline`, s."""
 
 _HEADING_STEP = 0.01
 """Sample period of the direction of flight, s."""
@@ -36,9 +36,9 @@ class SplineCurve:
 
     Attributes:
         spline: three times continuously differentiable.
-        checks_per_piece: smallest number of checks in each piece; an extreme between two checks is
-            missed by less than 0.3 %.
-        longest_step: largest phase between two checks, s; a heading may need a short one.
+        checks_per_piece: smallest number of check points in each piece; an extreme between two of
+            them is missed by less than 0.3 %.
+        longest_step: largest phase between two check points, s; a heading may need a short one.
     """
 
     spline: SepticSpline
@@ -46,10 +46,10 @@ class SplineCurve:
     longest_step: float = np.inf
 
     def sampling(self) -> PhaseSampling:
-        """Evenly spaced checks in each piece, more in long and in fast pieces.
+        """Evenly spaced check points in each piece, more in long and in fast pieces.
 
         Raises:
-            TrajectoryError: the curve needs too many checks.
+            TrajectoryError: the curve needs too many check points.
         """
         knots = self.spline.knots
         spans = np.diff(knots)

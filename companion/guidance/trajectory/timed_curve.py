@@ -2,8 +2,8 @@
 
 Where the rate of the time law is constant, all laps of a figure are alike. So only the first and
 the last lap are checked; a helix is lowest and highest there. The ramps are checked completely.
-Two checks are so close in phase and path length that an extreme between them is missed by less than
-0.3 %; `tests/trajectory/test_check_times.py` compares them with a finer grid.
+Neighbouring check times are so close in phase and path length that an extreme between them is
+missed by less than 0.3 %; `tests/trajectory/test_check_times.py` compares them with a finer grid.
 """
 
 from bisect import bisect_left, bisect_right
@@ -20,10 +20,10 @@ from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Piece, TimeLaw, derivatives
 
 _CHECKS_PER_PIECE = 256
-"""Fewest checks in each piece of a time law whose rate changes."""
+"""Fewest check times in each piece of a time law whose rate changes."""
 
 _TABLE_ROWS = 2048
-"""Rows of the table from which the time at a phase is interpolated; it need not be exact."""
+"""Rows of the table from which the time at a phase is interpolated; this time need not be exact."""
 
 
 def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST) -> list[float]:
@@ -31,7 +31,7 @@ def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST)
 
     Raises:
         TrajectoryError: the trajectory lasts longer than `longest` seconds, or needs more than
-            MOST_CHECKS checks.
+            MOST_CHECKS check times.
     """
     require_duration(law.duration, longest)
     parts = [
@@ -81,7 +81,7 @@ def _check_count(sampling: PhaseSampling, begin: float, end: float) -> float:
 def _check_times_in(
     piece: Piece, sampling: PhaseSampling, law: TimeLaw, span: tuple[float, float]
 ) -> Floats:
-    """The times of the checks in a piece, both ends included."""
+    """The check times in a piece, both ends included."""
     begin, end = span
     if sampling.step is None:
         phases = np.array(sampling.phases)
@@ -181,7 +181,7 @@ class TimedCurve:
         return isinstance(self.heading, HeldHeading)
 
     def check_times(self) -> list[float]:
-        """Times at which to check it against limits, s.
+        """Times at which to check the trajectory against limits, s.
 
         Raises:
             TrajectoryError: the trajectory is too long to be checked.

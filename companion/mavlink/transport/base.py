@@ -23,10 +23,10 @@ class Receiver(Protocol):
         """
 
     def receive(self, data: bytes, received_ns: int) -> bool:
-        """Take bytes of the peer (`Receive`)."""
+        """Take bytes from the peer; return whether a frame in them was accepted (`Receive`)."""
 
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
-        """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
+        """Take bytes from `sender`, who is not the peer; return whether `sender` becomes the peer.
 
         Without a valid claim in the bytes, no frame in them is accepted.
         """

@@ -39,7 +39,8 @@ class StepResponse:
     asked_tilt: float
     """Largest tilt of a target, rad, before the tilt limit of the planner."""
     cross_axis_max: float
-    """Straightness: largest distance from the line of a step."""
+    """Straightness: largest distance of the coefficients from the straight line of a step, which
+    leads to its target."""
     model_deviation_max: float
     """Largest distance from the ideal model ċ = p·(c_d − c)."""
     second_order: SecondOrderModel

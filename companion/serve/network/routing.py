@@ -45,11 +45,12 @@ class RoutingStats:
 class Routing:
     """Forwards each frame, byte for byte, to the channels that should hear it.
 
-    - A frame without a target, or for everybody, goes to all channels but its own.
-    - A targeted frame goes to the channels on which its target was heard. A frame for a component
-      of the vehicle's system that was never heard goes to the vehicle.
+    - A frame without a target, or for everybody, goes to all channels except the one it came from.
+    - A targeted frame goes to the channels on which its target was heard. A client's frame for a
+      never-heard component of the vehicle's system goes to the vehicle.
     - A frame for our own component is not forwarded.
-    - A message of an unknown kind goes to all channels but its own, as its target is not known.
+    - A message of an unknown kind goes to all channels except the one it came from, as its
+      target is not known.
 
     Several nodes may be behind a channel, also behind that to the vehicle.
 

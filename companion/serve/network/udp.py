@@ -148,8 +148,8 @@ class UdpClient(Client):
 
     Attributes:
         heard_at: arrival of its last datagram, s.
-        flood: counts what it sends. A client that floods loses datagrams itself, because the socket
-            must be read for the others.
+        flood: detects a flood from this client. All clients share the socket, so a flood cannot be
+            left unread: its datagrams are read and discarded.
     """
 
     def __init__(self, port: UdpPort, address: Any) -> None:

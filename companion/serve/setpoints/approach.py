@@ -31,7 +31,11 @@ class AxisLimits(NamedTuple):
 
 
 class UnplannableError(ValueError):
-    """No motion exists: the numbers are too large or too far apart."""
+    """Ruckig finds no motion.
+
+    Numbers of the error or of the limits are too large, differ by too many orders of magnitude, or
+    are not finite.
+    """
 
 
 class Approach:
@@ -40,7 +44,7 @@ class Approach:
     `by_velocity`: only the velocity error must become zero, and the position error need not.
 
     Raises:
-        UnplannableError: no such motion exists.
+        UnplannableError: Ruckig finds no such motion.
     """
 
     def __init__(

@@ -40,8 +40,8 @@ CAPTION = (
 _ENDS = np.array([FIGURE_2.start, FIGURE_2.target])  # of the step, coefficients
 _CROSS_TRACK_LABEL = "largest distance from the line"
 _WORSE_COLOUR = "#A33C00"
-"""Colour of cells where another method has less cross-track error than model-following, and of
-`does not hold` on the page."""
+"""Colour of cells where another method has less cross-track error than model-following, and of the
+verdict `does not hold` on the page."""
 _CUT_HZ, _CUT_LAG_MS, _CUT_DEAD_TIME_MS = 100.0, 25, 40
 """Sample rate, and fixed lag and dead time, of the two plots in the second row."""
 _SHADE: Line = {
