@@ -177,7 +177,7 @@ class Vehicle:
         """
         self._held_pose()  # raises if the vehicle is not under our control
         source = CommandedSource(name, self._context.config.deadman.target_stale, _START_TIMEOUT)
-        work = partial(fly_commanded, source=source)
+        work = partial(fly_commanded, commands=source)
         phase = program_phase("control", f"{name} to end its control", work)
         control_end = self._request(lambda _: (phase,))
         async with commanding(

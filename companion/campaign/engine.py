@@ -97,8 +97,8 @@ def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: f
         ConfigError: a worker refuses a case.
         VersionError: a worker that joined later has other versions.
     """
-    size = size_of_units(len(cases), case_s, number_of_workers(client))
-    units = unit_ranges(len(cases), size)
+    unit_size = size_of_units(len(cases), case_s, number_of_workers(client))
+    units = unit_ranges(len(cases), unit_size)
     tasks = {
         number: (fly_cases, kind, [cases[index] for index in unit], versions())
         for number, unit in enumerate(units)

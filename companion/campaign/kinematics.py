@@ -53,11 +53,11 @@ def check_case(case: Case) -> None:
         ConfigError: its planner keeps state, it has no open-loop steps, 1000 Hz is no multiple of
             its sample rate, or it has a fault.
     """
-    if reason := _unflyable(case):
+    if reason := _why_unflyable(case):
         raise ConfigError(f"{case.described()}: {reason}")
 
 
-def _unflyable(case: Case) -> str | None:
+def _why_unflyable(case: Case) -> str | None:
     """Why a case cannot be flown in a batch; None: it can."""
     config = case.config
     if config.planner_name not in LAW_NAMES:

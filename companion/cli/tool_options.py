@@ -163,8 +163,8 @@ def add_config(commands: Commands) -> None:
 
     start = commands.add_parser("init", help="write a commented starting configuration")
     start.add_argument("name", choices=list(STARTING_FILES), help="vehicle of the configuration")
-    out = "file to write (default: companion.yaml); an existing file is never replaced"
-    add_path(start, "--out", out, default=Path("companion.yaml"))
+    out_help = "file to write (default: companion.yaml); an existing file is never replaced"
+    add_path(start, "--out", out_help, default=Path("companion.yaml"))
     start.set_defaults(run="config.init")
 
     check = commands.add_parser(

@@ -35,11 +35,11 @@ class Following(NamedTuple):
 class PredictiveRecord:
     """Counters of predictive control in one flight."""
 
-    flown: int = 0
+    flown_answers: int = 0
     """Number of answers that were flown."""
     troubles: Counter[Trouble] = field(default_factory=Counter)
     """Number of answers that were not flown, by cause."""
-    seconds: "array[float]" = field(default_factory=lambda: array("d"))
+    computing_seconds: "array[float]" = field(default_factory=lambda: array("d"))
     """Computation time of each flown answer in the solver's process."""
 
 
@@ -101,8 +101,8 @@ class Predictive:
         target = target._replace(heading=frame.estimated_heading(target.heading))
         answer = None if following is None else self._answer(vehicle.time)
         if answer is not None:
-            self.record.flown += 1
-            self.record.seconds.append(answer.seconds)
+            self.record.flown_answers += 1
+            self.record.computing_seconds.append(answer.computing_seconds)
             target, down = _command_of(answer)
         self._record_input(vehicle.time, target, down)
         if following is not None:

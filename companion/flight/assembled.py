@@ -38,7 +38,7 @@ class AssembledFlight:
             return None
         record = predictive.record
         troubles = {trouble.value: count for trouble, count in record.troubles.items()}
-        return PredictiveFigures(record.flown, troubles, tuple(record.seconds))
+        return PredictiveFigures(record.flown_answers, troubles, tuple(record.computing_seconds))
 
     def counts(self) -> LoopCounts:
         """The counters of the control loop."""

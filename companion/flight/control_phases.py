@@ -50,12 +50,12 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
     context.guidance_loop.hold_reference()
 
 
-async def fly_commanded(context: FlightContext, source: Source) -> None:
+async def fly_commanded(context: FlightContext, commands: Source) -> None:
     """Fly the commands of another program until it ends its control, then brake and hold.
 
     The phase waits until the vehicle has stopped: the autopilot would brake it harder.
     """
-    await _fly(context, source, lambda: f"commanded by {source.name}")
+    await _fly(context, commands, lambda: f"commanded by {commands.name}")
     context.guidance_loop.hold_here()
     context.detail = "the vehicle to stop"
     await asyncio.sleep(context.guidance_loop.braking_left)

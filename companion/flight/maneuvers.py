@@ -12,7 +12,7 @@ from companion.flight.maneuver_checks import (
     require_flyable,
     with_reserve,
 )
-from companion.flight.trajectory_notes import overview, slowing
+from companion.flight.trajectory_notes import overview, slow_down_notes
 from companion.guidance import Corners, Doublets, Maneuver, ManeuverSequence, Steps
 from companion.guidance.follow import Follow, circle, hover
 from companion.guidance.trajectory import slow_down, violations
@@ -96,7 +96,8 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
     with naming_trajectory_errors(path):
         if config.flight.slow_down:
             slower = slow_down(trajectory, with_reserve(config, envelope))
-            notes = (*notes, *slowing(trajectory, slower, config.flight.slow_down_reserve_m_s2))
+            reserve = config.flight.slow_down_reserve_m_s2
+            notes = (*notes, *slow_down_notes(trajectory, slower, reserve))
             trajectory = slower.trajectory
         elif broken := violations(trajectory, envelope):
             first = min(broken, key=lambda one: one.slowing_helps)

@@ -86,6 +86,6 @@ class TakeoverPlan:
         first_phases = takeoff_for_client_phases if self._from_ground else takeover_phases
         for phase in first_phases(config):
             yield phase
-        work = partial(fly_commanded, source=self._source)
+        work = partial(fly_commanded, commands=self._source)
         yield program_phase("control", f"{self._source.name} to end its control", work)
         yield hand_back_phase()

@@ -105,7 +105,7 @@ class StatusReporter:
     ) -> None:
         self.takeoff: float | None = None
         self.battery_at_takeoff: float | None = None
-        self._context, self._ladder, self._trace = context, ladder, trace
+        self._context, self._safety_ladder, self._trace = context, ladder, trace
         self.real_time = real_time
         self._began, self._phase, self._show, self._clock = began, phase, show, clock
         self._counted: deque[tuple[float, int]] = deque()
@@ -173,7 +173,7 @@ class StatusReporter:
             missed=record.missed_deadlines if self.real_time else None,
             battery=context.link.state.battery,
             monitored=phase.monitored and context.loop.offboard_active,
-            alarms=self._ladder.raised,
+            alarms=self._safety_ladder.raised,
             view=view(context, now),
         )
 

@@ -21,7 +21,7 @@ def overview(trajectory: Trajectory) -> str:
     )
 
 
-def slowing(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[str, ...]:
+def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[str, ...]:
     """Messages for the user: where the trajectory was slowed down, and for which limit; or none.
 
     Args:

@@ -84,7 +84,7 @@ class Watch:
         clock: Callable[[], float],
     ) -> None:
         self._context = context
-        self._ladder = ladder
+        self._safety_ladder = ladder
         self._clock = clock
         self._rate_requester = rate_requester
         # Whether setpoints were stopped while the autopilot obeyed them: it may still wait for us.
@@ -156,7 +156,7 @@ class Watch:
         if snapshot.health.foreign:  # it may also be the autopilot's own setpoint, in a new mode
             self._request_heartbeat(now)
         self._rate_requester.check(snapshot.health)
-        verdict = self._ladder.step(snapshot)
+        verdict = self._safety_ladder.step(snapshot)
         if verdict is None:
             return
         if verdict.action is Action.HOLD:

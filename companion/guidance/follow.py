@@ -87,8 +87,8 @@ class Follow:
         """Duration with the first turn, s; with the longest one while the start is unknown."""
         if self._turned is not None:
             return self._turned.duration
-        longest = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
-        return longest + self.trajectory.duration
+        longest_turn = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
+        return longest_turn + self.trajectory.duration
 
     @property
     def turn_duration(self) -> float:

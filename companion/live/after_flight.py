@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 
 from companion.live.addresses import leave_address
 
-_LONGEST_UNUSED = 5.0
+_LONGEST_TIME_WITHOUT_USERS = 5.0
 """Time after which a page or stream without users ends, s."""
 _LONGEST_STAY = 3600.0
 """Longest time that a page or stream stays after the flight, s."""
@@ -24,7 +24,7 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
         quiet = 0.0
         for _ in range(int(_LONGEST_STAY)):
             quiet = 0.0 if is_open() else quiet + 1.0
-            if leave_requested.is_set() or quiet > _LONGEST_UNUSED:
+            if leave_requested.is_set() or quiet > _LONGEST_TIME_WITHOUT_USERS:
                 break
             waiting = asyncio.create_task(leave_requested.wait())
             await asyncio.wait({waiting}, timeout=1.0)

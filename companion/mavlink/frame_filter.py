@@ -36,7 +36,7 @@ class FrameFilter:
     def __init__(self, settings: LinkSettings, stats: LinkStats, notice: Notice) -> None:
         self._source = (settings.target_system, settings.target_component)
         self._signing = settings.signing
-        self._stats, self._notice = stats, notice
+        self._stats, self._notify = stats, notice
         self._noticed: set[str] = set()
 
     @property
@@ -80,4 +80,4 @@ class FrameFilter:
         """Pass a notice to the user, unless the same text was passed before."""
         if text not in self._noticed:
             self._noticed.add(text)
-            self._notice(text)
+            self._notify(text)

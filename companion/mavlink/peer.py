@@ -110,13 +110,13 @@ class PeerRule:
         *,
         every_frame_claims: bool,
     ) -> None:
-        self._stats, self._notice, self._clock = stats, notice, clock
+        self._stats, self._notify, self._clock = stats, notice, clock
         self._last_setpoint = last_setpoint
         self._every_frame_claims = every_frame_claims
         self._claimed_at = clock()
         self._peer: str | None = None
 
-    def is_claim(self, frame: Frame) -> bool:
+    def is_peer_claim(self, frame: Frame) -> bool:
         """Whether an accepted frame makes its sender the peer."""
         if self._every_frame_claims:
             return True
@@ -146,14 +146,14 @@ class PeerRule:
         self.renew()
         if before is not None and before != sender:
             self._stats.peers += 1
-            self._notice(
+            self._notify(
                 f"{PEER_NOTICE}the vehicle's frames now come from {sender}, before from {before}; "
                 f"to prevent this, name the vehicle's address in the endpoint (?peer=ADDRESS)"
             )
 
     def report_ignored(self, sender: str) -> None:
         """Tell the user that frames of `sender`, which the endpoint does not name, are ignored."""
-        self._notice(
+        self._notify(
             f"{PEER_NOTICE}frames from {sender} are ignored, as the endpoint names another peer; "
             f"if {sender} is the vehicle, correct ?peer="
         )

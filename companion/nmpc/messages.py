@@ -97,7 +97,7 @@ class Answer(NamedTuple):
     """Heading of the target, rad, in (−π, π]."""
     thrust: float
     """Specific thrust, m/s²."""
-    seconds: float
+    computing_seconds: float
     """Wall time of the computation, including prediction and reference, s."""
     solver_seconds: float
     """Processor time of the solver alone, s."""

@@ -24,8 +24,8 @@ oscillates at the limit of the roll-pitch rate; above the second, a slow vehicle
 
 def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether samples are fresh at arrival, if TIMESYNC can measure their age."""
-    seconds, stale = evidence.samples.age, config.deadman.telemetry_stale
-    if seconds is None:
+    sample_age, stale_after = evidence.samples.age, config.deadman.telemetry_stale
+    if sample_age is None:
         if evidence.link.other_clock:
             yield Finding(
                 Key.AGE,
@@ -36,14 +36,14 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 "TIMESYNC",
             )
         return
-    late = seconds > stale
+    is_stale = sample_age > stale_after
     yield Finding(
         Key.AGE,
-        UNSAFE if late else SAFE,
-        f"attitude is {1e3 * seconds:.1f} ms old when it arrives"
-        + (f", more than deadman.telemetry_stale_ms = {1e3 * stale:g}" if late else ""),
-        "such samples would not be answered" if late else "",
-        "find what delays the messages: a router, a full queue, a slow link" if late else "",
+        UNSAFE if is_stale else SAFE,
+        f"attitude is {1e3 * sample_age:.1f} ms old when it arrives"
+        + (f", more than deadman.telemetry_stale_ms = {1e3 * stale_after:g}" if is_stale else ""),
+        "such samples would not be answered" if is_stale else "",
+        "find what delays the messages: a router, a full queue, a slow link" if is_stale else "",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
     )
 

@@ -119,8 +119,8 @@ def _tracking(summary: Summary) -> RenderableType:
 def _predictive_words(figures: PredictiveFigures) -> Text:
     """Counts and times of predictive control, in words."""
     times = figures.as_dict()["solve_ms"]
-    words = f"predictive control: {figures.flown} answers flown"
-    if figures.flown:
+    words = f"predictive control: {figures.flown_answers} answers flown"
+    if figures.flown_answers:
         words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
     replaced = ", ".join(f"{count} {name}" for name, count in figures.troubles.items())
     if replaced:

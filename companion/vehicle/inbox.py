@@ -129,7 +129,7 @@ class Inbox:
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._is_admitted(frame)]
-        if not any(map(self._peer_rule.is_claim, admitted)):
+        if not any(map(self._peer_rule.is_peer_claim, admitted)):
             self._stats.unclaimed += len(admitted)
             return False
         self._candidate = None
@@ -172,7 +172,7 @@ class Inbox:
         return False
 
     def _accept(self, frame: Frame, received_ns: int) -> None:
-        if frame.message_id == HEARTBEAT and self._peer_rule.is_claim(frame):
+        if frame.message_id == HEARTBEAT and self._peer_rule.is_peer_claim(frame):
             self._peer_rule.renew()
         if self.lockstep is None:
             self._pass_on(frame, received_ns)

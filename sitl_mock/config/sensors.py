@@ -6,7 +6,7 @@ from pydantic import Field, field_validator
 
 from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
 
-Gains = tuple[NonNegative, NonNegative]
+InnovationGains = tuple[NonNegative, NonNegative]
 """Gains of one state: per position innovation, per velocity innovation."""
 
 
@@ -71,11 +71,11 @@ class EkfConfig(Section):
     within 2 s."""
     height_noise_time_s: Positive = 6.0
     """Correlation time of the slow noise of the height."""
-    position_gains: Gains = (0.0774, 0.0494)
+    position_gains: InnovationGains = (0.0774, 0.0494)
     """Gains of the position, m per m and m per m/s."""
-    velocity_gains: Gains = (0.0316, 0.0411)
+    velocity_gains: InnovationGains = (0.0316, 0.0411)
     """Gains of the velocity, m/s per m and m/s per m/s."""
-    acceleration_gains: Gains = (0.0056, 0.0102)
+    acceleration_gains: InnovationGains = (0.0056, 0.0102)
     """Gains of the acceleration error, m/s^2 per m and m/s^2 per m/s."""
     predictor_ms: Positive = 250.0
     """Time constant with which the output predictor applies a correction of position or speed."""

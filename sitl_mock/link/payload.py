@@ -16,32 +16,34 @@ Message = Any
 
 def pack(message: Message) -> bytes:
     """Return the payload of a message, with its trailing zeros."""
-    kind: Any = type(message)
-    payload: bytes = kind.unpacker.pack(*_wire_values(kind)(message))
+    message_class: Any = type(message)
+    payload: bytes = message_class.unpacker.pack(*_wire_values(message_class)(message))
     return payload
 
 
-def unpack(kind: Any, payload: bytes) -> Message:
+def unpack(message_class: Any, payload: bytes) -> Message:
     """Return the message of a class with this payload.
 
     Missing bytes are zero (MAVLink 2 truncates them); bytes after the last known field are ignored.
     """
-    layout = kind.unpacker
+    layout = message_class.unpacker
     size = layout.size
-    return kind(*_arguments(kind)(layout.unpack(payload.ljust(size, b"\0")[:size])))
+    return message_class(
+        *_arguments(message_class)(layout.unpack(payload.ljust(size, b"\0")[:size]))
+    )
 
 
 @cache
-def _wire_values(kind: Any) -> Callable[[Message], Iterable[Any]]:
+def _wire_values(message_class: Any) -> Callable[[Message], Iterable[Any]]:
     """Return the function that lists the field values of a message class in wire order."""
-    names = kind.ordered_fieldnames
-    texts = _texts(kind)
+    names = message_class.ordered_fieldnames
+    texts = _text_fields(message_class)
     fields = attrgetter(*(f"_{name}_raw" if name in texts else name for name in names))
     if len(names) == 1:
         return lambda message: (fields(message),)
     arrays = [
         bool(length) and name not in texts
-        for name, length in zip(names, kind.array_lengths, strict=True)
+        for name, length in zip(names, message_class.array_lengths, strict=True)
     ]
     if not any(arrays):
         return fields
@@ -59,17 +61,17 @@ def _wire_values(kind: Any) -> Callable[[Message], Iterable[Any]]:
 
 
 @cache
-def _arguments(kind: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]:
+def _arguments(message_class: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]:
     """Return the function that turns values in wire order into constructor arguments."""
-    lengths = kind.lengths
+    lengths = message_class.lengths
     starts = (0, *accumulate(lengths))
-    if sum(lengths) == len(lengths) > 1 and not _texts(kind):
-        return itemgetter(*kind.orders)
+    if sum(lengths) == len(lengths) > 1 and not _text_fields(message_class):
+        return itemgetter(*message_class.orders)
     picks = [
         starts[order] if lengths[order] == 1 else slice(starts[order], starts[order + 1])
-        for order in kind.orders
+        for order in message_class.orders
     ]
-    texts = [kind.fieldnames.index(name) for name in _texts(kind)]
+    texts = [message_class.fieldnames.index(name) for name in _text_fields(message_class)]
 
     def arguments(values: tuple[Any, ...]) -> Iterable[Any]:
         picked = [list(values[pick]) if isinstance(pick, slice) else values[pick] for pick in picks]
@@ -80,10 +82,10 @@ def _arguments(kind: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]:
     return arguments
 
 
-def _texts(kind: Any) -> set[str]:
+def _text_fields(message_class: Any) -> set[str]:
     """Return the names of the text fields of a message class."""
     return {
         name
-        for name, type_ in zip(kind.fieldnames, kind.fieldtypes, strict=True)
+        for name, type_ in zip(message_class.fieldnames, message_class.fieldtypes, strict=True)
         if type_ == "char"
     }

@@ -17,7 +17,7 @@ from sitl_mock.physics.rate_loop import (
     rate_law,
     rate_step,
 )
-from sitl_mock.physics.rate_shaping import NOT_SHAPED, Shaped, ShapingLaw, shape, shaping_law
+from sitl_mock.physics.rate_shaping import NOT_SHAPED, ShapingLaw, ShapingState, shape, shaping_law
 from sitl_mock.physics.rigid_body import Body, Load, Motion, advance, body_of, derivative
 from sitl_mock.physics.rotors import (
     STOPPED,
@@ -51,19 +51,18 @@ class MultirotorLaw(NamedTuple):
 Kinematics = tuple[Motion, Vector, Vector]
 """Motion after a step, and the means over the step: acceleration (NED, m/s^2), and angular
 acceleration (FRD, rad/s^2)."""
-Actuation = tuple[Mix, Four, Axes, Shaped]
+Actuation = tuple[Mix, Four, Axes, ShapingState]
 """State of controller and rotors after a step: throttles, thrust of each rotor (N), rate loop,
 shaping."""
 
 
 class Rings(NamedTuple):
-    """The latest setpoints, for the delays: before the shaping, and before the rate loop.
-
-    Without shaping only ``shaped`` is used.
-    """
+    """Rings of the latest setpoints, which delay them. Without shaping only ``shaped`` is used."""
 
     arrived: Ring
+    """Setpoints before the shaping."""
     shaped: Ring
+    """Setpoints before the rate loop."""
 
 
 class Conditions(NamedTuple):
@@ -142,13 +141,13 @@ def drive(
         controlled: whether the rate loop runs; otherwise it idles.
         conditions: battery, wind, and the error of the attitude, which only the shaping uses.
     """
-    mixed, thrusts, axes, shaped = actuation
+    mixed, thrusts, axes, shaping = actuation
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
     if law.shapes:
         estimated = rotated_slightly(conditions.attitude_error, (w, x, y, z))
-        setpoint, shaped = _shape_setpoint(
-            law, rings, shaped, estimated, step, setpoint, controlled
+        setpoint, shaping = _shape_setpoint(
+            law, rings, shaping, estimated, step, setpoint, controlled
         )
     setpoint = delayed(rings.shaped, law.rates.delays, step, setpoint)
     if controlled:
@@ -166,25 +165,25 @@ def drive(
         axes = ZERO_STATE
     mixed = _allocate(law, axes, throttle)
     thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], conditions.thrust_factor)
-    return _load(law, wrench, conditions.wind), (mixed, thrusts, axes, shaped)
+    return _load(law, wrench, conditions.wind), (mixed, thrusts, axes, shaping)
 
 
 def _shape_setpoint(
     law: MultirotorLaw,
     rings: Rings,
-    shaped: Shaped,
+    state: ShapingState,
     q: Quaternion,
     step: int,
     setpoint: Vector,
     controlled: bool,
-) -> tuple[Vector, Shaped]:
+) -> tuple[Vector, ShapingState]:
     """Return the delayed, shaped setpoint, and the state of the shaping after the step.
 
     If the rate loop does not run, the setpoint is returned unchanged.
     """
     goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
     if controlled:
-        return shape(law.shaping, shaped, goals, q)
+        return shape(law.shaping, state, goals, q)
     return setpoint, NOT_SHAPED
 
 

@@ -16,7 +16,7 @@ SqrtGains = tuple[float, float]
 deceleration, rad/s^2."""
 
 
-class Shaped(NamedTuple):
+class ShapingState(NamedTuple):
     """State of the shaping."""
 
     active: bool
@@ -28,7 +28,7 @@ class Shaped(NamedTuple):
     """Attitude target, body to world."""
 
 
-NOT_SHAPED = Shaped(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+NOT_SHAPED = ShapingState(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
 def slew(goal: float, rate: float, limit: float) -> float:
@@ -110,12 +110,14 @@ def shaping_law(axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: f
     )
 
 
-def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tuple[Vector, Shaped]:
+def shape(
+    law: ShapingLaw, state: ShapingState, goals: Vector, q: Quaternion
+) -> tuple[Vector, ShapingState]:
     """Shape the rates of the three axes, which share one attitude target, for one step (pure).
 
     Args:
         law: constants.
-        shaped: state before the step; if it is not active, the attitude target starts at `q`.
+        state: state before the step; if it is not active, the attitude target starts at `q`.
         goals: body rates, rad/s, already delayed; NaN holds the shaped rate, infinity grows
             without limit.
         q: present attitude.
@@ -124,13 +126,13 @@ def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tupl
         The setpoint of the rate loop, rad/s, FRD, and the state after the step.
     """
     max_change = law.max_change
-    before = shaped.rates
+    before = state.rates
     rates = (
         slew(goals[0], before[0], max_change[0]),
         slew(goals[1], before[1], max_change[1]),
         slew(goals[2], before[2], max_change[2]),
     )
-    target = rotated(shaped.target if shaped.active else q, rates, law.dt)
+    target = rotated(state.target if state.active else q, rates, law.dt)
     w, x, y, z = target
     body_in_target = multiply((w, -x, -y, -z), q)  # attitude of the body in the frame of the target
     turn_x, turn_y, turn_z = rotation_vector(body_in_target)
@@ -141,4 +143,4 @@ def shape(law: ShapingLaw, shaped: Shaped, goals: Vector, q: Quaternion) -> tupl
         pitch - sqrt_controller(turn_y, for_pitch[0], for_pitch[1]),
         yaw - sqrt_controller(turn_z, for_yaw[0], for_yaw[1]),
     )
-    return setpoint, Shaped(True, rates, target)
+    return setpoint, ShapingState(True, rates, target)

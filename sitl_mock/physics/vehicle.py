@@ -17,7 +17,7 @@ from sitl_mock.physics.multirotor_step import (
     steady_throttle,
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply
-from sitl_mock.physics.rate_shaping import Shaped
+from sitl_mock.physics.rate_shaping import ShapingState
 from sitl_mock.physics.rotors import Four
 from sitl_mock.physics.sensors import Estimate, Estimator
 from sitl_mock.physics.vehicle_step import (
@@ -160,7 +160,7 @@ class Vehicle:
         return estimate
 
     @property
-    def attitude_target(self) -> Shaped | None:
+    def attitude_target(self) -> ShapingState | None:
         """ArduPilot's shaped rates and attitude target; None if rates are not shaped now.
 
         The attitude target is in the frame of the estimate, with all resets of its heading.

@@ -33,11 +33,15 @@ _HEALTH_LAYOUT = struct.Struct("<BIII")
 
 
 class _Check(NamedTuple):
-    """A failing check; ``modes`` is the bit mask of the affected modes."""
+    """A failing check.
+
+    ``modes`` is the bit mask of the affected modes. ``health_component`` is the number of the part
+    of the vehicle in the health report.
+    """
 
     event_id: int
     modes: int
-    component: int
+    health_component: int
     severity: int
 
 
@@ -122,7 +126,7 @@ class HealthReport:
             send(
                 check.event_id,
                 check.severity,
-                arguments=_FAILURE_LAYOUT.pack(check.modes, check.component),
+                arguments=_FAILURE_LAYOUT.pack(check.modes, check.health_component),
             )
         health = _HEALTH_LAYOUT.pack(0, present, 0, 0)
         send(event_id("commander_health_summary"), _PROTOCOL, arguments=health)
@@ -132,5 +136,5 @@ def _components(checks: Iterable[_Check]) -> int:
     """Return the components of checks, one bit each."""
     bits = 0
     for check in checks:
-        bits |= 1 << check.component
+        bits |= 1 << check.health_component
     return bits

@@ -189,7 +189,7 @@ def test_guidance_whose_values_are_fixed_forbids_a_change():
 
 
 def test_a_page_stays_while_it_is_open_and_some_seconds_more(monkeypatch):
-    monkeypatch.setattr(after_flight, "_LONGEST_UNUSED", 2.0)
+    monkeypatch.setattr(after_flight, "_LONGEST_TIME_WITHOUT_USERS", 2.0)
     slept = []
 
     async def sleep(tasks, **_):
@@ -226,7 +226,7 @@ def test_a_page_leaves_for_the_same_user_only(monkeypatch):
 
 
 def test_a_page_whose_name_is_taken_stays_all_the_same(monkeypatch):
-    monkeypatch.setattr(after_flight, "_LONGEST_UNUSED", 0.0)
+    monkeypatch.setattr(after_flight, "_LONGEST_TIME_WITHOUT_USERS", 0.0)
     with socket.socket(socket.AF_UNIX) as other:
         other.bind(leave_address(1))
         asyncio.run(asyncio.wait_for(until_unused(1, lambda: False), 5.0))

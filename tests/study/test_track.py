@@ -54,12 +54,12 @@ def vehicle(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_a_trajectory_is_followed_closely_only_if_led(flown):
-    led, not_led, windy = (flown[0][task] for task in TASKS)
-    assert led.ok
-    assert led.telemetry.rms < 0.04
-    assert led.telemetry.rms < led.telemetry.largest < 0.1
-    assert not_led.telemetry.rms > 3.0 * led.telemetry.rms
-    assert 2.0 * led.telemetry.rms < windy.telemetry.rms < 0.15
+    with_lead, without_lead, windy = (flown[0][task] for task in TASKS)
+    assert with_lead.ok
+    assert with_lead.telemetry.rms < 0.04
+    assert with_lead.telemetry.rms < with_lead.telemetry.largest < 0.1
+    assert without_lead.telemetry.rms > 3.0 * with_lead.telemetry.rms
+    assert 2.0 * with_lead.telemetry.rms < windy.telemetry.rms < 0.15
 
 
 @pytest.mark.slow

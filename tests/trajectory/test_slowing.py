@@ -10,7 +10,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial import cKDTree
 
 from companion.drag import Drag
-from companion.flight.trajectory_notes import overview, slowing
+from companion.flight.trajectory_notes import overview, slow_down_notes
 from companion.guidance.trajectory import (
     Envelope,
     Frame,
@@ -159,7 +159,7 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
     assert len(as_before) > 100
     for t in as_before:
         assert found.trajectory.law.at(t).first > 0.97
-    notes = slowing(ANGULAR, found, 0.5)
+    notes = slow_down_notes(ANGULAR, found, 0.5)
     assert notes[0].startswith("angular is slowed down to keep its limits: from ")
     assert ", because of limits.max_tilt_rate_deg_s at" in notes[0]  # without the reserve
     assert f"instead of {ANGULAR.duration:.1f} s, and its highest speed is" in notes[1]
@@ -175,7 +175,7 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
 )
 def test_a_part_that_the_tilt_limit_slows_names_the_reserve_below_it(reserve, limit):
     found = slow_down(EIGHT, Envelope(max_tilt=radians(2.0)))
-    assert f", because of {limit}" in slowing(EIGHT, found, reserve)[0]
+    assert f", because of {limit}" in slow_down_notes(EIGHT, found, reserve)[0]
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_a_steady_speed_is_slowed_evenly_by_the_ratio_of_speeds():
 def test_what_can_be_flown_is_not_slowed():
     found = slow_down(EIGHT, Envelope(max_speed=5.0))
     assert (found.trajectory, found.parts) == (EIGHT, ())
-    assert slowing(EIGHT, found, 0.5) == ()
+    assert slow_down_notes(EIGHT, found, 0.5) == ()
 
 
 def test_what_is_too_long_is_slowed_evenly_and_says_so():
@@ -216,7 +216,7 @@ def test_what_is_too_long_is_slowed_evenly_and_says_so():
     found = slow_down(laps, ENVELOPE)
     assert found.even
     assert violations(found.trajectory, ENVELOPE) == ()
-    note, _ = slowing(laps, found, 0.5)
+    note, _ = slow_down_notes(laps, found, 0.5)
     assert "it is too long to be slowed down in parts; its tightest limit is limits." in note
 
 

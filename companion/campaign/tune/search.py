@@ -44,7 +44,7 @@ _HOPELESS_FACTOR = 1.3
 the best candidate on the same cases."""
 _LARGEST_ERROR = 10.0
 """Larger errors are reported to Optuna as this one, m, and so are flights that ended early."""
-_VALUES, _SCORE, _VIOLATION, _COMPLETE = "values", "score", "missed", "whole"
+_VALUES_KEY, _SCORE_KEY, _VIOLATION_KEY, _COMPLETE_KEY = "values", "score", "missed", "whole"
 """Names of the attributes of a trial in Optuna's storage."""
 
 
@@ -134,15 +134,15 @@ class Search:
 
     def results(self) -> SearchResults:
         """The results of all trials so far, including those of earlier runs."""
-        complete = [each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE)]
+        complete = [each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE_KEY)]
         found = [
             Candidate(
                 each.number,
-                each.user_attrs[_VALUES],
-                Score.from_attributes(each.user_attrs[_SCORE]),
+                each.user_attrs[_VALUES_KEY],
+                Score.from_attributes(each.user_attrs[_SCORE_KEY]),
             )
             for each in complete
-            if each.user_attrs[_VIOLATION] <= 0.0
+            if each.user_attrs[_VIOLATION_KEY] <= 0.0
         ]
         good = sorted(found, key=lambda each: each.score.rms)
         tried = len(self._ended_trials())
@@ -182,7 +182,7 @@ class Search:
 
     def _try_candidate(self, trial: "Trial") -> None:
         values = clamped_to_search(suggested(trial, self._tune.search), self._tune.search)
-        trial.set_user_attr(_VALUES, values)
+        trial.set_user_attr(_VALUES_KEY, values)
         try:
             flown = cases(self._campaign, values)
         except ConfigError:  # keys that do not fit together, such as a minimum above a maximum
@@ -195,9 +195,9 @@ class Search:
             self._stop(trial, _capped_rms(score), max(violation, 0.0))
             return
         score = score.combined_with(scored(self._fly(flown[count:]), self._tune.envelope_m))
-        trial.set_user_attr(_SCORE, score.as_attributes())
+        trial.set_user_attr(_SCORE_KEY, score.as_attributes())
         self._set_violation(trial, self._shortfall(score, len(flown)))
-        trial.set_user_attr(_COMPLETE, True)
+        trial.set_user_attr(_COMPLETE_KEY, True)
         self._study.tell(trial, _capped_rms(score))
 
     def _stop(self, trial: "Trial", error: float, violation: float) -> None:
@@ -207,14 +207,14 @@ class Search:
         self._study.tell(trial, state=self._optuna.trial.TrialState.PRUNED)
 
     def _set_violation(self, trial: "Trial", violation: float) -> None:
-        """Store the violation of the constraint, for Optuna's sampler; at most 0: none."""
-        trial.set_user_attr(_VIOLATION, violation)
-        trial.set_constraint(_VIOLATION, violation)
+        """Store the violation of the constraint, for Optuna's sampler; 0 or less: it is met."""
+        trial.set_user_attr(_VIOLATION_KEY, violation)
+        trial.set_constraint(_VIOLATION_KEY, violation)
 
     def _shortfall(self, score: Score, cases_count: int) -> float:
         """`inside_share` minus the largest share inside the envelope that is still possible.
 
-        At most 0: `inside_share` can still be reached. `score` covers the cases flown so far, and
+        0 or less: `inside_share` can still be reached. `score` covers the cases flown so far, and
         `cases_count` is the number of all cases.
         """
         outside = sum(not each for each in score.inside)

@@ -187,12 +187,14 @@ def _remedy(text: str) -> str:
         scheme, host, port = address[1], address[2], address[3]
         kind = _NETWORK_KINDS.get(scheme or "")
         if kind is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
-            own_scheme = "udpin" if scheme == "udp" else scheme
-            return f"write {own_scheme}://{host or '0.0.0.0'}:{port}"
+            our_scheme = "udpin" if scheme == "udp" else scheme
+            return f"write {our_scheme}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
             is_host_named = host and host not in _NETWORK_KINDS
-            out = f", or udpout://{host}:{port} to send to {host} first" if is_host_named else ""
-            return f"write udpin://0.0.0.0:{port} to wait for the vehicle{out}"
+            udpout_hint = (
+                f", or udpout://{host}:{port} to send to {host} first" if is_host_named else ""
+            )
+            return f"write udpin://0.0.0.0:{port} to wait for the vehicle{udpout_hint}"
     if text.isdigit() and 0 < int(text) <= 65535:
         return f"write udpin://0.0.0.0:{text}"
     return _HELP

@@ -60,18 +60,19 @@ class LoopCounts:
 class PredictiveFigures:
     """Counts and times of predictive control."""
 
-    flown: int
+    flown_answers: int
     """Answers that were flown."""
     troubles: dict[str, int]
     """Answers that were not flown, by reason."""
-    seconds: tuple[float, ...]
+    computing_seconds: tuple[float, ...]
     """Computing time of each flown answer in the solver's process."""
 
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON, in milliseconds."""
-        p50, p99 = np.percentile(self.seconds, (50, 99)) if self.seconds else (math.nan, math.nan)
+        seconds, flown = self.computing_seconds, self.flown_answers
+        p50, p99 = np.percentile(seconds, (50, 99)) if seconds else (math.nan, math.nan)
         times = {"p50": 1e3 * float(p50), "p99": 1e3 * float(p99)}
-        return {"flown": self.flown, "troubles": self.troubles, "solve_ms": without_nan(times)}
+        return {"flown": flown, "troubles": self.troubles, "solve_ms": without_nan(times)}
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ CAPTION = (
 )
 
 _METHODS = (*PAPER_METHODS, EXACT, FOLLOWING)
-_NOT_LED_COLOUR = "#D55E00"
+_COLOUR_WITHOUT_LEAD = "#D55E00"
 _STILL_AIR: Line = {"linestyle": "-", "marker": "o", "markersize": 4.0, "linewidth": 1.6}
 _IN_WIND: Line = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}
 _ERROR_TICKS_MM = (10, 20, 50, 100, 200, 500, 1000)
@@ -57,12 +57,12 @@ def draw_figure(flown: Flown) -> Figure:
 
 def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
     """Draw the reference path, and the paths flown with and without lead."""
-    led = flown[Task(course, MODEL_FOLLOWING)]
-    not_led = flown[Task(course, MODEL_FOLLOWING, lead=False)]
-    draw_line(axes, led.path[:, 3], led.path[:, 2], FOLLOWING.line, "led")
-    not_led_line = {"color": _NOT_LED_COLOUR, "linewidth": 1.0}
-    draw_line(axes, not_led.path[:, 3], not_led.path[:, 2], not_led_line, "not led")
-    draw_line(axes, led.path[:, 1], led.path[:, 0], REFERENCE, "reference")
+    with_lead = flown[Task(course, MODEL_FOLLOWING)]
+    without_lead = flown[Task(course, MODEL_FOLLOWING, lead=False)]
+    draw_line(axes, with_lead.path[:, 3], with_lead.path[:, 2], FOLLOWING.line, "led")
+    line_without_lead = {"color": _COLOUR_WITHOUT_LEAD, "linewidth": 1.0}
+    draw_line(axes, without_lead.path[:, 3], without_lead.path[:, 2], line_without_lead, "not led")
+    draw_line(axes, with_lead.path[:, 1], with_lead.path[:, 0], REFERENCE, "reference")
     axes.set(title=f"Path: {course}", xlabel="east, m", ylabel="north, m", aspect="equal")
 
 
@@ -81,7 +81,7 @@ def _draw_lead_and_wind(axes: Axes, errors: dict[Task, float], courses: Sequence
     """Draw the error over speed, mm, with and without lead, in still air and in wind."""
     for wind, style in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
         wind_label = f", wind of {wind:g} m/s" if wind else ""
-        for lead, colour in ((True, FOLLOWING.colour), (False, _NOT_LED_COLOUR)):
+        for lead, colour in ((True, FOLLOWING.colour), (False, _COLOUR_WITHOUT_LEAD)):
             tasks = [Task(course, MODEL_FOLLOWING, LINEAR, wind, lead) for course in courses]
             label = f"model-following{'' if lead else ', not led'}{wind_label}"
             _draw_over_speed(axes, tasks, errors, {**style, "color": colour}, label)

@@ -84,9 +84,9 @@ def tasks() -> tuple[Task, ...]:
     windy = [
         Task(course, planner, LINEAR, WINDY) for course in COURSES for planner in _PLANNERS_IN_WIND
     ]
-    not_led = [
+    without_lead = [
         Task(course, MODEL_FOLLOWING, LINEAR, wind, lead=False)
         for course in COURSES
         for wind in (CALM, WINDY)
     ]
-    return (*calm, *windy, *not_led)
+    return (*calm, *windy, *without_lead)
