@@ -130,10 +130,10 @@ def add_study(commands: Commands) -> None:
     study.add_argument(
         "name", choices=registry.choices(), metavar="NAME", help="a study, see below"
     )
-    case = f"case for {registry.names_with_case()}, such as configs/study-case.yaml"
-    add_path(study, "--case", case)
-    results = "folder for the results (default: study)"
-    add_path(study, "--out", results, "DIR", default=Path("study"))
+    case_help = f"case for {registry.names_with_case()}, such as configs/study-case.yaml"
+    add_path(study, "--case", case_help)
+    out_help = "folder for the results (default: study)"
+    add_path(study, "--out", out_help, "DIR", default=Path("study"))
     study.add_argument(
         "--workers",
         type=whole_number(1, 256),
