@@ -2,7 +2,6 @@
 
 The flight runs in the program's loop if the vehicle waits for each answer, as in lockstep.
 
-
 With a thread for the flight, a program that computes, blocks or never yields delays only its own
 commands. The flight continues to answer samples, notices the missing commands, and hands the
 vehicle back.
