@@ -65,7 +65,6 @@ class SampleEntry(NamedTuple):
     """A sample that reached the control loop."""
 
     sample: AttitudeSample
-    """The sample."""
     reason: Unanswered | None
     """Why it is unanswered, or None."""
     flags: LoopFlags

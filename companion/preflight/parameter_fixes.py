@@ -121,7 +121,6 @@ class ChangeOutcome(NamedTuple):
     """The outcome of a change."""
 
     change: ParameterChange
-    """The change."""
     refusal: str = ""
     """Why it was not made; empty if it was made."""
 

@@ -108,7 +108,6 @@ class ParameterFinding(NamedTuple):
     """The result of one rule."""
 
     rule: ParameterRule
-    """The rule."""
     value: float
     """The autopilot's value."""
     result: CheckResult
