@@ -11,6 +11,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.serve.component import Component
 from companion.serve.network import tcp
 from companion.serve.network.addresses import Address
+from companion.serve.network.client import FloodDetector
 from companion.serve.network.routing import _MAX_ADDRESSES, Routing
 from companion.serve.network.setpoint_limit import SetpointLimit
 from tests.mavlink.fakes import attitude, until
@@ -44,8 +45,8 @@ def test_noise_of_a_tcp_client_does_not_keep_samples_from_being_answered(run):
             flood = await tcp_client(net.ports[0].local[1])
             await until(lambda: net.clients)
             (ours,) = net.clients
-            sizes, scan = [], ours.scan
-            ours.scan = lambda data: [sizes.append(len(data)), scan(data)][1]
+            reads, scan = [], ours.scan
+            ours.scan = lambda data: [reads.append((net.now(), len(data))), scan(data)][1]
             answered = []
             link.on_attitude = lambda sample: answered.append(sample.time_boot_ms)
             noise = b"\xfe" * 65536
@@ -54,12 +55,17 @@ def test_noise_of_a_tcp_client_does_not_keep_samples_from_being_answered(run):
                     flood.socket.send(noise)
                 vehicle.send(attitude(4 * number + 4))
                 await until(lambda number=number: len(answered) == number + 1)
-            assert 0 < max(sizes) <= 4096
-            began = net.now()
-            read_before = sum(sizes)
-            await asyncio.sleep(0.2)
-            assert sum(sizes) - read_before <= 4096 * (2 + (net.now() - began) / 0.02)
+            await until(lambda: len(reads) >= 12)
             flood.close()
+        assert max(size for _, size in reads) == 4096
+        full = [
+            (first, third)
+            for (first, a), (_, b), (third, c) in zip(reads, reads[1:], reads[2:], strict=False)
+            if a == b == c == 4096
+        ]
+        assert full
+        # 5 ms less than the pause: uvloop's clock counts whole milliseconds
+        assert all(third - first > FloodDetector.WINDOW - 0.005 for first, third in full)
 
     run(scene())
 
