@@ -28,7 +28,7 @@ In and out
 
 Functions
     coefficients    the acceleration coefficients of an attitude
-    heading         its tilt-yaw heading, rad
+    heading         the tilt-yaw heading of an attitude, rad
     attitude        the attitude with given coefficients and heading
     decompose       an attitude as tilt ⊗ yaw
     is_unit         whether a planner accepts this quaternion

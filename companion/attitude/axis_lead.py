@@ -12,35 +12,37 @@ ROLL, PITCH = 0, 1
 class AxisLead:
     """Compensates the lag of one axis: commands ω + τ·ω̇ + σ·ω̈ for a planned rate ω.
 
-    The axis with the shorter dead time receives older plans, so that a plan takes effect on both
-    axes at the same time.
+    τ and σ are `lag` and `sigma` of the `AxisResponse`. The axis with the shorter dead time follows
+    older plans, so that a plan takes effect on both axes at the same time.
 
     Args:
         index: `ROLL` or `PITCH`.
         axis: response of this axis.
-        wait: larger dead time of roll and pitch minus that of this axis, s.
+        plan_delay: larger dead time of roll and pitch minus that of this axis, s.
         plans: plans of tilt and heading.
     """
 
-    __slots__ = ("_index", "_lag", "_plan", "_plans", "_sigma", "_turn", "_wait")
+    __slots__ = ("_index", "_lag", "_plan", "_plan_delay", "_plans", "_sigma", "_turn")
 
-    def __init__(self, index: int, axis: AxisResponse, wait: float, plans: PlanHistory) -> None:
+    def __init__(
+        self, index: int, axis: AxisResponse, plan_delay: float, plans: PlanHistory
+    ) -> None:
         self._index = index
         self._lag, self._sigma = axis.lag, axis.sigma
-        self._wait = wait
+        self._plan_delay = plan_delay
         self._plans = plans
 
     def advance(self) -> None:
-        """Take the plan for the time `wait` seconds before that of the newest plan."""
+        """Take the plan for `plan_delay` seconds before the time of the newest plan."""
         plans = self._plans
-        planned_for = plans.time - self._wait
-        self._plan = plans.tilt.at(planned_for) if self._wait else plans.tilt.newest
+        planned_for = plans.time - self._plan_delay
+        self._plan = plans.tilt.at(planned_for) if self._plan_delay else plans.tilt.newest
         self._turn = plans.predicted_turn(planned_for, self._plan)
 
     def command(self, dt: float, start_heading: float) -> float:
         """Advance to the next plan; return the rate to send for the `dt` seconds before it, rad/s.
 
-        The last and the next plan are rotated into the body axes predicted for their times.
+        Both plans are rotated into the body axes predicted for the times of the plans.
 
         Args:
             dt: time from the last plan to the next one, s.
@@ -48,15 +50,15 @@ class AxisLead:
         """
         rate, slope = self._planned_rate(start_heading)
         self.advance()
-        rate_then, slope_then = self._planned_rate(start_heading)
+        next_rate, next_slope = self._planned_rate(start_heading)
         return (
-            0.5 * (rate + rate_then)
-            + self._lag / dt * (rate_then - rate)
-            + self._sigma / dt * (slope_then - slope)
+            0.5 * (rate + next_rate)
+            + self._lag / dt * (next_rate - rate)
+            + self._sigma / dt * (next_slope - slope)
         )
 
     def _planned_rate(self, start_heading: float) -> tuple[float, float]:
-        """The planned rate about this body axis, rad/s, and its derivative, rad/s²."""
+        """The planned rate about this body axis, rad/s, and the derivative of that rate, rad/s²."""
         plan, heading = self._plan, start_heading + self._turn.angle
         cosine, sine = cos(heading), sin(heading)
         roll, pitch = into_body(cosine, sine, plan.x_rate, plan.y_rate)

@@ -1,4 +1,4 @@
-"""The laws that the paper compares its own with, section 4.2: `quaternion`, `so3` and `euler`.
+"""The laws with which the paper compares its own, section 4.2: `quaternion`, `so3` and `euler`.
 
 The paper claims that `quaternion` and `so3` respond in the same way at every heading. This holds
 for the attitude error in the body frame, q⁻¹ ⊗ q_d, used here, and not for the paper's q_d ⊗ q⁻¹.
@@ -42,7 +42,7 @@ def so3(
 def _scaled_rates(
     error: Quaternion, scale: float, heading_rate: float, constants: Constants
 ) -> tuple[float, float, float]:
-    """`scale` times the vector part of the error as body rates, rad/s, within the limits."""
+    """Limited body rates, rad/s: `scale` times the vector part of `error`, and the heading rate."""
     _, x, y, z = error
     return limit_rates(
         scale * x,
@@ -67,11 +67,11 @@ def euler(
     e_roll = gain * wrap_difference(roll_d - roll)
     e_pitch = gain * wrap_difference(pitch_d - pitch)
     e_yaw = gain * wrap_difference(yaw_d - yaw)
-    turning = e_yaw * cos(pitch)
+    yz_rate = e_yaw * cos(pitch)
     return limit_rates(
         e_roll - e_yaw * sin(pitch),
-        e_pitch * cos(roll) + turning * sin(roll),
-        turning * cos(roll) - e_pitch * sin(roll) + heading_rate,
+        e_pitch * cos(roll) + yz_rate * sin(roll),
+        yz_rate * cos(roll) - e_pitch * sin(roll) + heading_rate,
         constants.max_tilt_rate,
         constants.max_yaw_rate,
     )

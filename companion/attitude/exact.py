@@ -6,12 +6,12 @@ from companion.attitude.kinematics import (
     SMALLEST_A,
     heading_of,
     into_body,
+    law_weight,
     levelling_rates,
-    share_of_law,
     split,
 )
 from companion.attitude.limits import Constants
-from companion.attitude.reference import distance_left
+from companion.attitude.reference import remaining_distance
 from companion.attitude.rotation import angle_per_sine, clamp, limit_rates, wrap_difference
 from companion.attitude.types import Quaternion, Target
 
@@ -20,10 +20,10 @@ SHORTEST_PERIOD = 1e-4
 at most 1e-4·p (relative).
 """
 LONGEST_PERIOD = 1.0
-"""Longest sample period that is used, s; a longer one counts as this."""
+"""Longest sample period that is used, s; a longer one is replaced by this value."""
 
 _SETTLED_CHANGE = 1e-14
-"""The fixed-point iteration ends when its factor changes by less than this."""
+"""Change of the factor f in `_rotation` below which the fixed-point iteration ends."""
 _MAX_ITERATIONS = 20
 """Largest number of fixed-point iterations in `_rotation`. Usually 4 suffice: each multiplies the
 error by about θ²/12, where θ (rad) is the angle of the rotation in a sample period."""
@@ -47,35 +47,37 @@ def exact(
     north, east, heading, heading_rate = target
     a, b, tilt_x, tilt_y, yaw_z = split(w, x, y, z)
     cosine = 2.0 * a * a - 1.0
-    share = 1.0 if cosine >= cos_recovery else share_of_law(cosine, cos_recovery, slope)
+    weight = 1.0 if cosine >= cos_recovery else law_weight(cosine, cos_recovery, slope)
     roll = pitch = yaw = 0.0
-    if share > 0.0:
+    if weight > 0.0:
         remaining_north, remaining_east = north + 2.0 * a * tilt_y, east - 2.0 * a * tilt_x
         distance = sqrt(remaining_north * remaining_north + remaining_east * remaining_east)
-        part = 1.0 - distance_left(1.0, gain, max_speed / distance if distance > 0.0 else inf, dt)
-        error = wrap_difference(heading - heading_of(a, w, z))
-        turn = (1.0 - exp(-yaw_gain * dt)) * error + heading_rate * dt
+        wanted_share = 1.0 - remaining_distance(
+            1.0, gain, max_speed / distance if distance > 0.0 else inf, dt
+        )
+        heading_error = wrap_difference(heading - heading_of(a, w, z))
+        heading_change = (1.0 - exp(-yaw_gain * dt)) * heading_error + heading_rate * dt
         r_x, r_y, r_z = _rotation(
             a,
             tilt_x,
             tilt_y,
             remaining_north,
             remaining_east,
-            part,
-            turn,
+            wanted_share,
+            heading_change,
             max_rate * dt,
             max_yaw_rate * dt,
         )
         roll, pitch = into_body(b * b - yaw_z * yaw_z, 2.0 * b * yaw_z, r_x, r_y)
-        roll *= share / dt
-        pitch *= share / dt
-        yaw = share / dt * r_z
-    if share < 1.0:
+        roll *= weight / dt
+        pitch *= weight / dt
+        yaw = weight / dt * r_z
+    if weight < 1.0:
         a = a if a > SMALLEST_A else SMALLEST_A
-        up_roll, up_pitch = levelling_rates(gain, a, 1.0 / (a * a), w, x, y, z)
-        up_roll, up_pitch, _ = limit_rates(up_roll, up_pitch, 0.0, max_rate, 0.0)
-        roll += (1.0 - share) * up_roll
-        pitch += (1.0 - share) * up_pitch
+        level_roll, level_pitch = levelling_rates(gain, a, 1.0 / (a * a), w, x, y, z)
+        level_roll, level_pitch, _ = limit_rates(level_roll, level_pitch, 0.0, max_rate, 0.0)
+        roll += (1.0 - weight) * level_roll
+        pitch += (1.0 - weight) * level_pitch
     return limit_rates(roll, pitch, yaw, max_rate, max_yaw_rate)
 
 
@@ -85,43 +87,42 @@ def _rotation(
     y: float,
     remaining_north: float,
     remaining_east: float,
-    part: float,
-    turn: float,
+    wanted_share: float,
+    heading_change: float,
     max_angle: float,
     max_yaw_angle: float,
 ) -> tuple[float, float, float]:
-    """Rotation vector, rad, at heading 0, that covers `part` of the way to the target.
+    """Rotation vector (rad, at heading 0) of one sample: Log(d ⊗ yaw(heading_change)).
 
-    It is Log(d ⊗ yaw(turn)), where d rotates the present tilt into the next one. Each limit bounds
-    a component of Log, which is f = θ/sin(θ/2) times a component of the quaternion. The angle θ of
-    the result is not known before, so f is found by fixed-point iteration.
+    The rotation d changes the tilt (a, x, y, 0) so that the coefficients move by `wanted_share` of
+    the remaining way (north, east) to the target, or less if `max_angle` (rad) is reached. A
+    component of Log is f = θ/sin(θ/2) times a component of the quaternion. The limits depend on f,
+    and f on the angle θ of the result, so f is found by fixed-point iteration.
     """
     f = 2.0
     r_x = r_y = r_z = 0.0
     for _ in range(_MAX_ITERATIONS):
-        reached = part
+        share = wanted_share
         if max_angle < inf:
-            reached = _reachable_share(
-                a, x, y, remaining_north, remaining_east, part, max_angle / f
+            share = _reachable_share(
+                a, x, y, remaining_north, remaining_east, wanted_share, max_angle / f
             )
-        d_w, d_x, d_y, d_z = _tilt_change(
-            a, x, y, reached * remaining_north, reached * remaining_east
-        )
+        d_w, d_x, d_y, d_z = _tilt_change(a, x, y, share * remaining_north, share * remaining_east)
         length = sqrt(d_w * d_w + d_z * d_z)
-        own_half = atan2(d_z, d_w)
-        half = own_half + 0.5 * turn
-        if max_yaw_angle < inf and f * length * abs(sin(half)) > max_yaw_angle:
-            half = asin(clamp(sin(half), max_yaw_angle / (f * length)))
-        r_w, r_z = length * cos(half), length * sin(half)
-        cosine, sine = cos(half - own_half), sin(half - own_half)
+        half_tilt_yaw = atan2(d_z, d_w)
+        half_yaw = half_tilt_yaw + 0.5 * heading_change
+        if max_yaw_angle < inf and f * length * abs(sin(half_yaw)) > max_yaw_angle:
+            half_yaw = asin(clamp(sin(half_yaw), max_yaw_angle / (f * length)))
+        r_w, r_z = length * cos(half_yaw), length * sin(half_yaw)
+        cosine, sine = cos(half_yaw - half_tilt_yaw), sin(half_yaw - half_tilt_yaw)
         r_x, r_y = d_x * cosine + d_y * sine, d_y * cosine - d_x * sine
         if r_w < 0.0:
             r_w, r_x, r_y, r_z = -r_w, -r_x, -r_y, -r_z
-        before = f
+        previous_f = f
         f = angle_per_sine(r_w, sqrt(r_x * r_x + r_y * r_y + r_z * r_z))
-        free = reached == part and max_yaw_angle == inf
-        if abs(f - before) < _SETTLED_CHANGE or (
-            free and f * sqrt(r_x * r_x + r_y * r_y) <= max_angle
+        unlimited = share == wanted_share and max_yaw_angle == inf
+        if abs(f - previous_f) < _SETTLED_CHANGE or (
+            unlimited and f * sqrt(r_x * r_x + r_y * r_y) <= max_angle
         ):
             break
     return f * r_x, f * r_y, f * r_z
@@ -130,7 +131,7 @@ def _rotation(
 def _tilt_change(
     a: float, x: float, y: float, north: float, east: float
 ) -> tuple[float, float, float, float]:
-    """The quaternion tilt⁻¹ ⊗ tilt', where tilt' has the coefficients moved by (north, east)."""
+    """The quaternion tilt⁻¹ ⊗ tilt'; tilt' has the coefficients of tilt plus (north, east)."""
     north -= 2.0 * a * y
     east += 2.0 * a * x
     next_a = sqrt(0.5 * (1.0 + sqrt(1.0 - north * north - east * east)))
@@ -150,21 +151,23 @@ def _reachable_share(
     y: float,
     remaining_north: float,
     remaining_east: float,
-    part: float,
+    wanted_share: float,
     half_sine: float,
 ) -> float:
     """Share of the line to the target that the coefficients cover if the thrust axis turns by Θ.
 
-    `half_sine` is sin(Θ/2); the result is at most `part`. If n(s) is the thrust axis at the share s
-    of the line, n(0)·n(s) = cos Θ is a quadratic equation in s.
+    `half_sine` is sin(Θ/2); the result is at most `wanted_share`. If n(s) is the thrust axis at the
+    share s of the line, n(0)·n(s) = cos Θ is a quadratic equation in s.
     """
     k = 2.0 * half_sine * half_sine  # 1 − cos Θ
-    along = 2.0 * a * (x * remaining_east - y * remaining_north)
-    square = remaining_north * remaining_north + remaining_east * remaining_east
+    projection = 2.0 * a * (x * remaining_east - y * remaining_north)
+    distance_squared = remaining_north * remaining_north + remaining_east * remaining_east
     cosine = 2.0 * a * a - 1.0
-    leading = along * along + cosine * cosine * square
-    inside = along * along * k * k + leading * k * (2.0 * cosine * cosine - k)
-    if leading <= 0.0 or inside <= 0.0:
-        return part
-    reached = (sqrt(inside) - along * k) / leading
-    return reached if reached < part else part
+    leading_coefficient = projection * projection + cosine * cosine * distance_squared
+    discriminant = projection * projection * k * k + leading_coefficient * k * (
+        2.0 * cosine * cosine - k
+    )
+    if leading_coefficient <= 0.0 or discriminant <= 0.0:
+        return wanted_share
+    share = (sqrt(discriminant) - projection * k) / leading_coefficient
+    return share if share < wanted_share else wanted_share

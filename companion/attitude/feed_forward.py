@@ -72,15 +72,15 @@ class FeedForward:
         `body_rates`: rates at the start of the plan, rad/s; None: at rest.
         """
         w, x, y, z = q
-        square, ax, ay = tilt_products(w, x, y, z)
+        a_squared, ax, ay = tilt_products(w, x, y, z)
         north = east = turn_rate = yaw_rate = 0.0
         if body_rates is not None:
             yaw_rate = body_rates[2]
             north, east, turn_rate = rates_to_speed(w, x, y, z, *body_rates)
         # The rates sent for this sample take effect one dead time later: the plan begins there.
-        ahead, yaw_ahead = self.dead_time, self.yaw.dead_time
-        c = Coefficients(-2.0 * ay + ahead * north, 2.0 * ax + ahead * east)
-        heading = heading_of(sqrt(square), w, z) + yaw_ahead * turn_rate
+        dead_time, yaw_dead_time = self.dead_time, self.yaw.dead_time
+        c = Coefficients(-2.0 * ay + dead_time * north, 2.0 * ax + dead_time * east)
+        heading = heading_of(sqrt(a_squared), w, z) + yaw_dead_time * turn_rate
         model = self._model
         model.start_at(c, Coefficients(north, east))
         self._heading.start_at(heading, turn_rate)
@@ -107,32 +107,32 @@ class FeedForward:
 
         Args:
             target: an admissible target.
-            start_heading: heading at the start of the plan, rad, computed from the present one: the
-                body's heading minus its predicted turn since the start.
+            start_heading: heading at the start of the plan, rad: the present heading of the body
+                minus its predicted turn since the start.
             yaw_feedback: feedback to add to the yaw rate, rad/s.
             dt: time by which the plan advances, s.
         """
-        still_before, turn_before = self._still_rate, self._heading.turn_rate
+        last_still_rate, last_turn_rate = self._still_rate, self._heading.turn_rate
         self._model.advance(target, dt)
         self._heading.advance(target, dt)
-        x, y, still_after = self._model.rates()
-        turn_after = self._heading.turn_rate
+        x, y, still_rate = self._model.rates()
+        turn_rate = self._heading.turn_rate
         yaw = (
-            0.5 * (still_before + still_after + turn_before + turn_after)
-            + self.yaw.lag / dt * (still_after - still_before + turn_after - turn_before)
+            0.5 * (last_still_rate + still_rate + last_turn_rate + turn_rate)
+            + self.yaw.lag / dt * (still_rate - last_still_rate + turn_rate - last_turn_rate)
             + yaw_feedback
         )
         yaw = clamp(yaw, self._max_yaw_rate)
         self._body.advance(yaw, dt)
-        self._still_rate = still_after
-        mean_still = 0.5 * (still_before + still_after)
-        self.frame.advance(yaw, mean_still, dt)
+        self._still_rate = still_rate
+        mean_still_rate = 0.5 * (last_still_rate + still_rate)
+        self.frame.advance(yaw, mean_still_rate, dt)
         model, body, plans = self._model, self._body, self.plans
-        still_angle = plans.tilt.newest.still_angle + mean_still * dt
+        still_angle = plans.tilt.newest.still_angle + mean_still_rate * dt
         slopes = model.rate_slopes(x, y)
         plans.add(
             dt,
-            PlannedTilt(model.north, model.east, still_angle, x, y, *slopes, still_after),
-            PlannedYaw(self._heading.heading, body.turned, body.rate),
+            PlannedTilt(model.north, model.east, still_angle, x, y, *slopes, still_rate),
+            PlannedYaw(self._heading.heading, body.yaw_angle, body.rate),
         )
         return self._roll.command(dt, start_heading), self._pitch.command(dt, start_heading), yaw

@@ -5,8 +5,8 @@ from math import sqrt
 from companion.attitude.kinematics import (
     SMALLEST_A,
     heading_of,
+    law_weight,
     levelling_rates,
-    share_of_law,
     speed_to_rates,
     tilt_products,
 )
@@ -25,36 +25,42 @@ def first_order(
     together, so the line stays straight. Beyond the recovery angle the law fades into a rotation
     towards level without control of the heading, which is undefined upside down.
     """
-    gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_low, slope = constants
+    gain, yaw_gain, _, max_yaw_rate, _, rate_weight, speed_weight, _, cos_recovery, slope = (
+        constants
+    )
     w, x, y, z = q
     north, east, heading, heading_rate = target
-    square, ax, ay = tilt_products(w, x, y, z)
-    cosine = 2.0 * square - 1.0
-    share = 1.0
-    if cosine < cos_low:
-        share = share_of_law(cosine, cos_low, slope)
-        cosine = cos_low
-        square = max(square, SMALLEST_A * SMALLEST_A)
-    a = sqrt(square)
-    both = 1.0 / (square * cosine)  # one division instead of two: divisions cost a batch the most
-    inverse = both * cosine
-    faded = share * gain
-    e_x = faded * (east - 2.0 * ax)
-    e_y = -faded * (north + 2.0 * ay)
-    roll, pitch, still = speed_to_rates(w, z, ax, ay, inverse, both * square, e_x, e_y)
-    if share < 1.0:
-        up_roll, up_pitch = levelling_rates(gain, a, inverse, w, x, y, z)
-        roll += (1.0 - share) * up_roll
-        pitch += (1.0 - share) * up_pitch
+    a_squared, ax, ay = tilt_products(w, x, y, z)
+    cosine = 2.0 * a_squared - 1.0
+    weight = 1.0
+    if cosine < cos_recovery:
+        weight = law_weight(cosine, cos_recovery, slope)
+        cosine = cos_recovery
+        a_squared = max(a_squared, SMALLEST_A * SMALLEST_A)
+    a = sqrt(a_squared)
+    inverse_product = 1.0 / (
+        a_squared * cosine
+    )  # one division instead of two: divisions cost a batch the most
+    inverse_a_squared = inverse_product * cosine
+    weighted_gain = weight * gain
+    e_x = weighted_gain * (east - 2.0 * ax)
+    e_y = -weighted_gain * (north + 2.0 * ay)
+    roll, pitch, still_rate = speed_to_rates(
+        w, z, ax, ay, inverse_a_squared, inverse_product * a_squared, e_x, e_y
+    )
+    if weight < 1.0:
+        level_roll, level_pitch = levelling_rates(gain, a, inverse_a_squared, w, x, y, z)
+        roll += (1.0 - weight) * level_roll
+        pitch += (1.0 - weight) * level_pitch
     excess = rate_weight * (roll * roll + pitch * pitch)
     if speed_weight > 0.0:
-        too_fast = speed_weight * (e_x * e_x + e_y * e_y)
-        excess = max(excess, too_fast)
+        speed_excess = speed_weight * (e_x * e_x + e_y * e_y)
+        excess = max(excess, speed_excess)
     if excess > 1.0:
         scale = 1.0 / sqrt(excess)
         roll *= scale
         pitch *= scale
-        still *= scale
-    error = wrap_difference(heading - heading_of(a, w, z))
-    yaw = share * (yaw_gain * error + heading_rate) + still
+        still_rate *= scale
+    heading_error = wrap_difference(heading - heading_of(a, w, z))
+    yaw = weight * (yaw_gain * heading_error + heading_rate) + still_rate
     return roll, pitch, clamp(yaw, max_yaw_rate)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 _ROWS_PER_DROP = 64
-"""Number of rows that are dropped at a time once they are older than the longest delay."""
+"""Number of rows of a `History` that are dropped together once they are older than its `span`."""
 
 
 def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
@@ -47,13 +47,13 @@ class PlannedYaw(NamedTuple):
 
     Attributes:
         heading: planned heading, rad, not wrapped.
-        turned: integral of `turning` since the start, rad.
-        turning: predicted yaw rate of the body in response to the rates sent, rad/s.
+        body_yaw: integral of `body_yaw_rate` since the start, rad.
+        body_yaw_rate: predicted yaw rate of the body in response to the rates sent, rad/s.
     """
 
     heading: float
-    turned: float
-    turning: float
+    body_yaw: float
+    body_yaw_rate: float
 
 
 Row = TypeVar("Row", PlannedTilt, PlannedYaw)
@@ -73,9 +73,12 @@ class History(Generic[Row]):
         self._times: list[float] = []
         self._rows: list[Row] = []
 
-    def start(self, time: float, row: Row, motion: Row) -> None:
-        """Start again with `row` at `time`, s; before that, rows change by `motion` per second."""
-        earlier = type(row)(*[a - self._span * b for a, b in zip(row, motion, strict=True)])
+    def start(self, time: float, row: Row, slope: Row) -> None:
+        """Start again with `row` at `time`, s.
+
+        For earlier times the row is extrapolated; `slope` is its change per second.
+        """
+        earlier = type(row)(*[a - self._span * b for a, b in zip(row, slope, strict=True)])
         self._times[:] = [time - self._span, time]
         self._rows[:] = [earlier, row]
 
@@ -139,36 +142,38 @@ class PlanHistory:
         self._turn = Turn(0.0, 0.0)  # when `_turn_plan` takes effect
 
     def add(self, dt: float, tilt: PlannedTilt, yaw: PlannedYaw) -> None:
-        """Add a plan for a time `dt` seconds later than that of the newest plan."""
+        """Add a plan for `dt` seconds after the time of the newest plan."""
         self.time += dt
         self.tilt.add(self.time, tilt)
         self.yaw.add(self.time, yaw)
 
-    def in_effect(self, late: float) -> tuple[PlannedTilt, PlannedYaw]:
-        """The plans of tilt and heading in effect at a sample that came `late` s too late."""
-        now = self.time + late
+    def in_effect(self, lateness: float) -> tuple[PlannedTilt, PlannedYaw]:
+        """The plans in effect at the newest sample, which came `lateness` s later than expected."""
+        now = self.time + lateness
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
 
     def predicted_turn(self, planned_for: float, plan: PlannedTilt) -> Turn:
-        """The turn of the body when `plan`, which is for the time `planned_for` (s), takes effect.
+        """The turn of the body when `plan`, made for the time `planned_for` (s), takes effect.
 
-        The heading turns at the body's yaw rate minus the yaw rate that keeps it still.
+        The heading turns at the body's yaw rate minus the yaw rate that keeps the heading still.
         """
         if plan is not self._turn_plan:  # both axes and the attitude target ask for the newest plan
-            acts = planned_for + self._dead_time
-            body = self.yaw.at(acts - self._yaw_dead_time)
-            self._turn = Turn(body.turned - plan.still_angle, body.turning - plan.still_rate)
+            effect_time = planned_for + self._dead_time
+            body_plan = self.yaw.at(effect_time - self._yaw_dead_time)
+            self._turn = Turn(
+                body_plan.body_yaw - plan.still_angle, body_plan.body_yaw_rate - plan.still_rate
+            )
             self._turn_plan = plan
         return self._turn
 
-    def yaw_within(self, seconds: float) -> float:
-        """Predicted yaw of the body, rad, in the `seconds` after the newest tilt plan acts."""
-        acts = self.time + self._dead_time - self._yaw_dead_time
-        return self.yaw.at(acts + seconds).turned - self.yaw.at(acts).turned
+    def predicted_yaw_change(self, seconds: float) -> float:
+        """Predicted yaw of the body, rad, in `seconds` after the newest tilt plan takes effect."""
+        effect_time = self.time + self._dead_time - self._yaw_dead_time
+        return self.yaw.at(effect_time + seconds).body_yaw - self.yaw.at(effect_time).body_yaw
 
 
 _PERIOD_WEIGHT = 0.05
-"""Weight of the newest sample period in the running mean that is the expected period."""
+"""Weight of the newest sample period in the expected period, a running mean."""
 
 
 class SampleHold:
@@ -180,29 +185,31 @@ class SampleHold:
     not be straight. The next rates correct this, for a delay of one period at most.
 
     Attributes:
-        late: how much later than expected the newest sample came, s; negative if it was early.
+        lateness: how much later than expected the newest sample came, s; negative if it was early.
         period: expected sample period, s; 0 before the first sample.
         step: time by which the plan advances, s.
     """
 
-    __slots__ = ("_late_share", "_pitch", "_roll", "late", "period", "step")
+    __slots__ = ("_lateness_share", "_pitch", "_roll", "lateness", "period", "step")
 
     def __init__(self) -> None:
         self.restart()
 
     def restart(self) -> None:
         """Forget the rates that were sent and the expected period."""
-        self.period = self.late = self.step = self._roll = self._pitch = self._late_share = 0.0
+        self.period = self.lateness = self.step = self._roll = self._pitch = (
+            self._lateness_share
+        ) = 0.0
 
-    def take(self, dt: float) -> None:
+    def note_sample(self, dt: float) -> None:
         """Account for a new sample, `dt` seconds after the last one."""
-        before = self.period or dt
-        self.late = late = dt - before
+        expected = self.period or dt
+        self.lateness = lateness = dt - expected
         # Bounded, so that the plan always advances.
-        change = max(min(late, before), -0.5 * dt / _PERIOD_WEIGHT)
-        self.period = period = before + _PERIOD_WEIGHT * change
-        self.step = period + late
-        self._late_share = min(late / period, 1.0)
+        change = max(min(lateness, expected), -0.5 * dt / _PERIOD_WEIGHT)
+        self.period = period = expected + _PERIOD_WEIGHT * change
+        self.step = period + lateness
+        self._lateness_share = min(lateness / period, 1.0)
 
     def rates(self, roll: float, pitch: float) -> tuple[float, float]:
         """The planned rates, corrected because the newest sample came late or early, rad/s.
@@ -211,6 +218,6 @@ class SampleHold:
             roll: mean roll rate that is planned for the newest step, rad/s.
             pitch: mean pitch rate that is planned for the newest step, rad/s.
         """
-        self._roll = roll + self._late_share * (roll - self._roll)
-        self._pitch = pitch + self._late_share * (pitch - self._pitch)
+        self._roll = roll + self._lateness_share * (roll - self._roll)
+        self._pitch = pitch + self._lateness_share * (pitch - self._pitch)
         return self._roll, self._pitch

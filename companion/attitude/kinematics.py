@@ -37,7 +37,7 @@ def cos_tilt(x: float, y: float) -> float:
 
 
 def tilt_angle(x: float, y: float) -> float:
-    """The tilt in rad; a quaternion with a norm slightly above 1 is accepted."""
+    """Tilt, rad, from `x`, `y` as in `cos_tilt`; a norm slightly above 1 is accepted."""
     return acos(max(-1.0, min(1.0, cos_tilt(x, y))))
 
 
@@ -46,7 +46,7 @@ def speed_to_rates(
     z: float,
     ax: float,
     ay: float,
-    inverse: float,
+    inverse_a_squared: float,
     inverse_cos_tilt: float,
     e_x: float,
     e_y: float,
@@ -54,19 +54,23 @@ def speed_to_rates(
     """Body rates (rad/s) that give d(2ax)/dt = e_x, d(2ay)/dt = e_y and keep the heading still.
 
     Equations 21 to 24 with their common term (y·e_x − x·e_y) factored out, then equation 28.
-    `inverse` is 1/a². `inverse_cos_tilt` is 1/cos(tilt); the caller may bound it near 90° of tilt,
-    so that the rates stay bounded.
+    `inverse_a_squared` is 1/a². `inverse_cos_tilt` is 1/cos(tilt); the caller may bound it near 90°
+    of tilt, so that the rates stay bounded.
     """
-    across = 2.0 * inverse * (ay * e_x - ax * e_y)
-    r_x = inverse_cos_tilt * (e_x - ay * across)
-    r_y = inverse_cos_tilt * (e_y + ax * across)
-    cosine = (w * w - z * z) * inverse
-    sine = 2.0 * w * z * inverse
-    return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x, (ay * r_x - ax * r_y) * inverse
+    common_term = 2.0 * inverse_a_squared * (ay * e_x - ax * e_y)
+    r_x = inverse_cos_tilt * (e_x - ay * common_term)
+    r_y = inverse_cos_tilt * (e_y + ax * common_term)
+    cosine = (w * w - z * z) * inverse_a_squared
+    sine = 2.0 * w * z * inverse_a_squared
+    return (
+        cosine * r_x + sine * r_y,
+        cosine * r_y - sine * r_x,
+        (ay * r_x - ax * r_y) * inverse_a_squared,
+    )
 
 
 def into_body(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float, float]:
-    """Rotate rates about x, y from heading 0 to the heading with this cosine and sine (28)."""
+    """Rotate roll and pitch rate from heading 0 to a heading, given by cosine and sine (eq. 28)."""
     return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x
 
 
@@ -76,14 +80,16 @@ def rates_to_speed(
     """Speed of the coefficients (north, east; 1/s) and of the heading (rad/s) at given body rates.
 
     The inverse of `speed_to_rates`. At body rates ω (rad/s) the thrust axis −R·e_z moves with
-    −R·(ω × e_z). The heading turns at the yaw rate minus R_z, the yaw rate that keeps it still.
+    −R·(ω × e_z). The heading turns at the yaw rate minus the yaw rate that keeps the heading still.
     """
     north = 2.0 * (x * y - w * z) * roll - (1.0 - 2.0 * (y * y + z * z)) * pitch
     east = (1.0 - 2.0 * (x * x + z * z)) * roll - 2.0 * (x * y + w * z) * pitch
-    square, ax, ay = tilt_products(w, x, y, z)
-    inverse = 1.0 / square
-    _, _, still = speed_to_rates(w, z, ax, ay, inverse, 1.0 / (2.0 * square - 1.0), east, -north)
-    return north, east, yaw - still
+    a_squared, ax, ay = tilt_products(w, x, y, z)
+    inverse_a_squared = 1.0 / a_squared
+    _, _, still_rate = speed_to_rates(
+        w, z, ax, ay, inverse_a_squared, 1.0 / (2.0 * a_squared - 1.0), east, -north
+    )
+    return north, east, yaw - still_rate
 
 
 def heading_of(a: float, w: float, z: float) -> float:
@@ -95,30 +101,30 @@ def heading_of(a: float, w: float, z: float) -> float:
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
 
 
-def share_of_law(cosine: float, cos_recovery: float, slope: float) -> float:
+def law_weight(cosine: float, cos_recovery: float, slope: float) -> float:
     """Weight of the law beyond the recovery angle; the rest is the weight of the rotation to level.
 
     It falls smoothly from 1 at the recovery angle to 0 at `limits.RECOVERY_BLEND_ANGLE` (10°) more
     tilt. Below the recovery angle only the law acts, and this formula is not valid. `cosine` is
     cos(tilt), `slope` is `Constants.recovery_slope`.
     """
-    ratio = 1.0 + slope * (cosine - cos_recovery)
-    if ratio <= 0.0:
+    blend = 1.0 + slope * (cosine - cos_recovery)
+    if blend <= 0.0:
         return 0.0
-    return ratio * ratio * (3.0 - 2.0 * ratio)
+    return blend * blend * (3.0 - 2.0 * blend)
 
 
 def levelling_rates(
-    gain: float, a: float, inverse: float, w: float, x: float, y: float, z: float
+    gain: float, a: float, inverse_a_squared: float, w: float, x: float, y: float, z: float
 ) -> tuple[float, float]:
     """Body rates (roll, pitch) that rotate the vehicle to level at 2·gain·sin(tilt/2), rad/s.
 
     The rotation is about the tilt axis and is not divided by cos(tilt), so it is valid up to the
-    inverted attitude. There every axis leads to level equally fast; q and −q give the same axis.
-    `inverse` is 1/a².
+    inverted attitude. When inverted, every horizontal axis leads to level equally fast; q and −q
+    give the same axis.
     """
     if a <= SMALLEST_A:
         scale = 2.0 * gain if first_is_negative(x, y, 0.0) else -2.0 * gain
         return scale * x, scale * y
-    scale = -2.0 * gain * a * inverse
+    scale = -2.0 * gain * a * inverse_a_squared
     return scale * (w * x + z * y), scale * (w * y - z * x)

@@ -46,14 +46,14 @@ class Limits:
 
     @property
     def tilt_rate(self) -> float:
-        """W_M in rad/s, infinite where there is no limit."""
+        """Limit W_M of the tilt rate, rad/s; infinite if `max_tilt_rate` is None."""
         return inf if self.max_tilt_rate is None else self.max_tilt_rate
 
     @property
     def coefficient_speed(self) -> float:
-        """Largest speed of the coefficients, 1/s: W_M·cos(max_tilt) (33) in the shape "paper".
+        """Limit of the speed of the coefficients, 1/s: W_M·cos(max_tilt) (equation 33).
 
-        It is infinite in the shape "tight" and without a limit of tilt or tilt rate.
+        Infinite unless the shape is "paper" and both tilt and tilt rate are limited.
         """
         if self.shape != "paper" or self.max_tilt is None:
             return inf
@@ -61,12 +61,12 @@ class Limits:
 
     @property
     def yaw_rate(self) -> float:
-        """Largest |ω_z| in rad/s, infinite where there is no limit."""
+        """Limit of the yaw rate, rad/s; infinite if `max_yaw_rate` is None."""
         return inf if self.max_yaw_rate is None else self.max_yaw_rate
 
 
 RECOVERY_ANGLE = radians(75.0)
-"""Tilt from which a planner begins to rotate the vehicle towards level, rad; the default."""
+"""Default recovery angle: the tilt from which a planner rotates the vehicle towards level, rad."""
 RECOVERY_BLEND_ANGLE = radians(10.0)
 """Range of tilt beyond the recovery angle over which the law fades out, rad."""
 
@@ -74,18 +74,19 @@ RECOVERY_BLEND_ANGLE = radians(10.0)
 class Constants(NamedTuple):
     """Gains, limits and recovery angle of one planner; a limit that is not set is infinite.
 
-    A weight is 1/limit², and 0 without a limit: a quantity exceeds its limit if weight·value² > 1.
+    `tilt_rate_weight` and `speed_weight` are 1/limit², 0 without a limit: a value exceeds the limit
+    if weight·value² > 1.
     """
 
     gain: float  # p, 1/s
     yaw_gain: float  # 1/s
     max_tilt_rate: float  # W_M, rad/s
     max_yaw_rate: float  # rad/s
-    max_speed: float  # of the coefficients, 1/s: W_M·cos(max_tilt) in the paper's shape (eq 33)
+    max_speed: float  # of the coefficients, 1/s: `Limits.coefficient_speed`
     tilt_rate_weight: float  # s²/rad²
     speed_weight: float  # s²
     longest_target: float  # largest length of target coefficients: sin of the largest tilt
-    cos_recovery: float  # below this cosine of the tilt, recovery begins
+    cos_recovery: float  # cosine of the recovery angle
     recovery_slope: float  # 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND_ANGLE))
 
 
@@ -103,7 +104,7 @@ def make_constants(
             `limits.max_tilt`.
 
     Raises:
-        TypeError: `limits` are no `Limits`.
+        TypeError: `limits` is not a `Limits`.
         ValueError: a gain or the recovery angle is out of range.
     """
     if not isinstance(limits, Limits):

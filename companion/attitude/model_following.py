@@ -1,4 +1,4 @@
-"""`model-following`: a response that stays linear behind a real rate loop, beyond the paper."""
+"""`model-following`: keeps the response linear with a real rate loop; not from the paper."""
 
 from math import cos, sin, sqrt
 
@@ -28,16 +28,16 @@ SHORTEST_PERIOD, LONGEST_PERIOD = 1e-4, 0.2  # s
 
 
 class ModelFollowingPlanner:
-    """Two-degree-of-freedom control: planned motion fed forward, deviation from it fed back.
+    """Two-degree-of-freedom control: feedforward of a planned motion, feedback of the deviation.
 
-    `FeedForward` plans a smooth, straight motion within the limits, and the rates that make it.
+    `FeedForward` plans a smooth, straight motion within the limits, and computes its body rates.
 
     Feedback: the measured coefficients are compared with the plan of one dead time ago, which is
     the plan in effect now. The gain is p, but at most a quarter of the largest stable gain of the
     slower axis (`rate_response.feedback_gain`). The heading is fed back in the same way.
 
     ArduPilot takes the rates along the axes of its attitude target instead of the body's;
-    `TargetFrame` gives the rotation into these.
+    `TargetFrame` gives the rotation into the axes of that target.
 
     Beyond the recovery angle the rates are those of `first-order`; a new plan begins below it.
 
@@ -46,24 +46,24 @@ class ModelFollowingPlanner:
         response: response of the vehicle's rate loop.
 
     Attributes:
-        planned: the plan in effect at the newest sample; None before the first one and beyond the
-            recovery angle.
+        plan_in_effect: the plan in effect at the newest sample; None before the first sample and
+            beyond the recovery angle.
     """
 
     def __init__(self, constants: Constants, response: RateResponse) -> None:
-        self._forward = FeedForward(constants, response, LONGEST_PERIOD)
-        self._hold = SampleHold()
+        self._feed_forward = FeedForward(constants, response, LONGEST_PERIOD)
+        self._sample_hold = SampleHold()
         self._started = False
         self._target: Target | None = None
-        self.planned: PlannedTilt | None = None
+        self.plan_in_effect: PlannedTilt | None = None
         self.retune(constants)
 
     def retune(self, constants: Constants) -> None:
         """Use these gains and limits from the next sample on; the planned motion continues."""
         self._constants = constants
-        self._gain = min(feedback_gain(constants.gain, axis) for axis in self._forward.tilt)
-        self._yaw_gain = feedback_gain(constants.yaw_gain, self._forward.yaw)
-        self._forward.retune(constants)
+        self._gain = min(feedback_gain(constants.gain, axis) for axis in self._feed_forward.tilt)
+        self._yaw_gain = feedback_gain(constants.yaw_gain, self._feed_forward.yaw)
+        self._feed_forward.retune(constants)
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Start a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
@@ -77,16 +77,16 @@ class ModelFollowingPlanner:
             InvalidBodyRatesError: `body_rates` are not three numbers.
         """
         w, x, y, z = q = normalised(q)
-        square, _, _ = tilt_products(w, x, y, z)
+        a_squared, _, _ = tilt_products(w, x, y, z)
         plausible = plausible_rates(body_rates)
-        self._started = 2.0 * square - 1.0 >= self._constants.cos_recovery
+        self._started = 2.0 * a_squared - 1.0 >= self._constants.cos_recovery
         if self._started:
             self._start(q, plausible)
 
     def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
-        self._hold.restart()
+        self._sample_hold.restart()
         self._target = None
-        self._forward.start(q, body_rates)
+        self._feed_forward.start(q, body_rates)
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
         """Take the attitude target of ArduPilot, which takes body rates along the target's axes.
@@ -99,9 +99,9 @@ class ModelFollowingPlanner:
         if not (self._started and is_unit(q)):
             return
         w, x, y, z = normalised(q)
-        square, _, _ = tilt_products(w, x, y, z)
-        if 2.0 * square - 1.0 >= self._constants.cos_recovery:
-            self._forward.frame.note(heading_of(sqrt(square), w, z), age)
+        a_squared, _, _ = tilt_products(w, x, y, z)
+        if 2.0 * a_squared - 1.0 >= self._constants.cos_recovery:
+            self._feed_forward.frame.note_heading(heading_of(sqrt(a_squared), w, z), age)
 
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
@@ -118,37 +118,38 @@ class ModelFollowingPlanner:
             InvalidPeriodError: `dt` is not positive and finite.
         """
         require_period(dt)
-        constants, forward = self._constants, self._forward
+        constants, forward = self._constants, self._feed_forward
         w, x, y, z = q = normalised(q)
         target = limited_target(target, constants.longest_target)
-        square, ax, ay = tilt_products(w, x, y, z)
-        cosine = 2.0 * square - 1.0
+        a_squared, ax, ay = tilt_products(w, x, y, z)
+        cosine = 2.0 * a_squared - 1.0
         plausible = plausible_rates(body_rates)
         if cosine < constants.cos_recovery:
             self._started = False
-            self.planned = None
+            self.plan_in_effect = None
             return BodyRates(*first_order(q, target, dt, constants))
         if not self._started:
             self._start(q, plausible)
             self._started = True
         dt = min(max(SHORTEST_PERIOD, dt), LONGEST_PERIOD)
-        north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(square), w, z)
-        self._hold.take(dt)
-        tilt_plan, yaw_plan = forward.plans.in_effect(self._hold.late)
-        self.planned = tilt_plan
-        north_speed, east_speed, turn = self._feedback(tilt_plan, yaw_plan, north, east, heading)
-        more_roll, more_pitch, more_yaw = speed_to_rates(
-            w, z, ax, ay, 1.0 / square, 1.0 / cosine, east_speed, -north_speed
+        north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(a_squared), w, z)
+        self._sample_hold.note_sample(dt)
+        tilt_plan, yaw_plan = forward.plans.in_effect(self._sample_hold.lateness)
+        self.plan_in_effect = tilt_plan
+        speed_north, speed_east, turn = self._feedback(tilt_plan, yaw_plan, north, east, heading)
+        feedback_roll, feedback_pitch, feedback_yaw = speed_to_rates(
+            w, z, ax, ay, 1.0 / a_squared, 1.0 / cosine, speed_east, -speed_north
         )
         if plausible is not None:  # an unpredicted yaw rate lasts until these rates take effect
-            unpredicted = plausible.yaw - yaw_plan.turning
-            heading += (forward.dead_time + forward.lag) * unpredicted
-        heading += tilt_plan.still_angle - yaw_plan.turned
-        ahead = forward.frame.lead(heading, forward.plans)
-        roll, pitch, yaw = self._advance(target, heading, more_yaw + turn)
-        roll, pitch = self._hold.rates(roll, pitch)
-        ahead = 0.5 * (ahead + forward.frame.lead(heading, forward.plans))
-        roll, pitch = into_body(cos(ahead), sin(ahead), roll + more_roll, pitch + more_pitch)
+            unpredicted_yaw_rate = plausible.yaw - yaw_plan.body_yaw_rate
+            heading += (forward.dead_time + forward.lag) * unpredicted_yaw_rate
+        heading += tilt_plan.still_angle - yaw_plan.body_yaw
+        lead = forward.frame.lead(heading, forward.plans)
+        roll, pitch, yaw = self._advance(target, heading, feedback_yaw + turn)
+        roll, pitch = self._sample_hold.rates(roll, pitch)
+        lead = 0.5 * (lead + forward.frame.lead(heading, forward.plans))
+        roll, pitch = roll + feedback_roll, pitch + feedback_pitch
+        roll, pitch = into_body(cos(lead), sin(lead), roll, pitch)
         return BodyRates(
             *limit_rates(roll, pitch, yaw, constants.max_tilt_rate, constants.max_yaw_rate)
         )
@@ -159,17 +160,19 @@ class ModelFollowingPlanner:
         """Advance the plan to the time of the next expected sample; see `FeedForward.advance`.
 
         If the newest sample came late, the plan first follows the previous target for that delay,
-        because the new target was not in force then.
+        because the new target was not known then.
         """
-        hold, forward = self._hold, self._forward
-        before, self._target = self._target, target
-        if before is None or before == target or hold.late < SHORTEST_PERIOD:
+        hold, forward = self._sample_hold, self._feed_forward
+        previous, self._target = self._target, target
+        if previous is None or previous == target or hold.lateness < SHORTEST_PERIOD:
             return forward.advance(target, start_heading, yaw_feedback, hold.step)
-        late, coming = hold.late, hold.step - hold.late
-        late_roll, late_pitch, _ = forward.advance(before, start_heading, yaw_feedback, late)
-        roll, pitch, yaw = forward.advance(target, start_heading, yaw_feedback, coming)
-        share = late / hold.step
-        return roll + share * (late_roll - roll), pitch + share * (late_pitch - pitch), yaw
+        lateness, remaining = hold.lateness, hold.step - hold.lateness
+        first_roll, first_pitch, _ = forward.advance(
+            previous, start_heading, yaw_feedback, lateness
+        )
+        roll, pitch, yaw = forward.advance(target, start_heading, yaw_feedback, remaining)
+        share = lateness / hold.step
+        return roll + share * (first_roll - roll), pitch + share * (first_pitch - pitch), yaw
 
     def _feedback(
         self,
@@ -181,13 +184,13 @@ class ModelFollowingPlanner:
     ) -> tuple[float, float, float]:
         """Feedback towards the plan: speeds of the coefficients (1/s) and of the heading (rad/s).
 
-        It is 0 in the first dead time after the start, when no plan has taken effect yet.
+        Both are 0 in the first dead time after the start, when no plan has taken effect yet.
         """
-        speed_north = speed_east = turn = 0.0
-        forward = self._forward
+        speed_north = speed_east = turn_rate = 0.0
+        forward = self._feed_forward
         if forward.plans.time >= forward.dead_time:
             speed_north = self._gain * (tilt_plan.north - north)
             speed_east = self._gain * (tilt_plan.east - east)
         if forward.plans.time >= forward.yaw.dead_time:
-            turn = self._yaw_gain * wrap_angle(yaw_plan.heading - heading)
-        return speed_north, speed_east, turn
+            turn_rate = self._yaw_gain * wrap_angle(yaw_plan.heading - heading)
+        return speed_north, speed_east, turn_rate

@@ -77,7 +77,7 @@ class LawPlanner:
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
     ) -> BodyRates:
-        """Body rates of the law, rad/s; `dt` is the sample period in s.
+        """Body rates of the law, rad/s; `dt` is the sample period, s.
 
         Raises:
             InvalidPeriodError: `dt` is not positive and finite.
@@ -142,11 +142,12 @@ def make_planner(
         limits: bounds on tilt and rates.
         options: further options of that planner. Every planner takes `recovery_angle`, rad; without
             `limits.max_tilt` it is also the largest tilt of a target. `model-following` also needs
-            the response of the rate loop (`RateResponse`): `lag` and `dead_time`, s (0.0 for an
-            immediate one). It takes `damping` (default None: first order), `acceleration`, rad/s²
-            (default None: no limit), each of the four also with the prefix `pitch_` or `yaw_`
-            (default None: as roll), and `frame_lead`, s. There is no `yaw_damping`. With
-            `pitch_lag` and no `pitch_damping`, pitch is of first order.
+            the response of the rate loop (`AxisResponse`): `lag` and `dead_time`, s (0.0 for an
+            immediate one). It also takes `damping` (default None: first order), `acceleration`,
+            rad/s² (default None: no limit), and `RateResponse.frame_lead`, s. With the prefix
+            `pitch_` or `yaw_` the four values of a response are those of that axis (default None:
+            as roll). But there is no `yaw_damping`, and with `pitch_lag` and no `pitch_damping`,
+            pitch is of first order.
 
     Raises:
         TypeError: the planner does not take an option, the law does not return three numbers, or
@@ -155,11 +156,11 @@ def make_planner(
             `dead_time`.
     """
     if isinstance(name, type):
-        return _made_planner(name, constants_of(name.__name__, gain, yaw_gain, limits, options))
+        return _make_from_class(name, constants_of(name.__name__, gain, yaw_gain, limits, options))
     if callable(name):
-        label = getattr(name, "__name__", repr(name))
-        planner = LawPlanner(name, constants_of(label, gain, yaw_gain, limits, options))
-        _require_three_rates(label, planner)
+        law_name = getattr(name, "__name__", repr(name))
+        planner = LawPlanner(name, constants_of(law_name, gain, yaw_gain, limits, options))
+        _require_three_rates(law_name, planner)
         return planner
     if name == MODEL_FOLLOWING:
         return make_model_following(gain, yaw_gain, limits, **options)
@@ -168,11 +169,11 @@ def make_planner(
     return LawPlanner(_LAWS[name], constants_of(name, gain, yaw_gain, limits, options))
 
 
-def _made_planner(factory: Callable[[Constants], Planner], constants: Constants) -> Planner:
+def _make_from_class(factory: Callable[[Constants], Planner], constants: Constants) -> Planner:
     """Make a planner of a user's class.
 
     Raises:
-        TypeError: it lacks a method of `Planner`.
+        TypeError: the planner lacks a method of `Planner`.
     """
     planner = factory(constants)
     for method in ("rates", "reset", "note_attitude_target"):

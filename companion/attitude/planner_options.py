@@ -1,4 +1,4 @@
-"""The options of `make_planner`: those of each planner, and those of `model-following`."""
+"""Checks the options of `make_planner`, and makes `model-following` from its many options."""
 
 from collections.abc import Mapping
 from math import inf
@@ -12,7 +12,7 @@ from companion.attitude.rate_response import AxisResponse, RateResponse
 def constants_of(
     name: str, gain: float, yaw_gain: float, limits: Limits, options: Mapping[str, Any]
 ) -> Constants:
-    """The constants of the planner `name`, which takes no option but `recovery_angle`.
+    """The constants of the planner `name`; the only option here is `recovery_angle`.
 
     Raises:
         TypeError: there is an option that the planner `name` does not take.
@@ -42,10 +42,10 @@ def make_model_following(
     frame_lead: float | None = None,
     **options: Any,
 ) -> ModelFollowingPlanner:
-    """The planner for a rate loop; the options are those of `companion.attitude.make_planner`.
+    """Make the planner `model-following`; `companion.attitude.make_planner` explains the options.
 
     Raises:
-        TypeError: there is no such option.
+        TypeError: the planner does not take an option.
         ValueError: `lag` or `dead_time` is missing, or a value is out of range.
     """
     if lag is None or dead_time is None:
@@ -78,7 +78,7 @@ def _like_roll(
     acceleration: float | None,
     damping: float,
 ) -> AxisResponse:
-    """The response of an axis; a value that is None is that of roll."""
+    """The response of pitch or yaw; None is replaced by the value of roll."""
     return AxisResponse(
         roll.lag if lag is None else lag,
         roll.dead_time if dead_time is None else dead_time,

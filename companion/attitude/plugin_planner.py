@@ -10,7 +10,7 @@ from companion.user_code import naming_user_code
 
 
 class InvalidRatesError(AttitudeError):
-    """A planner of another package returned body rates that are not finite."""
+    """A planner from another package returned body rates that are not finite."""
 
 
 class PluginPlanner:

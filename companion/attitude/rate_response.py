@@ -1,4 +1,4 @@
-"""Response of the vehicle's rate loop to body rates, with which `model-following` plans."""
+"""Response of the vehicle's rate loop to commanded rates, for the planner `model-following`."""
 
 from dataclasses import dataclass, replace
 from math import atan2, hypot, inf, pi, sqrt
@@ -9,8 +9,8 @@ _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
 FIRST_ORDER_SHARE = 0.63
-"""Lag of the first-order model closest to PX4's second-order response, as a share of the lag of
-that response; the rest of the lag acts nearly like a dead time."""
+"""Share of the lag of PX4's second-order response that is the lag of the closest first-order model;
+the rest of the lag acts nearly like a dead time."""
 SHARE_OF_LARGEST_GAIN = 0.25
 """The feedback gain is at most this share of the largest stable gain: a gain margin of 4."""
 
@@ -38,13 +38,13 @@ class AxisResponse:
     @property
     def sigma(self) -> float:
         """σ of the lag σ·r̈ + lag·ṙ + r = command, s²; 0 for first order."""
-        half = 0.5 * self.lag / self.damping
-        return half * half
+        inverse_frequency = 0.5 * self.lag / self.damping
+        return inverse_frequency * inverse_frequency
 
 
 @dataclass(frozen=True, slots=True)
 class RateResponse:
-    """The response of all axes.
+    """Response of the rate loop on all axes.
 
     Attributes:
         roll, pitch, yaw: response of each axis.
@@ -77,7 +77,8 @@ class RateResponse:
 
         An autopilot with a slew limit in yaw is assumed to behave like ArduPilot: its attitude
         target turns as soon as roll and pitch begin to respond, and the body follows after the dead
-        time and lag of yaw. Without a slew limit (PX4) rates are along the body's axes: it is 0.
+        time and lag of yaw. Without a slew limit (PX4) rates are along the body's axes, and the
+        lead is 0.
         """
         if self.frame_lead is not None:
             return self.frame_lead
@@ -87,7 +88,7 @@ class RateResponse:
 
     @property
     def tilt(self) -> AxisResponse:
-        """First-order response with mean lag and dead time of roll and pitch; lower slew limit."""
+        """First-order response: mean lag and dead time of roll and pitch, the lower slew limit."""
         roll, pitch = self.roll, self.pitch
         return AxisResponse(
             0.5 * (roll.lag + pitch.lag),
@@ -134,5 +135,5 @@ def largest_gain(lag: float, dead_time: float, sigma: float = 0.0) -> float:
 
 def feedback_gain(gain: float, axis: AxisResponse) -> float:
     """The wanted `gain`, 1/s, reduced where `axis` would have a gain margin below 4."""
-    stable = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.sigma)
-    return min(gain, stable)
+    largest_allowed = SHARE_OF_LARGEST_GAIN * largest_gain(axis.lag, axis.dead_time, axis.sigma)
+    return min(gain, largest_allowed)

@@ -10,17 +10,17 @@ from math import cos, exp, expm1, inf, sin, sqrt
 from companion.attitude.types import Coefficients
 
 
-def distance_left(distance: float, gain: float, max_speed: float, dt: float) -> float:
+def remaining_distance(distance: float, gain: float, max_speed: float, dt: float) -> float:
     """Distance d to the target after `dt` seconds of ḋ = −min(gain·d, max_speed).
 
-    It falls at the largest speed (equation 33) until gain·d is below that, then exponentially.
+    The distance falls at `max_speed` (equation 33) until gain·d is below it, then exponentially.
     """
-    beyond = gain * distance - max_speed
-    if beyond > 0.0:
-        full_speed = beyond / (gain * max_speed)  # s
-        if full_speed >= dt:
+    excess_speed = gain * distance - max_speed
+    if excess_speed > 0.0:
+        full_speed_time = excess_speed / (gain * max_speed)  # s
+        if full_speed_time >= dt:
             return distance - max_speed * dt
-        return max_speed / gain * exp(-gain * (dt - full_speed))
+        return max_speed / gain * exp(-gain * (dt - full_speed_time))
     return distance * exp(-gain * dt)
 
 
@@ -42,8 +42,10 @@ class FirstOrderReference:
         distance = sqrt(north * north + east * east)
         if distance == 0.0:
             return target
-        left = distance_left(distance, self.gain, self.max_speed, dt) / distance
-        return Coefficients(target.north - left * north, target.east - left * east)
+        remaining_share = remaining_distance(distance, self.gain, self.max_speed, dt) / distance
+        return Coefficients(
+            target.north - remaining_share * north, target.east - remaining_share * east
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,76 +64,83 @@ class SecondOrderReference:
         self, c: Coefficients, speed: Coefficients, target: Coefficients, dt: float
     ) -> tuple[Coefficients, Coefficients]:
         """Coefficients and their speed (1/s) `dt` seconds later."""
-        still, moved, slope, kept = self.transition(dt)
+        c_from_c, c_from_speed, speed_from_c, speed_from_speed = self.transition(dt)
         north, east = c.north - target.north, c.east - target.east
         return (
             Coefficients(
-                target.north + still * north + moved * speed.north,
-                target.east + still * east + moved * speed.east,
+                target.north + c_from_c * north + c_from_speed * speed.north,
+                target.east + c_from_c * east + c_from_speed * speed.east,
             ),
             Coefficients(
-                slope * north + kept * speed.north,
-                slope * east + kept * speed.east,
+                speed_from_c * north + speed_from_speed * speed.north,
+                speed_from_c * east + speed_from_speed * speed.east,
             ),
         )
 
     def transition(self, dt: float) -> tuple[float, float, float, float]:
         """Transition matrix of the state (c − c_d, ċ) over `dt` seconds, row by row."""
-        decay = self.damping * self.frequency
-        square = self.frequency * self.frequency * (1.0 - self.damping * self.damping)
-        if square > 0.0:
-            root, fading = sqrt(square), exp(-decay * dt)
-            even, odd = fading * cos(root * dt), fading * sin(root * dt) / root
-        elif square < 0.0:
-            root = sqrt(-square)
-            slow = exp((root - decay) * dt)  # the slower of the two: nothing here overflows
-            even = 0.5 * slow * (1.0 + exp(-2.0 * root * dt))
-            odd = -0.5 * slow * expm1(-2.0 * root * dt) / root
+        decay_rate = self.damping * self.frequency
+        root_squared = self.frequency * self.frequency * (1.0 - self.damping * self.damping)
+        if root_squared > 0.0:
+            root, decay_factor = sqrt(root_squared), exp(-decay_rate * dt)
+            even_part, odd_part = (
+                decay_factor * cos(root * dt),
+                decay_factor * sin(root * dt) / root,
+            )
+        elif root_squared < 0.0:
+            root = sqrt(-root_squared)
+            slow_decay = exp(
+                (root - decay_rate) * dt
+            )  # the slower of the two: nothing here overflows
+            even_part = 0.5 * slow_decay * (1.0 + exp(-2.0 * root * dt))
+            odd_part = -0.5 * slow_decay * expm1(-2.0 * root * dt) / root
         else:
-            even = exp(-decay * dt)
-            odd = even * dt
+            even_part = exp(-decay_rate * dt)
+            odd_part = even_part * dt
         return (
-            even + decay * odd,
-            odd,
-            -self.frequency * self.frequency * odd,
-            even - decay * odd,
+            even_part + decay_rate * odd_part,
+            odd_part,
+            -self.frequency * self.frequency * odd_part,
+            even_part - decay_rate * odd_part,
         )
 
 
-def first_order_step(rate: float, aim: float, lag: float, dt: float) -> tuple[float, float]:
-    """One step of lag·ṙ = aim − r: the integral of r over `dt`, and r at the end.
+def first_order_step(rate: float, command: float, lag: float, dt: float) -> tuple[float, float]:
+    """One step of lag·ṙ = command − r: the integral of r over `dt`, and r at the end.
 
     `rate` is r at the start; `lag` and `dt` are in s.
     """
-    kept = exp(-dt / lag)
-    return aim * dt + (rate - aim) * lag * (1.0 - kept), aim + (rate - aim) * kept
+    decay_factor = exp(-dt / lag)
+    return command * dt + (rate - command) * lag * (1.0 - decay_factor), command + (
+        rate - command
+    ) * decay_factor
 
 
 def lag_step(
     rate: float,
     slope: float,
-    aim: float,
+    command: float,
     dt: float,
     lag: float,
     sigma: float,
     transition: tuple[float, float, float, float],
 ) -> tuple[float, float, float]:
-    """One step of σ·r̈ + lag·ṙ = aim − r: the integral of r over `dt`, and r and ṙ at the end.
+    """One step of σ·r̈ + lag·ṙ = command − r: the integral of r over `dt`, and r and ṙ at the end.
 
     `rate` and `slope` are r and ṙ at the start; `sigma` is σ, s²; `transition` is
     `Lag.transition(dt)`. If σ is 0, `slope` has no effect, and 0 is returned for ṙ.
     """
-    left, from_slope, falls, kept = transition
-    later = aim + left * (rate - aim) + from_slope * slope
-    steeper = falls * (rate - aim) + kept * slope
-    return aim * dt - lag * (later - rate) - sigma * (steeper - slope), later, steeper
+    r_from_r, r_from_slope, slope_from_r, slope_from_slope = transition
+    end_rate = command + r_from_r * (rate - command) + r_from_slope * slope
+    end_slope = slope_from_r * (rate - command) + slope_from_slope * slope
+    return command * dt - lag * (end_rate - rate) - sigma * (end_slope - slope), end_rate, end_slope
 
 
 class Lag:
-    """A lag of first or second order: σ·r̈ + lag·ṙ = aim − r.
+    """A lag of first or second order: σ·r̈ + lag·ṙ = command − r.
 
     Args:
-        lag: s.
+        lag: τ, s.
         sigma: σ, s²; 0 makes it first order.
     """
 
@@ -143,23 +152,25 @@ class Lag:
         if sigma > 0.0:
             self._model = SecondOrderReference(1.0 / sqrt(sigma), 0.5 * lag / sqrt(sigma))
 
-    def after(self, rate: float, slope: float, aim: float, dt: float) -> tuple[float, float, float]:
+    def after(
+        self, rate: float, slope: float, command: float, dt: float
+    ) -> tuple[float, float, float]:
         """The integral of r over `dt`, and r and ṙ at the end.
 
         Args:
             rate: r at the start, in any unit.
             slope: ṙ at the start, per second; has no effect in first order.
-            aim: constant input during `dt`, in the unit of `rate`.
-            dt: s.
+            command: constant input during `dt`, in the unit of `rate`.
+            dt: length of the step, s.
         """
         if self._model is None:
-            moved, later = first_order_step(rate, aim, self._lag, dt)
-            return moved, later, (aim - later) / self._lag
+            integral, end_rate = first_order_step(rate, command, self._lag, dt)
+            return integral, end_rate, (command - end_rate) / self._lag
         transition = self.transition(dt)
-        return lag_step(rate, slope, aim, dt, self._lag, self._sigma, transition)
+        return lag_step(rate, slope, command, dt, self._lag, self._sigma, transition)
 
     def transition(self, dt: float) -> tuple[float, float, float, float]:
-        """Transition matrix of the state (r − aim, ṙ) over `dt` seconds, row by row."""
+        """Transition matrix of the state (r − command, ṙ) over `dt` seconds, row by row."""
         if self._model is None:
             return exp(-dt / self._lag), 0.0, 0.0, 0.0
         return self._model.transition(dt)

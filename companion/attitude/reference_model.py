@@ -15,7 +15,7 @@ _LARGEST_RISE = radians(400.0)
 
 In PX4's simulation a jump by 270 °/s saturates the motors; 400 °/s spread over τ do not."""
 _FOUR_ZETA_SQUARED = 2.7
-"""Smallest 4·ζ² of the model, where ζ is its damping ratio."""
+"""Smallest 4·ζ² of the reference model (ζ: damping ratio), for at most 1 % of overshoot."""
 _LARGEST_GAIN_TIMES_STEP = 0.1
 """Largest p·dt of one step of the model; a longer sample is divided into several steps."""
 _DIFFERENCE_STEP = 1e-4
@@ -30,13 +30,15 @@ def rates_along(
     `kinematics.into_body` rotates roll and pitch to another heading; yaw does not depend on it.
     """
     cosine = sqrt(1.0 - north * north - east * east)
-    square = 0.5 + 0.5 * cosine  # a² of equation 9; at heading 0, a·x and a·y are half coefficients
+    a_squared = (
+        0.5 + 0.5 * cosine
+    )  # a² of equation 9; at heading 0, a·x and a·y are half coefficients
     return speed_to_rates(
-        sqrt(square),
+        sqrt(a_squared),
         0.0,
         0.5 * east,
         -0.5 * north,
-        1.0 / square,
+        1.0 / a_squared,
         1.0 / cosine,
         speed_east,
         -speed_north,
@@ -57,9 +59,12 @@ def braking_lead(gain: float, lag: float) -> float:
 
 
 def model_response(gain: float, lag: float) -> tuple[float, float]:
-    """The model of p and τ (`lag`), as p' (1/s) and τ' (s) of c̈ = (p'·(c_d − c) − ċ)/τ'."""
-    slowed = 1.0 + gain * braking_lead(gain, lag)
-    return gain / slowed, lag / slowed
+    """P' (1/s) and τ' (s) of the reference model in the form τ'·c̈ + ċ = p'·(c_d − c).
+
+    `gain` is p and `lag` is τ of `ReferenceModel`; its braking κ makes p' and τ' smaller.
+    """
+    braking_factor = 1.0 + gain * braking_lead(gain, lag)
+    return gain / braking_factor, lag / braking_factor
 
 
 class ReferenceModel:
@@ -68,7 +73,7 @@ class ReferenceModel:
     The whole vector v is scaled, so a step moves on a straight line. The scale keeps the body rates
     of the motion within the limits. The rates that are sent compensate the lag of the vehicle
     (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no faster
-    than that, and stays so small that it can be slowed down in time. Behind a lag of second order,
+    than that, and is bounded so that it can fall to 0 at the target. If the lag is of second order,
     a large step of v would saturate the motors, and the response would not be linear. In that case,
     if the body rates are limited, v changes by at most `_LARGEST_RISE` within τ.
 
@@ -80,12 +85,12 @@ class ReferenceModel:
 
     Attributes:
         north, east: coefficients of the reference.
-        speed_north, speed_east: their speed, 1/s.
+        speed_north, speed_east: speed of the coefficients, 1/s.
     """
 
     __slots__ = (
         "_acceleration",
-        "_braking",
+        "_braking_lead",
         "_constants",
         "_lag",
         "_sigma",
@@ -113,16 +118,16 @@ class ReferenceModel:
         self.start_at(Coefficients(0.0, 0.0), Coefficients(0.0, 0.0))
 
     def retune(self, constants: Constants, lag: float) -> None:
-        """Use other gains and limits, and the τ (s) that belongs to them; the motion continues."""
+        """Use other gains and limits, and the `model_lag` (s) for them; the motion continues."""
         self._constants = constants
-        self._braking = braking_lead(constants.gain, lag)
+        self._braking_lead = braking_lead(constants.gain, lag)
         self._lag = Lag(lag, self._sigma)
         self._acceleration = self._slew_limit
         if self._sigma > 0.0 and constants.max_tilt_rate < inf:
             self._acceleration = min(self._slew_limit, _LARGEST_RISE / lag)
         # Near the target v falls by p·v a second.
-        slowed_in_time = self._acceleration / constants.gain
-        self._tilt_rate_weight = max(constants.tilt_rate_weight, slowed_in_time**-2)
+        largest_v = self._acceleration / constants.gain
+        self._tilt_rate_weight = max(constants.tilt_rate_weight, largest_v**-2)
 
     def start_at(self, c: Coefficients, speed: Coefficients) -> None:
         """Start at these coefficients, shortened to `_LONGEST_REFERENCE`, at this speed (1/s)."""
@@ -137,7 +142,7 @@ class ReferenceModel:
         return rates_along(self.north, self.east, self.speed_north, self.speed_east)
 
     def rate_slopes(self, roll: float, pitch: float) -> tuple[float, float]:
-        """Derivatives of the roll and pitch rate of `rates`, rad/s², by differences.
+        """Derivatives of the roll and pitch rate of `rates`, rad/s², by finite differences.
 
         Args:
             roll: roll rate of `rates` now, rad/s.
@@ -153,30 +158,30 @@ class ReferenceModel:
 
     def advance(self, target: Target, dt: float) -> None:
         """Advance by `dt` seconds towards an admissible target."""
-        parts = ceil(dt * self._constants.gain / _LARGEST_GAIN_TIMES_STEP)
-        for _ in range(parts):
-            self._step(target, dt / parts)
+        step_count = ceil(dt * self._constants.gain / _LARGEST_GAIN_TIMES_STEP)
+        for _ in range(step_count):
+            self._step(target, dt / step_count)
 
     def _step(self, target: Target, dt: float) -> None:
         north, east = self.north, self.east
         self._choose_v(target, dt)
         lag = self._lag
-        moved, self.speed_north, self._slope_north = lag.after(
+        change, self.speed_north, self._slope_north = lag.after(
             self.speed_north, self._slope_north, self._v_north, dt
         )
-        self.north += moved
-        moved, self.speed_east, self._slope_east = lag.after(
+        self.north += change
+        change, self.speed_east, self._slope_east = lag.after(
             self.speed_east, self._slope_east, self._v_east, dt
         )
-        self.east += moved
-        self._stay_inside(north, east, dt)
+        self.east += change
+        self._limit_tilt(north, east, dt)
 
     def _choose_v(self, target: Target, dt: float) -> None:
-        """Choose v for the next step from the reference predicted for the middle of the step."""
+        """Choose v for the next step from the motion predicted for the middle of the step."""
         constants = self._constants
-        ahead, half = 0.5 * dt + self._braking, 0.5 * dt * self._braking
-        north = self.north + ahead * self.speed_north + half * self._slope_north
-        east = self.east + ahead * self.speed_east + half * self._slope_east
+        lead, slope_factor = 0.5 * dt + self._braking_lead, 0.5 * dt * self._braking_lead
+        north = self.north + lead * self.speed_north + slope_factor * self._slope_north
+        east = self.east + lead * self.speed_east + slope_factor * self._slope_east
         v_north = constants.gain * (target.north - north)
         v_east = constants.gain * (target.east - east)
         roll, pitch, _ = rates_along(self.north, self.east, v_north, v_east)
@@ -187,15 +192,15 @@ class ReferenceModel:
             v_north *= scale
             v_east *= scale
         if self._acceleration < inf:
-            more_north, more_east = v_north - self._v_north, v_east - self._v_east
-            roll, pitch, _ = rates_along(self.north, self.east, more_north, more_east)
-            share = self._acceleration * dt / max(hypot(roll, pitch), 1e-12)
-            if share < 1.0:
-                v_north = self._v_north + share * more_north
-                v_east = self._v_east + share * more_east
+            change_north, change_east = v_north - self._v_north, v_east - self._v_east
+            roll, pitch, _ = rates_along(self.north, self.east, change_north, change_east)
+            allowed_share = self._acceleration * dt / max(hypot(roll, pitch), 1e-12)
+            if allowed_share < 1.0:
+                v_north = self._v_north + allowed_share * change_north
+                v_east = self._v_east + allowed_share * change_east
         self._v_north, self._v_east = v_north, v_east
 
-    def _stay_inside(self, north: float, east: float, dt: float) -> None:
+    def _limit_tilt(self, north: float, east: float, dt: float) -> None:
         """Keep the coefficients within the largest tilt after a step of `dt` s from (north, east).
 
         If they were beyond the largest tilt before the step, they move no further out.

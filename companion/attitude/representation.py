@@ -131,10 +131,10 @@ def limited_target(target: Target, longest: float) -> Target:
             target = Target(*target)
         north, east, heading, heading_rate = target
         square = 0.0 + north * north + east * east  # an int too large for a float raises
-        usable = -inf < square + heading < inf and abs(heading_rate) <= LARGEST_HEADING_RATE
+        is_usable = -inf < square + heading < inf and abs(heading_rate) <= LARGEST_HEADING_RATE
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidTargetError(f"a target is three or four numbers: {error}") from error
-    if not usable:
+    if not is_usable:
         raise InvalidTargetError(f"target is not finite, or far too large: {target}")
     if square <= longest * longest and -pi < heading <= pi:
         return target
@@ -152,8 +152,8 @@ def plausible_rates(body_rates: BodyRates | None) -> BodyRates | None:
         return None
     try:
         roll, pitch, yaw = body_rates
-        most = _LARGEST_BODY_RATE
-        if abs(roll) < most and abs(pitch) < most and abs(yaw) < most:
+        limit = _LARGEST_BODY_RATE
+        if abs(roll) < limit and abs(pitch) < limit and abs(yaw) < limit:
             return BodyRates(roll, pitch, yaw)
     except (TypeError, ValueError) as error:
         raise InvalidBodyRatesError(f"body rates are three numbers: {error}") from error

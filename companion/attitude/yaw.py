@@ -32,7 +32,7 @@ class HeadingModel:
         self.start_at(0.0, 0.0)
 
     def retune(self, constants: Constants) -> None:
-        """Use another gain and limit; the planned heading continues."""
+        """Use other gains and limits; the planned heading continues."""
         self._gain = constants.yaw_gain
         # Near the target v falls by k·v a second.
         self._max_rate = constants.max_yaw_rate
@@ -46,11 +46,11 @@ class HeadingModel:
 
     def advance(self, target: Target, dt: float) -> None:
         """Advance by `dt` seconds towards an admissible target."""
-        wanted = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
-        change = clamp(wanted, self._max_rate) - self._v
+        wanted_v = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
+        change = clamp(wanted_v, self._max_rate) - self._v
         v = self._v = self._v + clamp(change, self._acceleration * dt)
-        moved, self.turn_rate = first_order_step(self.turn_rate, v, self._lag, dt)
-        self.heading += moved
+        turn, self.turn_rate = first_order_step(self.turn_rate, v, self._lag, dt)
+        self.heading += turn
 
 
 class YawModel:
@@ -61,10 +61,10 @@ class YawModel:
 
     Attributes:
         rate: predicted yaw rate, rad/s.
-        turned: yaw angle since the start, rad: the integral of `rate`.
+        yaw_angle: yaw angle since the start, rad: the integral of `rate`.
     """
 
-    __slots__ = ("_acceleration", "_aim", "_lag", "rate", "turned")
+    __slots__ = ("_acceleration", "_lag", "_slewed_rate", "rate", "yaw_angle")
 
     def __init__(self, response: AxisResponse) -> None:
         self._lag = response.lag
@@ -72,17 +72,19 @@ class YawModel:
         self.start(0.0)
 
     def start(self, rate: float) -> None:
-        """Start at a steady `rate`, rad/s, and set `turned` to 0."""
-        self.rate = self._aim = rate
-        self.turned = 0.0
+        """Start at a steady `rate`, rad/s, and set `yaw_angle` to 0."""
+        self.rate = self._slewed_rate = rate
+        self.yaw_angle = 0.0
 
     def advance(self, command: float, dt: float) -> None:
         """Advance by `dt` seconds in which the yaw rate `command` (rad/s) is sent."""
-        before, most = self._aim, self._acceleration * dt
-        aim = self._aim = before + clamp(command - before, most) if most < inf else command
+        previous, max_change = self._slewed_rate, self._acceleration * dt
+        slewed_rate = self._slewed_rate = (
+            previous + clamp(command - previous, max_change) if max_change < inf else command
+        )
         # Uses the aim at the end of the sample: at most half a sample early.
-        moved, self.rate = first_order_step(self.rate, aim, self._lag, dt)
-        self.turned += moved
+        turn, self.rate = first_order_step(self.rate, slewed_rate, self._lag, dt)
+        self.yaw_angle += turn
 
 
 LARGEST_LEAD = radians(45.0)
@@ -91,18 +93,19 @@ LARGEST_LEAD = radians(45.0)
 OLDEST_ATTITUDE_TARGET = 0.25
 """Largest age of an attitude target that is used, s."""
 
-_BODY_BEHIND_TARGET = 0.008
+_TARGET_TO_BODY_DELAY = 0.008
 """Dead time of roll and pitch from ArduPilot's attitude target to the body, s (measured)."""
 
 _ROWS_PER_DROP = 128
-"""Number of sent rates that are dropped at a time once they are too old."""
+"""Number of the oldest rows of a `TargetFrame` that are dropped together."""
 
 
 class TargetFrame:
     """Heading of ArduPilot's attitude target, along whose axes ArduPilot takes body rates.
 
     A yaw rate turns the attitude target at once, within its slew limit; the body follows 0.2 s
-    later. ATTITUDE_TARGET reports the target's heading; the turn by the rates sent since is added.
+    later. ATTITUDE_TARGET reports the target's heading; `advance` adds the turn by the rates sent
+    since then.
 
     Args:
         response: response of the vehicle's rate loop.
@@ -110,11 +113,11 @@ class TargetFrame:
 
     __slots__ = (
         "_acceleration",
-        "_aim",
         "_delay",
+        "_heading_offset",
         "_lead_time",
-        "_offset",
         "_reported_at",
+        "_slewed_rate",
         "_time",
         "_times",
         "_turns",
@@ -123,7 +126,7 @@ class TargetFrame:
     def __init__(self, response: RateResponse) -> None:
         self._acceleration = response.yaw.acceleration
         self._lead_time = response.lead_time
-        self._delay = max(0.0, response.tilt.dead_time - _BODY_BEHIND_TARGET)
+        self._delay = max(0.0, response.tilt.dead_time - _TARGET_TO_BODY_DELAY)
         self._times: list[float] = []
         self._turns: list[float] = []
         self.forget()
@@ -131,10 +134,10 @@ class TargetFrame:
     def forget(self) -> None:
         """Forget the heading of the attitude target."""
         self._time, self._reported_at = 0.0, -inf
-        self._offset = self._aim = 0.0
+        self._heading_offset = self._slewed_rate = 0.0
         self._times[:], self._turns[:] = [0.0], [0.0]
 
-    def note(self, heading: float, age: float) -> None:
+    def note_heading(self, heading: float, age: float) -> None:
         """Take the attitude target's heading (rad), `age` seconds older than the newest sample.
 
         It is ignored if it is older than `OLDEST_ATTITUDE_TARGET` or newer than the newest sample.
@@ -142,7 +145,7 @@ class TargetFrame:
         if not 0.0 <= age <= OLDEST_ATTITUDE_TARGET:
             return
         self._reported_at = self._time - age
-        self._offset = heading - self._turn_until(self._reported_at - self._delay)
+        self._heading_offset = heading - self._turn_until(self._reported_at - self._delay)
 
     def advance(self, yaw_rate: float, still_rate: float, dt: float) -> None:
         """Advance by `dt` seconds in which `yaw_rate` (rad/s) is sent.
@@ -151,11 +154,11 @@ class TargetFrame:
         """
         if self._reported_at == -inf:
             return  # no attitude target was received, so there is no heading to advance
-        self._aim += clamp(yaw_rate - self._aim, self._acceleration * dt)
+        self._slewed_rate += clamp(yaw_rate - self._slewed_rate, self._acceleration * dt)
         self._time += dt
         times = self._times
         times.append(self._time)
-        self._turns.append(self._turns[-1] + (self._aim - still_rate) * dt)
+        self._turns.append(self._turns[-1] + (self._slewed_rate - still_rate) * dt)
         if (
             len(times) > _ROWS_PER_DROP
             and times[_ROWS_PER_DROP] < self._time - OLDEST_ATTITUDE_TARGET - self._delay
@@ -173,19 +176,19 @@ class TargetFrame:
             start_heading: see `FeedForward.advance`.
             plans: plans of tilt and heading.
         """
-        reported = self.heading()
-        if reported is not None:
+        target_heading = self.heading()
+        if target_heading is not None:
             turn = plans.predicted_turn(plans.time, plans.tilt.newest)
-            lead = wrap_angle(reported - start_heading - turn.angle)
+            lead = wrap_angle(target_heading - start_heading - turn.angle)
             if abs(lead) <= LARGEST_LEAD:
                 return lead
-        return 0.0 if self._lead_time == 0.0 else plans.yaw_within(self._lead_time)
+        return 0.0 if self._lead_time == 0.0 else plans.predicted_yaw_change(self._lead_time)
 
     def heading(self) -> float | None:
         """The target's heading when the rates sent now take effect, rad; None: not known."""
         if self._time - self._reported_at > OLDEST_ATTITUDE_TARGET:
             return None
-        return self._offset + self._turns[-1]
+        return self._heading_offset + self._turns[-1]
 
     def _turn_until(self, time: float) -> float:
         """Turn of the target by the rates sent until `time`, rad; interpolated linearly."""

@@ -1,4 +1,4 @@
-"""Rates, steps and histories of many vehicles under one planner."""
+"""Body rates, attitudes and histories of many vehicles under one planner."""
 
 import importlib.util
 from math import ceil
@@ -57,7 +57,7 @@ def rates(
     """Body rates of many vehicles: for each vehicle the result of `planner.rates`.
 
     Args:
-        planner: gives the law and its constants; one without memory.
+        planner: a planner without memory; gives the law and its constants.
         q: (4, n) attitudes w, x, y, z, body → world.
         targets: (4, n) coefficients north and east, heading in rad, heading rate in rad/s.
         dt: the sample period, s; positive and finite.
@@ -73,15 +73,15 @@ def rates(
         InvalidQuaternionError: an attitude is not a unit quaternion.
         InvalidTargetError: a value of a target is not finite or far too large.
         MissingExtraError: `compiled` is True and numba is not installed.
-        TypeError: the planner keeps state between samples, or `compiled` is True and its law is no
-            plain function.
+        TypeError: the planner keeps state between samples, or `compiled` is True and its law is not
+            a plain function.
         ValueError: the shapes of `q` and `targets` are wrong or differ.
     """
     planner = _require_law_planner(planner)
-    q, targets, loops = _prepared(planner, q, targets, dt, 1, compiled)
-    out = np.empty((3, q.shape[1]))
-    loops.apply(q, targets, out, dt, planner.constants)
-    return out
+    q, targets, loops = _checked_arguments(planner, q, targets, dt, 1, compiled)
+    body_rates = np.empty((3, q.shape[1]))
+    loops.apply(q, targets, body_rates, dt, planner.constants)
+    return body_rates
 
 
 def advance(
@@ -94,16 +94,16 @@ def advance(
 ) -> Array:
     """Attitudes (4, n) after `steps` samples, each with constant body rates.
 
-    Arguments and errors are those of `rates`. Also, a negative `steps` raises ValueError, and one
-    that is no integer TypeError.
+    Arguments and errors are those of `rates`. Also, a negative `steps` raises ValueError, and a
+    `steps` that is not an integer raises TypeError.
     """
     planner = _require_law_planner(planner)
-    q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
-    after = _advanced(loops, planner, q, targets, dt, steps)
-    if _turned_too_far(loops, after):
+    q, targets, loops = _checked_arguments(planner, q, targets, dt, steps, compiled)
+    final_q = _final_attitudes(loops, planner, q, targets, dt, steps)
+    if _turned_too_far(loops, final_q):
         loops = compiled_loops(planner.law, any_angle=True)
-        after = _advanced(loops, planner, q, targets, dt, steps)
-    return after
+        final_q = _final_attitudes(loops, planner, q, targets, dt, steps)
+    return final_q
 
 
 def simulate(
@@ -116,7 +116,7 @@ def simulate(
 ) -> History:
     """As `advance`, but returns the attitudes and body rates of all samples."""
     planner = _require_law_planner(planner)
-    q, targets, loops = _prepared(planner, q, targets, dt, steps, compiled)
+    q, targets, loops = _checked_arguments(planner, q, targets, dt, steps, compiled)
     history = History(np.empty((steps + 1, *q.shape)), np.empty((steps, 3, q.shape[1])))
     history.q[0] = q
     loops.record(history.q, targets, history.rates, dt, planner.constants)
@@ -138,12 +138,12 @@ def coefficients(q: ArrayLike) -> Array:
         (..., 2, n) north, east.
 
     Raises:
-        ValueError: the last dimension but one has not four components.
+        ValueError: the last dimension but one does not have four components.
     """
-    rows = np.asarray(q, dtype=np.float64)
-    if rows.ndim < 2 or rows.shape[-2] != _COMPONENTS:
-        raise ValueError(f"q must have the shape (..., 4, n), not {rows.shape}")
-    _, ax, ay = tilt_products(*np.moveaxis(rows, -2, 0))
+    quaternions = np.asarray(q, dtype=np.float64)
+    if quaternions.ndim < 2 or quaternions.shape[-2] != _COMPONENTS:
+        raise ValueError(f"q must have the shape (..., 4, n), not {quaternions.shape}")
+    _, ax, ay = tilt_products(*np.moveaxis(quaternions, -2, 0))
     return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=-2)
 
 
@@ -151,7 +151,7 @@ def _require_law_planner(planner: Planner) -> LawPlanner:
     """The planner, which must be one without memory.
 
     Raises:
-        TypeError: it keeps state between samples.
+        TypeError: the planner keeps state between samples.
     """
     if isinstance(planner, LawPlanner):
         return planner
@@ -162,7 +162,7 @@ def _require_law_planner(planner: Planner) -> LawPlanner:
     )
 
 
-def _prepared(
+def _checked_arguments(
     planner: LawPlanner,
     q: ArrayLike,
     targets: ArrayLike,
@@ -193,7 +193,7 @@ def _prepared(
 
 
 def _is_plain_function(law: Law) -> bool:
-    """Whether a law can be compiled: no object with __call__, no function in a function."""
+    """Whether a law can be compiled: a function, without variables of a function around it."""
     return isinstance(law, FunctionType) and not (law.__closure__ or law.__defaults__)
 
 
@@ -213,25 +213,25 @@ def _require_plain_function(law: Law) -> None:
 
 
 def _turned_too_far(loops: Loops, q: Array) -> bool:
-    """Whether a vehicle turned further in one sample than the series of these loops allow."""
+    """Whether a turn in one sample was too large for the polynomials of `loops`: then q is NaN."""
     return not loops.any_angle and not bool(np.isfinite(q).all())
 
 
-def _advanced(
+def _final_attitudes(
     loops: Loops, planner: LawPlanner, q: Array, targets: Array, dt: float, steps: int
 ) -> Array:
     """The attitudes (4, n) after all steps, computed block by block."""
-    after = np.empty_like(q)
+    final_q = np.empty_like(q)
     blocks = max(1, ceil(q.shape[1] / _BLOCK_SIZE))
-    width = _CACHE_LINE * max(1, ceil(q.shape[1] / blocks / _CACHE_LINE))
-    for begin in range(0, q.shape[1], width):
-        block = slice(begin, min(begin + width, q.shape[1]))
-        even, odd, block_targets, block_rates = _work_space(block.stop - block.start)
-        even[...] = q[:, block]
+    block_size = _CACHE_LINE * max(1, ceil(q.shape[1] / blocks / _CACHE_LINE))
+    for begin in range(0, q.shape[1], block_size):
+        block = slice(begin, min(begin + block_size, q.shape[1]))
+        even_q, odd_q, block_targets, block_rates = _work_space(block.stop - block.start)
+        even_q[...] = q[:, block]
         block_targets[...] = targets[:, block]
-        loops.advance(even, odd, block_targets, block_rates, dt, planner.constants, steps)
-        after[:, block] = odd if steps % 2 else even
-    return after
+        loops.advance(even_q, odd_q, block_targets, block_rates, dt, planner.constants, steps)
+        final_q[:, block] = odd_q if steps % 2 else even_q
+    return final_q
 
 
 def _work_space(count: int) -> tuple[Array, Array, Array, Array]:
@@ -242,5 +242,5 @@ def _work_space(count: int) -> tuple[Array, Array, Array, Array]:
     rows = 15
     memory = np.empty(rows * count + _CACHE_LINE)
     first = -(memory.ctypes.data // memory.itemsize) % _CACHE_LINE
-    space = memory[first : first + rows * count].reshape(rows, count)
-    return space[0:4], space[4:8], space[8:12], space[12:15]
+    aligned = memory[first : first + rows * count].reshape(rows, count)
+    return aligned[0:4], aligned[4:8], aligned[8:12], aligned[12:15]

@@ -1,4 +1,4 @@
-"""Checks and limits arrays for a law by the rules that a planner applies to one sample."""
+"""Checks and limits arrays of attitudes and targets by the rules of a planner for one sample."""
 
 from functools import cache
 from math import pi
@@ -45,18 +45,18 @@ def all_fit(q: Array, targets: Array, longest: float) -> bool:
     `q` and `targets` are (4, n); `longest` is the largest length of a target's coefficients.
     Conditions are joined by `&` and counted, because only a loop without branches is vectorised.
     """
-    unfit = 0
+    unfit_count = 0
     for i in range(q.shape[1]):
         norm_square = q[0, i] * q[0, i] + q[1, i] * q[1, i] + q[2, i] * q[2, i] + q[3, i] * q[3, i]
         length_square = targets[0, i] * targets[0, i] + targets[1, i] * targets[1, i]
-        fit = (
+        fits = (
             (abs(norm_square - 1.0) <= _UNIT_TOLERANCE)
             & (length_square <= longest * longest)
             & (abs(targets[2, i]) < pi)
             & (abs(targets[3, i]) <= LARGEST_HEADING_RATE)
         )
-        unfit += 0 if fit else 1
-    return unfit == 0
+        unfit_count += 0 if fits else 1
+    return unfit_count == 0
 
 
 def unit_quaternions(q: Array) -> Array:
@@ -85,10 +85,10 @@ def limited_targets(targets: Array, longest: float) -> Array:
     """
     north, east, heading, heading_rate = targets
     with np.errstate(over="ignore", invalid="ignore"):  # such a target is refused below
-        fit = north * north + east * east <= longest * longest
-    fit &= (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
+        fits = north * north + east * east <= longest * longest
+    fits &= (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
     limited = targets.copy()
-    for i in np.flatnonzero(~fit):
+    for i in np.flatnonzero(~fits):
         try:
             limited[:, i] = limited_target(Target(*targets[:, i].tolist()), longest)
         except InvalidTargetError as error:

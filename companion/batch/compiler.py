@@ -1,4 +1,4 @@
-"""Compiles the laws of the flight with numba, unchanged, for many vehicles at once."""
+"""Compiles, unchanged, the laws that a flight calls, with numba for many vehicles at once."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -58,8 +58,7 @@ class Compiler:
 def _use_wide_registers() -> None:
     """Let LLVM use 512-bit registers if the processor has them; by default it uses 256 bits.
 
-    numba reads this once, before it compiles anything. A setting of the user (NUMBA_CPU_FEATURES)
-    is kept.
+    Call it before numba compiles anything. If the user has set NUMBA_CPU_FEATURES, nothing changes.
     """
     import llvmlite.binding as llvm  # noqa: PLC0415
     from numba import config  # noqa: PLC0415

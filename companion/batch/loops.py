@@ -52,7 +52,7 @@ def _compiler(any_angle: bool) -> Compiler:
 
 @cache
 def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
-    """`law` compiled; without `any_angle` for turns up to 1 rad per sample, which is faster."""
+    """Compile the loops of `law`; those for turns of up to 1 rad (not `any_angle`) are faster."""
     compiler = _compiler(any_angle)
     one_law = compiler.function(law)
 
@@ -68,13 +68,15 @@ def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
 @cache
 def _compiled_turn(any_angle: bool) -> _Turn:
     compiler = _compiler(any_angle)
-    turned = compiler.function(rotation.after_constant_rates)
+    rotate = compiler.function(rotation.after_constant_rates)
 
-    def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
+    def turn(q: Array, rates: Array, next_q: Array, dt: float) -> None:
         for i in range(q.shape[1]):
             attitude = q[0, i], q[1, i], q[2, i], q[3, i]
-            turning = rates[0, i], rates[1, i], rates[2, i]
-            after[0, i], after[1, i], after[2, i], after[3, i] = turned(attitude, turning, dt)
+            body_rates = rates[0, i], rates[1, i], rates[2, i]
+            next_q[0, i], next_q[1, i], next_q[2, i], next_q[3, i] = rotate(
+                attitude, body_rates, dt
+            )
 
     compiled: _Turn = compiler.loop(turn)
     return compiled
@@ -82,17 +84,17 @@ def _compiled_turn(any_angle: bool) -> _Turn:
 
 @cache
 def plain_loops(law: Law) -> Loops:
-    """`law` called for one vehicle after the other, on floats as in flight."""
+    """Loops that call `law` for one vehicle after the other, on floats as in flight."""
     one_law: Any = law
-    turned: Any = rotation.after_constant_rates
+    rotate: Any = rotation.after_constant_rates
 
     def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         vehicles = zip(q.T.tolist(), targets.T.tolist(), strict=True)
         rates[...] = np.transpose([one_law(*vehicle, dt, constants) for vehicle in vehicles])
 
-    def turn(q: Array, rates: Array, after: Array, dt: float) -> None:
+    def turn(q: Array, rates: Array, next_q: Array, dt: float) -> None:
         vehicles = zip(q.T.tolist(), rates.T.tolist(), strict=True)
-        after[...] = np.transpose([turned(*vehicle, dt) for vehicle in vehicles])
+        next_q[...] = np.transpose([rotate(*vehicle, dt) for vehicle in vehicles])
 
     return _over_samples(apply, turn, lambda loop: loop, any_angle=True)
 

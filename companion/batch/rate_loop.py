@@ -35,13 +35,13 @@ class StepFlight(NamedTuple):
     """One vehicle's flight, with one row for each attitude sample of the planner.
 
     Attributes:
-        path: (samples, 2), coefficients north and east at the sample.
+        coefficients: (samples, 2), coefficients north and east at the sample.
         targets: (samples, 2), target coefficients at the sample.
         commanded: (samples, 3), commanded body rates, rad/s.
         q: attitude at the end.
     """
 
-    path: Array
+    coefficients: Array
     targets: Array
     commanded: Array
     q: Quaternion
@@ -71,15 +71,24 @@ def fly_steps(
     if not isinstance(planner, LawPlanner):
         raise TypeError(f"{type(planner).__name__} keeps state; a batch needs a planner without")
     require("numba", "study", "a compiled batch")
-    path, commanded = np.empty((len(targets), 2)), np.empty((len(targets), 3))
-    rates, delays = _rate_loop(axes)
+    coefficients, commanded = np.empty((len(targets), 2)), np.empty((len(targets), 3))
+    loops, delays = _rate_loop_arrays(axes)
     fly = _compiled(planner.law)
-    q = fly(start, targets, rates, delays, planner.constants, steps_per_sample, path, commanded)
-    return StepFlight(path, targets[:, :2], commanded, q)
+    q = fly(
+        start,
+        targets,
+        loops,
+        delays,
+        planner.constants,
+        steps_per_sample,
+        coefficients,
+        commanded,
+    )
+    return StepFlight(coefficients, targets[:, :2], commanded, q)
 
 
-def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
-    """The rate loop of a vehicle as arrays.
+def _rate_loop_arrays(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
+    """The rate loop of a vehicle as arrays for `fly`.
 
     Returns:
         (3, 7), for each axis: lag (s) and σ (s²) of `Lag`, largest change of the acting command per
@@ -88,9 +97,9 @@ def _rate_loop(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
     """
     rows = []
     for axis in (each.with_least_lag() for each in axes):
-        slew = axis.acceleration / STEP_HZ if isfinite(axis.acceleration) else _UNLIMITED
+        max_change = axis.acceleration / STEP_HZ if isfinite(axis.acceleration) else _UNLIMITED
         transition = Lag(axis.lag, axis.sigma).transition(1.0 / STEP_HZ)
-        rows.append((axis.lag, axis.sigma, slew, *transition))
+        rows.append((axis.lag, axis.sigma, max_change, *transition))
     return np.array(rows), np.array([round(axis.dead_time * STEP_HZ) for axis in axes])
 
 
@@ -99,18 +108,18 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
     """Compile the flight of one vehicle under `law`."""
     compiler = Compiler({})
     one_law, turn = compiler.function(law), compiler.function(after_constant_rates)
-    lag_response, limited = compiler.function(lag_step), compiler.function(clamp)
+    lag_response, limit = compiler.function(lag_step), compiler.function(clamp)
     products = compiler.function(tilt_products)
     dt = 1.0 / STEP_HZ
 
     def fly(
         q: Quaternion,
         targets: Array,
-        rates: Array,
+        loops: Array,
         delays: NDArray[np.int64],
         constants: Constants,
         steps: int,
-        path: Array,
+        coefficients: Array,
         commanded: Array,
     ) -> Quaternion:
         length = delays.max() + 1
@@ -120,7 +129,7 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
         for sample in range(targets.shape[0]):
             target = targets[sample, 0], targets[sample, 1], targets[sample, 2], targets[sample, 3]
             _, ax, ay = products(q[0], q[1], q[2], q[3])
-            path[sample, 0], path[sample, 1] = -2.0 * ay, 2.0 * ax
+            coefficients[sample, 0], coefficients[sample, 1] = -2.0 * ay, 2.0 * ax
             roll, pitch, yaw = one_law(q, target, steps * dt, constants)
             commanded[sample, 0], commanded[sample, 1], commanded[sample, 2] = roll, pitch, yaw
             for _ in range(steps):
@@ -128,9 +137,9 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
                 commands[slot, 0], commands[slot, 1], commands[slot, 2] = roll, pitch, yaw
                 for axis in range(3):
                     delayed = commands[(k + length - delays[axis]) % length, axis]
-                    lag, sigma, slew = rates[axis, 0], rates[axis, 1], rates[axis, 2]
-                    slewed[axis] += limited(delayed - slewed[axis], slew)
-                    transition = rates[axis, 3], rates[axis, 4], rates[axis, 5], rates[axis, 6]
+                    lag, sigma, slew = loops[axis, 0], loops[axis, 1], loops[axis, 2]
+                    slewed[axis] += limit(delayed - slewed[axis], slew)
+                    transition = loops[axis, 3], loops[axis, 4], loops[axis, 5], loops[axis, 6]
                     angle, actual[axis], slopes[axis] = lag_response(
                         actual[axis], slopes[axis], slewed[axis], dt, lag, sigma, transition
                     )

@@ -22,7 +22,7 @@ def _fitted(
 ) -> tuple[float, ...]:
     """Coefficients, constant first, of the polynomial through the Chebyshev points of [0, largest].
 
-    Its error is within a small factor of that of the best polynomial.
+    The error of this polynomial is within a small factor of that of the best one.
     """
     fit = Chebyshev.interpolate(function, terms - 1, domain=[0.0, largest])
     return tuple(float(c) for c in fit.convert(kind=Polynomial).coef)
@@ -70,5 +70,5 @@ def _six_terms(
     c4: float,
     c5: float,
 ) -> float:
-    """Σ c_k·u^k; u2 and u4 are the powers of u."""
+    """Σ c_k·u^k for k from 0 to 5; u2 is u², u4 is u⁴."""
     return ((c0 + u * c1) + u2 * (c2 + u * c3)) + u4 * (c4 + u * c5)

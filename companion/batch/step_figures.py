@@ -18,10 +18,10 @@ from companion.batch.rate_loop import StepFlight
 _SHORTEST_LOG, _LONGEST_LOG = log(0.02), log(2.0)
 """Range in which the time constant is searched, as natural logarithms of seconds."""
 _GOLDEN_RATIO = 0.5 * (sqrt(5.0) - 1.0)
-_NARROWINGS = 17
+_SEARCH_STEPS = 17
 """Steps of the golden-section search; the range left is 0.13 % of a time constant."""
 _MIN_STEP = 1e-3
-"""Smallest target coefficient of a step; a smaller one counts as level."""
+"""Smallest target coefficient that counts as a step; a smaller one counts as level."""
 
 
 class StepFigures(NamedTuple):
@@ -35,7 +35,7 @@ class StepFigures(NamedTuple):
         rate_max: largest commanded roll-pitch rate, rad/s.
         time_constant_north: time constant of the first-order model that fits the north coefficient
             best (least squares), s; NaN if there was no step north.
-        time_constant_east: the same for the east coefficient.
+        time_constant_east: the same for the east coefficient, s; NaN if there was no step east.
     """
 
     model_deviation_max: float
@@ -55,8 +55,8 @@ def step_figures(flight: StepFlight, gain: float, period: float) -> StepFigures:
         period: time between two samples, s.
     """
     measure, fit = _compiled()
-    figures = measure(flight.path, flight.targets, flight.commanded, 1.0 / gain, period)
-    return StepFigures(*figures, *fit(flight.path, flight.targets, period))
+    figures = measure(flight.coefficients, flight.targets, flight.commanded, 1.0 / gain, period)
+    return StepFigures(*figures, *fit(flight.coefficients, flight.targets, period))
 
 
 @cache
@@ -66,32 +66,37 @@ def _compiled() -> tuple[Any, Any]:
 
 
 def _four_figures(
-    path: Array, targets: Array, commanded: Array, time_constant: float, period: float
+    coefficients: Array, targets: Array, commanded: Array, time_constant: float, period: float
 ) -> tuple[float, float, float, float]:
-    """The first four figures of `StepFigures`."""
-    model_north, model_east = path[0, 0], path[0, 1]
-    begin_north, begin_east = model_north, model_east
+    """The first four figures of `StepFigures`; `time_constant` is that of the ideal model, s."""
+    model_north, model_east = coefficients[0, 0], coefficients[0, 1]
+    start_north, start_east = model_north, model_east
     max_square, cross_axis, rate_squares, max_rate_square = 0.0, 0.0, 0.0, 0.0
-    for k in range(path.shape[0]):
-        north, east = path[k, 0], path[k, 1]
+    for k in range(coefficients.shape[0]):
+        north, east = coefficients[k, 0], coefficients[k, 1]
         if k > 0:
             previous_north, previous_east = targets[k - 1, 0], targets[k - 1, 1]
             _, model_north = first_order_step(model_north, previous_north, time_constant, period)
             _, model_east = first_order_step(model_east, previous_east, time_constant, period)
             if previous_north != targets[k, 0] or previous_east != targets[k, 1]:
-                begin_north, begin_east = north, east
+                start_north, start_east = north, east
         max_square = max(max_square, (north - model_north) ** 2 + (east - model_east) ** 2)
-        step_north, step_east = targets[k, 0] - begin_north, targets[k, 1] - begin_east
+        step_north, step_east = targets[k, 0] - start_north, targets[k, 1] - start_east
         length = max(sqrt(step_north * step_north + step_east * step_east), 1e-9)
-        cross_product = (east - begin_east) * step_north - (north - begin_north) * step_east
+        cross_product = (east - start_east) * step_north - (north - start_north) * step_east
         cross_axis = max(cross_axis, abs(cross_product) / length)
         rate_square = commanded[k, 0] ** 2 + commanded[k, 1] ** 2
         rate_squares += rate_square
         max_rate_square = max(max_rate_square, rate_square)
-    return sqrt(max_square), cross_axis, sqrt(rate_squares / path.shape[0]), sqrt(max_rate_square)
+    return (
+        sqrt(max_square),
+        cross_axis,
+        sqrt(rate_squares / coefficients.shape[0]),
+        sqrt(max_rate_square),
+    )
 
 
-def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, float]:
+def _time_constants(coefficients: Array, targets: Array, period: float) -> tuple[float, float]:
     """Time constants of the first-order models that fit north and east best, s; NaN: no step.
 
     The golden-section searches for north and east run together, because a processor computes two
@@ -106,9 +111,9 @@ def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, 
             largest[axis] = max(largest[axis], abs(targets[k, axis]))
     cost_left, cost_right, cost_new = np.empty(2), np.empty(2), np.empty(2)
     keep_left = np.empty(2, np.bool_)
-    _sums_of_squares(path, targets, left, period, cost_left)
-    _sums_of_squares(path, targets, right, period, cost_right)
-    for _ in range(_NARROWINGS):
+    _sums_of_squares(coefficients, targets, left, period, cost_left)
+    _sums_of_squares(coefficients, targets, right, period, cost_right)
+    for _ in range(_SEARCH_STEPS):
         for axis in range(2):
             keep_left[axis] = cost_left[axis] < cost_right[axis]
             if keep_left[axis]:
@@ -119,7 +124,7 @@ def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, 
                 low[axis], left[axis], cost_left[axis] = left[axis], right[axis], cost_right[axis]
                 right[axis] = low[axis] + _GOLDEN_RATIO * (high[axis] - low[axis])
                 new_point[axis] = right[axis]
-        _sums_of_squares(path, targets, new_point, period, cost_new)
+        _sums_of_squares(coefficients, targets, new_point, period, cost_new)
         for axis in range(2):
             if keep_left[axis]:
                 cost_left[axis] = cost_new[axis]
@@ -130,23 +135,23 @@ def _time_constants(path: Array, targets: Array, period: float) -> tuple[float, 
 
 
 def _sums_of_squares(
-    path: Array, targets: Array, logarithms: Array, period: float, sums: Array
+    coefficients: Array, targets: Array, logarithms: Array, period: float, sums: Array
 ) -> None:
     """Compute the sums of squared differences from first-order models, north and east.
 
     Args:
-        path: (N, 2), coefficients.
+        coefficients: (N, 2), coefficients.
         targets: (N, 2), target coefficients.
         logarithms: (2,), natural logarithms of the time constants in s.
         period: time between two samples, s.
         sums: (2,), the output.
     """
     constant_north, constant_east = exp(logarithms[0]), exp(logarithms[1])
-    north, east, total_north, total_east = path[0, 0], path[0, 1], 0.0, 0.0
-    for k in range(1, path.shape[0]):
+    north, east, total_north, total_east = coefficients[0, 0], coefficients[0, 1], 0.0, 0.0
+    for k in range(1, coefficients.shape[0]):
         _, north = first_order_step(north, targets[k - 1, 0], constant_north, period)
         _, east = first_order_step(east, targets[k - 1, 1], constant_east, period)
-        residual_north, residual_east = path[k, 0] - north, path[k, 1] - east
+        residual_north, residual_east = coefficients[k, 0] - north, coefficients[k, 1] - east
         total_north += residual_north * residual_north
         total_east += residual_east * residual_east
     sums[0], sums[1] = total_north, total_east

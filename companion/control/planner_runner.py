@@ -74,7 +74,7 @@ class PlannerRunner:
     @property
     def planned(self) -> PlannedTilt | None:
         """The plan in effect at the newest sample; None for a planner without a plan."""
-        return None if self._follower is None else self._follower.planned
+        return None if self._follower is None else self._follower.plan_in_effect
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """An attitude of the autopilot in the frame that the planner sees."""

@@ -1,15 +1,16 @@
 """The delay between commands and measurements, from their cross-correlation.
 
-Both are band-pass filtered to the frequencies at which a first-order lag describes a real rate loop
-best. At low frequencies the autopilot's rate integrator compensates the lag: PX4 follows a circle
-(1 rad/s) with a delay of 40 ms, but steps with 87 ms. At high frequencies the loop is second-order.
+Commands and measurements are band-pass filtered to the frequencies at which a first-order lag
+describes a real rate loop best. At low frequencies the autopilot's rate integrator compensates the
+lag: PX4 follows a circle (1 rad/s) with a delay of 40 ms, but steps with 87 ms. At high frequencies
+the loop is second-order.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from companion.attitude.rate_response import FIRST_ORDER_SHARE
-from companion.identification.lags import held_commands, lagged, slewed, value_at
+from companion.identification.lags import held_commands, lagged, slew_limited, value_at
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
 
 Floats = NDArray[np.float64]
@@ -17,9 +18,9 @@ Floats = NDArray[np.float64]
 _GRID_PERIOD = 0.004
 """Sample period of the correlation, s."""
 _DELAY_COUNT = int(LONGEST_DEAD_TIME / _GRID_PERIOD)
-"""Number of delays that are compared, besides 0; they are `_GRID_PERIOD` apart."""
+"""Number of delays that are compared, in addition to 0; they are `_GRID_PERIOD` apart."""
 _CENTRE_PHASE = 0.38
-"""The centre frequency of the filter is that at which the known lag has this phase, rad."""
+"""Phase of the known lag at the centre frequency of the filter, rad."""
 _CENTRE_FREQUENCIES = 5.0, 9.0
 """Bounds of the centre frequency, rad/s. At 8 rad/s on PX4 and 9 rad/s on ArduPilot, the dead times
 measured in steps, circles, figure-eights and doublets agree within 3 ms."""
@@ -28,7 +29,7 @@ _FILTER_REACH = 3.5
 _LEAST_EXPLAINED = 0.985
 """Smallest R² of a correlation that is used; below it, gusts or another axis distort the delay."""
 _LEAST_EXCITATION = 0.005
-"""Smallest root mean square of the filtered commands, rad/s."""
+"""Smallest RMS of the filtered commands with which a delay is measured, rad/s."""
 
 
 def dead_time_by_correlation(
@@ -66,9 +67,11 @@ def dead_time_by_correlation(
         raise ValueError(f"lag must be finite and not negative, not {lag}")
     if slew is not None and not slew > 0.0:
         raise ValueError(f"slew must be positive, not {slew}")
-    band = _band_pass(lag, damping)
-    parts = stretches(time, commanded, measured_time, measured)
-    filtered = [pair for each in parts if (pair := _filtered(each, lag, slew, band)) is not None]
+    taps = _band_pass(lag, damping)
+    record = stretches(time, commanded, measured_time, measured)
+    filtered = [
+        pair for stretch in record if (pair := _filtered(stretch, lag, slew, taps)) is not None
+    ]
     correlation = _correlation(filtered)
     delay = None if correlation is None else _peak_delay(correlation)
     return None if delay is None else max(0.0, delay - _second_order_delay(lag, damping))
@@ -79,17 +82,19 @@ def _correlation(pairs: list[tuple[Floats, Floats]]) -> Floats | None:
 
     None: there are no pairs, or the commands or the measurements hardly changed.
     """
-    products, powers = np.zeros(_DELAY_COUNT + 1), np.zeros(_DELAY_COUNT + 1)
-    squares, count = 0.0, 0
+    products, command_energy = np.zeros(_DELAY_COUNT + 1), np.zeros(_DELAY_COUNT + 1)
+    response_energy, count = 0.0, 0
     for commands, response in pairs:
         products += np.correlate(commands, response, "valid")[::-1]
-        powers += np.correlate(commands**2, np.ones(response.size), "valid")[::-1]
-        squares += float(response @ response)
+        command_energy += np.correlate(commands**2, np.ones(response.size), "valid")[::-1]
+        response_energy += float(response @ response)
         count += response.size
-    least_power = count * _LEAST_EXCITATION**2
-    if count == 0 or powers.max() < least_power or squares == 0.0:
+    least_energy = count * _LEAST_EXCITATION**2
+    if count == 0 or command_energy.max() < least_energy or response_energy == 0.0:
         return None
-    correlation: Floats = products / np.sqrt(np.maximum(powers, least_power) * squares)
+    correlation: Floats = products / np.sqrt(
+        np.maximum(command_energy, least_energy) * response_energy
+    )
     return correlation
 
 
@@ -102,7 +107,7 @@ def _centre_frequency(lag: float, damping: float) -> float:
 
 
 def _second_order_delay(lag: float, damping: float) -> float:
-    """Delay of a second-order lag at the centre frequency, beyond that of a first-order one, s."""
+    """Delay of the second-order lag minus that of a first-order one, at the centre frequency, s."""
     frequency = _centre_frequency(lag, damping)
     lag_phase = frequency * lag
     phase = np.arctan2(lag_phase, 1.0 - (0.5 * lag_phase / damping) ** 2)
@@ -112,7 +117,7 @@ def _second_order_delay(lag: float, damping: float) -> float:
 def _band_pass(lag: float, damping: float) -> Floats:
     """(k,), taps of a band-pass filter for samples on the grid: third derivative of a Gaussian.
 
-    Its gain is proportional to ω³·exp(−1.5·(ω/ω₀)²): 1 at its maximum, the centre frequency ω₀, and
+    The gain is proportional to ω³·exp(−1.5·(ω/ω₀)²): 1 at the centre frequency ω₀, its maximum, and
     nearly 0 for slow turns. The filter delays commands and measurements equally.
     """
     frequency = _centre_frequency(lag, damping)
@@ -126,24 +131,24 @@ def _band_pass(lag: float, damping: float) -> Floats:
 
 
 def _filtered(
-    stretch: Stretch, lag: float, slew: float | None, band: Floats
+    stretch: Stretch, lag: float, slew: float | None, taps: Floats
 ) -> tuple[Floats, Floats] | None:
     """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), both sampled on the grid.
 
-    Both end at the same time. None: the measurements are shorter than the filter.
+    Both arrays end at the same time. None: the measurements are shorter than the filter.
     """
-    first, last = stretch.measured_time[0], stretch.measured_time[-1]
-    count = int((last - first) / _GRID_PERIOD)
-    if count <= band.size:
+    first_time, last_time = stretch.measured_time[0], stretch.measured_time[-1]
+    count = int((last_time - first_time) / _GRID_PERIOD)
+    if count <= taps.size:
         return None
-    times = last - _GRID_PERIOD * np.arange(count + _DELAY_COUNT)[::-1]
+    times = last_time - _GRID_PERIOD * np.arange(count + _DELAY_COUNT)[::-1]
     times = np.maximum(times, stretch.time[0])
     knots = held_commands(stretch.time, stretch.commanded)
     if slew is not None:
-        knots = slewed(knots, slew)
+        knots = slew_limited(knots, slew)
     commands = lagged(knots, lag, times) if lag > 0.0 else value_at(knots, times)
     response = np.interp(times[_DELAY_COUNT:], stretch.measured_time, stretch.measured)
-    return np.convolve(commands, band, "valid"), np.convolve(response, band, "valid")
+    return np.convolve(commands, taps, "valid"), np.convolve(response, taps, "valid")
 
 
 def _peak_delay(correlation: Floats) -> float | None:

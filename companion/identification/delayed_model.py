@@ -1,4 +1,4 @@
-"""The two models of a rate loop, and their fit to a record with a dead time."""
+"""First- and second-order models of a rate loop, and their fit to a record with a dead time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from companion.identification.lags import (
     lagged,
     second_order,
     second_order_decay,
-    slewed,
+    slew_limited,
     value_at,
 )
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 class Model(Protocol):
-    """A linear response of gain 1 with k parameters; their logarithms are called its shape.
+    """A linear response of gain 1 with k parameters; `shape` is their logarithms, (k,).
 
     Attributes:
         lowest: (k,), lower bounds of the shape.
@@ -41,13 +41,13 @@ class Model(Protocol):
     def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
         """(m, k), k independent free responses at (m,) times after the start, s.
 
-        The effect of any initial state is a weighted sum of them.
+        The effect of any initial state is a weighted sum of the free responses.
         """
         ...
 
 
 class FirstOrder:
-    """A first-order lag; its shape is (log lag), lag in s."""
+    """A first-order lag; its `shape` is (log lag), lag in s."""
 
     lowest, highest = np.log([0.001]), np.log([1.0])
 
@@ -61,7 +61,7 @@ class FirstOrder:
 
 
 class SecondOrder:
-    """A second-order lag; its shape is (log 2ζ/ω, log ζ).
+    """A second-order lag; its `shape` is (log 2ζ/ω, log ζ).
 
     In a fit, these two parameters are nearly independent, unlike ω and ζ. 2ζ/ω is the delay of the
     response to a ramp, s.
@@ -79,7 +79,7 @@ class SecondOrder:
 
 
 def frequency_damping(shape: Floats) -> tuple[float, float]:
-    """ω (rad/s) and ζ of a `SecondOrder` with this shape."""
+    """Natural frequency ω (rad/s) and damping ratio ζ from the `shape` of a `SecondOrder`."""
     damping = exp(shape[1])
     return 2.0 * damping / exp(shape[0]), damping
 
@@ -95,18 +95,18 @@ class SecondOrderFit:
     dead_time: float
     """Dead time, s."""
     gain: float
-    """Measured per commanded rate."""
+    """Steady measured rate per commanded rate."""
     slew: float | None
-    """Slew limit of the command, per second; None: no sign of a limit."""
+    """Slew limit of the command, rad/s²; None: no limit was found."""
     explained: float
-    """R²."""
+    """R², share of the measurements' variance that the model explains."""
     misfit: float
     """RMS of the part of the residual that the commands explain, as a share of the standard
     deviation of the measurements."""
     dead_time_error: float
     """Standard error of the dead time due to noise, s."""
     lag_error: float
-    """Standard error of the property `lag` due to noise, s."""
+    """Standard error of `lag` due to noise, s."""
 
     @property
     def lag(self) -> float:
@@ -115,7 +115,7 @@ class SecondOrderFit:
 
     @property
     def described(self) -> str:
-        """The fit in one line."""
+        """Text for the user: model, parameters and R² in one line."""
         return (
             f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
             f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
@@ -126,8 +126,8 @@ class SecondOrderFit:
 DEAD_TIME_RANGE = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMP_TIMES = 0.01, 0.5
-"""Bounds of the search for the slew limit, as the time that the largest change of the commands
-takes at that limit, s."""
+"""Bounds of the search for the slew limit, as the duration of the largest change of the commands at
+that limit, s."""
 _SAME_COMMAND_SHARE = 0.005
 """Commands that differ by less than this share of their range count as the same."""
 
@@ -135,13 +135,13 @@ _SAME_COMMAND_SHARE = 0.005
 class DelayedModel:
     """A record with every n-th sample, and the response of a model to its commands.
 
-    y(t) = gain·x(t − dead time) + offset + remainder of the initial state of each stretch, where x
-    is the model's exact response. Offset, initial states, and the gain if it is not given, are
-    linear, and linear regression gives them. The unknowns are the model's shape, the dead time (s),
-    and optionally the logarithm of the slew limit.
+    y(t) = gain·x(t − dead time) + offset + free response of each stretch, where x is the model's
+    exact response. Linear regression gives the offset, the initial states, and the gain if it is
+    not given. The other unknowns are searched: the model's shape, the dead time (s), and optionally
+    the logarithm of the slew limit.
 
     Attributes:
-        model: the model.
+        model: response without dead time, of first or second order.
         gain: the given gain; None: the gain is fitted.
         thinning: n; every n-th sample is used.
         commands: commands of each stretch, before the slew limit.
@@ -167,7 +167,7 @@ class DelayedModel:
         self._slew_cache: tuple[float, list[Knots]] = (nan, [])
 
     def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """The best values of gain, offset and initial states, and the (m,) residual with them."""
+        """Best gain, offset and initial states for these unknowns, and the residual, (m,)."""
         response = self.response(unknown)
         if self.gain is None:
             columns = np.column_stack((response, self._offset_columns(unknown)))
@@ -188,35 +188,39 @@ class DelayedModel:
         )
 
     def dead_time(self, unknown: Floats) -> float:
-        """The dead time in the unknowns, s."""
+        """The dead time contained in the unknowns, s."""
         return float(unknown[self._dead_time_index])
 
     def slew(self, unknown: Floats) -> float | None:
-        """The slew limit in the unknowns, per second; None if they contain none."""
+        """The slew limit contained in the unknowns, per second; None if there is none."""
         return exp(unknown[-1]) if unknown.size > self._dead_time_index + 1 else None
 
     def search(self, start: Floats) -> Solution:
-        """The best fit near the unknowns `start`."""
-        ramps = [log(self.largest_change / ramp) for ramp in reversed(_RAMP_TIMES)]
-        limits = [*zip(self.model.lowest, self.model.highest, strict=True), DEAD_TIME_RANGE, ramps]
-        lowest, highest = np.array(limits[: start.size]).T
+        """The best fit, searched from the unknowns `start`."""
+        slew_limits = [log(self.largest_change / ramp_time) for ramp_time in reversed(_RAMP_TIMES)]
+        bounds = [
+            *zip(self.model.lowest, self.model.highest, strict=True),
+            DEAD_TIME_RANGE,
+            slew_limits,
+        ]
+        lowest, highest = np.array(bounds[: start.size]).T
         return minimise(self.projection, start, lowest, highest)
 
     def best_of(self, points: list[Floats]) -> Floats:
-        """The point (unknowns) with the smallest sum of squares of the residual."""
+        """The point (values of the unknowns) with the smallest sum of squares of the residual."""
         residuals = [self.projection(point)[1] for point in points]
         return points[int(np.argmin([float(residual @ residual) for residual in residuals]))]
 
-    def explained(self, found: Solution) -> float:
-        """R² of a fit; 0 if the measurements are constant."""
-        spread = self.measured - self.measured.mean()
-        return 1.0 - found.squares / float(spread @ spread) if spread.any() else 0.0
+    def explained(self, solution: Solution) -> float:
+        """R² of a solution; 0 if the measurements are constant."""
+        deviation = self.measured - self.measured.mean()
+        return 1.0 - solution.squares / float(deviation @ deviation) if deviation.any() else 0.0
 
     def _offset_columns(self, unknown: Floats) -> Floats:
         """(m, 1 + number of initial states): ones, and free responses of each stretch.
 
-        The free responses begin at the first sample of the stretch. From the first command on, they
-        would have decayed to nearly nothing there, and their weights would be unbounded.
+        A free response begins at the first sample of its stretch. If it began at the first command,
+        it would be nearly 0 at the samples, and its weight would be unbounded.
         """
         shape = unknown[: self._dead_time_index]
         decays = [self.model.free_responses(shape, times - times[0]) for times in self.times]
@@ -224,9 +228,9 @@ class DelayedModel:
         columns[:, 0] = 1.0
         row, column = 0, 1
         for decay in decays:
-            rows, width = decay.shape
-            columns[row : row + rows, column : column + width] = decay
-            row, column = row + rows, column + width
+            rows, count = decay.shape
+            columns[row : row + rows, column : column + count] = decay
+            row, column = row + rows, column + count
         return columns
 
     def _per_stretch(self, unknown: Floats, compute: Callable[[Knots, Floats], Floats]) -> Floats:
@@ -237,7 +241,7 @@ class DelayedModel:
         return np.concatenate([compute(knots, times - delay) for knots, times in pairs])
 
     def _slew_limited(self, slew: float) -> list[Knots]:
-        """The commands of each stretch after the slew limit; the result for the last is cached."""
+        """The commands of each stretch after the slew limit; the latest result is cached."""
         if slew != self._slew_cache[0]:
-            self._slew_cache = slew, [slewed(knots, slew) for knots in self.commands]
+            self._slew_cache = slew, [slew_limited(knots, slew) for knots in self.commands]
         return self._slew_cache[1]

@@ -1,7 +1,7 @@
 """Fits a first-order lag with dead time to commands and measurements of any unit.
 
-Only lag, dead time and slew limit are searched for; gain, offset and initial states are linear. A
-second-order lag is tried too, and reported if it fits clearly better.
+Lag, dead time and slew limit are searched; linear regression gives gain, offset and initial states.
+A second-order lag is tried too, and reported if it fits clearly better.
 """
 
 from dataclasses import dataclass, replace
@@ -29,19 +29,20 @@ LAG_RANGE = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMP_TIMES = (0.03, 0.06, 0.12, 0.25)
-"""Starts of the search for a slew limit, as the time (s) that the largest change of command takes
-at that limit."""
+"""Starts of the search for a slew limit, as the duration of the largest change of the commands at
+that limit, s."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
-"""Starts of the search with a slew limit, as shares of the lag and dead time found without it."""
+"""Starts of the search with a slew limit: `_LAG_SHARES` of the lag and `_DEAD_TIME_SHARES` of the
+dead time found without a slew limit."""
 _BETTER_SHARE = 0.6
-"""A model with more unknowns needs a sum of squares below this share of the simpler model's."""
+"""Share of the simpler model's sum of squares below which a model with more unknowns is used."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_DEAD_TIME_SHARES = (0.0, 0.3, 0.6)
 """Starts of the search for the dead time of a second-order model, as shares of lag + dead time."""
 _EXCITED_SHARE = 0.02
-"""A sample is excited if the modelled response differs from the command by more than this share of
-the commands' range."""
+"""Share of the commands' range by which the modelled response must differ from the command at an
+excited sample."""
 _RESPONSE_DURATION_FACTOR = 4.0
 """Duration of the vehicle's response and of the correlation of its noise, in lag + dead time."""
 _COARSE_SAMPLES = 500
@@ -61,60 +62,60 @@ class FitQuality:
     """R², share of the measurements' variance that the model explains."""
     misfit: float
     """Error of the model: RMS of the part of the residual that the commands explain, as a share of
-    the standard deviation of the measurements. It does not contain noise."""
+    the standard deviation of the measurements. Noise is not included."""
     dead_time_error: float
     """Standard error of the dead time due to noise, s."""
     lag_error: float
     """Standard error of the lag due to noise, s."""
     span: float
     """Largest minus smallest command, after the slew limit, in the unit of the commands."""
-    excited: int
-    """Number of samples at which the model differs from the command by more than 2 % of the span;
-    only these contain information on lag and dead time."""
+    excited_samples: int
+    """Number of samples at which the model differs from the command by more than 2 % of the span.
+    Only such samples contain information on lag and dead time."""
 
 
 @dataclass(frozen=True, slots=True)
 class LagFit:
-    """Result of a fit, in s and the units of commands and measurements."""
+    """Result of `fit_lag`, in the units of commands and measurements."""
 
     dead_time: float
     """Dead time, s."""
     lag: float
     """Lag, s."""
     gain: float
-    """Measured per commanded value; fitted anew if lag and dead time are for a given one."""
+    """Measured per commanded value. It is fitted even if lag and dead time are for a given gain."""
     offset: float
     """Measurement at a command of zero."""
     slew: float | None
-    """Slew limit of the command, per second; None: no sign of a limit."""
+    """Slew limit of the command, per second; None: no limit was found."""
     quality: FitQuality
     """Quality of the fit."""
     second_order: SecondOrderFit | None = None
-    """second-order fit, if it is clearly better; else None."""
+    """Second-order fit; None if it is not clearly better."""
 
 
 def fit_lag(
     record: list[Stretch], gain: float | None = None, *, may_slew: bool = True
 ) -> LagFit | None:
-    """The best fit; None if no command changes, or there are fewer than 10 samples.
+    """The best first-order fit; None if no command changes, or there are fewer than 10 samples.
 
     Args:
         record: commands and measurements.
         gain: given gain, for which lag and dead time are fitted; None: the gain is fitted too.
-        may_slew: whether to look for a slew limit.
+        may_slew: whether to search for a slew limit.
     """
     record = most_excited(record)
-    samples = sum(stretch.measured.size for stretch in record)
-    if samples < _FEWEST_SAMPLES or all(np.ptp(stretch.commanded) == 0.0 for stretch in record):
+    count = sum(stretch.measured.size for stretch in record)
+    if count < _FEWEST_SAMPLES or all(np.ptp(stretch.commanded) == 0.0 for stretch in record):
         return None
-    fine_thinning, coarse_thinning = 1 + samples // _MOST_SAMPLES, 1 + samples // _COARSE_SAMPLES
-    data = DelayedModel(record, FirstOrder(), gain, fine_thinning)
-    coarse_data = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
-    best = _best_without_slew(data, _grid_start(coarse_data))
+    fine_thinning, coarse_thinning = 1 + count // _MOST_SAMPLES, 1 + count // _COARSE_SAMPLES
+    fine = DelayedModel(record, FirstOrder(), gain, fine_thinning)
+    coarse = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
+    best = _best_without_slew(fine, _grid_start(coarse))
     if may_slew:
-        best = _with_slew_if_better(best, data, coarse_data)
-    fit = _lag_fit(data, best)
-    free_gain = data
+        best = _with_slew_if_better(best, fine, coarse)
+    fit = _lag_fit(fine, best)
+    free_gain = fine
     if gain is not None:
         free_gain = DelayedModel(record, FirstOrder(), None, fine_thinning)
         best = free_gain.search(best.unknown)
@@ -122,26 +123,32 @@ def fit_lag(
     return replace(fit, second_order=_second_order_fit(record, free_gain, best, coarse_thinning))
 
 
-def _with_slew_if_better(best: Solution, data: DelayedModel, coarse: DelayedModel) -> Solution:
+def _with_slew_if_better(best: Solution, fine: DelayedModel, coarse: DelayedModel) -> Solution:
     """The best fit with a slew limit if it is clearly better than `best`, else `best`."""
-    promising = coarse.search(_slewed_start(best, coarse))
-    if promising.squares > _BETTER_SHARE * coarse.search(best.unknown).squares:
+    coarse_solution = coarse.search(_slewed_start(best, coarse))
+    if coarse_solution.squares > _BETTER_SHARE * coarse.search(best.unknown).squares:
         return best
-    best_limited = data.search(promising.unknown)
+    best_limited = fine.search(coarse_solution.unknown)
     return best_limited if best_limited.squares < _BETTER_SHARE * best.squares else best
 
 
 def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
-    """(3,), the best of a coarse grid of starts of the search with a slew limit.
+    """(3,), start of the search with a slew limit: the best point of a coarse grid.
 
     A slew limit delays too, so smaller lags and dead times than without it are tried.
     """
     lag, dead_time = exp(best.unknown[0]), float(best.unknown[1])
     return coarse.best_of(
         [
-            np.array([log(share * lag), dead_share * dead_time, log(coarse.largest_change / ramp)])
-            for ramp in _TRIED_RAMP_TIMES
-            for share in _LAG_SHARES
+            np.array(
+                [
+                    log(lag_share * lag),
+                    dead_share * dead_time,
+                    log(coarse.largest_change / ramp_time),
+                ]
+            )
+            for ramp_time in _TRIED_RAMP_TIMES
+            for lag_share in _LAG_SHARES
             for dead_share in _DEAD_TIME_SHARES
         ]
     )
@@ -150,7 +157,7 @@ def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
 def _second_order_fit(
     record: list[Stretch], first_data: DelayedModel, first_order: Solution, thinning: int
 ) -> SecondOrderFit | None:
-    """The best second-order fit, also of the gain; None: not clearly better than first order."""
+    """The best second-order fit, gain included; None: not clearly better than first order."""
     lag, dead_time, *slew = first_order.unknown.tolist()
     delay = exp(lag) + dead_time
     model: Model = SecondOrder()
@@ -162,17 +169,17 @@ def _second_order_fit(
         ]
     )
     data = DelayedModel(record, model, None, first_data.thinning)
-    best = data.search(start)
-    if best.squares > _BETTER_SHARE * first_order.squares:
+    solution = data.search(start)
+    if solution.squares > _BETTER_SHARE * first_order.squares:
         return None
-    frequency, damping = frequency_damping(best.unknown)
-    quality = _quality(data, best)
+    frequency, damping = frequency_damping(solution.unknown)
+    quality = _quality(data, solution)
     return SecondOrderFit(
         frequency=frequency,
         damping=damping,
-        dead_time=data.dead_time(best.unknown),
-        gain=float(best.weights[0]),
-        slew=data.slew(best.unknown),
+        dead_time=data.dead_time(solution.unknown),
+        gain=float(solution.weights[0]),
+        slew=data.slew(solution.unknown),
         explained=quality.explained,
         misfit=quality.misfit,
         dead_time_error=quality.dead_time_error,
@@ -180,41 +187,41 @@ def _second_order_fit(
     )
 
 
-def _lag_fit(data: DelayedModel, found: Solution) -> LagFit:
+def _lag_fit(data: DelayedModel, solution: Solution) -> LagFit:
     return LagFit(
-        dead_time=data.dead_time(found.unknown),
-        lag=exp(found.unknown[0]),
-        gain=float(found.weights[0]),
-        offset=float(found.weights[1]),
-        slew=data.slew(found.unknown),
-        quality=_quality(data, found),
+        dead_time=data.dead_time(solution.unknown),
+        lag=exp(solution.unknown[0]),
+        gain=float(solution.weights[0]),
+        offset=float(solution.weights[1]),
+        slew=data.slew(solution.unknown),
+        quality=_quality(data, solution),
     )
 
 
-def _quality(data: DelayedModel, found: Solution) -> FitQuality:
+def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     """The quality of a fit of either order."""
-    unknown, lag = found.unknown, exp(found.unknown[0])
+    unknown, lag = solution.unknown, exp(solution.unknown[0])
     commands = data.delayed_commands(unknown)
     span = float(np.ptp(commands))
-    excited = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
+    excited_samples = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
     response_duration = _RESPONSE_DURATION_FACTOR * (lag + data.dead_time(unknown))
     sample_period = float(np.median(np.diff(np.concatenate(data.times))))
     residuals = analyse_residual(
-        found.residual,
-        found.slopes,
+        solution.residual,
+        solution.slopes,
         lambda delay: data.delayed_commands(unknown, delay),
         response_duration,
-        excited,
+        excited_samples,
         correlated_samples=1 + int(response_duration / max(sample_period, 1e-4)),
     )
     deviation = float(np.std(data.measured))
     return FitQuality(
-        explained=data.explained(found),
+        explained=data.explained(solution),
         misfit=residuals.misfit / deviation if deviation > 0.0 else 0.0,
         dead_time_error=data.dead_time(residuals.errors),
         lag_error=lag * float(residuals.errors[0]),
         span=span,
-        excited=excited,
+        excited_samples=excited_samples,
     )
 
 
@@ -224,18 +231,18 @@ def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
     If samples come at regular times after commands, there are shallow minima one sample apart, with
     the same sum of lag and dead time. Neighbouring minima are therefore tried too.
     """
-    found = data.search(start)
-    lag, dead_time = exp(found.unknown[0]), float(found.unknown[1])
+    solution = data.search(start)
+    lag, dead_time = exp(solution.unknown[0]), float(solution.unknown[1])
     neighbours = [
         data.search(np.array([log(lag - shift), dead_time + shift]))
         for shift in (-_NEIGHBOUR_DISTANCE, _NEIGHBOUR_DISTANCE)
         if lag > shift
     ]
-    return min(found, *neighbours, key=lambda each: each.squares)
+    return min(solution, *neighbours, key=lambda each: each.squares)
 
 
 def _grid_start(data: DelayedModel) -> Floats:
-    """(2,), the best start (log lag, dead time) of a coarse grid."""
+    """(2,), start of the search (log lag, dead time): the best point of a coarse grid."""
     return data.best_of(
         [np.array([log(lag), dead_time]) for lag in _TRIED_LAGS for dead_time in _TRIED_DEAD_TIMES]
     )

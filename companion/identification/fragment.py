@@ -1,4 +1,4 @@
-"""Writes an identified vehicle as YAML to include: good fits, otherwise the configured values."""
+"""Writes an identified vehicle as YAML to include; a bad fit is replaced by configured values."""
 
 from collections.abc import Mapping, Sequence
 from math import degrees
@@ -14,7 +14,7 @@ ConfiguredValues = Mapping[str, Sequence[float | None]]
 _KEY_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _AXIS_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
 _NO_SLEW_LIMIT = 100_000.0
-"""Slew limit written for an axis without one if roll has one, °/s²; null would mean roll's."""
+"""Slew limit written for an axis without one if roll has one, °/s²; null would mean as roll."""
 _SAME_MS = 3.0
 """Lags and dead times of roll and pitch that differ by at most this count as the same, ms."""
 _SAME_SLEW_SHARE = 0.1
@@ -22,7 +22,7 @@ _SAME_SLEW_SHARE = 0.1
 _SAME_DAMPING = 0.05
 """Damping ratios of roll and pitch that differ by at most this count as the same."""
 _ACCEPTED_DAMPINGS = 0.3, 10.0
-"""Damping ratios that `vehicle.damping` takes."""
+"""Smallest and largest damping ratio that `vehicle.damping` accepts."""
 
 
 class AxisValues(NamedTuple):
@@ -38,7 +38,7 @@ class AxisValues(NamedTuple):
     """Damping ratio ζ of a second-order lag; None: first order."""
 
     def described(self) -> str:
-        """The values in one line."""
+        """Text for the user: the values in one line."""
         slew = "" if self.slew is None else f", slew {self.slew:.0f} °/s²"
         damping = "" if self.damping is None else f", damping {self.damping:.2f}"
         return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}{damping}"
@@ -47,9 +47,9 @@ class AxisValues(NamedTuple):
 def vehicle_fragment(
     vehicle: IdentifiedVehicle,
     gravity: float,
-    known: ConfiguredValues,
+    configured: ConfiguredValues,
     flight: str = "",
-    second_order: bool = True,
+    allow_second_order: bool = True,
 ) -> str:
     """YAML for the configuration to include, with a comment on the quality of each fit.
 
@@ -57,27 +57,29 @@ def vehicle_fragment(
     values, and a comment says so. If roll and pitch hardly differ, their mean values are written as
     those of roll. The hover thrust is written only if the thrust map is good.
 
-    Roll and pitch are written as second-order lags if this fits both clearly better.
+    Roll and pitch are written as second-order lags if these fit clearly better on both axes.
 
     Args:
         vehicle: the identified vehicle.
         gravity: gravity, m/s², which gives the hover thrust.
-        known: configured values by axis; axes may be missing, and values None.
+        configured: configured values by axis; axes may be missing, and values None.
         flight: name of the flight, written as `identified`; empty: it is not written.
-        second_order: whether second-order lags may be written.
+        allow_second_order: whether second-order lags may be written.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values; the message
             gives a reason for each bad axis.
     """
-    kept = kept_axes(vehicle, known)
+    kept = kept_axes(vehicle, configured)
     lines = [_comment(name, response, kept) for name, response in vehicle.axes.items()]
     thrust = vehicle.thrust
     if thrust is not None and thrust.flaw(gravity) is None:
         lines.append(f"# thrust: {thrust.described()}")
         lines += ["thrust:", f"  hover_thrust: {thrust.normalised(gravity):.3f}"]
-    axes = {name: kept.get(name) or _fitted_values(each) for name, each in vehicle.axes.items()}
-    if second_order:
+    axes = {
+        name: kept.get(name) or _fitted_values(response) for name, response in vehicle.axes.items()
+    }
+    if allow_second_order:
         axes |= second_order_axes(vehicle)
     identified = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
     lines += ["vehicle:", *identified, *_tilt_keys(axes["roll"], axes["pitch"])]
@@ -103,8 +105,8 @@ def second_order_axes(vehicle: IdentifiedVehicle) -> dict[str, AxisValues]:
     return axes
 
 
-def kept_axes(vehicle: IdentifiedVehicle, known: ConfiguredValues) -> dict[str, AxisValues]:
-    """The configured values of the axes whose fit is bad; those axes keep them.
+def kept_axes(vehicle: IdentifiedVehicle, configured: ConfiguredValues) -> dict[str, AxisValues]:
+    """The axes whose fit is bad, with their configured values, which they keep.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values.
@@ -112,7 +114,7 @@ def kept_axes(vehicle: IdentifiedVehicle, known: ConfiguredValues) -> dict[str, 
     flaws = vehicle.flaws()
     kept = {}
     for name in flaws:
-        lag, dead_time, slew, damping = known.get(name, (None, None, None, None))
+        lag, dead_time, slew, damping = configured.get(name, (None, None, None, None))
         if lag is not None and dead_time is not None:
             kept[name] = AxisValues(lag, dead_time, slew, damping)
     if len(flaws) == len(vehicle.axes) or len(kept) < len(flaws):
@@ -127,7 +129,7 @@ def _fitted_values(response: RateResponse) -> AxisValues:
 
 def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
     """YAML lines of roll and pitch; if they hardly differ, mean values for roll, null for pitch."""
-    if not _nearly_same(roll, pitch):
+    if not _nearly_same_axes(roll, pitch):
         return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
     mean = AxisValues(
         0.5 * (roll.lag + pitch.lag),
@@ -142,25 +144,27 @@ def _mean(one: float | None, other: float | None) -> float | None:
     return None if one is None or other is None else 0.5 * (one + other)
 
 
-def _nearly_same(one: AxisValues, other: AxisValues) -> bool:
+def _nearly_same_axes(one: AxisValues, other: AxisValues) -> bool:
     return (
         max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time)) <= _SAME_MS
-        and _near(one.slew, other.slew, _SAME_SLEW_SHARE * max(one.slew or 0.0, other.slew or 0.0))
-        and _near(one.damping, other.damping, _SAME_DAMPING)
+        and _nearly_equal(
+            one.slew, other.slew, _SAME_SLEW_SHARE * max(one.slew or 0.0, other.slew or 0.0)
+        )
+        and _nearly_equal(one.damping, other.damping, _SAME_DAMPING)
     )
 
 
-def _near(one: float | None, other: float | None, tolerance: float) -> bool:
+def _nearly_equal(one: float | None, other: float | None, tolerance: float) -> bool:
     """Whether both are None, or differ by at most `tolerance`."""
     return one == other or (one is not None and other is not None and abs(one - other) <= tolerance)
 
 
-def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> list[str]:
-    """YAML lines of one axis; a null slew limit would mean `inherited`, the slew limit of roll.
+def _axis_keys(name: str, axis: AxisValues, roll_slew: float | None = None) -> list[str]:
+    """YAML lines of one axis; a null slew limit would mean `roll_slew`, the slew limit of roll.
 
     Keys without a value are written as null, so that no value of another file remains in effect.
     """
-    slew = axis.slew if axis.slew is not None or inherited is None else _NO_SLEW_LIMIT
+    slew = axis.slew if axis.slew is not None or roll_slew is None else _NO_SLEW_LIMIT
     values = {
         "lag_ms": f"{axis.lag:.1f}",
         "dead_time_ms": f"{axis.dead_time:.1f}",
@@ -172,7 +176,7 @@ def _axis_keys(name: str, axis: AxisValues, inherited: float | None = None) -> l
 
 
 def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:
-    """A comment on the fit of an axis, or on the reason why its configured values are kept."""
+    """A YAML comment on the fit of an axis, or on why its configured values are kept."""
     if name in kept:
         return (
             f"# {name}: kept from the configuration: {kept[name].described()}; the fit is bad: "
@@ -186,5 +190,5 @@ def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) 
         f"# {name}, first order: lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead "
         f"time {1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f} ms, gain "
         f"{response.gain:.2f}{slew}, explains {fit.explained:.1%}, misfit {fit.misfit:.0%}, "
-        f"{fit.excited} samples{second_text}"
+        f"{fit.excited_samples} samples{second_text}"
     )

@@ -33,18 +33,18 @@ def held_commands(time: Floats, commanded: Floats, tolerance: float = 0.0) -> Kn
     """Commands (n,), each held from its time (n,) until the next.
 
     A command begins a new piece only if it differs by more than `tolerance` from the latest piece.
-    Otherwise noise in the commands would make many pieces, which take time.
+    Otherwise noise in the commands would make many pieces, which take long to compute.
     """
-    kept, latest = [], np.inf
-    for number, value in enumerate(commanded.tolist()):
-        if abs(value - latest) > tolerance:
-            kept.append(number)
-            latest = value
-    return Knots(time[kept], commanded[kept], np.zeros(len(kept)))
+    piece_starts, latest_value = [], np.inf
+    for index, value in enumerate(commanded.tolist()):
+        if abs(value - latest_value) > tolerance:
+            piece_starts.append(index)
+            latest_value = value
+    return Knots(time[piece_starts], commanded[piece_starts], np.zeros(len(piece_starts)))
 
 
-def slewed(commands: Knots, slew: float) -> Knots:
-    """Held commands after the slew limit `slew`, per second; they start at the first command."""
+def slew_limited(commands: Knots, slew: float) -> Knots:
+    """Held commands after the slew limit `slew` (per second), from the first command on."""
     start = _start_values(commands, slew)
     change = commands.value - start
     arrival = commands.time + np.abs(change) / slew
@@ -61,24 +61,26 @@ def _start_values(commands: Knots, slew: float) -> Floats:
 
     This needs a loop, because each ramp starts where the ramp before it ended.
     """
-    value = float(commands.value[0])
-    starts, limits = [value], slew * np.diff(commands.time)
-    for target, limit in zip(commands.value[:-1].tolist(), limits.tolist(), strict=True):
-        change = target - value
-        if change > limit:
-            value += limit
-        elif change < -limit:
-            value -= limit
+    output = float(commands.value[0])
+    outputs, largest_changes = [output], slew * np.diff(commands.time)
+    for command, largest_change in zip(
+        commands.value[:-1].tolist(), largest_changes.tolist(), strict=True
+    ):
+        change = command - output
+        if change > largest_change:
+            output += largest_change
+        elif change < -largest_change:
+            output -= largest_change
         else:
-            value = target
-        starts.append(value)
-    return np.array(starts)
+            output = command
+        outputs.append(output)
+    return np.array(outputs)
 
 
 def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
     """(m,), response of a first-order lag of `lag` > 0 s to the commands, at the times `at`, s.
 
-    It starts in the steady state of the first command. No time may be before the first knot.
+    The response starts in the steady state of the first command. No time may be before it.
     """
     return np.asarray(complex_lagged(commands, lag, at), dtype=np.float64)
 
@@ -86,35 +88,36 @@ def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
 def complex_lagged(commands: Knots, lag: complex, at: Floats) -> Numbers:
     """Like `lagged`, for a complex lag, s.
 
-    An underdamped second-order response is a weighted sum of two, with conjugate complex lags.
+    An underdamped second-order response is a weighted sum of two such responses with complex
+    conjugate lags.
     """
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
-    excess = _decayed_sums(commands.time / lag, jumps)
-    piece = np.searchsorted(commands.time, at, side="right") - 1
-    elapsed = at - commands.time[piece]
-    forced = steady[piece] + commands.slope[piece] * elapsed
-    response: Numbers = forced + excess[piece] * np.exp(-elapsed / lag)
+    transients = _decayed_sums(commands.time / lag, jumps)
+    pieces = np.searchsorted(commands.time, at, side="right") - 1
+    elapsed = at - commands.time[pieces]
+    steady_response = steady[pieces] + commands.slope[pieces] * elapsed
+    response: Numbers = steady_response + transients[pieces] * np.exp(-elapsed / lag)
     return response
 
 
-def _decayed_sums(ages: Numbers, jumps: Numbers) -> Numbers:
-    """(n,), sum of all jumps up to each age, each decayed exponentially since its own age.
+def _decayed_sums(scaled_times: Numbers, jumps: Numbers) -> Numbers:
+    """(n,), at each knot the sum of the jumps so far, each decayed by exp(−elapsed time / lag).
 
-    An age is a time divided by the lag. The sums are computed in parts, each so short that no
-    exponential overflows.
+    `scaled_times` are the times of the knots divided by the lag. The sums are computed in parts so
+    short that no exponential overflows.
     """
     sums = np.empty_like(jumps)
-    real_ages = np.real(ages)
-    start, previous = 0, 0.0 * jumps[0]
+    real_times = np.real(scaled_times)
+    start, previous_sum = 0, 0.0 * jumps[0]
     while start < jumps.size:
-        end = int(np.searchsorted(real_ages, real_ages[start] + _LARGEST_EXPONENT, side="right"))
-        growth = np.exp(ages[start:end] - ages[start])
-        sums[start:end] = (previous + np.cumsum(jumps[start:end] * growth)) / growth
+        end = int(np.searchsorted(real_times, real_times[start] + _LARGEST_EXPONENT, side="right"))
+        growth = np.exp(scaled_times[start:end] - scaled_times[start])
+        sums[start:end] = (previous_sum + np.cumsum(jumps[start:end] * growth)) / growth
         if end < jumps.size:
-            step = ages[end] - ages[end - 1]
-            previous = sums[end - 1] * np.exp(-step)
+            elapsed = scaled_times[end] - scaled_times[end - 1]
+            previous_sum = sums[end - 1] * np.exp(-elapsed)
         start = end
     return sums
 
@@ -139,13 +142,15 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
         damping: damping ratio ζ.
         at: (m,), times, s.
     """
-    first, second = _two_lags(frequency, damping)
-    if first.imag:
-        oscillating: Floats = np.imag(first * complex_lagged(commands, first, at)) / first.imag
-        return oscillating
-    slow, quick = first.real, second.real
-    by_slow, by_quick = lagged(commands, slow, at), lagged(commands, quick, at)
-    return (slow * by_slow - quick * by_quick) / (slow - quick)
+    first_lag, second_lag = _two_lags(frequency, damping)
+    if first_lag.imag:
+        response: Floats = (
+            np.imag(first_lag * complex_lagged(commands, first_lag, at)) / first_lag.imag
+        )
+        return response
+    slow_lag, quick_lag = first_lag.real, second_lag.real
+    slow_response, quick_response = lagged(commands, slow_lag, at), lagged(commands, quick_lag, at)
+    return (slow_lag * slow_response - quick_lag * quick_response) / (slow_lag - quick_lag)
 
 
 def second_order_decay(elapsed: Floats, frequency: float, damping: float) -> Floats:
@@ -156,17 +161,19 @@ def second_order_decay(elapsed: Floats, frequency: float, damping: float) -> Flo
         frequency: natural frequency ω, rad/s.
         damping: damping ratio ζ.
     """
-    first, second = _two_lags(frequency, damping)
-    if first.imag:
-        oscillation = np.exp(-elapsed / first)
+    first_lag, second_lag = _two_lags(frequency, damping)
+    if first_lag.imag:
+        oscillation = np.exp(-elapsed / first_lag)
         return np.column_stack((np.real(oscillation), np.imag(oscillation)))
-    slow, quick = np.exp(-elapsed / first.real), np.exp(-elapsed / second.real)
+    slow_decay, quick_decay = np.exp(-elapsed / first_lag.real), np.exp(-elapsed / second_lag.real)
     # The second column is a difference, so that the two stay independent near critical damping.
-    return np.column_stack((slow, (slow - quick) / (first.real - second.real)))
+    return np.column_stack(
+        (slow_decay, (slow_decay - quick_decay) / (first_lag.real - second_lag.real))
+    )
 
 
 def _two_lags(frequency: float, damping: float) -> tuple[complex, complex]:
-    """The two first-order lags in a second-order one, s: the longer first, or a conjugate pair."""
+    """The two first-order lags of a second-order lag, s: the longer first, or a conjugate pair."""
     discriminant = damping * damping - 1.0
     discriminant = copysign(max(abs(discriminant), _NEARLY_CRITICAL), discriminant)
     root = complex(0.0, sqrt(-discriminant)) if discriminant < 0.0 else complex(sqrt(discriminant))

@@ -19,8 +19,8 @@ _WINDOW_DURATION = 10.0
 """A long record is cut into windows of this length, s; the fit uses those with the most
 excitation."""
 _WINDOW_LEAD = 1.5
-"""Commands are kept from this time before a window on, s. It is more than the longest dead time
-plus the longest slew-limited change of command that is searched."""
+"""Time before a window from which on its commands are kept, s: more than the longest dead time plus
+the longest slew-limited change of command that is searched."""
 
 
 class Stretch(NamedTuple):
@@ -32,7 +32,7 @@ class Stretch(NamedTuple):
     """(n,), the commands."""
     measured_time: Floats
     """(m,), times of the samples, s, from `LONGEST_DEAD_TIME` after the first command to the last
-    command. For each, the command is thus known at every dead time."""
+    command. So the command one dead time before a sample is known for every dead time."""
     measured: Floats
     """(m,), the samples, in the unit of the commands."""
 
@@ -52,23 +52,23 @@ def stretches(
         ValueError: a time series and its values are not one-dimensional and equally long.
     """
     t, u = _checked_series(time, commanded)
-    sampled, y = _checked_series(measured_time, measured)
-    parts = []
+    sample_times, y = _checked_series(measured_time, measured)
+    found = []
     for rows in np.split(np.arange(t.size), np.flatnonzero(np.diff(t) > _LONGEST_HOLD) + 1):
         if rows.size == 0:
             continue
-        first, last = t[rows[0]], t[rows[-1]]
-        inside = (sampled >= first + LONGEST_DEAD_TIME) & (sampled <= last)
-        if inside.any():
-            parts.append(Stretch(t[rows], u[rows], sampled[inside], y[inside]))
-    return parts
+        first_time, last_time = t[rows[0]], t[rows[-1]]
+        is_inside = (sample_times >= first_time + LONGEST_DEAD_TIME) & (sample_times <= last_time)
+        if is_inside.any():
+            found.append(Stretch(t[rows], u[rows], sample_times[is_inside], y[is_inside]))
+    return found
 
 
 def most_excited(record: list[Stretch]) -> list[Stretch]:
     """The record or, if it is long, only the windows in which the commands varied most.
 
     Half an hour of flight contains hardly more information on the response than its most excited
-    half minute. Each window keeps the commands shortly before it.
+    half minute. A window also holds the commands of the `_WINDOW_LEAD` before it.
     """
     if sum(stretch.time.size + stretch.measured_time.size for stretch in record) <= _MOST_ROWS:
         return record
@@ -88,12 +88,22 @@ def _windows(stretch: Stretch) -> list[Stretch]:
     """A stretch divided into windows; those without a sample are left out."""
     windows = []
     for start in np.arange(stretch.measured_time[0], stretch.measured_time[-1], _WINDOW_DURATION):
-        first, last = np.searchsorted(stretch.measured_time, (start, start + _WINDOW_DURATION))
-        begin, end = np.searchsorted(stretch.time, (start - _WINDOW_LEAD, start + _WINDOW_DURATION))
-        begin = max(int(begin) - 1, 0)
-        if last > first:
-            commands = stretch.time[begin:end], stretch.commanded[begin:end]
-            measured = stretch.measured_time[first:last], stretch.measured[first:last]
+        first_sample, end_sample = np.searchsorted(
+            stretch.measured_time, (start, start + _WINDOW_DURATION)
+        )
+        first_command, end_command = np.searchsorted(
+            stretch.time, (start - _WINDOW_LEAD, start + _WINDOW_DURATION)
+        )
+        first_command = max(int(first_command) - 1, 0)
+        if end_sample > first_sample:
+            commands = (
+                stretch.time[first_command:end_command],
+                stretch.commanded[first_command:end_command],
+            )
+            measured = (
+                stretch.measured_time[first_sample:end_sample],
+                stretch.measured[first_sample:end_sample],
+            )
             windows.append(Stretch(*commands, *measured))
     return windows
 
@@ -102,7 +112,7 @@ def _checked_series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]
     """Check two series, and return times and values in order of time, without non-finite rows.
 
     Raises:
-        ValueError: they are not one-dimensional and equally long.
+        ValueError: times and values are not one-dimensional and equally long.
     """
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or t.shape != v.shape:

@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 _MOST_DELAYS = 24
 _SAMPLES_PER_DELAY = 8
-"""Excited samples needed for each delay of the regression; with fewer, it would fit the noise."""
+"""Excited samples needed for each delay of the regression; with fewer it would fit the noise."""
 
 
 class Residuals(NamedTuple):
@@ -27,7 +27,7 @@ class Residuals(NamedTuple):
     misfit: float
     """RMS of the part that the commands explain, in the unit of the measurements."""
     errors: Floats
-    """(k,), standard errors of the unknowns."""
+    """(k,), standard errors of the unknowns, in the unit of each."""
 
 
 def analyse_residual(
@@ -35,7 +35,7 @@ def analyse_residual(
     slopes: Floats,
     commands: Callable[[float], Floats],
     response_duration: float,
-    excited: int,
+    excited_samples: int,
     correlated_samples: int,
 ) -> Residuals:
     """Split a residual; with fewer than 8 excited samples, all of it counts as noise.
@@ -44,12 +44,12 @@ def analyse_residual(
         residual: (m,), measured − modelled.
         slopes: (m, k), derivatives of the residual with respect to the unknowns; the effect of the
             linear unknowns is projected out.
-        commands: function from a further delay, s, to the (m,) delayed commands of the model.
+        commands: function from an additional delay (s) to the commands of the model, (m,).
         response_duration: longest time for which the vehicle responds to a command, s.
-        excited: number of excited samples; see `FitQuality`.
+        excited_samples: number of excited samples; see `FitQuality`.
         correlated_samples: number of samples over which the noise is correlated.
     """
-    delays = min(_MOST_DELAYS, excited // _SAMPLES_PER_DELAY)
+    delays = min(_MOST_DELAYS, excited_samples // _SAMPLES_PER_DELAY)
     noise = residual
     if delays:
         # Negative delays too, because the fitted dead time may be too long.
@@ -57,7 +57,7 @@ def analyse_residual(
         columns = np.column_stack([commands(delay) for delay in delay_values.tolist()])
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     # The regression takes one degree of freedom for each delay.
-    correction = excited / max(excited - delays, 1)
+    correction = excited_samples / max(excited_samples - delays, 1)
     return Residuals(
         _rms(residual - noise),
         _standard_errors(slopes, noise, correlated_samples) * np.sqrt(correction),
@@ -68,9 +68,9 @@ def _standard_errors(slopes: Floats, noise: Floats, correlated_samples: int) -> 
     """(k,), standard errors of the unknowns that allow for correlated noise (Newey & West)."""
     scores = slopes * noise[:, np.newaxis]
     spread = scores.T @ scores
-    for shift in range(1, min(correlated_samples, noise.size)):
-        shifted = scores[shift:].T @ scores[:-shift]
-        spread += (1.0 - shift / correlated_samples) * (shifted + shifted.T)
+    for offset in range(1, min(correlated_samples, noise.size)):
+        lagged_product = scores[offset:].T @ scores[:-offset]
+        spread += (1.0 - offset / correlated_samples) * (lagged_product + lagged_product.T)
     # Slopes near the smallest float have no inverse: such unknowns are not determined.
     with np.errstate(over="ignore", invalid="ignore"):
         inverse = np.linalg.pinv(slopes.T @ slopes)

@@ -19,18 +19,18 @@ class FitNeeds:
     """Requirements that a fit must meet to be used; see `FitQuality`."""
 
     misfit: float = 0.3
-    """Largest misfit."""
+    """Largest `FitQuality.misfit`, a share of the standard deviation of the measurements."""
     error: float = 0.003
-    """Largest standard error of lag and dead time, s."""
+    """Largest standard error of lag and dead time, s; see `relative_error`."""
     relative_error: float = 0.1
-    """Largest standard error as a share of lag + dead time; the larger of the limits `error` and
-    `relative_error` counts."""
+    """Largest standard error of lag and dead time, as a share of lag + dead time. Of this limit and
+    `error` the larger applies."""
     span: float = 0.2
     """Smallest span of the commands, rad/s."""
-    excited: int = 20
-    """Smallest number of excited samples."""
+    excited_samples: int = 20
+    """Smallest number of excited samples; see `FitQuality.excited_samples`."""
     gain: tuple[float, float] = (0.8, 1.2)
-    """Smallest and largest gain; that of a working rate loop is about 1."""
+    """Smallest and largest gain; a working rate loop has a gain of about 1."""
 
 
 DEFAULT_NEEDS = FitNeeds()
@@ -44,21 +44,21 @@ class RateResponse:
     dead_time: float
     """Time from a sample to the first effect of its command, s; NaN if not found."""
     lag: float
-    """Time constant, s; NaN if not found."""
+    """Time constant τ of the first-order lag, s; NaN if not found."""
     gain: float
     """Steady rate per commanded rate; NaN if not found. It is fitted even if lag and dead time are
-    for a given gain. If there is a second-order fit, the gain is that of this fit."""
+    fitted for a given gain. If there is a second-order fit, this is its gain."""
     slew: float | None
     """Slew limit of the commanded rate, before the lag, rad/s²; None if none was found."""
     fit: FitQuality
     """Quality of the fit."""
     second_order: SecondOrderFit | None = None
-    """second-order fit, if it is clearly better; else None."""
+    """Second-order fit; None if it is not clearly better."""
 
     def flaw(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
-        """Why this fit must not be used, a sentence without full stop; None if it may be used."""
+        """Reason why this fit must not be used, without full stop; None if it may be used."""
         fit, uncertainty = self.fit, max(self.fit.dead_time_error, self.fit.lag_error)
-        low, high = needs.gain
+        lowest_gain, highest_gain = needs.gain
         flaws = (
             (
                 isnan(self.dead_time) and fit.span == 0.0,
@@ -79,9 +79,9 @@ class RateResponse:
                 f"lag is at the edge of the searched range, {1e3 * self.lag:.0f} ms",
             ),
             (
-                fit.excited < needs.excited,
-                f"too little excitation: {fit.excited} samples show the response, "
-                f"{needs.excited} are needed",
+                fit.excited_samples < needs.excited_samples,
+                f"too little excitation: {fit.excited_samples} samples show the response, "
+                f"{needs.excited_samples} are needed",
             ),
             (
                 fit.misfit > needs.misfit,
@@ -89,7 +89,7 @@ class RateResponse:
                 f"{needs.misfit:.0%}",
             ),
             (
-                not low <= self.gain <= high,
+                not lowest_gain <= self.gain <= highest_gain,
                 f"gain {self.gain:.2f} is not near 1: the rates did not follow the commands",
             ),
             (
@@ -97,15 +97,15 @@ class RateResponse:
                 f"lag and dead time are uncertain by {1e3 * uncertainty:.1f} ms",
             ),
         )
-        return next((text for wrong, text in flaws if wrong), None)
+        return next((text for is_flawed, text in flaws if is_flawed), None)
 
     def is_good(self, needs: FitNeeds = DEFAULT_NEEDS) -> bool:
         """Whether the fit may be used: it has no `flaw`."""
         return self.flaw(needs) is None
 
 
-def _at_edge(value: float, searched: tuple[float, float]) -> bool:
-    return not searched[0] + _EDGE_TOLERANCE < value < searched[1] - _EDGE_TOLERANCE
+def _at_edge(value: float, searched_range: tuple[float, float]) -> bool:
+    return not searched_range[0] + _EDGE_TOLERANCE < value < searched_range[1] - _EDGE_TOLERANCE
 
 
 _NOT_FOUND = RateResponse(

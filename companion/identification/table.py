@@ -1,4 +1,4 @@
-"""The table of an identified vehicle for the terminal: the values that its file holds."""
+"""Table of an identified vehicle for the terminal: the values that its vehicle file holds."""
 
 from math import degrees, isnan
 
@@ -25,11 +25,12 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
         vehicle: the identified vehicle.
         gravity: gravity, m/s², which gives the hover thrust.
     """
-    written = second_order_axes(vehicle)
-    shown = {
-        name: each.second_order if name in written else None for name, each in vehicle.axes.items()
+    second_order_lags = second_order_axes(vehicle)
+    shown_fits = {
+        name: response.second_order if name in second_order_lags else None
+        for name, response in vehicle.axes.items()
     }
-    rows = [_cells(each, shown[name]) for name, each in vehicle.axes.items()]
+    rows = [_cells(response, shown_fits[name]) for name, response in vehicle.axes.items()]
     names = ("lag, ms", "dead time, ms", "damping", "gain", "slew, °/s²", "misfit", "")
     columns = [
         column for column in zip(names, *rows, strict=True) if set(column[1:]) != {_NO_VALUE}
@@ -40,13 +41,16 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
         table.add_column(name, justify="right")
     for row in zip(vehicle.axes, *(cells for _, *cells in columns), strict=True):
         table.add_row(*row)
-    models = [Text(_model_line(name, each, shown[name])) for name, each in vehicle.axes.items()]
+    models = [
+        Text(_model_line(name, response, shown_fits[name]))
+        for name, response in vehicle.axes.items()
+    ]
     noise = Text("± is the standard error by the noise of this flight.")
     return Group(table, noise, *models, Text(_thrust_line(vehicle.thrust, gravity)))
 
 
 def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple[str, ...]:
-    """The cells of an axis, from `second_order`; None: from the first-order fit."""
+    """Table cells of one axis, from its second-order fit; if that is None, from the first-order."""
     verdict = "good" if response.is_good() else "bad"
     if isnan(response.lag):
         return *(_NO_VALUE,) * 6, verdict
@@ -54,9 +58,12 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
     times = (response.lag, fit.lag_error), (response.dead_time, fit.dead_time_error)
     slew, misfit = response.slew, fit.misfit
     if second_order is not None:
-        shown, damping = second_order, f"{second_order.damping:.2f}"
-        times = (shown.lag, shown.lag_error), (shown.dead_time, shown.dead_time_error)
-        slew, misfit = shown.slew, shown.misfit
+        damping = f"{second_order.damping:.2f}"
+        times = (
+            (second_order.lag, second_order.lag_error),
+            (second_order.dead_time, second_order.dead_time_error),
+        )
+        slew, misfit = second_order.slew, second_order.misfit
     return (
         *(f"{1e3 * time:.1f} ± {1e3 * error:.1f}" for time, error in times),
         damping,
@@ -68,14 +75,14 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
 
 
 def _model_line(name: str, response: RateResponse, second_order: SecondOrderFit | None) -> str:
-    """Which model the row of an axis shows, and why."""
-    first, better = f"explains {response.fit.explained:.1%}", response.second_order
+    """A line that says which model the row of an axis shows, and why."""
+    first_order, better = f"explains {response.fit.explained:.1%}", response.second_order
     if second_order is not None:
         explained = f"explains {second_order.explained:.1%}"
-        return f"{name}: second order, which {explained}; first order {first}"
+        return f"{name}: second order, which {explained}; first order {first_order}"
     if better is None:
-        return f"{name}: a lag of first order {first}; second order is not clearly better"
-    return f"{name}: written as first order, which {first}; a better fit: {better.described}"
+        return f"{name}: a lag of first order {first_order}; second order is not clearly better"
+    return f"{name}: written as first order, which {first_order}; a better fit: {better.described}"
 
 
 def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:

@@ -11,7 +11,7 @@ from companion.identification.record import Stretch, stretches
 _LEAST_EXPLAINED = 0.8
 """Smallest R² of a usable map."""
 _EXCITED_SHARE = 0.2
-"""A command is excited if it differs from the median by more than this share of their range."""
+"""Share of the commands' range by which an excited command differs from their median."""
 _ACCEPTED_HOVER = 0.05, 0.95
 """Range of the normalised thrust at hover that the configuration accepts."""
 _LARGEST_DELAY = 0.5
@@ -23,7 +23,7 @@ class ThrustMap:
     """Specific thrust T = slope·u + offset, which follows the normalised thrust u with a lag."""
 
     slope: float
-    """m/s² per unit of normalised thrust."""
+    """Specific thrust per unit of normalised thrust, m/s²."""
     offset: float
     """Specific thrust at u = 0, by extrapolation, m/s²."""
     lag: float
@@ -31,17 +31,17 @@ class ThrustMap:
     dead_time: float
     """Time from a sample to the first effect of its command on the thrust, s."""
     explained: float
-    """R²."""
+    """R², share of the variance of the measured thrust that the map explains."""
 
     def normalised(self, specific_thrust: float) -> float:
-        """The normalised thrust that gives a specific thrust in m/s²."""
+        """Normalised thrust, 0..1, that gives a specific thrust (m/s²)."""
         return (specific_thrust - self.offset) / self.slope
 
     def flaw(self, gravity: float) -> str | None:
-        """Why the map may not be used, as text; None if it may be used.
+        """Reason why the map must not be used; None if it may be used.
 
         Args:
-            gravity: m/s²; the thrust at which the map gives it must be between 0.05 and 0.95.
+            gravity: gravity, m/s², which gives the hover thrust; this must be from 0.05 to 0.95.
         """
         if not self.explained >= _LEAST_EXPLAINED:
             return f"it explains {self.explained:.0%} of the measured thrust"
@@ -58,7 +58,7 @@ class ThrustMap:
         return None
 
     def described(self) -> str:
-        """The map as a line of text."""
+        """Text for the user: the map in one line."""
         return (
             f"T/m = {self.slope:.2f}·u {self.offset:+.2f} m/s² for u in 0..1, lag "
             f"{1e3 * self.lag:.0f} ms, dead time {1e3 * self.dead_time:.0f} ms, explains "
@@ -75,22 +75,22 @@ def _excited_samples(record: list[Stretch]) -> list[Stretch]:
         return []
     thrust = np.concatenate([stretch.commanded for stretch in record])
     median, least_change = float(np.median(thrust)), _EXCITED_SHARE * float(np.ptp(thrust))
-    excited = []
+    excited_stretches = []
     for stretch in record:
-        changed = stretch.time[np.abs(stretch.commanded - median) > least_change]
-        latest = np.searchsorted(changed, stretch.measured_time, side="right")
-        elapsed = stretch.measured_time - np.concatenate(([-np.inf], changed))[latest]
-        kept = elapsed < _LARGEST_DELAY
-        if kept.any():
-            measured = stretch.measured_time[kept], stretch.measured[kept]
-            excited.append(Stretch(stretch.time, stretch.commanded, *measured))
-    return excited
+        change_times = stretch.time[np.abs(stretch.commanded - median) > least_change]
+        latest_change = np.searchsorted(change_times, stretch.measured_time, side="right")
+        elapsed = stretch.measured_time - np.concatenate(([-np.inf], change_times))[latest_change]
+        is_kept = elapsed < _LARGEST_DELAY
+        if is_kept.any():
+            measured = stretch.measured_time[is_kept], stretch.measured[is_kept]
+            excited_stretches.append(Stretch(stretch.time, stretch.commanded, *measured))
+    return excited_stretches
 
 
 def fit_thrust_map(
     time: ArrayLike, thrust: ArrayLike, measured_time: ArrayLike, specific_thrust: ArrayLike
 ) -> ThrustMap | None:
-    """Fit a straight line with a first-order lag and dead time (least squares).
+    """Fit a `ThrustMap`: a straight line with first-order lag and dead time (least squares).
 
     Thrust doublets of a level, slow vehicle give the best fit. In fast flight, drag along the body
     z axis would be taken for thrust.

@@ -31,11 +31,11 @@ class IdentifiedVehicle:
 
     @property
     def axes(self) -> dict[str, RateResponse]:
-        """The responses by the name of the axis."""
+        """The responses by name of the axis: roll, pitch, yaw."""
         return dict(zip(AXES, (self.roll, self.pitch, self.yaw), strict=True))
 
     def flaws(self) -> dict[str, str]:
-        """By axis, why its fit must not be used; empty if all fits may be used."""
+        """Name of each axis whose fit must not be used, and the reason; empty if all are good."""
         flaws = {name: response.flaw() for name, response in self.axes.items()}
         return {name: flaw for name, flaw in flaws.items() if flaw is not None}
 
@@ -46,7 +46,7 @@ def identify_vehicle(
     """Fit each axis and the thrust map.
 
     Lag and dead time are fitted for a first-order rate loop of gain 1, as the planners assume. If
-    the real loop has another order or gain, they are the best approximation.
+    the real loop has another order or gain, lag and dead time are the best approximation.
 
     Args:
         setpoints: (n, 5), setpoints that controlled the vehicle: vehicle time of the sample to
@@ -66,13 +66,13 @@ def identify_vehicle(
     return IdentifiedVehicle(roll, pitch, yaw, thrust)
 
 
-def _rows(name: str, rows: ArrayLike, columns: int) -> Floats:
-    """The rows as an array (n, columns); an empty list has no rows.
+def _rows(name: str, values: ArrayLike, columns: int) -> Floats:
+    """`values` as an array (n, columns); n is 0 for an empty list. Messages call it `name`.
 
     Raises:
-        ValueError: it has another shape; `name` is the argument in the message.
+        ValueError: the array has another shape.
     """
-    array = np.asarray(rows, dtype=np.float64)
+    array = np.asarray(values, dtype=np.float64)
     if array.size == 0:
         return np.empty((0, columns))
     if array.ndim != 2 or array.shape[1] != columns:

@@ -157,7 +157,7 @@ def test_one_that_is_told_no_more_is_used_no_more():
     axis = AxisResponse(LAG, 0.015, inf)
     frame = TargetFrame(RateResponse(axis, axis, axis))
     assert frame.heading() is None
-    frame.note(1.0, 0.0)
+    frame.note_heading(1.0, 0.0)
     assert frame.heading() == pytest.approx(1.0)
     for n in range(1, 61):
         frame.advance(0.5, 0.1, 0.004)
@@ -165,7 +165,7 @@ def test_one_that_is_told_no_more_is_used_no_more():
     for _ in range(5):
         frame.advance(0.5, 0.1, 0.004)
     assert frame.heading() is None
-    frame.note(2.0, 0.0)
+    frame.note_heading(2.0, 0.0)
     assert frame.heading() == pytest.approx(2.0 + 0.4 * 0.007)  # sent within the delay
     frame.forget()
     assert frame.heading() is None
@@ -174,7 +174,7 @@ def test_one_that_is_told_no_more_is_used_no_more():
 def test_it_turns_no_faster_than_the_slew_limit():
     axis = AxisResponse(LAG, 0.0, 2.0)
     frame = TargetFrame(RateResponse(axis, axis, axis))
-    frame.note(0.0, 0.0)
+    frame.note_heading(0.0, 0.0)
     for _ in range(50):
         frame.advance(0.4, 0.0, 0.004)
     assert frame.heading() == pytest.approx(0.5 * 2.0 * 0.2**2, rel=0.03)
@@ -192,14 +192,14 @@ def test_the_lead_is_derived_where_acceleration_is_limited():
 def test_an_older_report_is_completed_by_the_rates_sent_since_it_was_measured():
     axis = AxisResponse(LAG, 0.008, inf)
     frame = TargetFrame(RateResponse(axis, axis, axis))
-    frame.note(1.0, 0.0)
+    frame.note_heading(1.0, 0.0)
     for _ in range(30):
         frame.advance(0.5, 0.1, 0.004)
-    frame.note(2.0, 0.04)  # after it was measured, ten samples turned the target
+    frame.note_heading(2.0, 0.04)  # after it was measured, ten samples turned the target
     assert frame.heading() == pytest.approx(2.0 + 0.4 * 0.04)
-    frame.note(3.0, OLDEST_ATTITUDE_TARGET)  # the oldest that is used; nothing is known of before
+    frame.note_heading(3.0, OLDEST_ATTITUDE_TARGET)  # the oldest that is used
     assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)
-    frame.note(4.0, OLDEST_ATTITUDE_TARGET + 1e-3)
+    frame.note_heading(4.0, OLDEST_ATTITUDE_TARGET + 1e-3)
     assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)
-    frame.note(4.0, -1e-3)
+    frame.note_heading(4.0, -1e-3)
     assert frame.heading() == pytest.approx(3.0 + 0.4 * 0.12)

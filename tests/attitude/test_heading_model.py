@@ -89,7 +89,7 @@ def test_the_body_turns_as_limit_and_lag_make_it(most):
             turned += rate * 1e-5
             rate += (aimed - rate) / lag * 1e-5
         assert model.rate == pytest.approx(rate, abs=2e-2 if most < 5.0 else 1e-3)
-        assert model.turned == pytest.approx(turned, abs=3e-3)
+        assert model.yaw_angle == pytest.approx(turned, abs=3e-3)
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from companion.attitude.kinematics import (
     cos_tilt,
     heading_of,
     into_body,
+    law_weight,
     levelling_rates,
     rates_to_speed,
-    share_of_law,
     speed_to_rates,
     split,
     tilt_angle,
@@ -106,7 +106,7 @@ def test_horizontal_rates_are_seen_from_the_heading():
 
 
 def test_the_share_of_the_law_fades_smoothly():
-    share = [share_of_law(0.5 - step / 16.0, 0.5, 4.0) for step in range(6)]
+    share = [law_weight(0.5 - step / 16.0, 0.5, 4.0) for step in range(6)]
     assert share == [1.0, 0.84375, 0.5, 0.15625, 0.0, 0.0]
 
 

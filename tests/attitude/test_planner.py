@@ -226,7 +226,7 @@ def test_each_axis_of_model_following_has_its_own_response(axis):
     planner = make_planner(
         "model-following", 5.0, **options | {f"{prefix}{key}": own[key] for key in own}
     )
-    forward = planner._forward
+    forward = planner._feed_forward
     axes = dict(zip(("roll", "pitch", "yaw"), (*forward.tilt, forward.yaw), strict=True))
     found = {name: (each.lag, each.dead_time, each.acceleration) for name, each in axes.items()}
     theirs = own if axis == "roll" else options  # pitch and yaw follow roll

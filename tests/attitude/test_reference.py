@@ -10,7 +10,11 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from companion.attitude import Coefficients
-from companion.attitude.reference import FirstOrderReference, SecondOrderReference, distance_left
+from companion.attitude.reference import (
+    FirstOrderReference,
+    SecondOrderReference,
+    remaining_distance,
+)
 
 START, GOAL = Coefficients(-0.4, -0.5), Coefficients(0.3, 0.1)
 SPEED = Coefficients(0.7, -1.1)
@@ -106,4 +110,4 @@ def test_a_model_at_its_target_stays_there():
 
 @pytest.mark.parametrize("max_speed", [np.inf, 1.0])
 def test_no_time_leaves_the_whole_distance(max_speed):
-    assert distance_left(0.6, 5.0, max_speed, 0.0) == 0.6
+    assert remaining_distance(0.6, 5.0, max_speed, 0.0) == 0.6

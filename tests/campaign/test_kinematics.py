@@ -80,7 +80,7 @@ def test_it_flies_as_the_planner_and_the_lags_do_in_python(planner, targets, nam
     path, commanded, end = in_python(planner, LOOPS[name], start, targets)
     flight = fly_steps(planner, LOOPS[name], start, targets, EVERY)
     assert np.abs(path).max() > 0.25
-    assert flight.path == pytest.approx(path, abs=1e-10)
+    assert flight.coefficients == pytest.approx(path, abs=1e-10)
     assert flight.commanded == pytest.approx(commanded, abs=1e-9)
     assert flight.q == pytest.approx(end, abs=1e-10)
 
@@ -89,7 +89,7 @@ def test_its_figures_are_those_that_a_flight_measures(planner, targets):
     start = attitude(Coefficients(0.0, 0.0), HEADING)
     flight = fly_steps(planner, LOOPS["first order"], start, targets, EVERY)
     figures = step_figures(flight, GAIN, EVERY / 1000)
-    attitudes = [attitude(Coefficients(*c), HEADING) for c in flight.path.tolist()]
+    attitudes = [attitude(Coefficients(*c), HEADING) for c in flight.coefficients.tolist()]
     time = np.arange(len(targets)) * EVERY / 1000
     measured = measure_response(np.column_stack([time, attitudes, flight.targets]), GAIN)
     assert figures.cross_axis_max == pytest.approx(measured.cross_axis_max, rel=1e-9)

@@ -211,7 +211,12 @@ def test_a_log_in_a_folder_that_is_not_there_is_what_is_blamed(capsys, tmp_path)
 
 
 GOOD = FitQuality(
-    explained=0.99, misfit=0.08, dead_time_error=0.001, lag_error=0.002, span=2.0, excited=200
+    explained=0.99,
+    misfit=0.08,
+    dead_time_error=0.001,
+    lag_error=0.002,
+    span=2.0,
+    excited_samples=200,
 )
 TILT = RateResponse(0.018, 0.020, 1.0, None, GOOD)
 YAW = RateResponse(0.06, 0.158, 1.0, 4.7, GOOD)

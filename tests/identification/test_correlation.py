@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from companion.identification import dead_time_by_correlation
-from companion.identification.lags import held_commands, lagged, slewed
+from companion.identification.lags import held_commands, lagged, slew_limited
 
 from .vehicles import RATE_NOISE, Doublets, irregular, lag_with_dead_time, mock_axis, regular
 
@@ -97,7 +97,7 @@ def recorded(autopilot, flown, axis):
 def by_least_squares(time, commanded, measured_time, measured, lag, slew):
     """The dead time with which the known lag comes nearest to what was measured."""
     knots = held_commands(time, commanded)
-    knots = knots if slew is None else slewed(knots, slew)
+    knots = knots if slew is None else slew_limited(knots, slew)
     sure = measured_time > time[0] + 0.5
     tried = np.arange(0.0, 0.1, 0.0005)
     misfits = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from companion.identification.lags import held_commands, lagged, slewed, value_at
+from companion.identification.lags import held_commands, lagged, slew_limited, value_at
 
 
 def recursion(commands, lag, at):
@@ -29,7 +29,7 @@ def test_running_sums_are_the_recursion_however_long_the_record(lag, slew):
     steps[[300, 301, 900]] = 0.9  # with a lag of 1 ms more than an exponential can bear
     commands = held_commands(np.cumsum(steps), rng.normal(size=2000))
     if slew is not None:
-        commands = slewed(commands, slew)
+        commands = slew_limited(commands, slew)
     at = np.sort(rng.uniform(commands.time[0], commands.time[-1] + 2.0, size=3000))
     assert lagged(commands, lag, at) == pytest.approx(recursion(commands, lag, at), abs=1e-9)
 
@@ -59,6 +59,6 @@ def test_slewed_commands_are_those_approached_in_small_steps(slew):
     for target in asked.tolist():
         approached.append(value)
         value += min(max(target - value, -slew * step), slew * step)
-    limited = slewed(commands, slew)
+    limited = slew_limited(commands, slew)
     assert np.all(np.diff(limited.time) >= 0.0)
     assert np.abs(value_at(limited, at) - approached).max() < 1.01 * slew * step + 1e-9

@@ -31,7 +31,7 @@ GOOD = FitQuality(
     dead_time_error=0.001,
     lag_error=0.002,
     span=2.0,
-    excited=200,
+    excited_samples=200,
 )
 ROLL = RateResponse(0.040, 0.046, 1.05, None, GOOD)
 PITCH = RateResponse(0.042, 0.049, 1.02, None, GOOD)
@@ -137,7 +137,7 @@ def test_a_second_order_of_one_axis_or_with_a_slew_limit_is_not_written(pitch):
 
 
 def test_a_second_order_is_not_written_where_it_is_not_wanted():
-    text = vehicle_fragment(SECOND_ORDER, GRAVITY, {}, second_order=False)
+    text = vehicle_fragment(SECOND_ORDER, GRAVITY, {}, allow_second_order=False)
     assert Config.model_validate(yaml.safe_load(text)).vehicle.axes["roll"].damping is None
     assert "clearly better: second order" in text
 

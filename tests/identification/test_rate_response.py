@@ -157,7 +157,7 @@ def test_a_response_that_comes_before_its_command_is_refused():
 
 def test_too_few_samples_and_too_much_doubt_are_refused():
     found = fit_rate_response(*fly(QUICK, 0.03, 0.04))
-    few = replace(found, fit=replace(found.fit, excited=19))
+    few = replace(found, fit=replace(found.fit, excited_samples=19))
     doubtful = replace(found, fit=replace(found.fit, lag_error=0.0081))
     assert few.flaw() == "too little excitation: 19 samples show the response, 20 are needed"
     assert doubtful.flaw() == "lag and dead time are uncertain by 8.1 ms"

@@ -8,7 +8,7 @@ from companion.identification.lags import (
     held_commands,
     second_order,
     second_order_decay,
-    slewed,
+    slew_limited,
     value_at,
 )
 
@@ -21,7 +21,7 @@ def test_it_answers_as_its_equation_says(frequency, damping, slew):
     rng = np.random.default_rng(1)
     commands = held_commands(np.cumsum(rng.integers(50, 300, size=30)) * 1e-3, rng.normal(size=30))
     if slew is not None:
-        commands = slewed(commands, slew)
+        commands = slew_limited(commands, slew)
     at = np.arange(commands.time[0], commands.time[-1] + 1.0, 5e-4)
     asked = value_at(commands, at + 1e-9)  # each step between two samples, as lsim holds it
     loop = [frequency**2], [1.0, 2.0 * damping * frequency, frequency**2]

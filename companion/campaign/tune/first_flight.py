@@ -55,7 +55,7 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
             rows = read_flight_log(folder / TLOG_FILE)
             vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
             axes = config.vehicle.axes
-            text = vehicle_fragment(vehicle, GRAVITY, axes, second_order=damped)
+            text = vehicle_fragment(vehicle, GRAVITY, axes, allow_second_order=damped)
             fragment.write_text(text, encoding="utf-8")
             identified = load(fragment).model_dump(exclude_unset=True, include={"vehicle"})
             return changed(config, identified, "the identified vehicle")
