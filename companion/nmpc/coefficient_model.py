@@ -21,7 +21,7 @@ from companion.nmpc.settings import Settings
 _SMALLEST_COS_SQUARED = 0.01
 """Lower bound of cos²(tilt) in the prediction: an iteration of the solver may tilt beyond 90°."""
 _SIDE_PAIRS = 6
-"""Number of pairs of opposite sides of the polygon that approximates a disc: a corner every 30°."""
+"""Number of pairs of opposite sides of the polygon inside a round limit: a corner every 30°."""
 
 
 def coefficient_model(settings: Settings) -> Model:
@@ -31,17 +31,18 @@ def coefficient_model(settings: Settings) -> Model:
     specific thrust T. With drag d(v) and wind w, v̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] −
     d(v) + w and τ·c̈ + ċ = p·(c_d − c). The heading responds in first order.
 
-    p is the gain of the planner, 1/s, and τ the lag of its response, s: `Settings.gain`, `lag`.
+    p is the gain of the planner (`Settings.gain`, 1/s), and τ the lag of its response
+    (`Settings.lag`, s).
 
     Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
-    p·(c_d − c) is at most `max_tilt_rate`; the heading rate is within its own limit. The first two
-    limits are discs, of c_d and of the tilt rate. A polygon inside each disc replaces it, so the
-    constraints are linear in the control at a given state. Therefore the first control, the only
-    one that is flown, satisfies them after a single iteration from any guess. The dead time is not
-    part of the model: `Predictor` integrates the motion to the end of the dead time.
+    p·(c_d − c) is at most `max_tilt_rate`; the heading rate is at most `max_yaw_rate`. The round
+    limits of c_d and of the tilt rate are replaced by polygons inside them, so the constraints are
+    linear in the control at a given state. Therefore the first control, the only one that is flown,
+    satisfies them after a single iteration from any guess. The dead time is not part of the model:
+    `Predictor` integrates the motion to the end of the dead time.
     """
     symbols = Symbols(size=11, own_constants=1)
-    rates, turning = symbols.state[9:11], symbols.turning(settings)
+    speeds, commanded_rates = symbols.state[9:11], symbols.commanded_rates(settings)
     longest_target = own_constant(symbols.constants)
 
     def constants_of(conditions: Conditions, start: Motion) -> Floats:
@@ -50,12 +51,15 @@ def coefficient_model(settings: Settings) -> Model:
     return symbols.model(
         settings,
         derivative=ca.vertcat(
-            symbols.translation(settings), rates, turning[2], (turning[0:2] - rates) / settings.lag
+            symbols.translation(settings),
+            speeds,
+            commanded_rates[2],
+            (commanded_rates[0:2] - speeds) / settings.lag,
         ),
-        bounded=ca.vertcat(
+        bounded_terms=ca.vertcat(
             _polygon_terms(symbols.control[0:2], longest_target),
-            _polygon_terms(_tilt_rate(symbols.c, turning[0:2]), settings.max_tilt_rate),
-            turning[2] / settings.max_yaw_rate,
+            _polygon_terms(_tilt_rate(symbols.c, commanded_rates[0:2]), settings.max_tilt_rate),
+            commanded_rates[2] / settings.max_yaw_rate,
         ),
         constants_of=constants_of,
     )
@@ -66,7 +70,7 @@ class Symbols:
 
     Args:
         size: size of the state, which begins with position, velocity, coefficients and heading.
-        own_constants: number of constants besides `Conditions`.
+        own_constants: number of constants of the model in addition to `Conditions`.
     """
 
     def __init__(self, size: int, own_constants: int = 0) -> None:
@@ -76,15 +80,15 @@ class Symbols:
         self.c = self.state[6:8]
         self.heading = self.state[8]
 
-    def turning(self, settings: Settings) -> ca.SX:
-        """(3,), commanded speeds: p·(c_d − c) of the coefficients, 1/s; of the heading, rad/s."""
+    def commanded_rates(self, settings: Settings) -> ca.SX:
+        """Commanded rates of change, (3,): coefficients, p·(c_d − c), 1/s, and heading, rad/s."""
         return ca.vertcat(
             settings.gain * (self.control[0:2] - self.c),
             settings.yaw_gain * (self.control[2] - self.heading),
         )
 
     def translation(self, settings: Settings) -> ca.SX:
-        """(6,), see `model.translation`."""
+        """(6,), velocity and acceleration of these symbols; see `model.translation`."""
         axis = ca.vertcat(self.c, _cos_tilt(self.c))
         velocity, thrust = self.state[3:6], self.control[3]
         return translation(velocity, thrust, axis, self.heading, self.constants, settings)
@@ -94,24 +98,24 @@ class Symbols:
         settings: Settings,
         *,
         derivative: ca.SX,
-        bounded: ca.SX,
+        bounded_terms: ca.SX,
         constants_of: Callable[[Conditions, Motion], Floats],
     ) -> Model:
-        """The `Model` of these symbols with the given terms; see `Model`."""
-        aim, size = ca.SX.sym("aim", 4), self.state.numel()
+        """Make the `Model`; the arguments are its terms that these symbols do not determine."""
+        attitude_reference, size = ca.SX.sym("attitude_reference", 4), self.state.numel()
         return Model(
             state=self.state,
             control=self.control,
             constants=self.constants,
             derivative=derivative,
-            aim=aim,
-            heading_error=self.heading - aim[0],
-            turning_error=self.turning(settings) - aim[1:4],
+            attitude_reference=attitude_reference,
+            heading_error=self.heading - attitude_reference[0],
+            attitude_rate_error=self.commanded_rates(settings) - attitude_reference[1:4],
             target=self.control,
-            bounded=bounded,
+            bounded_terms=bounded_terms,
             state_of=lambda motion: motion[:size],
             constants_of=constants_of,
-            aim_of=_aim_of,
+            attitude_reference_of=_attitude_reference_of,
             control_of=lambda node: (
                 node.north + node.speed_north / settings.gain,
                 node.east + node.speed_east / settings.gain,
@@ -121,8 +125,8 @@ class Symbols:
         )
 
 
-def _aim_of(node: Node) -> Floats:
-    """The values of the symbol `aim` at a node."""
+def _attitude_reference_of(node: Node) -> Floats:
+    """The numbers for `Model.attitude_reference` at a node."""
     return node.heading, node.speed_north, node.speed_east, node.heading_rate
 
 
@@ -143,10 +147,11 @@ def _cos_tilt(c: ca.SX) -> ca.SX:
 def _polygon_terms(vector: ca.SX, radius: Any) -> ca.SX:
     """Six terms, each within ±1, that keep a vector (2,) inside a regular polygon.
 
-    Each is the component normal to a pair of sides, as a share of their distance from the centre.
+    A term is the component of the vector normal to a pair of sides, divided by the distance of the
+    sides from the centre.
 
     Args:
-        vector: (2,).
+        vector: (2,), in any unit.
         radius: radius of the circle through the corners, in the unit of the vector.
     """
     angles = [pi * k / _SIDE_PAIRS for k in range(_SIDE_PAIRS)]

@@ -1,4 +1,4 @@
-"""Requests to the solver's process and its answers, and how they are packed in bytes."""
+"""Requests to the solver's process, its answers, and their form as bytes."""
 
 import struct
 from enum import IntEnum
@@ -18,18 +18,18 @@ _ANSWER = struct.Struct("<2q9d")
 
 
 class Vehicle(NamedTuple):
-    """State of the vehicle."""
+    """State of the vehicle at the time of a request."""
 
     time: float
     """Time of the state, s."""
     position: Vector
-    """m, NED."""
+    """Position, m, NED."""
     velocity: Vector
-    """m/s, NED."""
+    """Velocity, m/s, NED."""
     q: Quaternion
     """Attitude, body → world; must be a unit quaternion."""
     body_rates: BodyRates
-    """rad/s, FRD."""
+    """Body rates, rad/s, FRD."""
     disturbance: Vector = (0.0, 0.0, 0.0)
     """Acceleration by wind and other unmodelled forces, m/s², NED."""
     drag: Drag = NO_DRAG
@@ -42,7 +42,7 @@ class Input(NamedTuple):
     """A control input, commanded by predictive control or by linear guidance."""
 
     time: float
-    """When it was commanded, on the clock of `Vehicle.time`, s."""
+    """Time of the command, on the clock of `Vehicle.time`, s."""
     north: float
     east: float
     """`north` and `east`: coefficients of the target."""
@@ -63,8 +63,8 @@ class Request(NamedTuple):
     start: Start
     inputs: tuple[Input, ...]
     """Latest control inputs, in order of time. They must cover the dead time before `vehicle.time`.
-    Before the first input, that input is assumed. If there is no input, attitude and vertical speed
-    are assumed to be held."""
+    Before the first input, it is assumed to have been in effect. Without any input, attitude and
+    vertical speed are assumed to be held."""
 
 
 class Status(IntEnum):
@@ -87,9 +87,9 @@ class Answer(NamedTuple):
     """How the solve ended; unless it is `SOLVED`, target, thrust, `solver_seconds` and `iterations`
     are 0."""
     computed_at: float
-    """When the answer was computed, on the computer's monotonic clock, s."""
+    """Time at which the answer was computed, on the computer's monotonic clock, s."""
     time: float
-    """When to use the answer, on the clock of `Vehicle.time`, s."""
+    """Time at which to use the answer, on the clock of `Vehicle.time`, s."""
     north: float
     east: float
     """`north` and `east`: coefficients of the target."""
@@ -106,7 +106,7 @@ class Answer(NamedTuple):
 
 
 def pack_request(request: Request) -> bytes:
-    """The bytes of a request."""
+    """Convert a request to bytes."""
     vehicle, start = request.vehicle, request.start
     head = _REQUEST_HEAD.pack(
         request.number,
@@ -122,32 +122,38 @@ def pack_request(request: Request) -> bytes:
         *vehicle.drag,
         vehicle.axis_drag,
     )
-    return head + b"".join(_INPUT.pack(*one) for one in request.inputs)
+    return head + b"".join(_INPUT.pack(*each) for each in request.inputs)
 
 
 def unpack_request(message: bytes) -> Request:
-    """The request in these bytes."""
-    number, at, *v = _REQUEST_HEAD.unpack_from(message)
+    """Convert bytes to a request."""
+    number, trajectory_time, *numbers = _REQUEST_HEAD.unpack_from(message)
     vehicle = Vehicle(
-        v[4],
-        (v[5], v[6], v[7]),
-        (v[8], v[9], v[10]),
-        (v[11], v[12], v[13], v[14]),
-        BodyRates(v[15], v[16], v[17]),
-        (v[18], v[19], v[20]),
-        Drag(v[21], v[22]),
-        v[23],
+        numbers[4],
+        (numbers[5], numbers[6], numbers[7]),
+        (numbers[8], numbers[9], numbers[10]),
+        (numbers[11], numbers[12], numbers[13], numbers[14]),
+        BodyRates(numbers[15], numbers[16], numbers[17]),
+        (numbers[18], numbers[19], numbers[20]),
+        Drag(numbers[21], numbers[22]),
+        numbers[23],
     )
     inputs = tuple(Input(*values) for values in _INPUT.iter_unpack(message[_REQUEST_HEAD.size :]))
-    return Request(number, vehicle, at, Start((v[0], v[1], v[2]), v[3]), inputs)
+    return Request(
+        number,
+        vehicle,
+        trajectory_time,
+        Start((numbers[0], numbers[1], numbers[2]), numbers[3]),
+        inputs,
+    )
 
 
 def pack_answer(answer: Answer) -> bytes:
-    """The bytes of an answer."""
+    """Convert an answer to bytes."""
     return _ANSWER.pack(*answer)
 
 
 def unpack_answer(message: bytes) -> Answer:
-    """The answer in these bytes."""
-    number, status, *rest = _ANSWER.unpack(message)
-    return Answer(number, Status(status), *rest)
+    """Convert bytes to an answer."""
+    number, status, *values = _ANSWER.unpack(message)
+    return Answer(number, Status(status), *values)

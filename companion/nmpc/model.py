@@ -1,4 +1,4 @@
-"""The form of a prediction model in CasADi; translation and integrator, which all models share."""
+"""The type of a prediction model in CasADi; translation and integrator, which all models share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ Floats = Sequence[float]
 
 
 class Motion(NamedTuple):
-    """The motion of the vehicle: the state of the `coefficient_model`, in its order."""
+    """The motion of the vehicle: the state of the `coefficient_model`, in the same order."""
 
     p_n: float
     p_e: float
@@ -28,7 +28,7 @@ class Motion(NamedTuple):
     east: float
     """`north` and `east`: acceleration coefficients."""
     heading: float
-    """tilt-yaw heading, rad."""
+    """Tilt-yaw heading, rad."""
     speed_north: float
     speed_east: float
     """`speed_north` and `speed_east`: time derivative of the coefficients, 1/s."""
@@ -43,7 +43,7 @@ class Conditions(NamedTuple):
     """`w_n`, `w_e` and `w_d`: acceleration by wind and other unmodelled forces, m/s², NED."""
     linear_drag: float
     quadratic_drag: float
-    """`linear_drag` and `quadratic_drag`: `Drag`, 1/s and 1/m."""
+    """`linear_drag` and `quadratic_drag`: coefficients of `Drag`, 1/s and 1/m."""
     axis_drag: float
     """Coefficient of `AxisDrag`, 1/m."""
 
@@ -52,45 +52,45 @@ class Conditions(NamedTuple):
 class Model:
     """A model ẋ = f(x, u) in CasADi symbols, with the terms of the cost.
 
-    The functions `state_of`, `constants_of`, `aim_of` and `control_of` compute the numbers for the
-    symbols.
+    The functions `state_of`, `constants_of`, `attitude_reference_of` and `control_of` compute the
+    numbers for the symbols.
     """
 
     state: ca.SX
-    """(n,), begins with position and velocity."""
+    """State x, (n,); begins with position and velocity."""
     control: ca.SX
-    """(m,), ends with the specific thrust."""
+    """Control u, (m,); ends with the specific thrust."""
     constants: ca.SX
-    """(c,), constant over the horizon; begins with `Conditions`."""
+    """Values that are constant over the horizon, (c,); begins with `Conditions`."""
     derivative: ca.SX
-    """(n,), ẋ."""
-    aim: ca.SX
-    """(k,), values of the reference at a node, with which heading and attitude rate are
-    compared."""
+    """Time derivative ẋ of the state, (n,)."""
+    attitude_reference: ca.SX
+    """Heading and attitude rate of the reference at a node, (k,), in the form that the model needs
+    for `heading_error` and `attitude_rate_error`."""
     heading_error: ca.SX
-    """Heading (in studies also yaw) of `state` minus that of `aim`, rad; a smooth approximation in
-    the quaternion model, 0 in a model of constant yaw."""
-    turning_error: ca.SX
-    """Commanded attitude rate (of coefficients and heading, of the body, or of Euler angles) minus
-    that of `aim`."""
+    """Heading (in studies also yaw) of `state` minus that of `attitude_reference`, rad; a smooth
+    approximation in the quaternion model, 0 in a model of constant yaw."""
+    attitude_rate_error: ca.SX
+    """Commanded attitude rate minus that of `attitude_reference`: rates of coefficients (1/s) and
+    heading (rad/s), or in studies of the body or of Euler angles, rad/s."""
     target: ca.SX
-    """(4,), coefficients, tilt-yaw heading and specific thrust to send to the planner for
-    `control`."""
-    bounded: ca.SX
+    """Target for the planner when `control` is applied, (4,): coefficients, tilt-yaw heading and
+    specific thrust."""
+    bounded_terms: ca.SX
     """Terms that must be between −1 and 1 at every control."""
     state_of: Callable[[Motion], Floats]
-    """A motion → `state`."""
+    """Function: motion → numbers for `state`."""
     constants_of: Callable[[Conditions, Motion], Floats]
-    """The conditions and the motion at the start of the horizon → `constants`."""
-    aim_of: Callable[[Node], Floats]
-    """A node of the reference → `aim`."""
+    """Function: conditions, and motion at the start of the horizon → numbers for `constants`."""
+    attitude_reference_of: Callable[[Node], Floats]
+    """Function: node of the reference → numbers for `attitude_reference`."""
     control_of: Callable[[Node], Floats]
-    """A node of the reference → the `control` that keeps the vehicle on the reference."""
+    """Function: node of the reference → the `control` that keeps the vehicle on the reference."""
 
 
-def constants_symbols(own: int = 0) -> ca.SX:
-    """(6 + own,), symbols of `Conditions` and of `own` further constants of the model."""
-    return ca.SX.sym("constants", len(Conditions._fields) + own)
+def constants_symbols(own_count: int = 0) -> ca.SX:
+    """Symbols of `Conditions` and of `own_count` further constants, (6 + own_count,)."""
+    return ca.SX.sym("constants", len(Conditions._fields) + own_count)
 
 
 def own_constant(constants: ca.SX) -> ca.SX:
@@ -114,7 +114,7 @@ def translation(
         axis: (3,), coefficients north and east, and cos(tilt).
         heading: tilt-yaw heading, rad; the body's forward axis is assumed to point there.
         constants: symbols that begin with `Conditions`.
-        settings: settings, which contain gravity.
+        settings: settings that contain gravity.
     """
     lift = thrust * ca.vertcat(axis[0], axis[1], -axis[2])
     weight = ca.vertcat(0.0, 0.0, settings.gravity)
@@ -140,5 +140,5 @@ def integrator(model: Model) -> ca.Function:
     k2 = slope(x + 0.5 * dt * k1, u, constants)
     k3 = slope(x + 0.5 * dt * k2, u, constants)
     k4 = slope(x + dt * k3, u, constants)
-    after = x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    return ca.Function("advance", [x, u, constants, dt], [after])
+    next_state = x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    return ca.Function("advance", [x, u, constants, dt], [next_state])

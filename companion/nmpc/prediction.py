@@ -1,4 +1,4 @@
-"""Predicts the motion until an answer takes effect; earlier control inputs act until then."""
+"""Predicts the motion, under the earlier control inputs, until an answer takes effect."""
 
 from collections.abc import Sequence
 from math import hypot, sin, sqrt
@@ -32,8 +32,8 @@ def motion_of(vehicle: Vehicle) -> Motion:
         TiltedTooFarError: the tilt exceeds 78°.
     """
     w, x, y, z = normalised(vehicle.q)
-    square, ax, ay = tilt_products(w, x, y, z)
-    if 2.0 * square - 1.0 < _LEAST_COSINE:
+    a_squared, ax, ay = tilt_products(w, x, y, z)
+    if 2.0 * a_squared - 1.0 < _LEAST_COSINE:
         raise TiltedTooFarError
     speed_north, speed_east, _ = rates_to_speed(w, x, y, z, *vehicle.body_rates)
     return Motion(
@@ -41,7 +41,7 @@ def motion_of(vehicle: Vehicle) -> Motion:
         *vehicle.velocity,
         -2.0 * ay,
         2.0 * ax,
-        heading_of(square**0.5, w, z),
+        heading_of(a_squared**0.5, w, z),
         speed_north,
         speed_east,
     )
@@ -75,11 +75,13 @@ class Predictor:
         time = vehicle.time
         conditions = conditions_of(vehicle)
         constants = list(self._model.constants_of(conditions, motion))
-        acting = [each for each in inputs if self._effect_time(each) <= time][-1:] or [*inputs[:1]]
-        current = acting[0] if acting else self._holding_input(vehicle.time, motion)
+        in_effect = [each for each in inputs if self._effect_time(each) <= time][-1:] or [
+            *inputs[:1]
+        ]
+        current = in_effect[0] if in_effect else self._holding_input(vehicle.time, motion)
         for next_input in [each for each in inputs if time < self._effect_time(each) < until]:
-            span = self._effect_time(next_input) - time
-            motion = self._integrated(motion, current, span, constants)
+            duration = self._effect_time(next_input) - time
+            motion = self._integrated(motion, current, duration, constants)
             time, current = self._effect_time(next_input), next_input
         motion = self._integrated(motion, current, until - time, constants)
         if hypot(motion.north, motion.east) > _LONGEST_COEFFICIENTS:
@@ -90,22 +92,22 @@ class Predictor:
         return command.time + self._settings.dead_time
 
     def _holding_input(self, time: float, motion: Motion) -> Input:
-        """The input that holds the attitude and the vertical speed."""
+        """The control input that holds the attitude and the vertical speed."""
         cos_tilt = (1.0 - motion.north**2 - motion.east**2) ** 0.5
         thrust = self._settings.gravity / cos_tilt
         return Input(time, motion.north, motion.east, motion.heading, thrust)
 
     def _integrated(
-        self, motion: Motion, current: Input, span: float, constants: list[float]
+        self, motion: Motion, current: Input, duration: float, constants: list[float]
     ) -> Motion:
-        """The motion `span` seconds later, with the input `current` in effect."""
+        """The motion `duration` seconds later, with the control input `current` in effect."""
         heading = motion.heading + wrap_angle(current.heading - motion.heading)
         # The planner shortens a target that exceeds its tilt limit.
         length = hypot(current.north, current.east)
         scale = min(1.0, sin(self._settings.max_tilt) / max(length, 1e-9))
         control = (scale * current.north, scale * current.east, heading, current.thrust)
-        steps = int(span / _LONGEST_STEP) + 1
+        steps = int(duration / _LONGEST_STEP) + 1
         for _ in range(steps):
-            after = self._advance(motion, control, constants, span / steps)
-            motion = Motion(*(float(value) for value in after.elements()))
+            next_state = self._advance(motion, control, constants, duration / steps)
+            motion = Motion(*(float(value) for value in next_state.elements()))
         return motion

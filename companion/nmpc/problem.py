@@ -1,4 +1,4 @@
-"""The optimal control problem: multiple shooting and least squares, solved by CasADi's SQP."""
+"""The optimal control problem: multiple shooting, least squares, solved by CasADi's SQP method."""
 
 from collections.abc import Sequence
 from math import sqrt
@@ -29,20 +29,23 @@ _SQP_OPTIONS: dict[str, Any] = {
 
 
 class Program(NamedTuple):
-    """Minimise ½·|r(w, p)|² with bounds on w and on g(w, p); n states, m controls, N steps."""
+    """A nonlinear program: minimise ½·|r(w, p)|² with bounds on w and on g(w, p).
+
+    The horizon has N steps. Each state x_k has n components, each control u_k m components.
+    """
 
     unknown: ca.SX
-    """w, (x_0, u_0, x_1, u_1, …, x_N)."""
+    """Unknowns w: (x_0, u_0, x_1, u_1, …, x_N)."""
     parameters: ca.SX
-    """p; `parameters_of` computes its numbers."""
+    """Parameters p, whose numbers `parameters_of` computes."""
     residual: ca.SX
-    """r."""
+    """Residual r: weighted errors of all nodes."""
     constraints: ca.SX
-    """g: for each step the gap to the next state, then `Model.bounded`. HPIPM requires this
-    order."""
+    """Constraints g: for each step the gap to the next state, then `Model.bounded_terms`. HPIPM
+    requires this order."""
     lower: Floats
     upper: Floats
-    """`lower` and `upper`: bounds on w; the caller sets the first n to the state at the start."""
+    """`lower` and `upper`: bounds on w; the caller sets the first n of each to the start state."""
     g_lower: Floats
     g_upper: Floats
     """`g_lower` and `g_upper`: bounds on g."""
@@ -50,24 +53,26 @@ class Program(NamedTuple):
 
 def transcribe(model: Model, settings: Settings) -> Program:
     """Formulate the optimal control problem of this model over the horizon."""
-    node = ca.vertcat(ca.SX.sym("p", 3), ca.SX.sym("v", 3), ca.SX.sym("T"), model.aim)
+    node = ca.vertcat(
+        ca.SX.sym("p", 3), ca.SX.sym("v", 3), ca.SX.sym("T"), model.attitude_reference
+    )
     advance = integrator(model)
     running_residual = ca.Function(
         "r", [model.state, model.control, node], [_running_residual(model, node, settings)]
     )
-    bounded = ca.Function("b", [model.state, model.control, model.constants], [model.bounded])
+    bounded = ca.Function("b", [model.state, model.control, model.constants], [model.bounded_terms])
     constants = ca.SX.sym("constants", model.constants.numel())
     nodes = [ca.SX.sym(f"node_{k}", node.numel()) for k in range(settings.steps + 1)]
     x = ca.SX.sym("x_0", model.state.numel())
     unknown, residual, constraints = [x], [], []
     for k in range(settings.steps):
         u = ca.SX.sym(f"u_{k}", model.control.numel())
-        after = ca.SX.sym(f"x_{k + 1}", model.state.numel())
-        unknown += [u, after]
+        next_x = ca.SX.sym(f"x_{k + 1}", model.state.numel())
+        unknown += [u, next_x]
         residual.append(running_residual(x, u, nodes[k]))
-        constraints.append(advance(x, u, constants, settings.step) - after)
+        constraints.append(advance(x, u, constants, settings.step) - next_x)
         constraints.append(bounded(x, u, constants))
-        x = after
+        x = next_x
     residual.append(_final_residual(x, nodes[-1], settings))
     return Program(
         ca.vertcat(*unknown),
@@ -80,30 +85,33 @@ def transcribe(model: Model, settings: Settings) -> Program:
 
 
 def parameters_of(
-    constants: Sequence[float], nodes: Sequence[Node], aims: Sequence[Sequence[float]]
+    constants: Sequence[float],
+    nodes: Sequence[Node],
+    attitude_references: Sequence[Sequence[float]],
 ) -> Floats:
-    """The numbers for `Program.parameters`: constants, then each node's reference and aim.
+    """The numbers for `Program.parameters`.
 
-    The reference is position, velocity and thrust of the node; its aim is `Model.aim`.
+    They are the constants, then for each node its position, velocity, thrust, and attitude
+    reference (`Model.attitude_reference`).
     """
     values = [*constants]
-    for node, aim in zip(nodes, aims, strict=True):
-        values += [*node.position, *node.velocity, node.thrust, *aim]
+    for node, attitude_reference in zip(nodes, attitude_references, strict=True):
+        values += [*node.position, *node.velocity, node.thrust, *attitude_reference]
     return np.array(values)
 
 
 def _running_residual(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
     """Contribution of one step to the residual r."""
     weights = settings.weights
-    scaled = (
+    weighted_errors = (
         (weights.position, model.state[0:3] - node[0:3]),
         (weights.velocity, model.state[3:6] - node[3:6]),
         (weights.heading, model.heading_error),
-        (weights.turning, model.turning_error),
+        (weights.attitude_rate, model.attitude_rate_error),
         (weights.thrust, model.control[-1] - node[6]),
     )
     residual: ca.SX = ca.vertcat(
-        *(sqrt(settings.step * weight) * error for weight, error in scaled)
+        *(sqrt(settings.step * weight) * error for weight, error in weighted_errors)
     )
     return residual
 
@@ -129,7 +137,7 @@ def _bounds_of_unknown(model: Model, settings: Settings) -> tuple[Floats, Floats
 
 
 def _bounds_of_constraints(model: Model, settings: Settings) -> tuple[Floats, Floats]:
-    gap, bounded = np.zeros(model.state.numel()), np.ones(model.bounded.numel())
+    gap, bounded = np.zeros(model.state.numel()), np.ones(model.bounded_terms.numel())
     upper = np.concatenate([gap, bounded] * settings.steps)
     return -upper, upper
 
@@ -138,7 +146,7 @@ class Solution(NamedTuple):
     """Result of one solve."""
 
     unknown: Floats
-    """(x_0, u_0, x_1, …, x_N), as `Program.unknown`."""
+    """The plan (x_0, u_0, x_1, …, x_N), in the order of `Program.unknown`."""
     solved: bool
     """Whether the plan may be flown, provided that it is finite."""
     iterations: int
@@ -184,7 +192,7 @@ class SqpSolver:
 
 
 def _sqp_function(program: Program, iterations: int) -> ca.Function:
-    """`sqpmethod` with the Gauss–Newton Hessian; a single iteration takes the whole step."""
+    """CasADi's `sqpmethod` with Gauss–Newton Hessian; a single iteration takes the full step."""
     jacobian = ca.jacobian(program.residual, program.unknown)
     objective_factor = ca.SX.sym("lam_f")
     multipliers = ca.SX.sym("lam_g", program.constraints.numel())
@@ -195,14 +203,14 @@ def _sqp_function(program: Program, iterations: int) -> ca.Function:
         ["x", "p", "lam_f", "lam_g"],
         ["hess_gamma_x_x"],
     )
-    single = iterations == 1
+    is_single = iterations == 1
     options = {
         "hess_lag": hessian,
         "max_iter": iterations,
-        "max_iter_ls": 0 if single else 10,  # line search in every iteration
+        "max_iter_ls": 0 if is_single else 10,  # line search in every iteration
         "qpsol_options": {
             # In a single iteration the full accuracy, which takes a fifth longer, is of no use.
-            "hpipm": {"mode": "speed_abs" if single else "speed"},
+            "hpipm": {"mode": "speed_abs" if is_single else "speed"},
             # HPIPM has no infinite bounds, so CasADi passes large numbers. Its default, 1e8, loses
             # so many digits that ten times as many iterations are needed.
             "inf": 1e4,

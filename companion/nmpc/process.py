@@ -30,8 +30,7 @@ _LARGEST_MESSAGE = 4096  # bytes
 _EXIT_TIME = 0.02
 """Time allowed for the process to exit after its socket has closed, s; it usually takes < 1 ms."""
 _ANSWER_TOLERANCE = 0.02
-"""Margin for rounding when an answer is checked: a share of the tilt limit; for thrust, of gravity.
-"""
+"""Margin for rounding when an answer is checked, as a share of the tilt limit and of gravity."""
 
 
 class Trouble(Enum):
@@ -56,13 +55,13 @@ class _Pending(NamedTuple):
 
     number: int
     sent_at: float
-    """When it was sent, on the computer's monotonic clock, s."""
+    """Time at which the request was sent, on the computer's monotonic clock, s."""
     longest_target: float
-    """Largest |c| that its answer may have."""
+    """Largest length of the target coefficients that the answer may have."""
 
 
 class Solver:
-    """Starts the process, sends requests, returns answers that may be flown.
+    """Starts the solver's process, sends requests, returns answers that may be flown.
 
     An answer that is late, failed or implausible is reported and not returned. The end of the
     process is reported at the next call.
@@ -86,20 +85,20 @@ class Solver:
         self._report = report
         self._pending: _Pending | None = None
         self._ready = False
-        self._ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._ours.setblocking(False)
+        self._socket, worker_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.setblocking(False)
         # Files instead of pipes, which could fill up: the process reads its input late, and its
         # output is read only after it has ended.
         self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by close()
-        with theirs, tempfile.TemporaryFile() as job:
-            pickle.dump((settings, trajectory), job)
-            job.seek(0)
+        with worker_socket, tempfile.TemporaryFile() as job_file:
+            pickle.dump((settings, trajectory), job_file)
+            job_file.seek(0)
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "companion.nmpc.worker", str(theirs.fileno())],
-                stdin=job,
+                [sys.executable, "-m", "companion.nmpc.worker", str(worker_socket.fileno())],
+                stdin=job_file,
                 stdout=self._output,
                 stderr=self._output,
-                pass_fds=[theirs.fileno()],
+                pass_fds=[worker_socket.fileno()],
                 env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
         self.pid = self._process.pid
@@ -122,7 +121,7 @@ class Solver:
             return
         self._drop_pending("was not answered before the next one")
         try:
-            self._ours.send(pack_request(request))
+            self._socket.send(pack_request(request))
         except BlockingIOError:
             self._report(Trouble.LATE, "the solver does not read its requests")
         except (BrokenPipeError, ConnectionResetError):
@@ -133,15 +132,17 @@ class Solver:
             self._pending = _Pending(request.number, monotonic(), longest_target)
 
     def take(self, wait: float = 0.0) -> Answer | None:
-        """The answer to the last request, once, if it has come and may be flown; else None.
+        """The answer to the last request if it has arrived and may be flown; else None.
+
+        Each answer is returned once.
 
         Args:
-            wait: longest time to wait for the answer, s; 0 in real time, where the call returns at
+            wait: longest time to wait for the answer, s. In real time use 0: the call returns at
                 once.
         """
-        until = monotonic() + wait
+        deadline = monotonic() + wait
         while self.ready:
-            message = self._receive(max(0.0, until - monotonic()) if self._pending else 0.0)
+            message = self._receive(max(0.0, deadline - monotonic()) if self._pending else 0.0)
             if not message:
                 break
             answer = unpack_answer(message)
@@ -159,7 +160,7 @@ class Solver:
         """End the process."""
         if self.alive:
             self.alive = False
-            self._ours.close()
+            self._socket.close()
             self._process.kill()
             self._process.wait()
             self._output.close()
@@ -167,9 +168,9 @@ class Solver:
     def _receive(self, wait: float = 0.0) -> bytes:
         """The next message; empty if there is none, or if the process has ended."""
         if wait > 0.0:
-            select.select([self._ours], [], [], wait)
+            select.select([self._socket], [], [], wait)
         try:
-            message = self._ours.recv(_LARGEST_MESSAGE)
+            message = self._socket.recv(_LARGEST_MESSAGE)
         except BlockingIOError:
             return b""
         except ConnectionResetError:
@@ -179,7 +180,7 @@ class Solver:
         return message
 
     def _checked(self, pending: _Pending, answer: Answer) -> Answer | None:
-        """The answer if it may be flown; otherwise None, and the trouble is reported."""
+        """The answer if it may be flown; otherwise report the trouble and return None."""
         elapsed = answer.computed_at - pending.sent_at
         if elapsed > self._settings.deadline:
             self._report(Trouble.LATE, f"request {pending.number} took {1e3 * elapsed:.1f} ms")
@@ -195,10 +196,10 @@ class Solver:
             return answer
         return None
 
-    def _drop_pending(self, why: str) -> None:
+    def _drop_pending(self, reason: str) -> None:
         """Report the pending request as late, if there is one."""
         if self._pending is not None:
-            self._report(Trouble.LATE, f"request {self._pending.number} {why}")
+            self._report(Trouble.LATE, f"request {self._pending.number} {reason}")
             self._pending = None
 
     def _handle_exit(self) -> None:
@@ -217,15 +218,15 @@ class Solver:
 
 
 def _why_implausible(answer: Answer, longest_target: float, settings: Settings) -> str | None:
-    """Why an answer is implausible; None if it is plausible."""
+    """Reason why an answer is implausible; None if it is plausible."""
     values = (answer.north, answer.east, answer.heading, answer.thrust, answer.time)
     if not all(isfinite(value) for value in values):
         return "a number that is not finite"
     length = hypot(answer.north, answer.east)
     if length > (1.0 + _ANSWER_TOLERANCE) * longest_target:
         return f"coefficients of length {length:.3f}, more than the limit {longest_target:.3f}"
-    slack = _ANSWER_TOLERANCE * settings.gravity
-    if not settings.min_thrust - slack <= answer.thrust <= settings.max_thrust + slack:
-        limits = f"{settings.min_thrust:.2f} to {settings.max_thrust:.2f}"
-        return f"a thrust of {answer.thrust:.2f} m/s², outside {limits}"
+    tolerance = _ANSWER_TOLERANCE * settings.gravity
+    if not settings.min_thrust - tolerance <= answer.thrust <= settings.max_thrust + tolerance:
+        limits_text = f"{settings.min_thrust:.2f} to {settings.max_thrust:.2f}"
+        return f"a thrust of {answer.thrust:.2f} m/s², outside {limits_text}"
     return None

@@ -15,7 +15,7 @@ from companion.nmpc.settings import Settings
 
 
 class Plan(NamedTuple):
-    """The result of one solve, with the first control of the plan."""
+    """The result of one solve: the first control of the plan, and figures of the solver."""
 
     iterations: int
     """Number of SQP iterations."""
@@ -24,8 +24,7 @@ class Plan(NamedTuple):
     north: float
     east: float
     heading: float
-    """`north`, `east` and `heading`: target for the planner: coefficients, and heading in
-    rad."""
+    """`north`, `east` and `heading`: target for the planner (coefficients; heading in rad)."""
     thrust: float
     """Specific thrust, m/s²."""
 
@@ -46,7 +45,7 @@ class RecedingHorizon:
         self._model = make_model(settings)
         self._solver = SqpSolver(self._model, settings)
         inputs = [self._model.state, self._model.control, self._model.constants]
-        self._target = ca.Function("target", inputs, [self._model.target])
+        self._target_function = ca.Function("target", inputs, [self._model.target])
         self._previous: Floats | None = None
         self._previous_time = 0.0
 
@@ -57,7 +56,7 @@ class RecedingHorizon:
     def solve(
         self, time: float, motion: Motion, nodes: Sequence[Node], conditions: Conditions
     ) -> Plan | None:
-        """Solve for a plan that begins at `motion`; None if there is none that may be flown.
+        """Compute a plan that begins at `motion`; None if no plan was found that may be flown.
 
         Args:
             time: time of `motion`, s. The solve starts from the previous plan, shifted to this
@@ -71,20 +70,24 @@ class RecedingHorizon:
         constants = list(model.constants_of(conditions, motion))
         guess = self._guess(time, nodes)
         guess[: len(start)] = start
-        parameters = parameters_of(constants, nodes, [model.aim_of(node) for node in nodes])
+        parameters = parameters_of(
+            constants, nodes, [model.attitude_reference_of(node) for node in nodes]
+        )
         if not (np.isfinite(start).all() and np.isfinite(parameters).all()):
             self.forget()
             return None
         began = thread_time()
         solution = self._solver.solve(guess, parameters)
-        seconds = thread_time() - began
+        solver_seconds = thread_time() - began
         if not (solution.solved and np.isfinite(solution.unknown).all()):
             self.forget()
             return None
         self._previous, self._previous_time = solution.unknown, time
         control = solution.unknown[len(start) : len(start) + model.control.numel()]
-        target = np.asarray(self._target(start, control, constants), dtype=np.float64).ravel()
-        return Plan(solution.iterations, seconds, *(float(v) for v in target))
+        target = np.asarray(
+            self._target_function(start, control, constants), dtype=np.float64
+        ).ravel()
+        return Plan(solution.iterations, solver_seconds, *(float(v) for v in target))
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
         """The first guess: the previous plan shifted to `time`, or the reference."""

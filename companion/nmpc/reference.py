@@ -15,31 +15,31 @@ class Node(NamedTuple):
     """The reference at one node of the horizon."""
 
     position: Vector
-    """m, NED."""
+    """Position, m, NED."""
     velocity: Vector
-    """m/s, NED."""
+    """Velocity, m/s, NED."""
     north: float
     east: float
     """`north` and `east`: acceleration coefficients."""
     speed_north: float
     speed_east: float
-    """`speed_north` and `speed_east`: their time derivative, 1/s."""
+    """`speed_north` and `speed_east`: time derivative of the coefficients, 1/s."""
     thrust: float
     """Specific thrust, m/s²."""
     heading: float
-    """tilt-yaw heading, rad; unwrapped, so that it does not jump between nodes."""
+    """Tilt-yaw heading, rad; unwrapped, so that it does not jump between nodes."""
     heading_rate: float
-    """rad/s."""
+    """Time derivative of the heading, rad/s."""
 
 
 class Start(NamedTuple):
-    """Where a trajectory begins, and the angle added to its headings."""
+    """Start position of a trajectory, and the angle added to the headings of its samples."""
 
     position: Vector
-    """Position where it begins, m, NED."""
+    """Position at which the trajectory begins, m, NED; added to the positions of its samples."""
     heading_offset: float = 0.0
-    """Angle added to its headings, rad: the sum of the heading resets; for a trajectory that holds
-    its heading, plus that heading. Positions are not rotated."""
+    """Angle added to the headings of the trajectory, rad: the sum of the heading resets; if the
+    trajectory holds the heading of its start, plus that heading. Positions are not rotated."""
 
 
 def node_of(
@@ -63,7 +63,7 @@ def node_of(
         nearby_heading: a heading, rad; the node's heading is unwrapped to within π of it.
         drag: drag of the vehicle.
         axis_drag: coefficient of `AxisDrag`, 1/m.
-        gravity: m/s².
+        gravity: gravity, m/s².
         disturbance: w, acceleration by wind and other unmodelled forces, m/s².
     """
     velocity, acceleration, jerk = sample.velocity, sample.acceleration, sample.jerk
@@ -71,8 +71,8 @@ def node_of(
     heading = nearby_heading + wrap_angle(start.heading_offset + sample.heading - nearby_heading)
     axes = AxisDrag(axis_drag, heading)
     axis_d = *axes.deceleration(*velocity[:2]), 0.0
-    turn = sample.heading_rate
-    axis_d_rate = *axes.deceleration_rate(velocity[:2], acceleration[:2], turn), 0.0
+    heading_rate = sample.heading_rate
+    axis_d_rate = *axes.deceleration_rate(velocity[:2], acceleration[:2], heading_rate), 0.0
     f_n, f_e, f_d = (acceleration[i] + d[i] + axis_d[i] - disturbance[i] for i in range(3))
     f_d = min(f_d - gravity, -_LEAST_LIFT * gravity)
     rate_n, rate_e, rate_d = (jerk[i] + d_rate[i] + axis_d_rate[i] for i in range(3))

@@ -13,13 +13,13 @@ class Weights:
     """Weight of the velocity error, s²/m²."""
     heading: float = 2.0
     """Weight of the heading error, 1/rad²."""
-    turning: float = 0.1
+    attitude_rate: float = 0.1
     """Weight of the commanded attitude rate minus that of the reference, s²/rad²."""
     thrust: float = 0.02
     """Weight of the specific thrust minus that of the reference, s⁴/m²."""
     final: float = 0.5
-    """Weights of position and velocity at the end of the horizon, divided by the weights over it,
-    s."""
+    """Factor (s) from `position` and `velocity` to the weights of the same errors at the end of the
+    horizon."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,21 +27,21 @@ class Settings:
     """Vehicle, horizon and solver.
 
     Raises:
-        ValueError: a configuration allows it, but this controller does not: `yaw_gain` or
-            `min_thrust` is 0, gravity is not between the limits of the thrust, or `lag` is too
-            short for the step of the horizon.
+        ValueError: `yaw_gain` or `min_thrust` is not positive, gravity is not between the limits of
+            the thrust, or `lag` is too short for the step of the horizon. A configuration allows
+            these values, but this controller does not.
     """
 
     gain: float = 5.0
-    """Gain p of the planner that flies the targets, 1/s."""
+    """Gain p of the planner that receives the targets, 1/s."""
     yaw_gain: float = 2.0
-    """Heading gain of that planner, 1/s."""
+    """Gain of the planner on the heading error, 1/s."""
     lag: float = 0.05
-    """τ of that planner's response τ·c̈ + ċ = p·(c_d − c), s."""
+    """Lag τ of the planner's response τ·c̈ + ċ = p·(c_d − c), s."""
     dead_time: float = 0.0
     """Time from sending a target to the first response of the vehicle, s."""
     gravity: float = 9.80665
-    """m/s²."""
+    """Acceleration of gravity, m/s²."""
     max_tilt: float = 0.7
     """Tilt limit of the planner, rad."""
     max_tilt_rate: float = 2.0
@@ -61,7 +61,7 @@ class Settings:
     lead: float = 0.02
     """Time from a request to the use of its answer, s."""
     deadline: float = 0.02
-    """Time allowed for an answer, s of wall time."""
+    """Wall time allowed for an answer, s."""
     niceness: int = 5
     """Niceness of the solver's process relative to the flight's, 0 to 19."""
 

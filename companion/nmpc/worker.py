@@ -32,7 +32,7 @@ from companion.nmpc.receding_horizon import Plan, RecedingHorizon
 from companion.nmpc.reference import Node, Start, node_of
 from companion.nmpc.settings import Settings
 
-_WARM_UP = 5
+_WARM_UP_SOLVES = 5
 """Number of solves before the first request, which fill caches and allocate memory."""
 _LARGEST_MESSAGE = 65536  # bytes
 
@@ -41,12 +41,13 @@ class Worker:
     """Answers requests about one trajectory.
 
     The dead time is not part of the problem. The motion is predicted to the time at which the
-    answer takes effect, lead plus dead time after the given state. The plan starts there.
+    answer takes effect, `Settings.lead` plus dead time after the state in the request. The plan
+    starts at that time.
 
     Args:
         settings: vehicle, horizon and solver.
         trajectory: the trajectory to follow.
-        make_model: makes the prediction model; only studies use another one than the default.
+        make_model: makes the prediction model; only studies use another than the default.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class Worker:
         """Solve a few times and discard the answers."""
         level = Vehicle(0.0, (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0))
         hover = Input(0.0, 0.0, 0.0, 0.0, self._settings.gravity)
-        for number in range(_WARM_UP):
+        for number in range(_WARM_UP_SOLVES):
             self.answer(Request(number, level, 0.0, Start((0.0, 0.0, 0.0)), (hover,)))
         self.forget()
 
@@ -74,7 +75,7 @@ class Worker:
         self._horizon.forget()
 
     def answer(self, request: Request) -> Answer:
-        """Compute the answer to a request; it is to be used `Settings.lead` after that request."""
+        """Compute the answer to a request, to be used `Settings.lead` after the request."""
         began = perf_counter()
         use_time = request.vehicle.time + self._settings.lead
         try:

@@ -1,4 +1,4 @@
-"""What to expect of a configuration: margins, tracking error, rates and settling time."""
+"""Expected behaviour of a configuration: margins, tracking error, rates and settling time."""
 
 from dataclasses import dataclass
 from math import hypot, pi, sqrt
@@ -15,7 +15,7 @@ from companion.tuning.margins import Margins, frequencies, margins, smaller_marg
 Floats = NDArray[np.float64]
 
 _SETTLED_SHARE = 0.05
-"""The response to a gust has settled when it stays below this share of its peak."""
+"""Share of its peak below which the response to a gust has settled."""
 _RESPONSE_DURATION = 10.0
 """Duration of the computed response to a gust, s."""
 _RESPONSE_PERIOD = 0.01
@@ -24,10 +24,7 @@ _RESPONSE_PERIOD = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Disturbances:
-    """Disturbances of the vehicle on each horizontal axis.
-
-    Densities are one-sided amplitude spectral densities.
-    """
+    """Disturbances of the vehicle on each horizontal axis."""
 
     gust: float = 0.5
     """Standard deviation of the gusts, m/s; drag turns them into an acceleration."""
@@ -40,15 +37,16 @@ class Disturbances:
     path_time: float = 1.0
     """Correlation time of `velocity_error` and `acceleration_error`, s."""
     velocity_density: float = 0.01
-    """Density of the error of the estimated velocity in hover, m/s/√Hz."""
+    """One-sided amplitude spectral density of the error of the velocity in hover, m/s/√Hz."""
     acceleration_density: float = 0.02
-    """Density of the acceleration that tilt and drag do not explain, m/s²/√Hz."""
+    """One-sided amplitude spectral density of the acceleration that is not due to tilt and drag,
+    m/s²/√Hz."""
     position_noise: float = 0.003
     """Standard deviation of the noise of a single position estimate, m."""
     velocity_noise: float = 0.005
     """Standard deviation of the noise of a single velocity estimate, m/s."""
     source: str = "typical of a multirotor"
-    """Source of the two densities and two noises, as text for the user."""
+    """Text for the user: source of the values of densities and noise."""
 
 
 class Errors(NamedTuple):
@@ -73,28 +71,28 @@ class Errors(NamedTuple):
 class Expectation:
     """The expected behaviour of a configuration."""
 
-    whole: Margins
+    margins_at_rate: Margins
     """Margins of the loop opened at the commanded body rate."""
-    outer: Margins
+    margins_at_acceleration: Margins
     """Margins of the loop opened at the commanded acceleration."""
     errors: Errors
     """Expected position errors and commanded rate."""
     peak: float
     """Largest position error after a gust that changes the velocity by 1 m/s at once, m."""
     settling: float
-    """Time from the gust until its position error stays below 5 % of `peak`, s; at most 10 s."""
+    """Time from a gust until the position error stays below 5 % of `peak`, s; at most 10 s."""
 
     @property
     def margins(self) -> Margins:
-        """For each margin the smaller value of `whole` and `outer`."""
-        return smaller_margins(self.whole, self.outer)
+        """Of each margin the smaller of `margins_at_rate` and `margins_at_acceleration`."""
+        return smaller_margins(self.margins_at_rate, self.margins_at_acceleration)
 
 
 def stability(config: Config, error: ModelError = EXACT) -> Margins:
-    """Gain and phase margin of a configuration.
+    """Stability margins of a configuration.
 
-    For each the smaller value of the loop opened at the commanded body rate and of the loop opened
-    at the commanded acceleration.
+    The loop is opened at the commanded body rate and at the commanded acceleration; of each margin
+    the smaller value is returned.
 
     Args:
         config: the configuration.
@@ -107,8 +105,10 @@ def stability(config: Config, error: ModelError = EXACT) -> Margins:
 
 
 def loop_margins(loop: Loop) -> Margins:
-    """Margins of a loop at `frequencies`; for each the smaller value of `whole` and `outer`."""
-    return smaller_margins(margins(loop.s, loop.whole), margins(loop.s, loop.outer))
+    """Margins of a loop at `frequencies`; of those at rate and acceleration the smaller of each."""
+    return smaller_margins(
+        margins(loop.s, loop.gain_at_rate), margins(loop.s, loop.gain_at_acceleration)
+    )
 
 
 def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Errors:
@@ -121,7 +121,7 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
     """
     omega = loop.s.imag
     by_acceleration, by_velocity = loop.by_acceleration(), loop.by_velocity_error()
-    position = loop.by_position_error()
+    by_position = loop.by_position_error()
     gusts = (
         (
             by_acceleration,
@@ -141,22 +141,24 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
             disturbances.velocity_density**2 + 2.0 * period * disturbances.velocity_noise**2,
         ),
         (by_acceleration, disturbances.acceleration_density**2),
-        (position, 2.0 * period * disturbances.position_noise**2),
+        (by_position, 2.0 * period * disturbances.position_noise**2),
     )
     causes = (gusts, path, noise)
     # Both axes are disturbed independently, therefore the factor 2.
-    by_gusts, on_path, by_noise = (
+    gust_error, path_error, noise_error = (
         sqrt(sum(2.0 * _variance(omega, response[0], density) for response, density in terms))
         for terms in causes
     )
     rate_variance = sum(
-        2.0 * _variance(omega, r[1], density) for terms in causes for r, density in terms
+        2.0 * _variance(omega, response[1], density)
+        for terms in causes
+        for response, density in terms
     )
-    return Errors(by_gusts, on_path, by_noise, sqrt(rate_variance))
+    return Errors(gust_error, path_error, noise_error, sqrt(rate_variance))
 
 
 def _slow_density(omega: Floats, deviation: float, time: float) -> Floats:
-    """(n,), one-sided power spectral density of low-pass filtered (first-order) noise, per Hz.
+    """(n,), one-sided power spectral density, per Hz, of noise after a first-order low-pass filter.
 
     Args:
         omega: (n,), frequencies, rad/s.
@@ -177,8 +179,8 @@ def expectation(config: Config, disturbances: Disturbances) -> Expectation:
     loop = control_loop(config, s)
     peak, settling = _after_gust(config)
     return Expectation(
-        margins(s, loop.whole),
-        margins(s, loop.outer),
+        margins(s, loop.gain_at_rate),
+        margins(s, loop.gain_at_acceleration),
         expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz),
         peak,
         settling,
@@ -191,20 +193,20 @@ def _variance(omega: Floats, response: Complex, density: Floats | float) -> floa
     Args:
         omega: (n,), frequencies, rad/s.
         response: (n,), frequency response to the noise.
-        density: (n,), or a number for white noise.
+        density: power spectral density, (n,), or a number for white noise.
     """
     return float(np.trapezoid(np.abs(response) ** 2 * density, omega) / (2.0 * pi))
 
 
 def _after_gust(config: Config) -> tuple[float, float]:
     """`Expectation.peak` and `Expectation.settling` of a configuration."""
-    offset = 0.1  # 1/s; real part of the frequencies, so that the integrators lie to their left
+    real_part = 0.1  # 1/s; real part of the frequencies, so that the integrators lie to their left
     omega = np.arange(0.0, 60.0, 0.05)
-    s = np.asarray(offset + 1j * omega, dtype=np.complex128)
+    s = np.asarray(real_part + 1j * omega, dtype=np.complex128)
     position, _ = control_loop(config, s).by_acceleration()
     time = np.arange(0.0, _RESPONSE_DURATION, _RESPONSE_PERIOD)
-    terms = np.trapezoid(np.exp(1j * np.outer(time, omega)) * position, omega).real
-    response = np.abs(np.exp(offset * time) * terms / pi)
+    integral = np.trapezoid(np.exp(1j * np.outer(time, omega)) * position, omega).real
+    response = np.abs(np.exp(real_part * time) * integral / pi)
     peak = float(response.max())
     unsettled = np.flatnonzero(response > _SETTLED_SHARE * peak)
     return peak, float(time[unsettled[-1]]) + _RESPONSE_PERIOD

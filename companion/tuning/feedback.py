@@ -13,23 +13,23 @@ Complex = NDArray[np.complex128]
 
 
 class Feedback(NamedTuple):
-    """Frequency responses of the commanded coefficient to the measurements, with opposite sign.
+    """Frequency responses of the commanded coefficient to the measurements, sign reversed.
 
     The command is −(tilt·c + velocity·v + position·x), before it is held for a guidance period.
     """
 
     tilt: Complex
-    """(n,), per measured coefficient c."""
+    """Response to the measured coefficient c, (n,)."""
     velocity: Complex
-    """(n,), per measured velocity v, m/s."""
+    """Response to the measured velocity v, (n,), s/m."""
     position: Complex
-    """(n,), per measured position x, m."""
+    """Response to the measured position x, (n,), 1/m."""
 
 
 def hold_element(s: Complex, period: float) -> Complex:
     """(n,), frequency response of a zero-order hold of `period` s at the frequencies `s`, rad/s."""
-    held: Complex = (1.0 - np.exp(-s * period)) / (s * period)
-    return held
+    response: Complex = (1.0 - np.exp(-s * period)) / (s * period)
+    return response
 
 
 def guidance_feedback(
@@ -42,18 +42,18 @@ def guidance_feedback(
     """The feedback of `LinearGuidance` with the states of `MotionObserver`.
 
     Both are linear while no limit is reached. A position is used until the next one arrives, so its
-    mean age is half a period. The prediction covers this age.
+    mean age is half a period; the prediction covers this age.
 
     Args:
         s: (n,), frequencies, rad/s, none of them 0.
         guidance: gains, response of the tilt and period of guidance.
         observer: settings of the motion observer.
-        drag: linear drag that the program assumes, 1/s.
+        drag: assumed linear drag of the vehicle, 1/s.
         position_period: time between two position messages, s.
     """
     by_acceleration, by_position, by_velocity = _observer_responses(s, observer, position_period)
     age = 0.5 * position_period
-    delayed = np.exp(-s * age)[:, None]
+    delay = np.exp(-s * age)[:, None]
     prediction = guidance.tilt.dead_time + 0.5 * guidance.period
     # The known acceleration is g·c − drag·v; between two positions its newest value is used.
     inputs = (
@@ -62,18 +62,18 @@ def guidance_feedback(
         (by_position, 0.0),
     )
     responses = []
-    for observed, known in inputs:
-        position, velocity, disturbance = (delayed * observed).T
-        velocity_now = velocity + age * (disturbance + known)
-        velocity_then = velocity + (age + prediction) * (disturbance + known)
+    for observer_response, known in inputs:
+        position, velocity, disturbance = (delay * observer_response).T
+        present_velocity = velocity + age * (disturbance + known)
+        predicted_velocity = velocity + (age + prediction) * (disturbance + known)
         span = age + prediction
-        position_then = position + span * velocity + 0.5 * span * span * (disturbance + known)
+        predicted_position = position + span * velocity + 0.5 * span * span * (disturbance + known)
         by_tilt = max(known, 0.0)  # drag acts on the observed velocity, not on the measured one
-        acceleration = by_tilt - drag * velocity_now + disturbance
+        acceleration = by_tilt - drag * present_velocity + disturbance
         gains = guidance.gains
         command = (
-            gains.position * position_then
-            + gains.velocity * velocity_then
+            gains.position * predicted_position
+            + gains.velocity * predicted_velocity
             + gains.acceleration * acceleration
             + disturbance
         )
@@ -86,8 +86,8 @@ def _observer_responses(
 ) -> tuple[Complex, Complex, Complex]:
     """Frequency responses of the motion observer, as three arrays (n, 3).
 
-    The arrays are for the inputs known acceleration, measured position and measured velocity; the
-    columns for the observed position, velocity and disturbance. The observer is
+    The arrays are for three inputs: known acceleration, measured position, measured velocity. The
+    columns are the observed position, velocity and disturbance. The observer is
     x = (I − K·C)·(A·x/z + B·a) + K·y, where a is the mean acceleration over the past period.
     """
     # The largest trust, in motion, leaves the smallest margins.

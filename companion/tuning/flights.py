@@ -1,4 +1,4 @@
-"""Flies a configuration on the mock vehicle, in this process, and measures how it tracks."""
+"""Flies a configuration on the mock vehicle, in this process, and measures the tracking errors."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -16,15 +16,15 @@ from companion.testing import MockVehicle, fly
 _Rows = np.ndarray[Any, np.dtype[np.float64]]
 
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
-"""Wind of the flights in gusts, m/s: mean and standard deviation."""
+"""Wind of the courses in gusts: mean and standard deviation, m/s."""
 _STRONG_GUST = 2.0
-"""A strong gust is this number of standard deviations of the gusts."""
+"""Strength of a strong gust, in standard deviations of the gusts."""
 _LARGEST_RESERVE = 0.8
 """Largest reserve for feedback and wind, as a share of the acceleration at the tilt limit."""
 _MAX_THRUST = 0.95
 _FENCE_SIZE = 50.0  # m
 _REFERENCE_JUMP = 20.0
-"""At a higher speed the reference jumps to the vehicle's position, as at the hand-back, m/s."""
+"""Speed of the reference, m/s, above which it is taken for a jump to the vehicle's position."""
 _DATAGRAM_DELAY_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
 _STEPS_PER_TRUTH_ROW = 5
@@ -33,7 +33,7 @@ _QUICK_TAKEOFF_AND_LANDING = {
     "px4": {"MPC_TKO_RAMP_T": 0.3, "MPC_TKO_SPEED": 3.0, "MPC_LAND_SPEED": 3.0},
     "ardupilot": {"LAND_SPEED": 150.0},
 }
-"""Parameters that shorten take-off and landing."""
+"""Autopilot parameters that shorten take-off and landing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Course:
     trajectory: str
     """Name of a file in `configs/trajectories`."""
     wind: Mapping[str, float]
-    """Section `wind` of the mock vehicle."""
+    """Section `wind` of the configuration of the mock vehicle."""
 
 
 CIRCLE = Course("circle at 5 m/s", "circle5.yaml", {})
@@ -68,7 +68,7 @@ class CourseResult:
         rate: RMS commanded roll-pitch rate, rad/s.
         rate_limited: share of the setpoints at the rate limit.
         speed: largest speed of the reference, m/s; lower if the course was slowed down.
-        wind: mean wind, m/s; less than the course's if the tilt limit would not hold against it.
+        wind: mean wind, m/s; weaker than that of the course if the tilt limit requires it.
     """
 
     result: str
@@ -87,9 +87,9 @@ class CourseResult:
 
 
 def autopilot_like(config: Config) -> str:
-    """The autopilot of the mock vehicle that is most similar: "ardupilot" if roll has a slew limit.
+    """Autopilot of the mock vehicle that suits the vehicle best: "ardupilot" or "px4".
 
-    Otherwise "px4".
+    It is "ardupilot" if the roll rate has a slew limit.
     """
     roll = config.vehicle.axes["roll"]
     return "px4" if roll.acceleration_limit is None else "ardupilot"
@@ -99,9 +99,9 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
     """Fly a course on the mock vehicle, with this configuration's gains, lag and dead time.
 
     The configured limits of tilt and tilt rate apply. The course is slowed down if it would exceed
-    them, with a reserve for feedback and wind. Wind and gusts are made weaker by one factor if the
-    vehicle could not hold its position in them within the tilt limit. Thrust, drag, take-off height
-    and fence are not the configured ones, but suit the mock vehicle and the course. No message is
+    them, with a reserve for feedback and wind. Wind and gusts are both scaled down if the vehicle
+    could not hold its position in them within the tilt limit. Thrust, drag, take-off height and
+    fence are not the configured ones, but suit the mock vehicle and the course. No message is
     signed.
 
     Args:
@@ -147,23 +147,25 @@ def _tracking(
     """
     time, reference = tracking[:, 0], tracking[:, 1:3]
     speed = np.hypot(*np.gradient(reference, time, axis=0).T)
-    moving = np.flatnonzero((speed > 0.05) & (speed < _REFERENCE_JUMP))
-    moving_rows = slice(moving[0], moving[-1] + 1)
-    true = np.column_stack([np.interp(time, truth[:, 0], each) for each in truth[:, 1:].T])
+    moving_indices = np.flatnonzero((speed > 0.05) & (speed < _REFERENCE_JUMP))
+    moving_rows = slice(moving_indices[0], moving_indices[-1] + 1)
+    true_position = np.column_stack(
+        [np.interp(time, truth[:, 0], column) for column in truth[:, 1:].T]
+    )
     tilt_rates = [
-        hypot(*each.rates[:2])
-        for each in vehicle.setpoints
-        if time[moving[0]] <= each.time <= time[moving[-1]]
+        hypot(*column.rates[:2])
+        for column in vehicle.setpoints
+        if time[moving_indices[0]] <= column.time <= time[moving_indices[-1]]
     ]
-    rates, limit = np.array(tilt_rates), flown_config.limits.max_tilt_rate
+    rates, max_tilt_rate = np.array(tilt_rates), flown_config.limits.max_tilt_rate
     return CourseResult(
         "ok",
         _rms(tracking[moving_rows, 4:6] - reference[moving_rows]),
-        _rms(true[moving_rows] - reference[moving_rows]),
-        _rms(true[moving_rows] - tracking[moving_rows, 4:6]),
+        _rms(true_position[moving_rows] - reference[moving_rows]),
+        _rms(true_position[moving_rows] - tracking[moving_rows, 4:6]),
         float(np.sqrt(np.mean(rates**2))),
-        float(np.mean(rates > 0.99 * limit)),
-        float(speed[moving].max()),
+        float(np.mean(rates > 0.99 * max_tilt_rate)),
+        float(speed[moving_indices].max()),
     )
 
 
@@ -220,9 +222,9 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
 
 
 def _tolerable_wind(config: Config, course: Course, mock: Config) -> Mapping[str, float]:
-    """The wind of the course, or a weaker one whose drag leaves a part of the tilt limit."""
-    largest = _LARGEST_RESERVE * config.limits.largest_horizontal
-    factor = min(1.0, largest / max(_wind_deceleration(course, mock), 1e-9))
+    """The wind of the course, weakened if its drag would need too much of the tilt limit."""
+    largest_deceleration = _LARGEST_RESERVE * config.limits.largest_horizontal
+    factor = min(1.0, largest_deceleration / max(_wind_deceleration(course, mock), 1e-9))
     return {key: factor * value for key, value in course.wind.items()}
 
 
@@ -235,5 +237,7 @@ def _wind_deceleration(course: Course, mock: Config) -> float:
 
 def _reserve(config: Config, course: Course, mock: Config) -> float:
     """Horizontal acceleration that a course must leave for feedback and wind drag, m/s²."""
-    largest = _LARGEST_RESERVE * config.limits.largest_horizontal
-    return min(config.flight.slow_down_reserve_m_s2 + _wind_deceleration(course, mock), largest)
+    largest_reserve = _LARGEST_RESERVE * config.limits.largest_horizontal
+    return min(
+        config.flight.slow_down_reserve_m_s2 + _wind_deceleration(course, mock), largest_reserve
+    )

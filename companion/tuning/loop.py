@@ -23,9 +23,9 @@ from companion.guidance import GRAVITY
 from companion.tuning.feedback import Complex, guidance_feedback, hold_element
 
 POSITION_LATENESS = 0.010
-"""Delay of the autopilot's position that its time stamp does not show, s."""
+"""Delay of the autopilot's position that is not contained in its time stamp, s."""
 _USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
-"""Lag and dead time of the rate loop, s, if none is identified: a heavy vehicle's."""
+"""Lag and dead time of the rate loop of a heavy vehicle, s; used if they are not identified."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +33,11 @@ class ModelError:
     """Difference between the real rate loop and the configured one."""
 
     time_factor: float = 1.0
-    """Factor on lag and dead time."""
+    """Factor on lag and dead time: real value / configured value."""
     delay: float = 0.0
     """Additional dead time, s."""
     gain: float = 1.0
-    """Factor on the body rates."""
+    """Factor on the body rates: real rate / commanded rate."""
 
 
 EXACT = ModelError()
@@ -45,19 +45,19 @@ EXACT = ModelError()
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Frequency responses of the loop and of its parts, each (n,)."""
+    """Frequency responses of the control loop and of its parts, each (n,)."""
 
     s: Complex
-    """Frequencies, rad/s."""
-    whole: Complex
+    """Complex frequencies, rad/s."""
+    gain_at_rate: Complex
     """Loop gain with the loop opened at the commanded body rate; includes all feedback."""
-    outer: Complex
+    gain_at_acceleration: Complex
     """Loop gain with the loop opened at the commanded acceleration; the attitude loop stays
     closed."""
-    rates: Complex
+    rate_response: Complex
     """Response of the coefficient to the commanded body rate, s."""
-    command: Complex
-    """Response of the coefficient to the coefficient that guidance commands, without feedback."""
+    command_response: Complex
+    """Response of the coefficient to the commanded coefficient of guidance, without feedback."""
     velocity: Complex
     """Response of the commanded coefficient to the measured velocity, sign reversed, s/m."""
     position: Complex
@@ -66,27 +66,27 @@ class Loop:
     """Linear drag, 1/s."""
 
     def by_acceleration(self) -> tuple[Complex, Complex]:
-        """Position (m) and commanded body rate (rad/s) per disturbing acceleration, m/s²."""
-        to_velocity = 1.0 / (self.s + self.drag)
-        tilt = self._tilt((self.velocity + self.position / self.s) * to_velocity)
-        return (GRAVITY * tilt + 1.0) * to_velocity / self.s, tilt / self.rates
+        """Responses of position (m) and commanded rate (rad/s) to a disturbance, m/s²."""
+        velocity_response = 1.0 / (self.s + self.drag)
+        tilt = self._tilt((self.velocity + self.position / self.s) * velocity_response)
+        return (GRAVITY * tilt + 1.0) * velocity_response / self.s, tilt / self.rate_response
 
     def by_position_error(self) -> tuple[Complex, Complex]:
-        """Position (m) and commanded body rate (rad/s) per error of the position, m."""
+        """Responses of position (m) and commanded rate (rad/s) to an error of the position, m."""
         return self._by_measurement_error(self.position)
 
     def by_velocity_error(self) -> tuple[Complex, Complex]:
-        """Position (m) and commanded body rate (rad/s) per error of the velocity, m/s."""
+        """Responses of position (m) and commanded rate (rad/s) to an error of the velocity, m/s."""
         return self._by_measurement_error(self.velocity)
 
     def _by_measurement_error(self, feedback: Complex) -> tuple[Complex, Complex]:
-        """Position and commanded body rate per error of a measurement with this feedback."""
+        """Responses of position and commanded rate to an error of the measurement of `feedback`."""
         tilt = self._tilt(feedback)
-        return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rates
+        return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rate_response
 
     def _tilt(self, subtracted: Complex) -> Complex:
-        """Closed-loop coefficient when `subtracted` is subtracted from the command of guidance."""
-        return -self.command * subtracted / (1.0 + self.whole)
+        """Coefficient in the closed loop if `subtracted` is subtracted from guidance's command."""
+        return -self.command_response * subtracted / (1.0 + self.gain_at_rate)
 
 
 def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
@@ -109,23 +109,26 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
     target_gain, rate_feedback = _planner_response(config, s)
     axis, factor = _slower_axis(config), error.time_factor
     dead_time = np.exp(-s * (factor * axis.dead_time + error.delay))
-    rates = error.gain * dead_time / (1.0 + factor * s * (axis.lag + factor * s * axis.sigma)) / s
+    lag = 1.0 + factor * s * (axis.lag + factor * s * axis.sigma)
+    rate_response = error.gain * dead_time / lag / s
     hold = hold_element(s, 1.0 / config.link.attitude_rate_hz)
     feedback = guidance_feedback(
         s, guidance, observer_settings(config), drag, 1.0 / config.link.position_rate_hz
     )
-    command = rates * target_gain * hold_element(s, guidance.period)
-    attitude_path = rates * hold * rate_feedback
+    command_response = rate_response * target_gain * hold_element(s, guidance.period)
+    attitude_path = rate_response * hold * rate_feedback
     position_delay = np.exp(-s * POSITION_LATENESS)
     velocity, position = feedback.velocity * position_delay, feedback.position * position_delay
     velocity_per_tilt = GRAVITY / (s + drag)
-    guidance_path = command * (feedback.tilt + velocity_per_tilt * (velocity + position / s))
+    guidance_path = command_response * (
+        feedback.tilt + velocity_per_tilt * (velocity + position / s)
+    )
     return Loop(
         s=s,
-        whole=attitude_path + guidance_path,
-        outer=guidance_path / (1.0 + attitude_path),
-        rates=rates,
-        command=command,
+        gain_at_rate=attitude_path + guidance_path,
+        gain_at_acceleration=guidance_path / (1.0 + attitude_path),
+        rate_response=rate_response,
+        command_response=command_response,
         velocity=velocity,
         position=position,
         drag=drag,
@@ -133,7 +136,7 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
 
 
 def _slower_axis(config: Config) -> AxisResponse:
-    """The configured response of the slower of roll and pitch; a heavy vehicle's if not known."""
+    """Configured response of the slower of roll and pitch; if unknown, that of a heavy vehicle."""
     if not config.vehicle.response_known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
     lag, dead_time = slower_tilt(config)
@@ -143,19 +146,19 @@ def _slower_axis(config: Config) -> AxisResponse:
 def _planner_response(config: Config, s: Complex) -> tuple[Complex, float]:
     """Responses of the body rate to the target coefficient and to the measured coefficient, 1/s.
 
-    The first is (n,); the second is a number, with its sign reversed.
+    The first response is (n,); the second is a number, with reversed sign.
 
     `model-following` commands the rates that compensate the lag in its reference model, and feeds
     back the difference from this model, one dead time later. All other planners command p times the
-    error.
+    error of the coefficient.
     """
     gain = config.planner.gain_per_s
     if config.planner_name != MODEL_FOLLOWING:
         return np.full_like(s, gain), gain
     axis = _slower_axis(config)
     feedback, reference_lag = feedback_gain(gain, axis), model_lag(gain, axis.lag)
-    braking = 1.0 + gain * braking_lead(gain, reference_lag)
-    model = gain / (s * (braking + s * (reference_lag + s * axis.sigma)) + gain)
+    braking_factor = 1.0 + gain * braking_lead(gain, reference_lag)
+    model_response = gain / (s * (braking_factor + s * (reference_lag + s * axis.sigma)) + gain)
     inverse_lag = s * (1.0 + s * (axis.lag + s * axis.sigma))
-    forward = (inverse_lag + feedback * np.exp(-s * axis.dead_time)) * model
-    return forward, feedback
+    target_response = (inverse_lag + feedback * np.exp(-s * axis.dead_time)) * model_response
+    return target_response, feedback

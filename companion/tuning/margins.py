@@ -8,9 +8,9 @@ import numpy as np
 from companion.tuning.feedback import Complex
 
 _REAL_PART = 1e-2
-"""Real part of the frequencies s, 1/s; it keeps them right of the loop's integrators at s = 0."""
+"""Real part of the frequencies s, 1/s; keeps them to the right of the integrators at s = 0."""
 _HIGHEST_FREQUENCY = 150.0
-"""Highest frequency, rad/s; guidance at 50 Hz has its Nyquist frequency at 157 rad/s."""
+"""Highest frequency of the analysis, rad/s; the Nyquist frequency of guidance at 50 Hz is 157."""
 _FREQUENCY_COUNT = 120
 
 
@@ -37,10 +37,10 @@ class Margins(NamedTuple):
     delay: float
     """Delay margin, s; infinite if the gain never crosses 1."""
     stable: bool
-    """Whether the closed loop is stable; if not, the margins say how far it is from stability."""
+    """Whether the closed loop is stable. If not, the margins are its distance from stability."""
 
     def sentence(self) -> str:
-        """The margins in a sentence for the user."""
+        """Text for the user: the margins, or "unstable"."""
         if not self.stable:
             return "unstable"
         delay = 1e3 * self.delay
@@ -69,9 +69,9 @@ def margins(s: Complex, loop_gain: Complex) -> Margins:
         gain_db = min(gain_db, abs(20.0 * log_gain))
     for k in np.flatnonzero((gain[1:] > 1.0) != (gain[:-1] > 1.0)):
         fraction = log10(gain[k]) / log10(gain[k] / gain[k + 1])
-        phase_there = phase[k] + fraction * (phase[k + 1] - phase[k])
+        phase_at_crossing = phase[k] + fraction * (phase[k + 1] - phase[k])
         frequency = omega[k] + fraction * (omega[k + 1] - omega[k])
-        margin = (phase_there + np.pi) % (2.0 * np.pi)
+        margin = (phase_at_crossing + np.pi) % (2.0 * np.pi)
         delay = min(delay, margin / frequency)
         phase_margin = min(phase_margin, margin, 2.0 * np.pi - margin)
     return Margins(gain_db, degrees(phase_margin), delay, bool(stable))

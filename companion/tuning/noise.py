@@ -1,4 +1,4 @@
-"""Measures the disturbances of a recorded flight, estimator errors and gusts, in its telemetry."""
+"""Measures the disturbances of a recorded flight from its telemetry: estimator errors and gusts."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,47 +17,48 @@ Floats = NDArray[np.float64]
 _HOLD_BAND = 0.15, 1.5
 """Range of frequencies at which position hold responds to disturbances, Hz."""
 _WHITE_NOISE_SHARE = 0.6
-"""Above this share of the Nyquist frequency of the telemetry, a spectrum is noise of messages."""
+"""Share of the telemetry's Nyquist frequency above which a spectrum contains only the noise of
+single messages."""
 _SEGMENT_DURATION = 8.0
 """Duration of the segments of the record whose spectra are computed, s."""
 _LEAST_HEIGHT = 1.0
-"""Telemetry less than this height above the first position of the log is left out, m."""
+"""Height above the first position of the log below which telemetry is left out, m."""
 _AUTOPILOTS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
 
 
-def measured_disturbances(log: Path, drag: float, usual: Disturbances) -> Disturbances:
+def measured_disturbances(log: Path, drag: float, default: Disturbances) -> Disturbances:
     """The disturbances in flight, measured in a `.tlog`.
 
-    `velocity_density` is measured as the change of position that the velocity does not explain,
-    `acceleration_density` as the change of velocity that tilt and drag do not explain. The latter
-    includes gusts.
+    `velocity_density` is measured from the change of position that is not due to the velocity,
+    `acceleration_density` from the change of velocity that is not due to tilt and drag.
+    `acceleration_density` includes gusts.
 
     Args:
         log: a `.tlog` of this or another program.
         drag: linear drag of the vehicle, 1/s.
-        usual: disturbances that supply what a log does not show: gusts and the errors on a path.
-            They are returned unchanged if the log has too little flight.
+        default: disturbances that supply what a log does not show: gusts and the errors on a path.
+            It is returned unchanged if the log has too little flight.
 
     Raises:
         LogError: the file cannot be read or is not a `.tlog`.
     """
     motion, slopes = _telemetry(log)
     if len(motion) < 2 or len(slopes) < 2:
-        return usual
+        return default
     time, position, velocity = motion[:, 0], motion[:, 1:3], motion[:, 3:5]
-    step = np.diff(time)[:, None]
-    mean_slope = np.diff(_integral(time, slopes), axis=0) / step
+    period = np.diff(time)[:, None]
+    mean_slope = np.diff(_integral(time, slopes), axis=0) / period
     mean_velocity = 0.5 * (velocity[1:] + velocity[:-1])
-    unexplained_velocity = np.diff(position, axis=0) / step - mean_velocity
+    unexplained_velocity = np.diff(position, axis=0) / period - mean_velocity
     unexplained_acceleration = (
-        np.diff(velocity, axis=0) / step - GRAVITY * mean_slope + drag * mean_velocity
+        np.diff(velocity, axis=0) / period - GRAVITY * mean_slope + drag * mean_velocity
     )
     velocity_density, position_noise = _densities(time[1:], unexplained_velocity)
     acceleration_density, velocity_noise = _densities(time[1:], unexplained_acceleration)
     if not np.isfinite([velocity_density, acceleration_density]).all():
-        return usual
+        return default
     return replace(
-        usual,
+        default,
         velocity_density=velocity_density,
         acceleration_density=acceleration_density,
         position_noise=position_noise,
@@ -74,23 +75,23 @@ def _telemetry(log: Path) -> tuple[Floats, Floats]:
     vehicle: tuple[int, int] | None = None
     motion: list[tuple[float, ...]] = []
     slopes: list[tuple[float, ...]] = []
-    home = None
+    first_down = None
     for frame, message in messages(log, {"HEARTBEAT", "LOCAL_POSITION_NED", "ATTITUDE_QUATERNION"}):
-        source, kind = (frame.system, frame.component), message.get_type()
-        if kind == "HEARTBEAT":
+        source, message_type = (frame.system, frame.component), message.get_type()
+        if message_type == "HEARTBEAT":
             if vehicle is None and message.autopilot in _AUTOPILOTS:
                 vehicle = source
             continue
         if source != vehicle:
             continue
         time = 1e-3 * message.time_boot_ms
-        if kind == "ATTITUDE_QUATERNION":
-            square, ax, ay = tilt_products(message.q1, message.q2, message.q3, message.q4)
-            cosine = max(2.0 * square - 1.0, 0.2)
+        if message_type == "ATTITUDE_QUATERNION":
+            a_squared, ax, ay = tilt_products(message.q1, message.q2, message.q3, message.q4)
+            cosine = max(2.0 * a_squared - 1.0, 0.2)
             slopes.append((time, -2.0 * ay / cosine, 2.0 * ax / cosine))
             continue
-        home = message.z if home is None else home
-        if home - message.z > _LEAST_HEIGHT and (not motion or time > motion[-1][0]):
+        first_down = message.z if first_down is None else first_down
+        if first_down - message.z > _LEAST_HEIGHT and (not motion or time > motion[-1][0]):
             motion.append((time, message.x, message.y, message.vx, message.vy))
     return np.array(motion).reshape(-1, 5), np.array(slopes).reshape(-1, 3)
 
@@ -103,17 +104,17 @@ def _integral(time: Floats, slopes: Floats) -> Floats:
 
 
 def _densities(time: Floats, residual: Floats) -> tuple[float, float]:
-    """Density of a residual in `_HOLD_BAND`, per √Hz, and noise of a single measurement.
+    """Spectral density of a residual in `_HOLD_BAND`, per √Hz, and noise of a single measurement.
 
     Args:
         time: (n,), s.
-        residual: (n, 2), north and east: change of a measurement from one message to the next that
-            is not explained, per second.
+        residual: (n, 2), north and east: unexplained change of a measurement from one message to
+            the next, divided by the time between them.
     """
     period = float(np.median(np.diff(time)))
     length = round(_SEGMENT_DURATION / period)
     gaps = np.flatnonzero(np.diff(time) > 3.0 * period)
-    in_band, white_levels = [], []
+    band_levels, noise_levels = [], []
     for stretch in np.split(residual, gaps + 1):
         for begin in range(0, len(stretch) - length + 1, max(1, length // 2)):
             segment = stretch[begin : begin + length]
@@ -121,15 +122,17 @@ def _densities(time: Floats, residual: Floats) -> tuple[float, float]:
             spectrum = np.abs(np.fft.rfft((segment - segment.mean(axis=0)) * window, axis=0)) ** 2
             density = 2.0 * period * spectrum / np.sum(window**2)
             hertz = np.fft.rfftfreq(length, period)
-            in_band.append(density[(hertz >= _HOLD_BAND[0]) & (hertz <= _HOLD_BAND[1])].mean())
-            upper = hertz >= _WHITE_NOISE_SHARE * hertz[-1]
+            band_levels.append(density[(hertz >= _HOLD_BAND[0]) & (hertz <= _HOLD_BAND[1])].mean())
+            is_high = hertz >= _WHITE_NOISE_SHARE * hertz[-1]
             # Noise of single messages, differenced over a period, is amplified by this.
-            gain = (2.0 * np.sin(np.pi * hertz[upper] * period) / period) ** 2
-            white_levels.append((density[upper].mean(axis=1) / gain).mean())
-    if not in_band:
+            noise_gain = (2.0 * np.sin(np.pi * hertz[is_high] * period) / period) ** 2
+            noise_levels.append((density[is_high].mean(axis=1) / noise_gain).mean())
+    if not band_levels:
         return float("nan"), float("nan")
-    white_level = float(np.median(white_levels))
+    noise_level = float(np.median(noise_levels))
     # The noise of single messages belongs to the measurement, not to the motion.
     band_middle = 0.5 * (_HOLD_BAND[0] + _HOLD_BAND[1])
-    motion = max(float(np.median(in_band)) - white_level * (2.0 * np.pi * band_middle) ** 2, 0.0)
-    return float(np.sqrt(motion)), float(np.sqrt(white_level / (2.0 * period)))
+    motion_density = max(
+        float(np.median(band_levels)) - noise_level * (2.0 * np.pi * band_middle) ** 2, 0.0
+    )
+    return float(np.sqrt(motion_density)), float(np.sqrt(noise_level / (2.0 * period)))

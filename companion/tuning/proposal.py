@@ -10,30 +10,30 @@ from companion.tuning.margins import Margins
 from companion.tuning.search import Aims, Design, errors_to_tolerate, search
 
 _ANALYSED_MANEUVERS = ("hover",)
-"""The maneuvers that the analysis assumes: with `identify`, the gains in effect would be low."""
+"""Maneuvers that the analysis assumes; those of `identify` are flown with lower gains."""
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A proposed configuration, and what to expect of it."""
+    """A proposed configuration and its expected behaviour."""
 
     untuned: Config
-    """Configuration before."""
+    """The configuration without the proposed values."""
     tuned: Config
-    """Configuration with the proposal."""
+    """The configuration with the proposed values."""
     design: Design
     """The proposed values."""
     before: Expectation
-    """Expectation of `untuned`."""
+    """Expected behaviour of `untuned`."""
     after: Expectation
-    """Expectation of `tuned`."""
-    with_errors: tuple[tuple[ModelError, Margins], ...]
-    """Model errors of lag and dead time, each with the margins of `tuned` then."""
+    """Expected behaviour of `tuned`."""
+    margins_with_errors: tuple[tuple[ModelError, Margins], ...]
+    """Errors of lag and dead time, each with the margins that `tuned` has with this error."""
     disturbances: Disturbances
     """Disturbances of the vehicle."""
     aims: Aims
-    """Requirements of the search. The margins without model error reach at least 95 % of them; the
-    other requirements may be missed a little."""
+    """Requirements of the search. The margins without model error are at least 95 % of the required
+    ones; the other requirements may be missed a little."""
 
     @property
     def changes(self) -> dict[str, dict[str, float]]:
@@ -65,8 +65,8 @@ def propose(
 
     Args:
         config: the configuration to tune; `vehicle` must be identified.
-        disturbances: disturbances of the vehicle; None: the usual ones.
-        aims: requirements such as the margins to keep; None: the default ones.
+        disturbances: disturbances of the vehicle; None: the defaults of `Disturbances`.
+        aims: requirements such as the margins to keep; None: the defaults of `Aims`.
 
     Raises:
         ConfigError: lag and dead time are unknown, the analysis does not support planner or
@@ -78,21 +78,24 @@ def propose(
             "tune with the file that it writes"
         )
     disturbances, aims = disturbances or Disturbances(), aims or Aims()
-    flight = config.flight.model_copy(update={"maneuvers": _ANALYSED_MANEUVERS})
-    untuned = config.model_copy(update={"flight": flight})
+    analysed_flight = config.flight.model_copy(update={"maneuvers": _ANALYSED_MANEUVERS})
+    untuned = config.model_copy(update={"flight": analysed_flight})
     before = expectation(untuned, disturbances)
     design = search(untuned, disturbances, aims)
     tuned = design.applied(untuned)
     after = expectation(tuned, disturbances)
-    reached = after.margins
+    reached_margins = after.margins
     # The values are rounded after the search, which costs up to a twentieth of a margin.
     if (
-        not reached.stable
-        or min(reached.gain_db / aims.gain_db, reached.phase_deg / aims.phase_deg) < 0.95
+        not reached_margins.stable
+        or min(reached_margins.gain_db / aims.gain_db, reached_margins.phase_deg / aims.phase_deg)
+        < 0.95
     ):
         raise ConfigError(
             f"no values keep {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin with this "
             "vehicle; check vehicle.lag_ms and vehicle.dead_time_ms"
         )
-    errors = tuple((error, stability(tuned, error)) for error in errors_to_tolerate(tuned, aims))
-    return Proposal(untuned, tuned, design, before, after, errors, disturbances, aims)
+    margins_with_errors = tuple(
+        (error, stability(tuned, error)) for error in errors_to_tolerate(tuned, aims)
+    )
+    return Proposal(untuned, tuned, design, before, after, margins_with_errors, disturbances, aims)

@@ -13,15 +13,15 @@ from companion.tuning.loop import ModelError, control_loop
 from companion.tuning.margins import Margins, frequencies, margins
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
-"""First and last step of the search: changes of the natural logarithm of a value."""
+"""First and last step size of the search: change of the natural logarithm of a value."""
 _COST_OF_MISSED_AIM = 30.0
-"""Cost of a missed aim, times how far it is missed (`_shortfall`). The expected error costs
-its natural logarithm."""
+"""Weight of a shortfall (`_shortfall`) in the cost, which is added to the natural logarithm of the
+expected position error."""
 
 
 @dataclass(frozen=True, slots=True)
 class Aims:
-    """Requirements for a proposal; the search adds a penalty for each one that is missed."""
+    """Requirements for a proposal; the search adds a penalty for each missed requirement."""
 
     gain_db: float = 7.0
     """Smallest gain margin, dB."""
@@ -35,15 +35,15 @@ class Aims:
     mismatch_phase_deg: float = 15.0
     """Smallest phase margin when lag and dead time differ by the factor `mismatch`, degrees."""
     rate_share: float = 1.0
-    """Three standard deviations of the commanded roll-pitch rate may be at most this share of the
-    rate limit."""
+    """Largest share of the rate limit that three standard deviations of the commanded roll-pitch
+    rate may be."""
 
 
 class Design(NamedTuple):
-    """The values of the configuration that are searched."""
+    """Values of the configuration that the search chooses."""
 
     gain: float
-    """P of the planner, 1/s."""
+    """Gain p of the planner, 1/s."""
     position: float
     """Weight of the position in guidance, 1/s⁴."""
     velocity: float
@@ -52,7 +52,7 @@ class Design(NamedTuple):
     """Bandwidth of the motion observer, rad/s."""
 
     def applied(self, config: Config) -> Config:
-        """The configuration with these values."""
+        """Return `config` with these values."""
         weights = {
             "position_weight_per_s4": self.position,
             "velocity_weight_per_s2": self.velocity,
@@ -67,9 +67,9 @@ class Design(NamedTuple):
 
 
 _LARGEST_DESIGN = Design(20.0, 10000.0, 10000.0, 14.0)
-"""Largest values that are searched."""
+"""Upper bounds of the search."""
 _SMALLEST_DESIGN = Design(1.0, 0.01, 0.01, 0.3)
-"""Smallest values that are searched."""
+"""Lower bounds of the search."""
 _LARGEST_BANDWIDTH_SLEWING = 8.0
 """Largest bandwidth for a rate loop with a slew limit (ArduPilot), rad/s.
 
@@ -85,12 +85,12 @@ vehicle.
 
 
 def largest_gain(config: Config) -> float:
-    """The largest planner gain that is searched, 1/s: that of `check-config`, but at most 20."""
+    """Largest planner gain of the search, 1/s: the largest sensible gain, but at most 20."""
     return min(_LARGEST_DESIGN.gain, sensible_gain(config))
 
 
 def largest_design(config: Config) -> Design:
-    """The largest values that are searched for this vehicle."""
+    """Upper bounds of the search for this vehicle."""
     design = _LARGEST_DESIGN._replace(gain=largest_gain(config))
     if config.vehicle.axes["roll"].acceleration_limit is None:
         return design
@@ -115,7 +115,7 @@ def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
 def _best_near(
     config: Config, start: Design, disturbances: Disturbances, aims: Aims
 ) -> tuple[float, Design]:
-    """The cost and the values of the best design near `start`."""
+    """The best design that the search finds from `start`, with its cost."""
     largest = largest_design(config)
     best, step = Design(*map(min, start, largest)), _FIRST_STEP
     cost = _cost(config, best, disturbances, aims)
@@ -133,15 +133,16 @@ def _best_near(
 def _starts(config: Config) -> Iterator[Design]:
     """Three starts, because the pattern search finds only the nearest minimum.
 
-    Like the program's rule (`hold_settings.hold_weights`), they scale with the delay of the
-    attitude; their velocity weights are lower and their observers quicker than by this rule.
+    The starts scale with the delay of the attitude, as the default weights do
+    (`hold_settings.hold_weights`). Velocity weights are lower than the default and observers
+    quicker.
     """
-    for share, position, velocity, bandwidth in (
+    for gain_share, position, velocity, bandwidth in (
         (1.0, 1.0, 0.5, 2.0),
         (1.0, 0.9, 0.1, 2.7),
         (0.8, 1.4, 0.12, 3.5),
     ):
-        gain = share * largest_gain(config)
+        gain = gain_share * largest_gain(config)
         delay = attitude_delay(with_gain(config, gain))
         yield Design(gain, position / delay**4, velocity / delay**2, bandwidth / delay)
 
@@ -150,50 +151,52 @@ def _neighbours(design: Design, step: float, largest: Design) -> Iterator[Design
     """Designs that differ by one step in one or two values, clamped to the bounds."""
     up, down = exp(step), exp(-step)
     scales = [
-        *((1.0,) * k + (factor,) + (1.0,) * (3 - k) for k in range(4) for factor in (up, down)),
+        *((1.0,) * k + (ratio,) + (1.0,) * (3 - k) for k in range(4) for ratio in (up, down)),
         (1.0, up, 1.0, down), (1.0, down, 1.0, up), (up, down, 1.0, 1.0), (down, up, 1.0, 1.0),
         (up, 1.0, 1.0, down), (down, 1.0, 1.0, up),
     ]  # fmt: skip
     for scale in scales:
-        moved = Design(*(value * by for value, by in zip(design, scale, strict=True)))
-        yield Design(*map(max, _SMALLEST_DESIGN, map(min, largest, moved)))
+        neighbour = Design(*(value * factor for value, factor in zip(design, scale, strict=True)))
+        yield Design(*map(max, _SMALLEST_DESIGN, map(min, largest, neighbour)))
 
 
 def _cost(
     config: Config, design: Design, disturbances: Disturbances, aims: Aims, stop_at: float = inf
 ) -> float:
-    """Logarithm of the expected position error, plus a penalty for each missed aim.
+    """Logarithm of the expected position error, plus a penalty for each missed requirement.
 
     The computation stops when the cost reaches `stop_at`; the result is then a lower bound.
     """
     candidate = design.applied(config)
     s = frequencies()
     loop = control_loop(candidate, s)
-    expected = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
-    missed = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
-    missed += max(0.0, 3.0 * expected.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0)
-    cost = log(expected.position) + _COST_OF_MISSED_AIM * missed
+    expected_error = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
+    shortfall = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
+    shortfall += max(
+        0.0, 3.0 * expected_error.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0
+    )
+    cost = log(expected_error.position) + _COST_OF_MISSED_AIM * shortfall
     for error in errors_to_tolerate(candidate, aims):
         if cost >= stop_at:
             break
         loop = control_loop(candidate, s, error)
         share = _SLEWING_SHARE if error.delay else 1.0
-        needed = share * aims.mismatch_gain_db, share * aims.mismatch_phase_deg
-        cost += _COST_OF_MISSED_AIM * _shortfall(margins(s, loop.whole), *needed)
+        required_margins = share * aims.mismatch_gain_db, share * aims.mismatch_phase_deg
+        cost += _COST_OF_MISSED_AIM * _shortfall(margins(s, loop.gain_at_rate), *required_margins)
     return cost
 
 
 def errors_to_tolerate(config: Config, aims: Aims) -> list[ModelError]:
-    """Model errors with which the loop must keep margins: `Aims.mismatch`, and delay by slewing."""
+    """Model errors with which margins must remain: `Aims.mismatch`, and the delay by slewing."""
     errors = [ModelError(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
     return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors
 
 
 def _shortfall(actual: Margins, gain_db: float, phase_deg: float) -> float:
-    """How far the margins are missed, as the sum of their shortfalls in units of 6 dB and of 30°.
+    """Sum of the shortfalls of gain margin (in units of 6 dB) and phase margin (in units of 30°).
 
-    For an unstable loop: 1 plus the sum of its margins in these units.
+    For an unstable loop: 1 plus its distances from stability in these units.
     """
     if not actual.stable:
         return 1.0 + actual.gain_db / 6.0 + actual.phase_deg / 30.0

@@ -18,21 +18,21 @@ Flights = Mapping[str, tuple[CourseResult, CourseResult]]
 """Results of the flights before and with the proposal, by name of the course."""
 
 
-_WORSE_FACTOR, _WORSE_BY = 1.25, 0.01
-"""A course is flown worse if its true error grows by both this factor and this distance, m."""
+_WORSE_FACTOR, _WORSE_DISTANCE = 1.25, 0.01
+"""A course is flown worse if the true error grows by more than the factor and the distance, m."""
 
 
 def proposal_text(
     proposal: Proposal, vehicle: Path | Mapping[str, Any], flights: Flights, source: str
 ) -> str:
-    """The text of the proposal's file: what to expect, and the keys with their reasons.
+    """Text of the proposal's file: the expected behaviour, and the keys with their reasons.
 
     Args:
         proposal: the proposal.
-        vehicle: vehicle file to include, relative to the file; or a mapping with the section
-            `vehicle` itself.
+        vehicle: path of the vehicle file to include, relative to the proposal's file; or a mapping
+            with the section `vehicle`.
         flights: flights on the mock vehicle; empty if none was flown.
-        source: name of the source of the vehicle's values, for the reader.
+        source: text for the user: where the values of the vehicle come from.
     """
     lines = [f"# Proposed by `companion tune` for {source}.", "#"]
     lines += [f"# {line}".rstrip() for line in summary_lines(proposal, flights)]
@@ -49,7 +49,7 @@ def proposal_text(
 
 
 def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
-    """For the user: what to expect before and with the proposal, its rate use, and its flights."""
+    """Text for the user: expected behaviour before and with the proposal, rates, and flights."""
     before, after, aims = proposal.before, proposal.after, proposal.aims
     limit = degrees(proposal.tuned.limits.max_tilt_rate)
     warning = worse_sentence(flights)
@@ -64,7 +64,7 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
     ]
     lines += [
         f"margin {_error_text(error)}: {reached.sentence()}"
-        for error, reached in proposal.with_errors
+        for error, reached in proposal.margins_with_errors
     ]
     used_rate = 3.0 * degrees(after.errors.rate)
     lines.append(
@@ -81,20 +81,20 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         lines += [_flight_line(name, *pair) for name, pair in flights.items()]
     if flights and warning is None:
         percent = 100.0 * (_WORSE_FACTOR - 1.0)
-        lines.append(f"No course was flown worse by {percent:.0f} % and {_WORSE_BY:g} m.")
+        lines.append(f"No course was flown worse by {percent:.0f} % and {_WORSE_DISTANCE:g} m.")
     return lines
 
 
 def worse_sentence(flights: Flights) -> str | None:
-    """A warning if a test course failed or was flown worse with the proposal; else None."""
+    """A warning if a course failed or was flown worse with the proposal; else None."""
     failed_as_before: list[str] = []
-    worse: list[str] = []
+    worse_flights: list[str] = []
     for name, (before, after) in flights.items():
         if not after.ok:
-            (worse if before.ok else failed_as_before).append(f"{name} {after.result}")
-        elif after.true > max(_WORSE_FACTOR * before.true, before.true + _WORSE_BY):
-            worse.append(f"{name} {before.true:.3f} -> {after.true:.3f} m")
-    faults = [f"flew worse: {'; '.join(worse)}"] if worse else []
+            (worse_flights if before.ok else failed_as_before).append(f"{name} {after.result}")
+        elif after.true > max(_WORSE_FACTOR * before.true, before.true + _WORSE_DISTANCE):
+            worse_flights.append(f"{name} {before.true:.3f} -> {after.true:.3f} m")
+    faults = [f"flew worse: {'; '.join(worse_flights)}"] if worse_flights else []
     if failed_as_before:
         faults.append(f"failed as without it: {'; '.join(failed_as_before)}")
     if not faults:
@@ -105,8 +105,10 @@ def worse_sentence(flights: Flights) -> str | None:
 def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
     old, new = before.errors, after.errors
     return [
-        f"margins at the body rate: {before.whole.sentence()} -> {after.whole.sentence()}",
-        f"margins at the acceleration: {before.outer.sentence()} -> {after.outer.sentence()}",
+        f"margins at the body rate: {before.margins_at_rate.sentence()} -> "
+        f"{after.margins_at_rate.sentence()}",
+        f"margins at the acceleration: {before.margins_at_acceleration.sentence()} -> "
+        f"{after.margins_at_acceleration.sentence()}",
         f"position error by gusts {old.gusts:.3f} -> {new.gusts:.3f} m, on a path at 5 m/s "
         f"{old.path:.3f} -> {new.path:.3f} m, by noise {old.noise:.3f} -> {new.noise:.3f} m",
         f"after a gust that adds 1 m/s: {before.peak:.2f} -> {after.peak:.2f} m off, settled after "
@@ -135,20 +137,20 @@ def _flight_line(name: str, before: CourseResult, after: CourseResult) -> str:
 
 
 def _reasons(proposal: Proposal) -> dict[str, str]:
-    """The reason for the value of each key."""
+    """Reason for the proposed value, by key."""
     untuned, tuned, design = proposal.untuned, proposal.tuned, proposal.design
     limit, weights = largest_gain(tuned), hold_weights(untuned)
-    capped = design.gain > 0.97 * limit
-    slewing = slewing_delay(tuned)
-    if capped:
-        sensible = f"{LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)"
-        gain_reason = f"the largest sensible gain, {sensible} = {limit:.2f}"
+    is_capped = design.gain > 0.97 * limit
+    slewing_s = slewing_delay(tuned)
+    if is_capped:
+        formula = f"{LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)"
+        gain_reason = f"the largest sensible gain, {formula} = {limit:.2f}"
         if limit < sensible_gain(tuned):
             gain_reason = f"the largest gain that is searched, {limit:g}"
-    elif slewing:
+    elif slewing_s:
         gain_reason = (
             f"below {limit:.1f}, the largest sensible gain, because the rate loop needs "
-            f"{2e3 * slewing:.0f} ms to reach limits.max_tilt_rate_deg_s; tune again after "
+            f"{2e3 * slewing_s:.0f} ms to reach limits.max_tilt_rate_deg_s; tune again after "
             "a change of that limit"
         )
     else:

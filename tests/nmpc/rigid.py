@@ -78,7 +78,7 @@ def nodes_about(time, step=H):
 
 
 def assert_stays_on_its_reference(model, settings, time, states):
-    """Flatness, control and aim of a turning, climbing path: nothing is left to correct.
+    """Flatness, control and reference of a turning, climbing path: nothing is left to correct.
 
     The first `states` of the derivative are compared.
     """
@@ -91,16 +91,16 @@ def assert_stays_on_its_reference(model, settings, time, states):
     assert np.allclose(moved[:states], (after - before)[:states] / (2.0 * H), rtol=0.0, atol=1e-5)
     errors = ca.Function(
         "e",
-        [model.state, model.control, model.aim],
-        [ca.vertcat(model.heading_error, model.turning_error)],
+        [model.state, model.control, model.attitude_reference],
+        [ca.vertcat(model.heading_error, model.attitude_rate_error)],
     )
-    left = np.array(errors(here, control, model.aim_of(nodes[1]))).ravel()
+    left = np.array(errors(here, control, model.attitude_reference_of(nodes[1]))).ravel()
     assert np.allclose(left, np.zeros(4), rtol=0.0, atol=1e-9)
 
 
 def heading_error(model):
     """Of a level vehicle at 0.5 rad whose reference is level at 0.4 rad."""
     node = nodes_about(3.0)[1]._replace(heading=0.4, north=0.0, east=0.0)
-    error = ca.Function("e", [model.state, model.aim], [model.heading_error])
+    error = ca.Function("e", [model.state, model.attitude_reference], [model.heading_error])
     state = model.state_of(motion(POSITION, VELOCITY, Rotation.from_euler("Z", 0.5)))
-    return float(error(state, model.aim_of(node)))
+    return float(error(state, model.attitude_reference_of(node)))

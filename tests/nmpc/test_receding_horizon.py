@@ -79,13 +79,17 @@ def test_on_the_reference_the_plan_is_what_the_reference_takes():
 
 
 def test_the_cost_is_the_weighted_square_of_the_error_over_the_horizon_and_at_its_end():
-    weights = Weights(position=3.0, velocity=0.7, heading=1.1, turning=0.2, thrust=0.3, final=0.4)
+    weights = Weights(
+        position=3.0, velocity=0.7, heading=1.1, attitude_rate=0.2, thrust=0.3, final=0.4
+    )
     settings = Settings(weights=weights, horizon=0.8, steps=16, max_thrust=50.0)
     model, ahead = coefficient_model(settings), nodes(settings, STEADY)
     program = transcribe(model, settings)
     residual = ca.Function("r", [program.unknown, program.parameters], [program.residual])
     constants = model.constants_of(CONDITIONS, on_circle(STEADY))
-    parameters = parameters_of(constants, ahead, [model.aim_of(node) for node in ahead])
+    parameters = parameters_of(
+        constants, ahead, [model.attitude_reference_of(node) for node in ahead]
+    )
 
     def cost(plan):
         return np.sum(

@@ -109,10 +109,14 @@ def test_the_reduced_euler_model_aims_at_the_rates_of_its_angles():
         )[6:]
         for n in (before, after)
     ]
-    assert model.aim_of(here) == pytest.approx((angles[1] - angles[0]) / (2.0 * H), abs=1e-5)
-    assert model.control_of(here) == (*model.aim_of(here), here.thrust)
-    left = ca.Function("e", [model.control, model.aim], [model.turning_error])
-    assert np.array(left(model.control_of(here), model.aim_of(here))).ravel().tolist() == [0.0, 0.0]
+    assert model.attitude_reference_of(here) == pytest.approx(
+        (angles[1] - angles[0]) / (2.0 * H), abs=1e-5
+    )
+    assert model.control_of(here) == (*model.attitude_reference_of(here), here.thrust)
+    left = ca.Function("e", [model.control, model.attitude_reference], [model.attitude_rate_error])
+    assert np.array(
+        left(model.control_of(here), model.attitude_reference_of(here))
+    ).ravel().tolist() == [0.0, 0.0]
 
 
 @pytest.mark.parametrize("name", ["proposed", "euler", "quaternion"])

@@ -82,7 +82,7 @@ def measured(config, omega):
 @pytest.mark.parametrize("omega", [2.0, 6.0, 14.0])
 def test_guidance_and_planner_answer_as_the_formulas_say(name, omega):
     loop = control_loop(CONFIGS[name], np.array([1j * omega]))
-    ratio = measured(CONFIGS[name], omega) / (loop.whole / loop.rates)[0]
+    ratio = measured(CONFIGS[name], omega) / (loop.gain_at_rate / loop.rate_response)[0]
     # The vehicle holds the rates for half a sample, which the sinusoid does not.
     ratio *= np.exp(-0.5j * omega * DT)
     assert abs(ratio) == pytest.approx(1.0, abs=0.02)
@@ -102,7 +102,7 @@ def growth(config, **vehicle):
 @pytest.mark.parametrize("name", ["px4", "ardupilot"])
 def test_it_begins_to_oscillate_at_the_predicted_margins(name):
     s = frequencies()
-    found = margins(s, control_loop(CONFIGS[name], s).whole)
+    found = margins(s, control_loop(CONFIGS[name], s).gain_at_rate)
     assert found.stable
     assert growth(CONFIGS[name], rate_gain=10 ** ((found.gain_db - 1.2) / 20.0)) < 0.5
     assert growth(CONFIGS[name], rate_gain=10 ** ((found.gain_db + 1.2) / 20.0)) > 0.5
@@ -113,9 +113,9 @@ def test_it_begins_to_oscillate_at_the_predicted_margins(name):
 @pytest.mark.parametrize("name", ["px4", "ardupilot"])
 def test_beyond_the_margins_the_model_is_unstable(name):
     s, config = frequencies(), CONFIGS[name]
-    found = margins(s, control_loop(config, s).whole)
+    found = margins(s, control_loop(config, s).gain_at_rate)
     for share, stable in ((0.95, True), (1.05, False)):
         gain = 10 ** (share * found.gain_db / 20.0)
         errors = ModelError(gain=gain), ModelError(delay=share * found.delay)
         for error in errors:
-            assert margins(s, control_loop(config, s, error).whole).stable == stable
+            assert margins(s, control_loop(config, s, error).gain_at_rate).stable == stable

@@ -90,7 +90,7 @@ def test_a_vehicle_without_good_values_is_refused(monkeypatch):
         good.margins._replace(gain_db=0.94 * 7.0),
         good.margins._replace(phase_deg=0.94 * 31.0),
     ):
-        expected = replace(good, whole=margins, outer=margins)
+        expected = replace(good, margins_at_rate=margins, margins_at_acceleration=margins)
         monkeypatch.setattr("companion.tuning.proposal.expectation", lambda *_, e=expected: e)
         with pytest.raises(ConfigError, match=r"no values keep 7 dB and 31° of margin"):
             propose(VEHICLES["px4"])

@@ -44,8 +44,8 @@ def proposed(settings: Settings) -> Model:
     symbols = Symbols(size=9)
     return symbols.model(
         settings,
-        derivative=ca.vertcat(symbols.translation(settings), symbols.turning(settings)),
-        bounded=ca.SX(0, 1),
+        derivative=ca.vertcat(symbols.translation(settings), symbols.commanded_rates(settings)),
+        bounded_terms=ca.SX(0, 1),
         constants_of=_conditions_only,
     )
 
@@ -68,20 +68,20 @@ def euler(settings: Settings) -> Model:
         control=control,
         constants=constants,
         derivative=derivative,
-        aim=aim,
+        attitude_reference=aim,
         heading_error=yaw - aim[0],
-        turning_error=control[0:3] - aim[1:4],
+        attitude_rate_error=control[0:3] - aim[1:4],
         target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
         state_of=lambda motion: (
             *motion[:6],
             *_euler_near_heading(motion.north, motion.east, motion.heading),
         ),
-        aim_of=lambda node: (
+        attitude_reference_of=lambda node: (
             _euler_near_heading(node.north, node.east, node.heading)[2],
             *_body_rates(node),
         ),
         control_of=lambda node: (*_body_rates(node), node.thrust),
-        bounded=ca.SX(0, 1),
+        bounded_terms=ca.SX(0, 1),
         constants_of=_conditions_only,
     )
 
@@ -91,7 +91,7 @@ def euler_reduced(settings: Settings) -> Model:
 
     The controls are φ̇, θ̇ and the specific thrust; ω = M·(φ̇, θ̇, ψ̇) can be computed afterwards.
     """
-    state, control, constants = ca.SX.sym("x", 8), ca.SX.sym("u", 3), constants_symbols(own=1)
+    state, control, constants = ca.SX.sym("x", 8), ca.SX.sym("u", 3), constants_symbols(own_count=1)
     yaw = own_constant(constants)
     roll, pitch = state[6], state[7]
     axis = _thrust_axis(roll, pitch, yaw)
@@ -104,17 +104,17 @@ def euler_reduced(settings: Settings) -> Model:
         control=control,
         constants=constants,
         derivative=derivative,
-        aim=aim,
+        attitude_reference=aim,
         heading_error=ca.SX(0, 1),
-        turning_error=control[0:2] - aim,
+        attitude_rate_error=control[0:2] - aim,
         target=_led_target(state, derivative, axis[0:2], heading, control[2], settings),
         state_of=lambda motion: (
             *motion[:6],
             *_euler_near_heading(motion.north, motion.east, motion.heading)[:2],
         ),
-        aim_of=_angle_rates,
+        attitude_reference_of=_angle_rates,
         control_of=lambda node: (*_angle_rates(node), node.thrust),
-        bounded=ca.SX(0, 1),
+        bounded_terms=ca.SX(0, 1),
         constants_of=lambda conditions, start: (
             *conditions,
             _euler_near_heading(start.north, start.east, start.heading)[2],
@@ -146,22 +146,22 @@ def quaternion(settings: Settings) -> Model:
         control=control,
         constants=constants,
         derivative=derivative,
-        aim=aim,
+        attitude_reference=aim,
         # Twice the sine of half the heading error, which is smooth where an angle would jump.
         heading_error=2.0 * (z * aim[0] - w * aim[1]) / ca.sqrt(w * w + z * z),
-        turning_error=control[0:3] - aim[2:5],
+        attitude_rate_error=control[0:3] - aim[2:5],
         target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
         state_of=lambda motion: (
             *motion[:6],
             *attitude_of(motion.north, motion.east, motion.heading),
         ),
-        aim_of=lambda node: (
+        attitude_reference_of=lambda node: (
             cos(0.5 * node.heading),
             sin(0.5 * node.heading),
             *_body_rates(node),
         ),
         control_of=lambda node: (*_body_rates(node), node.thrust),
-        bounded=ca.SX(0, 1),
+        bounded_terms=ca.SX(0, 1),
         constants_of=_conditions_only,
     )
 
