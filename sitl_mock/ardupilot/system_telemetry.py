@@ -96,7 +96,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         return self._battery_status(
             dialect.MAV_BATTERY_FUNCTION_UNKNOWN,
             dialect.MAV_BATTERY_TYPE_UNKNOWN,
-            round(self._vehicle.battery.used_as / 3.6),
+            round(self._vehicle.battery.used_charge_a_s / 3.6),
             0,
         )
 

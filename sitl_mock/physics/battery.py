@@ -6,16 +6,16 @@ from sitl_mock.config.airframe import AirframeConfig, BatteryConfig
 
 
 class BatteryState(NamedTuple):
-    """Measurements of a power module."""
+    """State of the battery, as a power module measures it."""
 
     voltage_v: float
     current_a: float
-    remaining: float  # charge left, 0..1
-    used_as: float = 0.0  # charge drawn since the boot, A s
+    remaining: float  # remaining charge, 0..1
+    used_charge_a_s: float = 0.0  # charge drawn since boot, A s
 
 
 class Battery:
-    """Integrates the current. Voltage = open-circuit voltage (linear in the charge) - R I.
+    """Integrates the current. The voltage is the open-circuit voltage (linear in charge) minus R I.
 
     Attributes:
         state: measurements after the latest step.
@@ -24,9 +24,9 @@ class Battery:
 
     def __init__(self, config: BatteryConfig, airframe: AirframeConfig) -> None:
         self._config = config
-        self._capacity_as = config.capacity_ah * 3600.0
+        self._capacity_a_s = config.capacity_ah * 3600.0
         self._hover_thrust = airframe.mass_kg * airframe.gravity_m_s2
-        self._reference_v = (
+        self._full_hover_voltage = (
             config.cells * config.full_cell_v
             - (config.idle_current_a + config.hover_current_a) * config.resistance_ohm
         )
@@ -42,11 +42,11 @@ class Battery:
         """Draw the current of `thrust` (N), or a given current (A), for `dt` seconds."""
         config = self._config
         if current is None:
-            load = thrust / self._hover_thrust
-            current = config.idle_current_a + config.hover_current_a * load**1.5
-        drawn = current * dt
-        remaining = max(0.0, self.state.remaining - drawn / self._capacity_as)
-        cell = config.empty_cell_v + (config.full_cell_v - config.empty_cell_v) * remaining
-        voltage = max(0.0, config.cells * cell - config.resistance_ohm * current)
-        self.state = BatteryState(voltage, current, remaining, self.state.used_as + drawn)
-        self.thrust_factor = (voltage / self._reference_v) ** config.thrust_exponent
+            relative_thrust = thrust / self._hover_thrust
+            current = config.idle_current_a + config.hover_current_a * relative_thrust**1.5
+        charge = current * dt
+        remaining = max(0.0, self.state.remaining - charge / self._capacity_a_s)
+        cell_voltage = config.empty_cell_v + (config.full_cell_v - config.empty_cell_v) * remaining
+        voltage = max(0.0, config.cells * cell_voltage - config.resistance_ohm * current)
+        self.state = BatteryState(voltage, current, remaining, self.state.used_charge_a_s + charge)
+        self.thrust_factor = (voltage / self._full_hover_voltage) ** config.thrust_exponent

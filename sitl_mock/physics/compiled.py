@@ -1,8 +1,8 @@
-"""The vehicle's steps compiled by numba: the same source, and results that are equal to the bit.
+"""The vehicle's steps compiled by numba, from the same source; results are equal to the last bit.
 
-This is worth its cost for whole flights in one process. Importing this module takes half a second.
+Compiling pays off for whole flights in one process. Importing this module takes half a second.
 Compiling takes ten seconds, once for each version of the source on a computer. A compiled step
-costs a tenth of one in Python.
+costs a tenth of a step in Python.
 """
 
 import os
@@ -50,14 +50,18 @@ for _function in _COMPILED_FUNCTIONS:
 def _compiled(function: Callable[..., T]) -> Callable[..., T]:
     """Compile a function when it is first called, and keep the code for other processes.
 
-    numba notices a change only in the file of this function. So each version of the source has its
-    own folder for compiled code.
+    numba notices a change only in the file of `function`. So each version of the source has its own
+    folder for compiled code.
     """
     files = {each.__code__.co_filename for each in _COMPILED_FUNCTIONS} | {__file__}
-    version = sha256(b"".join(Path(file).read_bytes() for file in sorted(files))).hexdigest()[:16]
+    source_hash = sha256(b"".join(Path(file).read_bytes() for file in sorted(files))).hexdigest()[
+        :16
+    ]
     cache_home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     configured_folder = numba.config.CACHE_DIR  # NUMBA_CACHE_DIR
-    folder = (Path(configured_folder) if configured_folder else cache_home / "sitl_mock") / version
+    folder = (
+        Path(configured_folder) if configured_folder else cache_home / "sitl_mock"
+    ) / source_hash
     try:
         folder.mkdir(parents=True, exist_ok=True)
         numba.config.CACHE_DIR = str(folder)
@@ -69,29 +73,29 @@ def _compiled(function: Callable[..., T]) -> Callable[..., T]:
     return compiled
 
 
-def _load_and_store(kind: Any) -> tuple[Any, Any]:
+def _load_and_store(numba_type: Any) -> tuple[Any, Any]:
     """Return compiled functions that load and store a value of a numba type in an array of bytes.
 
-    The law and the state stay in such memory, because to pass one of them between Python and
-    compiled code costs as much as 20 steps.
+    Law and state stay in such an array, because passing one of them between Python and compiled
+    code costs as much as 20 steps.
     """
 
     def pointer(context: Any, builder: Any, array_type: Any, array: Any) -> Any:
         data = context.make_array(array_type)(context, builder, array).data
-        return builder.bitcast(data, context.get_value_type(kind).as_pointer())
+        return builder.bitcast(data, context.get_value_type(numba_type).as_pointer())
 
     def load(_context: Any, memory: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return builder.load(pointer(context, builder, signature.args[0], arguments[0]))
 
-        return kind(memory), generate
+        return numba_type(memory), generate
 
     def store(_context: Any, memory: Any, value: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             builder.store(arguments[1], pointer(context, builder, signature.args[0], arguments[0]))
             return context.get_dummy_value()
 
-        return numba.types.none(memory, kind), generate
+        return numba.types.none(memory, numba_type), generate
 
     return intrinsic(load), intrinsic(store)
 
@@ -118,8 +122,8 @@ def _read_state(state_memory: Any) -> Any:
 def _advance(
     law_memory: Any,
     state_memory: Any,
-    arrived: Any,
-    shaped: Any,
+    before_shaping: Any,
+    before_rate_loop: Any,
     history: Any,
     armed: bool,
     roll: float,
@@ -133,7 +137,7 @@ def _advance(
 ) -> Outcome:
     state = advance(
         _load_law(law_memory),
-        Rings(arrived, shaped),
+        Rings(before_shaping, before_rate_loop),
         history,
         _load_state(state_memory),
         ActuatorCommand(armed, roll, pitch, yaw, thrust),
@@ -159,12 +163,14 @@ _white_noise = _compiled(white_noise)
 
 
 class CompiledPlant:
-    """A vehicle whose steps and estimates are compiled; its arguments: see `Plant`."""
+    """A vehicle whose steps and estimates are compiled; `Plant` explains the arguments."""
 
     def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None:
         self.law, self._law_memory, self._state_memory = law, _memory_for(law), _memory_for(state)
         _store_start(self._law_memory, law, self._state_memory, state)
-        self._arrived, self._shaped = (np.array(ring) for ring in empty_rings(law.multirotor))
+        self._before_shaping, self._before_rate_loop = (
+            np.array(ring) for ring in empty_rings(law.multirotor)
+        )
         self._history = np.array([truth_row(state.body, state.position)] * history_length)
         self._state: VehicleState | None = state
         self._steps = state.steps
@@ -185,8 +191,8 @@ class CompiledPlant:
         return _advance(
             self._law_memory,
             self._state_memory,
-            self._arrived,
-            self._shaped,
+            self._before_shaping,
+            self._before_rate_loop,
             self._history,
             *command,
             *conditions,
@@ -194,14 +200,14 @@ class CompiledPlant:
         )
 
     def row_before(self, steps: int) -> TruthRow:
-        """Row of the history `steps` steps ago."""
+        """The true motion `steps` steps ago."""
         row: TruthRow = tuple(self._history[(self._steps - steps) % len(self._history)].tolist())
         return row
 
     def estimate(
         self, law: SensorLaw, state: SensorState, time: float, noise: Any
     ) -> tuple[Estimate, Vector]:
-        """The autopilot's estimate now: see `sensors.estimate`."""
+        """The present estimate of the autopilot: see `sensors.estimate`."""
         if state is not self._sensor_state:
             self._sensor_state = state
             _write_sensors(self._sensor_memory, (law, state))

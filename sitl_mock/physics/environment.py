@@ -9,7 +9,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, normalise
 
 
 class Wind:
-    """Wind with gusts. `velocity` is the air's (NED, m/s); each `step` advances time by `dt` s."""
+    """Wind with gusts, in steps of `dt` s. `velocity` is the velocity of the air, NED, m/s."""
 
     def __init__(self, config: WindConfig, dt: float, seed: int) -> None:
         direction = radians(config.from_deg)
@@ -17,7 +17,7 @@ class Wind:
         self._decay = exp(-dt / config.gust_time_s)
         self._gust_noise = config.gust_m_s * sqrt(1.0 - self._decay**2)
         self._vertical_gust_noise = config.vertical_gust_m_s * sqrt(1.0 - self._decay**2)
-        self._calm = config.gust_m_s == 0.0 and config.vertical_gust_m_s == 0.0
+        self._has_no_gusts = config.gust_m_s == 0.0 and config.vertical_gust_m_s == 0.0
         # A text seed gives the same numbers on every machine, independent of the other noises.
         self._random = Random(f"{seed}/wind")
         # Drawn from the stationary distribution, so that gusts do not start from zero.
@@ -34,8 +34,8 @@ class Wind:
         return (self._mean[0] + north, self._mean[1] + east, down)
 
     def step(self) -> None:
-        """Advance the gusts by one `dt`."""
-        if self._calm:
+        """Advance the gusts by `dt`."""
+        if self._has_no_gusts:
             return
         gauss, decay = self._random.gauss, self._decay
         north, east, down = self._gust
@@ -55,7 +55,7 @@ class GroundLaw(NamedTuple):
 
     crash_cosine: float  # cosine of the tilt above which a touchdown is a crash
     crash_speed: float  # sink speed above which a touchdown is a crash, m/s
-    levelling: float  # factor on the tilt in one step
+    levelling: float  # factor on the tilt in one step on the ground
 
 
 def ground_law(airframe: AirframeConfig, dt: float) -> GroundLaw:
@@ -70,11 +70,11 @@ def ground_law(airframe: AirframeConfig, dt: float) -> GroundLaw:
 def survives(law: GroundLaw, q: Quaternion, sink_speed: float) -> bool:
     """Whether a touchdown at this attitude and sink speed (m/s) does not count as a crash."""
     _, x, y, _ = q
-    upright = 1.0 - 2.0 * (x * x + y * y) >= law.crash_cosine
-    return upright and sink_speed <= law.crash_speed
+    is_upright = 1.0 - 2.0 * (x * x + y * y) >= law.crash_cosine
+    return is_upright and sink_speed <= law.crash_speed
 
 
 def levelled(law: GroundLaw, q: Quaternion) -> Quaternion:
-    """Return the attitude on the ground after one step of levelling; the heading stays."""
+    """Return the attitude on the ground after one step of levelling; the heading is kept."""
     w, x, y, z = q
     return normalise((w, x * law.levelling, y * law.levelling, z))

@@ -21,9 +21,9 @@ _STILL_AIR = Conditions(1.0, ZERO, ZERO)
 
 
 class Multirotor:
-    """The inner loop in fixed steps: each step is `drive`, then `move`.
+    """A multirotor with its rate loop, in fixed steps: each step is `drive`, then `move`.
 
-    It starts at rest, with rotors at a steady speed.
+    The multirotor starts at rest, with rotors at a steady speed.
 
     Args:
         airframe: body and rotors.
@@ -78,7 +78,7 @@ class Multirotor:
         """Run controller, allocation and rotors for one step in still air; return the load.
 
         Args:
-            setpoint: body rates, rad/s, FRD, as `multirotor_step.drive` takes them.
+            setpoint: body rates, rad/s, FRD; NaN and infinity as in `multirotor_step.drive`.
             throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
             controlled: whether the rate loop runs; otherwise it idles.
         """
@@ -98,5 +98,5 @@ class Multirotor:
 
     def move(self, load: Load) -> Vector:
         """Integrate one step under this load; return the displacement, NED, m."""
-        self.body, moved = move(self.law, self.body, load)
-        return moved
+        self.body, displacement = move(self.law, self.body, load)
+        return displacement

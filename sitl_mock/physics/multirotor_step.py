@@ -44,7 +44,7 @@ class MultirotorLaw(NamedTuple):
     body: Body
     rotors: RotorLaw
     rates: RateLaw
-    shapes: bool  # whether setpoints are shaped, by the law `shaping`
+    is_shaping: bool  # whether setpoints are shaped, by the law `shaping`
     shaping: ShapingLaw
 
 
@@ -57,12 +57,12 @@ shaping."""
 
 
 class Rings(NamedTuple):
-    """Rings of the latest setpoints, which delay them. Without shaping only ``shaped`` is used."""
+    """Ring buffers that delay setpoints; without shaping only `before_rate_loop` is used."""
 
-    arrived: Ring
-    """Setpoints before the shaping."""
-    shaped: Ring
-    """Setpoints before the rate loop."""
+    before_shaping: Ring
+    """Latest setpoints received, in front of the shaping."""
+    before_rate_loop: Ring
+    """Latest setpoints in front of the rate loop, after the shaping if there is one."""
 
 
 class Conditions(NamedTuple):
@@ -73,7 +73,7 @@ class Conditions(NamedTuple):
     wind: Vector
     """Velocity of the air, NED, m/s."""
     attitude_error: Vector
-    """Small rotation of the estimated attitude against the true one, rad, NED."""
+    """Small rotation from the true to the estimated attitude, rad, NED."""
 
 
 def multirotor_law(airframe: AirframeConfig, rate_loop: RateLoopConfig) -> MultirotorLaw:
@@ -106,7 +106,7 @@ def initial_actuation(law: MultirotorLaw, throttle: float) -> Actuation:
 
 
 def empty_rings(law: MultirotorLaw) -> Rings:
-    """Return rings of zero setpoints, longer than the delays."""
+    """Return ring buffers of zero setpoints, longer than the delays."""
     return Rings([ZERO] * (1 + max(law.shaping.delays)), [ZERO] * (1 + max(law.rates.delays)))
 
 
@@ -127,14 +127,14 @@ def drive(
     controlled: bool,
     conditions: Conditions,
 ) -> tuple[Load, Actuation]:
-    """Run controller, allocation and rotors for one step; return the load and their new state.
+    """Run controller, allocation and rotors for one step; return the load and the new actuation.
 
     Args:
         law: constants.
         rings: the latest setpoints; they are changed.
         actuation: state of controller and rotors before the step.
         body: motion before the step.
-        step: number of the step.
+        step: number of the step, one more with each call.
         setpoint: body rates, rad/s, FRD. NaN and infinity hold the present rate. If the setpoints
             are shaped, NaN holds the shaped rate, and infinity lets it grow without limit.
         throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
@@ -144,12 +144,12 @@ def drive(
     mixed, thrusts, axes, shaping = actuation
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
-    if law.shapes:
-        estimated = rotated_slightly(conditions.attitude_error, (w, x, y, z))
+    if law.is_shaping:
+        estimated_q = rotated_slightly(conditions.attitude_error, (w, x, y, z))
         setpoint, shaping = _shape_setpoint(
-            law, rings, shaping, estimated, step, setpoint, controlled
+            law, rings, shaping, estimated_q, step, setpoint, controlled
         )
-    setpoint = delayed(rings.shaped, law.rates.delays, step, setpoint)
+    setpoint = delayed(rings.before_rate_loop, law.rates.delays, step, setpoint)
     if controlled:
         _, tilt_saturated, yaw_saturated = mixed
         axes = rate_step(
@@ -181,9 +181,9 @@ def _shape_setpoint(
 
     If the rate loop does not run, the setpoint is returned unchanged.
     """
-    goals = delayed(rings.arrived, law.shaping.delays, step, setpoint)
+    delayed_setpoint = delayed(rings.before_shaping, law.shaping.delays, step, setpoint)
     if controlled:
-        return shape(law.shaping, state, goals, q)
+        return shape(law.shaping, state, delayed_setpoint, q)
     return setpoint, NOT_SHAPED
 
 
@@ -207,13 +207,13 @@ def _load(law: MultirotorLaw, wrench: Four, wind: Vector) -> Load:
 def move(law: MultirotorLaw, body: Kinematics, load: Load) -> tuple[Kinematics, Vector]:
     """Integrate one step under this load; return also the displacement, NED, m."""
     rate_hz = law.rate_hz
-    before = body[0]
-    vn, ve, vd, _, _, _, _, p, q, r = before
-    motion, moved = advance(before, load, law.body, law.rates.dt)
+    old_motion = body[0]
+    vn, ve, vd, _, _, _, _, p, q, r = old_motion
+    motion, displacement = advance(old_motion, load, law.body, law.rates.dt)
     new_vn, new_ve, new_vd, _, _, _, _, new_p, new_q, new_r = motion
     acceleration = ((new_vn - vn) * rate_hz, (new_ve - ve) * rate_hz, (new_vd - vd) * rate_hz)
     angular_acceleration = ((new_p - p) * rate_hz, (new_q - q) * rate_hz, (new_r - r) * rate_hz)
-    return (motion, acceleration, angular_acceleration), moved
+    return (motion, acceleration, angular_acceleration), displacement
 
 
 def sinks(law: MultirotorLaw, body: Kinematics, load: Load) -> bool:

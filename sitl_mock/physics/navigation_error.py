@@ -1,4 +1,4 @@
-"""The error of a navigation filter between two fixes: its parts, and their closed form (pure).
+"""The error of a navigation filter between two fixes: its parts in closed form (pure).
 
 Horizontal vectors are complex numbers, north + j east. The functions can be compiled.
 """
@@ -31,9 +31,9 @@ class ErrorState(NamedTuple):
 
     errors: Errors
     pending: tuple[complex, complex]
-    """Corrections of position and velocity that the output does not yet contain."""
+    """Corrections of position (m) and velocity (m/s) that the output does not yet contain."""
     noise: tuple[complex, complex]
-    """Noise of the latest fix: position and velocity."""
+    """Noise of the latest fix: position, m, and velocity, m/s."""
 
 
 class FilterState(NamedTuple):
@@ -42,10 +42,10 @@ class FilterState(NamedTuple):
     horizontal: ErrorState
     vertical: ErrorState
     yaw: float  # heading error, rad
-    yaw_pending: float  # part of `yaw` that the output does not yet contain, rad
+    pending_yaw: float  # part of `yaw` that the output does not yet contain, rad
     noiseless_yaw: float  # heading error without its noise, rad
-    sag: float  # slow error of the down position, m
-    sink: float  # slow error of the down velocity, m/s
+    down_error: float  # slow error of the down position, m
+    sink_error: float  # slow error of the down velocity, m/s
     height_noise: float  # slow noise that the height follows, m
     fused_at: float  # fusion time of the fix, s
     corrected_at: float  # time at which the fix corrected the errors, s
@@ -56,12 +56,12 @@ class FilterState(NamedTuple):
 class ErrorLaw(NamedTuple):
     """Constants of the errors between two fixes."""
 
-    lead: float  # s, position error per velocity, and velocity error per acceleration
+    lead: float  # position error per velocity, and velocity error per acceleration, s
     scale: float  # relative error of the acceleration
     tilt: complex  # constant rotation about north + j east, rad
-    height_offset: float  # m, true minus estimated height
-    predictor_ms: float  # time constant with which the output follows a correction
-    heading_predictor_ms: float  # the same for the heading
+    height_offset: float  # true minus estimated height, m
+    predictor_ms: float  # time constant with which the output follows a correction, ms
+    heading_predictor_ms: float  # the same for the heading, ms
 
 
 def extrapolated(errors: Errors, elapsed: float) -> Errors:
@@ -75,7 +75,10 @@ def extrapolated(errors: Errors, elapsed: float) -> Errors:
 
 
 def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
-    """Return the share of the latest corrections that the output does not contain at ``now``."""
+    """Return the share of the latest corrections that the output does not yet contain at ``now``.
+
+    ``predictor_ms`` is the time constant with which the output follows a correction.
+    """
     return exp((state.corrected_at - now) * 1e3 / predictor_ms)
 
 
@@ -116,7 +119,7 @@ def propagated_vertical(
 
 
 def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> ErrorVectors:
-    """Return the error at time ``now`` (s), when the true motion is ``truth`` (pure)."""
+    """Return the error of the estimate at time ``now`` (s); ``truth`` is the true motion (pure)."""
     elapsed = now - state.fused_at
     pending_part = pending_share(law.predictor_ms, state, now)
     yaw_pending_part = pending_share(law.heading_predictor_ms, state, now)
@@ -126,14 +129,18 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> 
     velocity += law.lead * complex(truth[13], truth[14]) - pending_part * pending[1]
     down, sink_rate, _ = propagated_vertical(law, state, truth, elapsed)
     pending = state.vertical.pending
-    down += law.height_offset + state.sag - pending_part * pending[0]
+    down += law.height_offset + state.down_error - pending_part * pending[0]
     return ErrorVectors(
         (position.real, position.imag, down.real),
-        (velocity.real, velocity.imag, (sink_rate - pending_part * pending[1]).real + state.sink),
+        (
+            velocity.real,
+            velocity.imag,
+            (sink_rate - pending_part * pending[1]).real + state.sink_error,
+        ),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (
             acceleration.imag / GRAVITY + law.tilt.real,
             -acceleration.real / GRAVITY + law.tilt.imag,
-            state.yaw - yaw_pending_part * state.yaw_pending,
+            state.yaw - yaw_pending_part * state.pending_yaw,
         ),
     )

@@ -21,23 +21,23 @@ from sitl_mock.physics.navigation_error import (
 )
 from sitl_mock.physics.rigid_body import GRAVITY
 
-_SAG_TIME_S = 2.0
-"""Time constant with which errors of height and climb follow the acceleration, s."""
+_SLOW_ERROR_TIME_S = 2.0
+"""Time constant with which errors of height and vertical speed follow the acceleration, s."""
 _MIN_COURSE_SPEED = 0.5
 """Smallest speed for which the turn rate of the course is computed, m/s; the course of a slower
 vehicle would seem to turn infinitely fast."""
 _COMPASS_TIME_S = 20.0
 """Time constant with which the heading follows the compass without acceleration, s."""
 _LARGEST_UNCERTAINTY = 0.1
-"""Uncertainty of the heading after a long time without acceleration, s^3/m^2. Times the squared
-acceleration it is the rate, 1/s, at which fixes correct the heading. Fixes reduce it as in a Kalman
+"""Uncertainty of the heading after a long time without acceleration, s^3/m^2. Fixes correct the
+heading at the rate uncertainty * acceleration^2, 1/s, and reduce the uncertainty, as in a Kalman
 filter."""
 _UNCERTAINTY_GROWTH = 0.0002
-"""Growth of the uncertainty, s^2/m^2."""
+"""Growth of the uncertainty of the heading per second, s^2/m^2."""
 
 
 class NavigationFilter:
-    """Computes the errors from fix to fix.
+    """Computes the errors of the navigation filter from fix to fix.
 
     Args:
         config: noise, delays and gains.
@@ -45,7 +45,7 @@ class NavigationFilter:
         seed: seed of the noise.
 
     Attributes:
-        law: constants between two fixes.
+        law: constants of the errors between two fixes.
         state: errors after the latest fix.
     """
 
@@ -76,7 +76,7 @@ class NavigationFilter:
         )
 
     def _initial(self, ratio: float) -> ErrorState:
-        """Return the errors after the first fix: its noise, scaled by `ratio`."""
+        """Return the errors after the first fix: the noise of the fix, scaled by `ratio`."""
         config, gauss = self._config, self._random.gauss
         sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
         noise = (
@@ -117,18 +117,18 @@ class NavigationFilter:
         vertical = self._corrected_state(errors, noise, noise, share * tilt_noise)
         noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
         yaw = self._next_yaw_noise() + noiseless_yaw
-        yaw_pending_part = pending_share(law.heading_predictor_ms, state, now)
-        yaw_pending = yaw_pending_part * state.yaw_pending + yaw - state.yaw
+        pending_yaw_part = pending_share(law.heading_predictor_ms, state, now)
+        pending_yaw = pending_yaw_part * state.pending_yaw + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
-        sag, sink = self._next_sag(abs(acceleration), height_noise, elapsed)
+        down_error, sink_error = self._next_slow_errors(abs(acceleration), height_noise, elapsed)
         corrected = FilterState(
             horizontal,
             vertical,
             yaw,
-            yaw_pending,
+            pending_yaw,
             noiseless_yaw,
-            sag,
-            sink,
+            down_error,
+            sink_error,
             height_noise,
             at,
             now,
@@ -176,22 +176,22 @@ class NavigationFilter:
         turn_rate = cross_product / max(abs(velocity) ** 2, _MIN_COURSE_SPEED**2)
         fix_rate = self._uncertainty * abs(acceleration) ** 2
         total_rate = compass_rate + fix_rate
-        drive = compass_rate * radians(config.compass_error_deg)
-        drive -= fix_rate * turn_rate * config.turn_yaw_ms * 1e-3
-        steady_error = drive / total_rate
+        numerator = compass_rate * radians(config.compass_error_deg)
+        numerator -= fix_rate * turn_rate * config.turn_yaw_ms * 1e-3
+        steady_error = numerator / total_rate
         uncertainty = self._uncertainty / (1.0 + fix_rate * elapsed)
         self._uncertainty = min(uncertainty + _UNCERTAINTY_GROWTH * elapsed, _LARGEST_UNCERTAINTY)
         return steady_error + (self.state.noiseless_yaw - steady_error) * exp(-total_rate * elapsed)
 
-    def _next_sag(
+    def _next_slow_errors(
         self, acceleration: float, height_noise: float, elapsed: float
     ) -> tuple[float, float]:
         """Return the slow errors of the down position (m) and velocity (m/s) at the next fix."""
-        config, state = self._config, self.state
-        sag = config.height_sag_s4_per_m * acceleration**2 + height_noise
-        sink = config.sink_per_acceleration_ms * 1e-3 * acceleration
-        share = 1.0 - exp(-elapsed / _SAG_TIME_S)
-        return state.sag + share * (sag - state.sag), state.sink + share * (sink - state.sink)
+        config, down, sink = self._config, self.state.down_error, self.state.sink_error
+        down_error = config.height_sag_s4_per_m * acceleration**2 + height_noise
+        sink_error = config.sink_per_acceleration_ms * 1e-3 * acceleration
+        share = 1.0 - exp(-elapsed / _SLOW_ERROR_TIME_S)
+        return down + share * (down_error - down), sink + share * (sink_error - sink)
 
     def _next_height_noise(self, elapsed: float) -> float:
         """Return the slow noise of the height at the next fix, m."""
@@ -218,13 +218,13 @@ class NavigationFilter:
     ) -> ErrorState:
         """Return the errors corrected by a fix whose own errors are `fix_errors`.
 
-        A random tilt error is added; `tilt_noise` is its standard deviation, m/s^2 of acceleration.
+        A random tilt error is added, with the standard deviation `tilt_noise`, m/s^2 (tilt * g).
         """
         position, velocity, tilt = errors
         innovations = fix_errors[0] - position, fix_errors[1] - velocity
         to_position, to_velocity, to_tilt = (
-            per_position * innovations[0] + per_velocity * innovations[1]
-            for per_position, per_velocity in self._gains
+            position_gain * innovations[0] + velocity_gain * innovations[1]
+            for position_gain, velocity_gain in self._gains
         )
         gauss = self._random.gauss
         random_walk = complex(gauss(0.0, tilt_noise), gauss(0.0, tilt_noise))

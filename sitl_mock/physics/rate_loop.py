@@ -10,7 +10,7 @@ from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 from sitl_mock.physics.quaternion import Vector
 
 AxisState = tuple[float, float]
-"""State of one axis, N m: its integral, and its filtered torque, which is the output."""
+"""State of one axis, N m: integral, and filtered torque, which is the output."""
 Axes = tuple[AxisState, AxisState, AxisState]
 """States of roll, pitch and yaw."""
 ZERO_STATE: Axes = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
@@ -62,18 +62,20 @@ def axis_step(
         setpoint: setpoint of the body rate, rad/s.
         rate: present body rate, rad/s.
         acceleration: present angular acceleration, rad/s^2.
-        saturated: the rotors could not give the last torque; the integral must not grow further in
-            its direction.
+        saturated: whether the rotors could not give the last torque; the integral must then not
+            grow further in the direction of that torque.
         dt: step, s.
     """
     proportional, integral_gain, feed_forward, damping, limit, filter_decay = law
-    integral, filtered = state
+    integral, torque = state
     error = setpoint - rate
-    if not (saturated and error * filtered > 0.0):
+    if not (saturated and error * torque > 0.0):
         integral += integral_gain * error * dt
         integral = limit if integral > limit else -limit if integral < -limit else integral
-    unfiltered = proportional * error + integral + feed_forward * setpoint - damping * acceleration
-    return integral, unfiltered + filter_decay * (filtered - unfiltered)
+    unfiltered_torque = (
+        proportional * error + integral + feed_forward * setpoint - damping * acceleration
+    )
+    return integral, unfiltered_torque + filter_decay * (torque - unfiltered_torque)
 
 
 class RateLaw(NamedTuple):
@@ -115,12 +117,12 @@ def rate_step(
 
     Args:
         law: constants.
-        axes: axes before the step.
+        axes: states of the axes before the step.
         setpoint: body rates, rad/s, FRD, already delayed.
         rates: present body rates, rad/s.
         accelerations: present angular accelerations, rad/s^2.
-        tilt_saturated: the rotors could not give the last torque about x and y.
-        yaw_saturated: the rotors could not give the last torque about z.
+        tilt_saturated: whether the rotors could not give the last torque about x and y.
+        yaw_saturated: whether the rotors could not give the last torque about z.
     """
     roll, pitch, yaw = setpoint
     p, q, r = rates

@@ -1,7 +1,7 @@
 """ArduPilot's shaping of body-rate setpoints.
 
-It limits the angular acceleration and integrates the rates to an attitude target. An attitude
-controller follows the target; its output is the setpoint of the rate loop.
+The shaping limits the angular acceleration and integrates the rates to an attitude target. An
+attitude controller follows the target; its output is the setpoint of the rate loop.
 """
 
 from math import atan2, copysign, inf, isnan, sqrt
@@ -12,8 +12,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 from sitl_mock.physics.rate_loop import Delays, delay_steps
 
 SqrtGains = tuple[float, float]
-"""Arguments of `sqrt_controller` for one axis: body rate per small angle, 1/s; limit of the
-deceleration, rad/s^2."""
+"""Arguments of `sqrt_controller` for one axis: gain, 1/s; limit of the deceleration, rad/s^2."""
 
 
 class ShapingState(NamedTuple):
@@ -45,8 +44,8 @@ def slew(goal: float, rate: float, limit: float) -> float:
 
 def rotated(q: Quaternion, rates: Vector, dt: float) -> Quaternion:
     """Return the attitude after `dt` s of body rates (rad/s), to within (rate dt)^3 / 12 rad."""
-    half = 0.5 * dt
-    return normalise(multiply(q, (1.0, half * rates[0], half * rates[1], half * rates[2])))
+    half_dt = 0.5 * dt
+    return normalise(multiply(q, (1.0, half_dt * rates[0], half_dt * rates[1], half_dt * rates[2])))
 
 
 def rotation_vector(q: Quaternion) -> Vector:
@@ -58,20 +57,20 @@ def rotation_vector(q: Quaternion) -> Vector:
 
 
 def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
-    """Return the rate that reduces an angle to zero, rad/s, as ArduPilot's sqrt_controller does.
+    """Return the rate that corrects an angle error, rad/s, as ArduPilot's sqrt_controller does.
 
-    For small angles it is proportional to the angle. For larger ones it is the rate that
-    `acceleration` brings to zero together with the angle.
+    For small errors the rate is proportional to the error. For larger ones it is the rate that
+    `acceleration` brings to zero together with the error. It has the sign of the error.
 
     Args:
-        angle: angle to reduce, rad.
-        gain: rate per small angle, 1/s.
+        angle: angle error, rad.
+        gain: rate per error, if the error is small, 1/s.
         acceleration: limit of the deceleration, rad/s^2.
     """
-    linear = acceleration / (gain * gain) if gain > 0.0 else inf
-    if abs(angle) <= linear:
+    linear_range = acceleration / (gain * gain) if gain > 0.0 else inf
+    if abs(angle) <= linear_range:
         return gain * angle
-    return copysign(sqrt(2.0 * acceleration * (abs(angle) - 0.5 * linear)), angle)
+    return copysign(sqrt(2.0 * acceleration * (abs(angle) - 0.5 * linear_range)), angle)
 
 
 class ShapingLaw(NamedTuple):
@@ -118,7 +117,7 @@ def shape(
     Args:
         law: constants.
         state: state before the step; if it is not active, the attitude target starts at `q`.
-        goals: body rates, rad/s, already delayed; NaN holds the shaped rate, infinity grows
+        goals: body rates, rad/s, already delayed. NaN holds the shaped rate; with infinity it grows
             without limit.
         q: present attitude.
 
@@ -126,21 +125,21 @@ def shape(
         The setpoint of the rate loop, rad/s, FRD, and the state after the step.
     """
     max_change = law.max_change
-    before = state.rates
+    old_rates = state.rates
     rates = (
-        slew(goals[0], before[0], max_change[0]),
-        slew(goals[1], before[1], max_change[1]),
-        slew(goals[2], before[2], max_change[2]),
+        slew(goals[0], old_rates[0], max_change[0]),
+        slew(goals[1], old_rates[1], max_change[1]),
+        slew(goals[2], old_rates[2], max_change[2]),
     )
     target = rotated(state.target if state.active else q, rates, law.dt)
     w, x, y, z = target
     body_in_target = multiply((w, -x, -y, -z), q)  # attitude of the body in the frame of the target
-    turn_x, turn_y, turn_z = rotation_vector(body_in_target)
+    angle_x, angle_y, angle_z = rotation_vector(body_in_target)
     roll, pitch, yaw = to_body(body_in_target, rates)
-    for_roll, for_pitch, for_yaw = law.sqrt_gains
+    roll_gains, pitch_gains, yaw_gains = law.sqrt_gains
     setpoint = (
-        roll - sqrt_controller(turn_x, for_roll[0], for_roll[1]),
-        pitch - sqrt_controller(turn_y, for_pitch[0], for_pitch[1]),
-        yaw - sqrt_controller(turn_z, for_yaw[0], for_yaw[1]),
+        roll - sqrt_controller(angle_x, roll_gains[0], roll_gains[1]),
+        pitch - sqrt_controller(angle_y, pitch_gains[0], pitch_gains[1]),
+        yaw - sqrt_controller(angle_z, yaw_gains[0], yaw_gains[1]),
     )
     return setpoint, ShapingState(True, rates, target)

@@ -16,7 +16,7 @@ Load = tuple[float, float, float, float, float, float, float]
 """(specific thrust [m/s^2], torque x, y, z [N m, FRD], wind n, e, d [m/s])."""
 
 GRAVITY = 9.80665
-"""Standard gravity, m/s^2: autopilots and their filters assume it, whatever the airframe's is."""
+"""Standard gravity, m/s^2, which autopilots assume; `Body.gravity` may differ."""
 NO_AXIS_DRAG = 0.0, 0.0, 0.0
 """Coefficients of a body that has no drag along its own axes."""
 
@@ -125,28 +125,28 @@ def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, 
     b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = k2
     c0, c1, c2, c3, c4, c5, c6, c7, c8, c9 = k3
     d0, d1, d2, d3, d4, d5, d6, d7, d8, d9 = k4
-    sixth = dt / 6.0
+    sixth_dt = dt / 6.0
     displacement = (
-        dt * (vn + sixth * (a0 + b0 + c0)),
-        dt * (ve + sixth * (a1 + b1 + c1)),
-        dt * (vd + sixth * (a2 + b2 + c2)),
+        dt * (vn + sixth_dt * (a0 + b0 + c0)),
+        dt * (ve + sixth_dt * (a1 + b1 + c1)),
+        dt * (vd + sixth_dt * (a2 + b2 + c2)),
     )
-    w += sixth * (a3 + 2.0 * (b3 + c3) + d3)
-    x += sixth * (a4 + 2.0 * (b4 + c4) + d4)
-    y += sixth * (a5 + 2.0 * (b5 + c5) + d5)
-    z += sixth * (a6 + 2.0 * (b6 + c6) + d6)
+    w += sixth_dt * (a3 + 2.0 * (b3 + c3) + d3)
+    x += sixth_dt * (a4 + 2.0 * (b4 + c4) + d4)
+    y += sixth_dt * (a5 + 2.0 * (b5 + c5) + d5)
+    z += sixth_dt * (a6 + 2.0 * (b6 + c6) + d6)
     # The norm drifts by less than 1e-9 a step, so one Newton step of 1/sqrt is exact enough.
     scale = 1.5 - 0.5 * (w * w + x * x + y * y + z * z)
-    moved = (
-        vn + sixth * (a0 + 2.0 * (b0 + c0) + d0),
-        ve + sixth * (a1 + 2.0 * (b1 + c1) + d1),
-        vd + sixth * (a2 + 2.0 * (b2 + c2) + d2),
+    new_motion = (
+        vn + sixth_dt * (a0 + 2.0 * (b0 + c0) + d0),
+        ve + sixth_dt * (a1 + 2.0 * (b1 + c1) + d1),
+        vd + sixth_dt * (a2 + 2.0 * (b2 + c2) + d2),
         w * scale,
         x * scale,
         y * scale,
         z * scale,
-        p + sixth * (a7 + 2.0 * (b7 + c7) + d7),
-        q + sixth * (a8 + 2.0 * (b8 + c8) + d8),
-        r + sixth * (a9 + 2.0 * (b9 + c9) + d9),
+        p + sixth_dt * (a7 + 2.0 * (b7 + c7) + d7),
+        q + sixth_dt * (a8 + 2.0 * (b8 + c8) + d8),
+        r + sixth_dt * (a9 + 2.0 * (b9 + c9) + d9),
     )
-    return moved, displacement
+    return new_motion, displacement

@@ -22,7 +22,7 @@ class Mix(NamedTuple):
 
 
 STOPPED = Mix((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
-"""Rotors off: they give no torque."""
+"""Result of the allocation while the rotors are off and give no torque."""
 
 
 def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
@@ -37,25 +37,25 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
         yaw: the same for body z.
     """
     demand = abs(roll) + abs(pitch)
-    room = throttle if throttle < 0.5 else 0.5
-    tilt_saturated = demand > room
+    headroom = throttle if throttle < 0.5 else 0.5
+    tilt_saturated = demand > headroom
     if tilt_saturated:
-        scale = room / demand
+        scale = headroom / demand
         roll *= scale
         pitch *= scale
-        demand = room
+        demand = headroom
     remaining = 1.0 - demand
     throttle = remaining if remaining < throttle else throttle
     # One diagonal has pitch - roll and +yaw, the other pitch + roll and -yaw.
     largest_rise, largest_fall = abs(pitch - roll), abs(pitch + roll)
     if yaw < 0.0:
         largest_rise, largest_fall = largest_fall, largest_rise
-    room_above, room_below = 1.0 - throttle - largest_rise, throttle - largest_fall
-    room = room_below if room_below < room_above else room_above
-    yaw_saturated = abs(yaw) > room
+    headroom_above, headroom_below = 1.0 - throttle - largest_rise, throttle - largest_fall
+    headroom = headroom_below if headroom_below < headroom_above else headroom_above
+    yaw_saturated = abs(yaw) > headroom
     if yaw_saturated:
-        room = max(room, 0.0)
-        yaw = room if yaw > 0.0 else -room
+        headroom = max(headroom, 0.0)
+        yaw = headroom if yaw > 0.0 else -headroom
     return Mix(
         (
             throttle - roll + pitch + yaw,
@@ -75,9 +75,9 @@ class RotorLaw(NamedTuple):
     offset: float  # N, thrust of this line at throttle 0
     low_slope: float  # N per throttle, below `linear_from`
     linear_from: float  # throttle
-    decay: float  # of the lag in one step
-    arm: float  # m
-    drag_ratio: float  # m
+    decay: float  # factor of the lag in one step
+    arm: float  # lever of a rotor about body x and y, m
+    drag_ratio: float  # torque about body z per thrust, m
 
 
 def rotor_law(airframe: AirframeConfig, dt: float) -> RotorLaw:
@@ -120,8 +120,8 @@ def rotor_step(
 
     Args:
         law: the rotors.
-        thrusts: thrusts of each rotor before the step, N.
-        throttles: 0..1 each.
+        thrusts: thrust of each rotor before the step, N.
+        throttles: throttle of each rotor, 0..1.
         thrust_factor: factor of the battery voltage on the thrust of every rotor.
 
     Returns:
@@ -131,14 +131,14 @@ def rotor_step(
     t0, t1, t2, t3 = throttles
     old0, old1, old2, old3 = thrusts
     decay = law.decay
-    goal = thrust_factor * steady_thrust(law, t0)
-    new0 = goal + decay * (old0 - goal)
-    goal = thrust_factor * steady_thrust(law, t1)
-    new1 = goal + decay * (old1 - goal)
-    goal = thrust_factor * steady_thrust(law, t2)
-    new2 = goal + decay * (old2 - goal)
-    goal = thrust_factor * steady_thrust(law, t3)
-    new3 = goal + decay * (old3 - goal)
+    steady = thrust_factor * steady_thrust(law, t0)
+    new0 = steady + decay * (old0 - steady)
+    steady = thrust_factor * steady_thrust(law, t1)
+    new1 = steady + decay * (old1 - steady)
+    steady = thrust_factor * steady_thrust(law, t2)
+    new2 = steady + decay * (old2 - steady)
+    steady = thrust_factor * steady_thrust(law, t3)
+    new3 = steady + decay * (old3 - steady)
     f0 = 0.5 * (old0 + new0)
     f1 = 0.5 * (old1 + new1)
     f2 = 0.5 * (old2 + new2)

@@ -36,7 +36,7 @@ _ESTIMATES_PER_DRAW = 16
 
 
 class Estimate(NamedTuple):
-    """The autopilot's estimate. SI; world NED (origin: where it booted), body FRD."""
+    """The autopilot's estimate. SI; world NED (origin: position at boot), body FRD."""
 
     q: Quaternion
     body_rates: Vector  # rad/s, what the gyro measures
@@ -53,8 +53,8 @@ class SensorLaw(NamedTuple):
     rate_delay: int  # steps
     position_delay: int  # steps
     dt: float  # length of a step, s
-    filtered: bool  # whether there is a navigation filter, whose law is `errors`
-    errors: ErrorLaw
+    has_filter: bool  # whether there is a navigation filter, with the law `filter_law`
+    filter_law: ErrorLaw
     yaw_rate_bias: float  # rad/s
 
 
@@ -89,30 +89,32 @@ def estimate(
     time: float,
     noise: Sequence[float],
 ) -> tuple[Estimate, Vector]:
-    """Return the estimate now, and the rotation of its attitude by the filter's error (pure).
+    """Return the present estimate, and the filter's attitude error in it, rad, NED (pure).
 
     Args:
         law: constants.
         state: errors after the latest fix, and all resets.
         history: the true motion of the latest steps.
         steps: steps since boot.
-        time: now, s.
+        time: present time, s.
         noise: 15 numbers, three each for attitude, rates, position, velocity and force.
     """
     attitude_row = history[(steps - law.attitude_delay) % len(history)]
     position_row = history[(steps - law.position_delay) % len(history)]
-    if law.filtered:
-        error = error_at(law.errors, state.filter, position_row, time - law.position_delay * law.dt)
+    if law.has_filter:
+        error = error_at(
+            law.filter_law, state.filter, position_row, time - law.position_delay * law.dt
+        )
     else:
         error = NO_ERRORS
     q = (attitude_row[3], attitude_row[4], attitude_row[5], attitude_row[6])
     fx, fy, fz = to_body(q, (attitude_row[13], attitude_row[14], attitude_row[15] - law.gravity))
-    tilted = multiply(state.yaw, rotated_slightly(error.rotation, q))
+    attitude_estimate = multiply(state.yaw, rotated_slightly(error.rotation, q))
     rate_row = history[(steps - law.rate_delay) % len(history)]
     yaw_rate = rate_row[9] + law.yaw_rate_bias + noise[5]
     position, velocity, offset = error.position, error.velocity, state.offset
-    estimated = Estimate(
-        normalise(multiply(tilted, (1.0, noise[0], noise[1], noise[2]))),
+    new_estimate = Estimate(
+        normalise(multiply(attitude_estimate, (1.0, noise[0], noise[1], noise[2]))),
         (rate_row[7] + noise[3], rate_row[8] + noise[4], yaw_rate),
         (
             position_row[10] + position[0] + offset[0] + noise[6],
@@ -126,7 +128,7 @@ def estimate(
         ),
         (fx + noise[12], fy + noise[13], fz + noise[14]),
     )
-    return estimated, error.rotation
+    return new_estimate, error.rotation
 
 
 class Estimator:
@@ -184,12 +186,12 @@ class Estimator:
             ErrorLaw(0.0, 0.0, 0j, 0.0, 0.0, 0.0) if filter_ is None else filter_.law,
             0.0 if config.ekf is None else radians(config.ekf.yaw_rate_bias_deg_s),
         )
-        horizon = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
-        self._fusion_delay = max(horizon, self.law.position_delay)
+        fix_delay = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
+        self._fusion_delay = max(fix_delay, self.law.position_delay)
         self.history_length = 1 + max(self.law.rate_delay, self._fusion_delay)
         self._filter = filter_
-        first = _NO_FILTER if filter_ is None else filter_.state
-        self.state = SensorState(first, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        filter_state = _NO_FILTER if filter_ is None else filter_.state
+        self.state = SensorState(filter_state, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._random = Random(f"{seed}/sensors")
         self._make_noise = make_noise
         self._noise: Sequence[float] = ()
@@ -198,7 +200,7 @@ class Estimator:
         self.reset_counter = 0
 
     def shift(self, *, yaw: float = 0.0, position_ned: Vector = (0.0, 0.0, 0.0)) -> None:
-        """Reset the estimator: the estimate jumps by this yaw (rad) and position (NED, m)."""
+        """Reset the estimator: the estimate jumps by `yaw` (rad) and `position_ned` (m)."""
         n, e, d = self.state.offset
         self.state = self.state._replace(
             yaw=multiply(from_yaw(yaw), self.state.yaw),
@@ -210,16 +212,16 @@ class Estimator:
         """Correct the errors if a fix of the navigation filter is due.
 
         Args:
-            time: now, s.
+            time: present time, s.
             row_before: returns the true motion k steps ago, for k below `history_length`.
         """
-        fused = time - self._fusion_delay * self.law.dt
-        if self._filter is not None and self._filter.is_due(fused):
-            self._filter.advance(row_before(self._fusion_delay), fused, row_before(0), time)
+        fusion_time = time - self._fusion_delay * self.law.dt
+        if self._filter is not None and self._filter.is_due(fusion_time):
+            self._filter.advance(row_before(self._fusion_delay), fusion_time, row_before(0), time)
             self.state = self.state._replace(filter=self._filter.state)
 
     def draw(self) -> Sequence[float]:
-        """Return fresh noise for one estimate, 15 numbers."""
+        """Return new white noise for one estimate, 15 numbers."""
         count, begin = len(self._deviations), self._noise_used
         if begin == len(self._noise):
             random = self._random.random

@@ -37,7 +37,7 @@ SLOW_STEP_S = 0.01
 
 
 class TruthState(NamedTuple):
-    """The true state. SI; world NED (origin: where it booted), body FRD."""
+    """The true state. SI; world NED (origin: position at boot), body FRD."""
 
     time: float  # s since boot
     position_ned: Vector
@@ -121,7 +121,7 @@ class Vehicle:
         """The true state after the latest step."""
         _, body, actuation, position, on_ground, crashed, touchdown_speed = self.plant.state
         motion, acceleration, _ = body
-        mixed, thrusts, _, _ = actuation
+        mix, thrusts, _, _ = actuation
         vn, ve, vd, w, x, y, z, p, q, r = motion
         return TruthState(
             self.time,
@@ -134,7 +134,7 @@ class Vehicle:
             crashed,
             touchdown_speed,
             thrusts,
-            mixed.throttles,
+            mix.throttles,
         )
 
     @property
@@ -151,7 +151,7 @@ class Vehicle:
         return steady_throttle(self._multirotor, specific_thrust)
 
     def estimate(self) -> Estimate:
-        """Return the autopilot's estimate now; every call draws fresh noise."""
+        """Return the autopilot's present estimate; every call draws new noise."""
         estimator, time = self.estimator, self.time
         estimator.correct(time, self.plant.row_before)
         estimate, estimator.rotation = self.plant.estimate(
@@ -165,10 +165,10 @@ class Vehicle:
 
         The attitude target is in the frame of the estimate, with all resets of its heading.
         """
-        *_, shaped = self.plant.state.actuation
-        if not shaped.active:
+        *_, shaping = self.plant.state.actuation
+        if not shaping.active:
             return None
-        return shaped._replace(target=multiply(self.estimator.state.yaw, shaped.target))
+        return shaping._replace(target=multiply(self.estimator.state.yaw, shaping.target))
 
     def step(self, command: ActuatorCommand, count: int = 1) -> None:
         """Advance by `count` physics steps under one command."""

@@ -28,9 +28,9 @@ from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate
 class ActuatorCommand(NamedTuple):
     """Setpoint of the rate loop and the rotors.
 
-    Rates in rad/s, body FRD, without limit. NaN and infinity hold the present rate in PX4's rate
-    loop; in ArduPilot's NaN holds the shaped rate, and with infinity it grows without limit.
-    Thrust 0..1; NaN or <= 0 = none, above 1 = full.
+    Rates in rad/s, body FRD, without limit. In PX4's rate loop, NaN and infinity hold the present
+    rate. In ArduPilot's, NaN holds the shaped rate; with infinity that rate grows without limit.
+    Thrust 0..1; NaN or <= 0 stops the rotors, values above 1 mean 1.
     """
 
     armed: bool
@@ -133,9 +133,9 @@ def _move_or_rest(
     if on_ground and sinks(multirotor, body, load):
         body = at_rest(levelled(ground, (w, x, y, z)))
         return body, position, on_ground, crashed, touchdown_speed
-    body, moved = move(multirotor, body, load)
+    body, displacement = move(multirotor, body, load)
     north, east, down = position
-    position = (north + moved[0], east + moved[1], down + moved[2])
+    position = (north + displacement[0], east + displacement[1], down + displacement[2])
     _, _, sink_speed, w, x, y, z, _, _, _ = body[0]
     if position[2] >= 0.0 and sink_speed > 0.0:
         crashed = not survives(ground, (w, x, y, z), sink_speed)
@@ -180,13 +180,13 @@ class Plant(Protocol):
         ...
 
     def row_before(self, steps: int) -> TruthRow:
-        """Row of the history `steps` steps ago."""
+        """The true motion `steps` steps ago."""
         ...
 
     def estimate(
         self, law: SensorLaw, state: SensorState, time: float, noise: Sequence[float]
     ) -> tuple[Estimate, Vector]:
-        """The autopilot's estimate now: see `sensors.estimate`."""
+        """The present estimate of the autopilot: see `sensors.estimate`."""
         ...
 
     @staticmethod
@@ -196,7 +196,7 @@ class Plant(Protocol):
 
 
 class PythonPlant:
-    """A vehicle whose steps and estimates are computed in Python; its arguments: see `Plant`."""
+    """A vehicle whose steps and estimates are computed in Python; for the arguments see `Plant`."""
 
     def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None:
         self.state = state
@@ -212,13 +212,13 @@ class PythonPlant:
         return outcome(self.state)
 
     def row_before(self, steps: int) -> TruthRow:
-        """Row of the history `steps` steps ago."""
+        """The true motion `steps` steps ago."""
         return self._history[(self.state.steps - steps) % len(self._history)]
 
     def estimate(
         self, law: SensorLaw, state: SensorState, time: float, noise: Sequence[float]
     ) -> tuple[Estimate, Vector]:
-        """The autopilot's estimate now: see `sensors.estimate`."""
+        """The present estimate of the autopilot: see `sensors.estimate`."""
         return estimate(law, state, self._history, self.state.steps, time, noise)
 
     @staticmethod
