@@ -40,7 +40,7 @@ class PluginPlanner:
             roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
             finite = isfinite(roll) and isfinite(pitch) and isfinite(yaw)
         if not finite:
-            raise InvalidRatesError(f"the planner returned {(roll, pitch, yaw)}")
+            raise InvalidRatesError(f"the planner returned {(roll, pitch, yaw)}, not finite rates")
         return BodyRates(*limit_rates(roll, pitch, yaw, self._tilt_rate, self._yaw_rate))
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:

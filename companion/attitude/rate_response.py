@@ -12,7 +12,7 @@ FIRST_ORDER_SHARE = 0.63
 """Share of the lag of PX4's second-order response that is the lag of the closest first-order model;
 the rest of the lag acts nearly like a dead time."""
 SHARE_OF_LARGEST_GAIN = 0.25
-"""The feedback gain is at most this share of the largest stable gain: a gain margin of 4."""
+"""Largest feedback gain, as a share of the largest stable gain: a gain margin of 4."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,12 +46,12 @@ def rates_along(
 
 
 def model_lag(gain: float, lag: float) -> float:
-    """τ of the model, s: the lag of the rate loop, but at least 0.25/p (critical damping)."""
+    """τ of `ReferenceModel`, s: lag of the rate loop, but at least 0.25/p (critical damping)."""
     return max(0.25 / gain, lag)
 
 
 def braking_lead(gain: float, lag: float) -> float:
-    """κ of the model, s: how far ahead the model brakes, so that it overshoots by 1 % at most.
+    """κ of `ReferenceModel`, s: how far ahead the model brakes, to overshoot by 1 % at most.
 
     The damping of τ·c̈ + (1 + p·κ)·ċ + p·c is then 0.82, or more if κ is 0.
     """

@@ -22,7 +22,7 @@ from companion.attitude.types import (
 NORM_TOLERANCE = 1e-3
 """Largest deviation of a quaternion's norm from 1."""
 _LARGEST_BODY_RATE = 100.0
-"""A measured body rate above this is implausible, rad/s."""
+"""Largest plausible body rate of a measurement, rad/s."""
 
 
 def is_unit(q: Quaternion) -> bool:

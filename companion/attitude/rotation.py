@@ -11,7 +11,7 @@ from companion.attitude.types import Quaternion
 TWO_PI = 2.0 * pi
 
 _SMALL_ANGLE = 1e-12
-"""Below this half angle h (rad), sin(h)/h is 1 to double precision."""
+"""Half angle h, rad, below which sin(h)/h is 1 to double precision."""
 
 
 def attitude_of(north: float, east: float, heading: float) -> Quaternion:
@@ -55,9 +55,9 @@ def angle_per_sine(w: float, sine: float) -> float:
     return 2.0 * atan2(sine, w) / sine
 
 
-def cos_and_sinc(square: float) -> tuple[float, float]:
+def cos_and_sinc(h_squared: float) -> tuple[float, float]:
     """cos(h) and sin(h)/h of an angle h in rad, given as h²."""
-    h = sqrt(square)
+    h = sqrt(h_squared)
     return cos(h), sin(h) / h if h > _SMALL_ANGLE else 1.0
 
 

@@ -18,7 +18,7 @@ from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
 
 _UNIT_TOLERANCE = 1e-14
-"""A quaternion whose squared norm is this close to 1 is not normalised again."""
+"""Largest deviation of a squared norm from 1 at which a quaternion is not normalised again."""
 
 
 def as_rows(values: ArrayLike, name: str) -> Array:

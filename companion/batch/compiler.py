@@ -32,7 +32,7 @@ class Compiler:
             import numba  # noqa: PLC0415  optional, and slow to import
 
             self._compiled[function] = numba.njit(
-                self._rebuilt(function), forceinline=True, **_OPTIONS
+                self._rebuild(function), forceinline=True, **_OPTIONS
             )
         return self._compiled[function]
 
@@ -42,7 +42,7 @@ class Compiler:
 
         return numba.njit(function, **_OPTIONS)
 
-    def _rebuilt(self, function: Callable[..., Any]) -> FunctionType:
+    def _rebuild(self, function: Callable[..., Any]) -> FunctionType:
         """A copy of the function whose globals hold compiled functions for all that it calls."""
         assert isinstance(function, FunctionType)
         names = dict(function.__globals__)

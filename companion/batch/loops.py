@@ -62,7 +62,7 @@ def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
             target = targets[0, i], targets[1, i], targets[2, i], targets[3, i]
             rates[0, i], rates[1, i], rates[2, i] = one_law(attitude, target, dt, constants)
 
-    return _over_samples(compiler.loop(apply), _compiled_turn(any_angle), compiler.loop, any_angle)
+    return _sample_loops(compiler.loop(apply), _compiled_turn(any_angle), compiler.loop, any_angle)
 
 
 @cache
@@ -96,10 +96,10 @@ def plain_loops(law: Law) -> Loops:
         vehicles = zip(q.T.tolist(), rates.T.tolist(), strict=True)
         next_q[...] = np.transpose([rotate(*vehicle, dt) for vehicle in vehicles])
 
-    return _over_samples(apply, turn, lambda loop: loop, any_angle=True)
+    return _sample_loops(apply, turn, lambda loop: loop, any_angle=True)
 
 
-def _over_samples(
+def _sample_loops(
     apply: _Apply, turn: _Turn, compiled: Callable[[Any], Any], any_angle: bool
 ) -> Loops:
     """Make the loops over samples from the loops over vehicles.

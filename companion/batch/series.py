@@ -17,7 +17,7 @@ LARGEST_SQUARE = 0.25
 """Largest argument of `cos_and_sinc`, rad²: a turn of 1 rad per sample."""
 
 
-def _fitted(
+def _polynomial_fit(
     function: Callable[[NDArray[np.float64]], Any], largest: float, terms: int
 ) -> tuple[float, ...]:
     """Coefficients, constant first, of the polynomial through the Chebyshev points of [0, largest].
@@ -28,9 +28,9 @@ def _fitted(
     return tuple(float(c) for c in fit.convert(kind=Polynomial).coef)
 
 
-_ARCTANGENT = _fitted(lambda u: np.arctan(np.sqrt(u)) / np.sqrt(u), 1.0, 18)
-_COSINE = _fitted(lambda u: np.cos(np.sqrt(u)), LARGEST_SQUARE, 6)
-_SINC = _fitted(lambda u: np.sin(np.sqrt(u)) / np.sqrt(u), LARGEST_SQUARE, 6)
+_ARCTANGENT = _polynomial_fit(lambda u: np.arctan(np.sqrt(u)) / np.sqrt(u), 1.0, 18)
+_COSINE = _polynomial_fit(lambda u: np.cos(np.sqrt(u)), LARGEST_SQUARE, 6)
+_SINC = _polynomial_fit(lambda u: np.sin(np.sqrt(u)) / np.sqrt(u), LARGEST_SQUARE, 6)
 
 
 def arctangent(t: float) -> float:
@@ -45,17 +45,17 @@ def arctangent(t: float) -> float:
     return t * (low + u6 * (middle + u6 * high))
 
 
-def cos_and_sinc(square: float) -> tuple[float, float]:
+def cos_and_sinc(h_squared: float) -> tuple[float, float]:
     """cos(h) and sin(h)/h for h² from 0 to `LARGEST_SQUARE`; replaces `rotation.cos_and_sinc`.
 
     A larger h² gives NaN. The attitude then stays NaN, and the caller detects that.
     """
-    square = square if square <= LARGEST_SQUARE else nan
-    fourth = square * square
-    eighth = fourth * fourth
+    h_squared = h_squared if h_squared <= LARGEST_SQUARE else nan
+    h_fourth = h_squared * h_squared
+    h_eighth = h_fourth * h_fourth
     return (
-        _six_terms(square, fourth, eighth, *_COSINE),
-        _six_terms(square, fourth, eighth, *_SINC),
+        _six_terms(h_squared, h_fourth, h_eighth, *_COSINE),
+        _six_terms(h_squared, h_fourth, h_eighth, *_SINC),
     )
 
 

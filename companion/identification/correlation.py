@@ -10,7 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from companion.attitude.rate_response import FIRST_ORDER_SHARE
-from companion.identification.lags import held_commands, lagged, slew_limited, value_at
+from companion.identification.lags import (
+    first_order_response,
+    held_commands,
+    slew_limited,
+    value_at,
+)
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
 
 Floats = NDArray[np.float64]
@@ -70,7 +75,7 @@ def dead_time_by_correlation(
     taps = _band_pass(lag, damping)
     record = stretches(time, commanded, measured_time, measured)
     filtered = [
-        pair for stretch in record if (pair := _filtered(stretch, lag, slew, taps)) is not None
+        pair for stretch in record if (pair := _filter(stretch, lag, slew, taps)) is not None
     ]
     correlation = _correlation(filtered)
     delay = None if correlation is None else _peak_delay(correlation)
@@ -130,7 +135,7 @@ def _band_pass(lag: float, damping: float) -> Floats:
     return taps
 
 
-def _filtered(
+def _filter(
     stretch: Stretch, lag: float, slew: float | None, taps: Floats
 ) -> tuple[Floats, Floats] | None:
     """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), both sampled on the grid.
@@ -146,7 +151,7 @@ def _filtered(
     knots = held_commands(stretch.time, stretch.commanded)
     if slew is not None:
         knots = slew_limited(knots, slew)
-    commands = lagged(knots, lag, times) if lag > 0.0 else value_at(knots, times)
+    commands = first_order_response(knots, lag, times) if lag > 0.0 else value_at(knots, times)
     response = np.interp(times[_DELAY_COUNT:], stretch.measured_time, stretch.measured)
     return np.convolve(commands, taps, "valid"), np.convolve(response, taps, "valid")
 

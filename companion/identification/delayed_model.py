@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from companion.identification.lags import (
     Knots,
+    first_order_response,
     held_commands,
-    lagged,
-    second_order,
-    second_order_decay,
+    second_order_free_responses,
+    second_order_response,
     slew_limited,
     value_at,
 )
@@ -53,7 +53,7 @@ class FirstOrder:
 
     def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return lagged(commands, exp(shape[0]), at)
+        return first_order_response(commands, exp(shape[0]), at)
 
     def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
@@ -71,11 +71,11 @@ class SecondOrder:
 
     def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return second_order(commands, *frequency_damping(shape), at)
+        return second_order_response(commands, *frequency_damping(shape), at)
 
     def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
-        return second_order_decay(elapsed, *frequency_damping(shape))
+        return second_order_free_responses(elapsed, *frequency_damping(shape))
 
 
 def frequency_damping(shape: Floats) -> tuple[float, float]:
@@ -129,7 +129,7 @@ _RAMP_TIMES = 0.01, 0.5
 """Bounds of the search for the slew limit, as the duration of the largest change of the commands at
 that limit, s."""
 _SAME_COMMAND_SHARE = 0.005
-"""Commands that differ by less than this share of their range count as the same."""
+"""Largest difference of commands that count as the same, as a share of the commands' range."""
 
 
 class DelayedModel:

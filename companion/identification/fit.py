@@ -44,7 +44,7 @@ _EXCITED_SHARE = 0.02
 """Share of the commands' range by which the modelled response must differ from the command at an
 excited sample."""
 _RESPONSE_DURATION_FACTOR = 4.0
-"""Duration of the vehicle's response and of the correlation of its noise, in lag + dead time."""
+"""Duration of a response and of the correlation of noise, as a multiple of lag + dead time."""
 _COARSE_SAMPLES = 500
 """Approximate number of samples used to find the start of the search."""
 _MOST_SAMPLES = 4000

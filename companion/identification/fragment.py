@@ -16,11 +16,11 @@ _AXIS_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
 _NO_SLEW_LIMIT = 100_000.0
 """Slew limit written for an axis without one if roll has one, °/s²; null would mean as roll."""
 _SAME_MS = 3.0
-"""Lags and dead times of roll and pitch that differ by at most this count as the same, ms."""
+"""Largest difference of lag and of dead time at which roll and pitch count as the same, ms."""
 _SAME_SLEW_SHARE = 0.1
-"""Slew limits of roll and pitch that differ by at most this share count as the same."""
+"""Largest relative difference of the slew limits at which roll and pitch count as the same."""
 _SAME_DAMPING = 0.05
-"""Damping ratios of roll and pitch that differ by at most this count as the same."""
+"""Largest difference of the damping ratios at which roll and pitch count as the same."""
 _ACCEPTED_DAMPINGS = 0.3, 10.0
 """Smallest and largest damping ratio that `vehicle.damping` accepts."""
 

@@ -77,16 +77,16 @@ def _start_values(commands: Knots, slew: float) -> Floats:
     return np.array(outputs)
 
 
-def lagged(commands: Knots, lag: float, at: Floats) -> Floats:
+def first_order_response(commands: Knots, lag: float, at: Floats) -> Floats:
     """(m,), response of a first-order lag of `lag` > 0 s to the commands, at the times `at`, s.
 
     The response starts in the steady state of the first command. No time may be before it.
     """
-    return np.asarray(complex_lagged(commands, lag, at), dtype=np.float64)
+    return np.asarray(complex_lag_response(commands, lag, at), dtype=np.float64)
 
 
-def complex_lagged(commands: Knots, lag: complex, at: Floats) -> Numbers:
-    """Like `lagged`, for a complex lag, s.
+def complex_lag_response(commands: Knots, lag: complex, at: Floats) -> Numbers:
+    """Like `first_order_response`, for a complex lag, s.
 
     An underdamped second-order response is a weighted sum of two such responses with complex
     conjugate lags.
@@ -133,7 +133,7 @@ _NEARLY_CRITICAL = 1e-6
 """Smallest |ζ² − 1| that is used; at 0 both lags would be equal, with a division by 0."""
 
 
-def second_order(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
+def second_order_response(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
     """(m,), response of a second-order lag, from the steady state of the first command.
 
     Args:
@@ -145,15 +145,18 @@ def second_order(commands: Knots, frequency: float, damping: float, at: Floats) 
     first_lag, second_lag = _two_lags(frequency, damping)
     if first_lag.imag:
         response: Floats = (
-            np.imag(first_lag * complex_lagged(commands, first_lag, at)) / first_lag.imag
+            np.imag(first_lag * complex_lag_response(commands, first_lag, at)) / first_lag.imag
         )
         return response
     slow_lag, quick_lag = first_lag.real, second_lag.real
-    slow_response, quick_response = lagged(commands, slow_lag, at), lagged(commands, quick_lag, at)
+    slow_response, quick_response = (
+        first_order_response(commands, slow_lag, at),
+        first_order_response(commands, quick_lag, at),
+    )
     return (slow_lag * slow_response - quick_lag * quick_response) / (slow_lag - quick_lag)
 
 
-def second_order_decay(elapsed: Floats, frequency: float, damping: float) -> Floats:
+def second_order_free_responses(elapsed: Floats, frequency: float, damping: float) -> Floats:
     """(m, 2), two independent free responses of a second-order lag.
 
     Args:

@@ -81,9 +81,9 @@ class Predictor:
         current = in_effect[0] if in_effect else self._holding_input(vehicle.time, motion)
         for next_input in [each for each in inputs if time < self._effect_time(each) < until]:
             duration = self._effect_time(next_input) - time
-            motion = self._integrated(motion, current, duration, constants)
+            motion = self._integrate(motion, current, duration, constants)
             time, current = self._effect_time(next_input), next_input
-        motion = self._integrated(motion, current, until - time, constants)
+        motion = self._integrate(motion, current, until - time, constants)
         if hypot(motion.north, motion.east) > _LONGEST_COEFFICIENTS:
             raise TiltedTooFarError
         return motion
@@ -97,7 +97,7 @@ class Predictor:
         thrust = self._settings.gravity / cos_tilt
         return Input(time, motion.north, motion.east, motion.heading, thrust)
 
-    def _integrated(
+    def _integrate(
         self, motion: Motion, current: Input, duration: float, constants: list[float]
     ) -> Motion:
         """The motion `duration` seconds later, with the control input `current` in effect."""

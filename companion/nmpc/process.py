@@ -148,7 +148,7 @@ class Solver:
             answer = unpack_answer(message)
             if self._pending is not None and answer.number == self._pending.number:
                 pending, self._pending = self._pending, None
-                return self._checked(pending, answer)
+                return self._usable_answer(pending, answer)
         if (
             self._pending is not None
             and monotonic() - self._pending.sent_at > self._settings.deadline
@@ -179,7 +179,7 @@ class Solver:
             self._handle_exit()
         return message
 
-    def _checked(self, pending: _Pending, answer: Answer) -> Answer | None:
+    def _usable_answer(self, pending: _Pending, answer: Answer) -> Answer | None:
         """The answer if it may be flown; otherwise report the trouble and return None."""
         elapsed = answer.computed_at - pending.sent_at
         if elapsed > self._settings.deadline:

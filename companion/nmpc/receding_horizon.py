@@ -108,7 +108,7 @@ def shifted_plan(model: Model, plan: Floats, steps: float) -> Floats:
     n = model.state.numel()
     stages = plan[:-n].reshape(-1, n + model.control.numel())
     states = np.vstack([stages[:, :n], plan[-n:]])
-    return _interleaved(_shifted(states, steps), _shifted(stages[:, n:], steps))
+    return _interleave(_shift_rows(states, steps), _shift_rows(stages[:, n:], steps))
 
 
 def plan_on_reference(model: Model, nodes: Sequence[Node], settings: Settings) -> Floats:
@@ -116,10 +116,10 @@ def plan_on_reference(model: Model, nodes: Sequence[Node], settings: Settings) -
     states = [model.state_of(_motion_of(node)) for node in nodes]
     controls = np.array([model.control_of(node) for node in nodes[:-1]])
     controls[:, -1] = controls[:, -1].clip(settings.min_thrust, settings.max_thrust)
-    return _interleaved(np.array(states), controls)
+    return _interleave(np.array(states), controls)
 
 
-def _shifted(rows: Floats, steps: float) -> Floats:
+def _shift_rows(rows: Floats, steps: float) -> Floats:
     """Rows, one for each node, shifted to a time `steps` steps later; the last row repeats."""
     whole_steps = floor(steps)
     last = len(rows) - 1
@@ -128,7 +128,7 @@ def _shifted(rows: Floats, steps: float) -> Floats:
     return np.asarray(rows[before] + (steps - whole_steps) * (rows[after] - rows[before]))
 
 
-def _interleaved(states: Floats, controls: Floats) -> Floats:
+def _interleave(states: Floats, controls: Floats) -> Floats:
     """The plan (x_0, u_0, …, x_N) of N + 1 states and N controls."""
     return np.concatenate([np.hstack([states[:-1], controls]).ravel(), states[-1]])
 

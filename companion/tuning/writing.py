@@ -96,7 +96,7 @@ def worse_sentence(flights: Flights) -> str | None:
             worse_flights.append(f"{name} {before.true:.3f} -> {after.true:.3f} m")
     faults = [f"flew worse: {'; '.join(worse_flights)}"] if worse_flights else []
     if failed_as_before:
-        faults.append(f"failed as without it: {'; '.join(failed_as_before)}")
+        faults.append(f"failed, as it did without the proposal: {'; '.join(failed_as_before)}")
     if not faults:
         return None
     return f"DO NOT USE IT: with the proposal the mock vehicle {', and '.join(faults)}"

@@ -68,7 +68,7 @@ def ground_law(airframe: AirframeConfig, dt: float) -> GroundLaw:
 
 
 def survives(law: GroundLaw, q: Quaternion, sink_speed: float) -> bool:
-    """Whether a touchdown at this attitude and sink speed (m/s) does not count as a crash."""
+    """Whether a touchdown at this attitude and sink speed (m/s) is not a crash."""
     _, x, y, _ = q
     is_upright = 1.0 - 2.0 * (x * x + y * y) >= law.crash_cosine
     return is_upright and sink_speed <= law.crash_speed

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from companion.identification import dead_time_by_correlation
-from companion.identification.lags import held_commands, lagged, slew_limited
+from companion.identification.lags import first_order_response, held_commands, slew_limited
 
 from .vehicles import RATE_NOISE, Doublets, irregular, lag_with_dead_time, mock_axis, regular
 
@@ -101,7 +101,7 @@ def by_least_squares(time, commanded, measured_time, measured, lag, slew):
     sure = measured_time > time[0] + 0.5
     tried = np.arange(0.0, 0.1, 0.0005)
     misfits = [
-        np.var(measured[sure] - lagged(knots, lag, measured_time[sure] - dead_time))
+        np.var(measured[sure] - first_order_response(knots, lag, measured_time[sure] - dead_time))
         for dead_time in tried
     ]
     return float(tried[np.argmin(misfits)])

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from companion.identification.lags import held_commands, lagged, slew_limited, value_at
+from companion.identification.lags import (
+    first_order_response,
+    held_commands,
+    slew_limited,
+    value_at,
+)
 
 
 def recursion(commands, lag, at):
@@ -31,7 +36,9 @@ def test_running_sums_are_the_recursion_however_long_the_record(lag, slew):
     if slew is not None:
         commands = slew_limited(commands, slew)
     at = np.sort(rng.uniform(commands.time[0], commands.time[-1] + 2.0, size=3000))
-    assert lagged(commands, lag, at) == pytest.approx(recursion(commands, lag, at), abs=1e-9)
+    assert first_order_response(commands, lag, at) == pytest.approx(
+        recursion(commands, lag, at), abs=1e-9
+    )
 
 
 def test_commands_that_hardly_differ_make_no_piece_of_their_own():

@@ -37,7 +37,7 @@ def work(monkeypatch):
 
         return count
 
-    for name in ("lagged", "second_order"):
+    for name in ("first_order_response", "second_order_response"):
         monkeypatch.setattr(delayed_model, name, counted(getattr(delayed_model, name)))
     return sizes
 

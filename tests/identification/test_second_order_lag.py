@@ -6,8 +6,8 @@ from scipy.signal import lsim
 
 from companion.identification.lags import (
     held_commands,
-    second_order,
-    second_order_decay,
+    second_order_free_responses,
+    second_order_response,
     slew_limited,
     value_at,
 )
@@ -26,7 +26,7 @@ def test_it_answers_as_its_equation_says(frequency, damping, slew):
     asked = value_at(commands, at + 1e-9)  # each step between two samples, as lsim holds it
     loop = [frequency**2], [1.0, 2.0 * damping * frequency, frequency**2]
     _, simulated, _ = lsim(loop, asked - asked[0], at - at[0], interp=slew is not None)
-    answered = second_order(commands, frequency, damping, at)
+    answered = second_order_response(commands, frequency, damping, at)
     np.testing.assert_allclose(answered, simulated + asked[0], rtol=0.0, atol=2e-3, strict=True)
 
 
@@ -36,6 +36,6 @@ def test_what_it_began_with_dies_away_by_the_two_columns_whatever_it_was(frequen
     state = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * damping * frequency]])
     loop = state, np.zeros((2, 1)), np.eye(2)[:1], np.zeros((1, 1))
     _, dying, _ = lsim(loop, np.zeros(500), since, X0=[0.7, -3.0])
-    columns = second_order_decay(since, frequency, damping)
+    columns = second_order_free_responses(since, frequency, damping)
     weights, *_ = np.linalg.lstsq(columns, dying, rcond=None)
     assert columns @ weights == pytest.approx(dying, abs=1e-5)

@@ -151,9 +151,9 @@ def test_a_course_that_no_values_fly_to_its_end_is_not_called_worse():
     proposal, lost = propose(VEHICLES["px4"]), CourseResult("no attitude")
     opening = "DO NOT USE IT: with the proposal the mock vehicle "
     first = summary_lines(proposal, {"the circle": (lost, lost), "the eight": (FLOWN, FLOWN)})[0]
-    assert first == f"{opening}failed as without it: the circle no attitude"
+    assert first == f"{opening}failed, as it did without the proposal: the circle no attitude"
     first = summary_lines(proposal, {"the circle": (lost, lost), "the eight": (FLOWN, lost)})[0]
     assert first == (
-        f"{opening}flew worse: the eight no attitude, and failed as without it: the circle no "
-        "attitude"
+        f"{opening}flew worse: the eight no attitude, and failed, as it did without the proposal: "
+        "the circle no attitude"
     )
