@@ -17,9 +17,9 @@ def require(module: str, extra: str, purpose: str) -> None:
     """Check that an optional package is installed.
 
     Args:
-        module: the module to import.
-        extra: the extra of this project that installs it.
-        purpose: what needs the package; the message begins with it.
+        module: name of a module in the package.
+        extra: the extra of this project that installs the package.
+        purpose: the feature that needs the package; the message begins with it.
 
     Raises:
         MissingExtraError: the package is not installed.

@@ -17,7 +17,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar, TypeVarTuple
 
-from companion.api.program import ended_by
+from companion.api.program import flight_ended
 from companion.mavlink.lockstep import LockstepEventLoop
 from companion.mavlink.loop import LinkEventLoop
 
@@ -96,7 +96,7 @@ class OwnThreadLoop:
             future = asyncio.run_coroutine_threadsafe(work, self._loop)
         except RuntimeError as error:  # the loop is closed
             work.close()
-            raise ended_by("ok") from error
+            raise flight_ended("ok") from error
         self._unfinished.add(future)
         future.add_done_callback(self._unfinished.discard)
         return asyncio.wrap_future(future)
@@ -116,7 +116,7 @@ class OwnThreadLoop:
         self._end_flight = end
 
     def close(self, *, wait: bool) -> None:
-        """End the flight if it still runs, and its thread; with `wait`, return after both."""
+        """End the flight, if it still runs, and its thread; with `wait`, return after their end."""
         self.post(self._closing.set)
         if wait:
             self._thread.join()
@@ -148,8 +148,8 @@ class OwnThreadLoop:
 
 _switch_interval_lock = threading.Lock()
 _intervals_before: list[float] = []
-"""`sys.getswitchinterval()` at the start of each running flight, s. The first value is set again
-after the last flight."""
+"""`sys.getswitchinterval()` at the start of each running flight, s. When no flight runs any more,
+the value from before the first flight is restored."""
 
 
 @contextmanager

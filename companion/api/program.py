@@ -39,14 +39,15 @@ class ProgramPlan:
     control, and the safety monitors stay active.
 
     Attributes:
-        maneuvers: empty, because they are not known before the flight.
+        maneuvers: empty, because the program's maneuvers are not known before the flight.
         connected: receives the flight's context when the preflight checks have passed.
         summary: summary of the flight, available after it has ended.
         over: whether the flight has no further phases: the last request is done, or the flight has
             ended.
         end_error: exception that every later call raises; None before the end of the flight.
         finished: set when the flight has ended and its files are written.
-        interrupt: function that ends the flight for a reason in words: see `Session.interrupt`.
+        interrupt: function that ends the flight; its argument is the reason in words
+            (`Session.interrupt`).
     """
 
     def __init__(self) -> None:
@@ -138,6 +139,6 @@ class ProgramPlan:
             await self._new_request.wait()
 
 
-def ended_by(result: str) -> FlightEnded:
-    """The exception for a flight that has ended with `result`."""
+def flight_ended(result: str) -> FlightEnded:
+    """The exception for calls after the end of the flight; `result` is that of its summary."""
     return FlightEnded("the flight is over" if result == "ok" else result)

@@ -27,7 +27,7 @@ class Flight:
         self.end, self.answer, self.told = end, {"text": "done"}, []
 
     def serve(self):
-        for message in self.end.arrived():
+        for message in self.end.received_messages():
             if message is None:
                 return
             self.told.append(message)

@@ -46,7 +46,7 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
     @ui.page("/")
     def page(client: Client, token: str = "") -> None:
         _add_drawings()
-        Panel(relay, store, guard, unlocked=guard.knows(token))
+        Panel(relay, store, guard, unlocked=guard.is_token(token))
         state = {"fence": store.fence(), "frames": store.since(0), "events": store.events_since(0)}
         sent[client.id] = store.state_count, store.event_count
         client.run_javascript(f"live.begin({json.dumps(state)})")
@@ -60,7 +60,7 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
                 "frames": store.since(known[0]),
                 "events": store.events_since(known[1]),
                 "fence": store.fence(),
-                "over": store.over,
+                "over": store.end_text,
             }
             sent[client.id] = store.state_count, store.event_count
             client.run_javascript(f"live.push({json.dumps(new)})")

@@ -24,7 +24,7 @@ _WRONG_TOKEN_DELAY = 1.0
 class Panel:
     """Inputs and buttons of one browser tab; each tab must be unlocked separately.
 
-    `unlocked`: the tab was opened with the token.
+    A tab that was opened with the token begins `unlocked`.
     """
 
     def __init__(self, relay: Relay, store: Store, guard: Guard, *, unlocked: bool) -> None:
@@ -53,7 +53,7 @@ class Panel:
             token = ui.input("token, as shown at the start").props("dense")
 
             async def unlock() -> None:
-                if self._guard.knows(str(token.value or "").strip()):
+                if self._guard.is_token(str(token.value or "").strip()):
                     self._unlocked = True
                     self._show_message("values can be changed in this tab now")
                 else:
@@ -116,14 +116,14 @@ class Panel:
                 if str(field.value or "").strip() == self._shown[name] or field.value is None:
                     field.value = value
                 self._shown[name] = value
-        self._undo.set_enabled(self._store.can_undo and self._store.over is None)
+        self._undo.set_enabled(self._store.can_undo and self._store.end_text is None)
 
     def _show_message(self, text: str) -> None:
         self._message.set_text(text)
 
 
 def _range(allowed: str) -> str:
-    """The range of a key as a hint; the words "changeable in flight" are removed."""
+    """The range of a key, for a hint: `allowed` without the words "changeable in flight"."""
     return (
         allowed.replace("changeable in flight within its range", "")
         .strip(", ")
@@ -132,7 +132,7 @@ def _range(allowed: str) -> str:
 
 
 def _parsed(text: str) -> Any:
-    """The number in a field, or None if it is empty. Another text is returned, to be refused."""
+    """The number in a field, None for an empty field, or a text that the checks refuse."""
     if text in ("", "null"):
         return None
     try:

@@ -25,7 +25,7 @@ class Store:
         config: the configuration after the newest change.
         start: the configuration with which the flight began.
         can_undo: whether a change can be undone.
-        over: how the flight ended; None: it has not ended.
+        end_text: how the flight ended; None: it has not ended.
     """
 
     def __init__(self, config: Config) -> None:
@@ -35,7 +35,7 @@ class Store:
         self.event_count = 0
         self.config = self.start = config
         self.can_undo = False
-        self.over: str | None = None
+        self.end_text: str | None = None
 
     def take(self, message: Message) -> None:
         """Take one message."""
@@ -51,11 +51,11 @@ class Store:
                 self.config = Config.model_validate(message["config"])
                 self.can_undo = bool(message["can_undo"])
             case "end":
-                self.over = str(message["text"])
+                self.end_text = str(message["text"])
 
     def end(self) -> None:
         """Note the end of the flight, if its message `end` was not received."""
-        self.over = self.over or "the program that flew has ended"
+        self.end_text = self.end_text or "the program that flew has ended"
 
     def since(self, count: int) -> list[Message]:
         """The kept states after the first `count` states."""
