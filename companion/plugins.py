@@ -31,7 +31,7 @@ def load(group: str, name: str) -> Any:
     """The object that an entry point names.
 
     Raises:
-        PluginError: there is no such plug-in, two packages provide it, or its package fails.
+        PluginError: there is no such plug-in, two packages provide it, or its import fails.
     """
     found = tuple(entry_points(group=group, name=name))
     if len(found) != 1:

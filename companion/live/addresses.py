@@ -96,7 +96,7 @@ def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.s
         listening.listen(50)
     except OSError as error:
         listening.close()
-        remedy = f"name another one, as {option} {port + 1}"
+        remedy = f"choose another port, such as {option} {port + 1}"
         if error.errno == errno.EADDRNOTAVAIL:
             remedy = f"no interface of this computer has that address; use {option} 0.0.0.0:{port}"
         raise ConfigError(
@@ -117,7 +117,8 @@ def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, i
         ip_address(host)
     except ValueError as error:
         raise ConfigError(
-            f"{option} {address}: write an IP address, a port, or both, as 0.0.0.0:{default_port}"
+            f"{option} {address}: write an IP address, a port, or both, such as "
+            f"0.0.0.0:{default_port}"
         ) from error
     if not 0 <= number <= 65535:
         raise ConfigError(f"{option} {address}: a port is at most 65535")

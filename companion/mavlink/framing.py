@@ -50,11 +50,11 @@ class FrameScanner:
     """Finds the intact frames in the bytes that arrive.
 
     Args:
-        crc_extra: The dialect's CRC_EXTRA as one byte for each known message id.
+        crc_extra: the dialect's CRC_EXTRA as one byte for each known message id.
         streaming: True if a frame may continue in the next call (TCP, serial). False for
             datagrams: an incomplete frame is dropped.
-        stats: Counts wrong checksums and unknown messages.
-        keep_unknown: Whether frames of unknown messages are returned too, with their checksum not
+        stats: counts wrong checksums and unknown messages.
+        keep_unknown: whether frames of unknown messages are returned too, with their checksum not
             checked. Their id is not in `crc_extra`.
     """
 

@@ -27,8 +27,8 @@ class CurrentModeMessage:
 
     Attributes:
         standard_mode: MAV_STANDARD_MODE; 0 for a mode that is not a standard mode.
-        custom_mode: Number of the mode, specific to the autopilot.
-        intended_custom_mode: The mode that the user commanded last; it differs in a failsafe.
+        custom_mode: number of the mode, specific to the autopilot.
+        intended_custom_mode: the mode that the user commanded last; it differs in a failsafe.
     """
 
     msgname = "CURRENT_MODE"
@@ -75,7 +75,7 @@ def message_id(name: str) -> int:
     """Number of a message by its name, such as `ATTITUDE_QUATERNION`.
 
     Raises:
-        UnknownMessage: The dialect has no such message.
+        UnknownMessage: the dialect has no such message.
     """
     try:
         return MESSAGE_IDS[name]

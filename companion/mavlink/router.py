@@ -32,7 +32,7 @@ class Router:
         """Call `callback` with each decoded message of that name; return a function that ends this.
 
         Raises:
-            UnknownMessage: The dialect has no such message.
+            UnknownMessage: the dialect has no such message.
         """
         return _add(self._decoded, message_id(name), callback)
 
@@ -42,7 +42,7 @@ class Router:
         The payload is passed as it was sent: MAVLink 2 cuts trailing zeros.
 
         Raises:
-            UnknownMessage: Neither the dialect nor `UNDECODED` has such a message.
+            UnknownMessage: neither the dialect nor `UNDECODED` has such a message.
         """
         return _add(self._raw, UNDECODED.get(name) or message_id(name), callback)
 

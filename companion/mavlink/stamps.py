@@ -1,9 +1,9 @@
-"""Which signature time stamps are accepted, and which date this program assumes.
+"""Decides which signature time stamps are accepted, and which date this program assumes.
 
 Source: the MAVLink message-signing guide, "Timestamp handling". The stamps of a stream must rise. A
-new stream may be a minute behind. The newest stamp is kept on disk, and the next run starts at the
-later of clock and disk. The guide accepts every stamp with the right key; here, stamps too far in
-the future are refused.
+new stream may be a minute behind. The newest stamp is kept on disk, and the next run starts at this
+stamp or at the computer's clock, whichever is later. The guide accepts every stamp with the right
+key; here, stamps too far in the future are refused.
 """
 
 import time
@@ -20,7 +20,7 @@ _MINUTE = 60 * TICKS_PER_S
 _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
 """2026-09-01, ticks. A correct clock is never earlier; raise this date with a release."""
 _MAX_AHEAD = 5 * 365 * _DAY
-"""Furthest that an accepted stamp may be ahead of the date, ticks."""
+"""Largest time by which an accepted stamp may be ahead of the date, ticks."""
 
 LATEST_TICKS = 2**48 - 2 * _MAX_AHEAD
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
@@ -71,29 +71,29 @@ class StampJudge:
     - A stamp further ahead is refused.
 
     Args:
-        kept: The stamps kept by the last run.
-        clock: Returns Unix time in s; called once.
-        elapsed: Returns monotonic time in s.
+        kept: the stamps kept by the last run.
+        clock: returns Unix time in s; called once.
+        monotonic_clock: returns monotonic time in s.
 
     Attributes:
-        remarks: Sentences for the user; whoever shows them removes them.
-        changed: Set at the first frame of a stream in this run.
+        remarks: sentences for the user; the code that shows them removes them.
+        changed: set at the first frame of a stream in this run.
     """
 
     def __init__(
         self,
         kept: Stamps,
         clock: Callable[[], float] = time.time,
-        elapsed: Callable[[], float] = time.monotonic,
+        monotonic_clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.remarks: list[str] = []
         self.changed = Event()
         self._remarked: set[str] = set()
-        self._monotonic_time = elapsed
+        self._monotonic_clock = monotonic_clock
         start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
         self._check_clock(start, kept.date)
         self._start = min(max(start, kept.date, _PROGRAM_DATE), LATEST_TICKS)
-        self._start_monotonic = elapsed()
+        self._start_monotonic = monotonic_clock()
         self._ahead_limit = self._start + _DAY
         self._kept_streams = kept.streams
         self._newest_by_stream: dict[tuple[Stream, bool], int] = {}  # the bool as in `_newest`
@@ -102,22 +102,22 @@ class StampJudge:
 
     def date(self) -> int:
         """The date of this program now, ticks."""
-        return self._start + int((self._monotonic_time() - self._start_monotonic) * TICKS_PER_S)
+        return self._start + int((self._monotonic_clock() - self._start_monotonic) * TICKS_PER_S)
 
     def awaits_answer(self, stamp: int) -> bool:
         """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
         date = self.date()
-        in_reach = date + _DAY < stamp <= date + _MAX_AHEAD
+        is_far_ahead = date + _DAY < stamp <= date + _MAX_AHEAD
         # Once a stamp near the date was accepted, no other stamp changes the date.
-        return in_reach and not self._date_proven and not self._newest[False]
+        return is_far_ahead and not self._date_proven and not self._newest[False]
 
     def judge(self, stream: Stream, stamp: int, *, answers_timesync: bool) -> SignatureResult:
         """Judge a stamp; only a good one is remembered.
 
         Args:
-            stream: The signer's stream.
-            stamp: The time stamp, ticks.
-            answers_timesync: Whether the frame answers a TIMESYNC request of this run.
+            stream: the signer's stream.
+            stamp: the time stamp, ticks.
+            answers_timesync: whether the frame answers a TIMESYNC request of this run.
         """
         date = self.date()
         ahead = stamp > date + _DAY
@@ -171,11 +171,11 @@ class StampJudge:
         return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
 
     def _kept_stamp(self, stream: Stream, ahead: bool) -> int:
-        """The newest stamp of a stream on disk, 0 without one.
+        """The newest stamp of a stream on disk, ticks; 0 without one.
 
         Args:
             stream: the signer's stream.
-            ahead: true: among the stamps far ahead of the date; false: among the others.
+            ahead: whether to search only the stamps far ahead of the date, or only the others.
         """
         stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)

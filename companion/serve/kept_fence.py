@@ -33,9 +33,9 @@ class KeptFence:
 
     @property
     def centre(self) -> FenceCentre | None:
-        """Centre of the fence in the first flight since the vehicle was armed; None: none yet.
+        """Centre of the fence in the first flight since the vehicle was armed; None: no flight yet.
 
-        It is given in the autopilot's present local frame.
+        The centre is in the autopilot's present local frame.
         """
         if self._kept_centre is None:
             return None

@@ -28,7 +28,7 @@ class Programs:
         self._newest: dict[Program, Request] = {}  # in the order of their newest requests
 
     def keep(self, program: Program, request: Request) -> None:
-        """Keep a program's newest request; if too many are kept, drop the oldest ones."""
+        """Keep a program's newest request; drop the oldest of more than `_MAX_PROGRAMS`."""
         self._newest.pop(program, None)
         self._newest[program] = request
         while len(self._newest) > _MAX_PROGRAMS:
@@ -42,8 +42,8 @@ class Programs:
         """The program that sent a command.
 
         A program may use different component ids for commands and setpoints. If no setpoint came
-        from the sender's address, the sender is taken for the program of the same client with the
-        newest setpoint.
+        from the address of `frame`, this is the program with the newest setpoint at the same
+        client.
         """
         program = Program(client, source_of(frame))
         if program in self._newest:

@@ -13,9 +13,9 @@ from companion.realtime import schedule_as_usual
 _PAGE_TIMEOUT = 120.0
 """Time allowed for one page, s; a small computer needs about ten seconds."""
 _CHECK_PERIOD = 1.0
-"""Period of the checks whether to stop waiting for the process, s."""
+"""Period of the checks whether the program ends or the page takes too long, s."""
 _NICENESS = 19
-"""Niceness of the process, so that it yields to everything else; the next flight may have begun."""
+"""Niceness of the process, so that it yields to a flight that has begun meanwhile."""
 _INTERRUPTED = "interrupted"
 
 

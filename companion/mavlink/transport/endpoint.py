@@ -13,9 +13,9 @@ _PEER_PATTERN = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d{1,5}))?")
 _NETWORK_PATTERN = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d{1,5})")
 _SERIAL_PATTERN = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
 _DEVICE_PATTERN = re.compile(r"(?:serial:/*)?(/?dev/[^:,]+|tty[^:,/]+|COM\d+)(?:[:,](\d{1,8}))?")
-"""A serial device as other programs write it, and its baud rate."""
+"""A serial device and its baud rate, in the notations of other programs."""
 _ADDRESS_PATTERN = re.compile(r"(?:(\w+):/*)?([^:/\[\]]*|\[[0-9a-fA-F:.]+\]):(\d{1,5})/?")
-"""An address as other programs write it: in pymavlink's notation, or without a scheme."""
+"""An address in the notations of other programs: pymavlink's, or without a scheme."""
 _LISTENING_HOSTS = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
 """Hosts for which `udp://` can only mean listening."""
 
@@ -91,7 +91,7 @@ def parse_endpoint(text: str) -> Endpoint:
     several separated by commas.
 
     Raises:
-        EndpointError: The text is in none of the notations in `_HELP`, a host name is not valid, or
+        EndpointError: the text is in none of the notations in `_HELP`, a host name is not valid, or
             a port is not 1..65535 (a listening endpoint also takes 0: any free port). For the
             notation of another program, the message says what to write instead.
     """
@@ -148,7 +148,7 @@ def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
 
 
 def is_host(text: str) -> bool:
-    """Whether this is a valid host name: labels of 1 to 63 characters, 253 in all, no blanks."""
+    """Whether `text` is a valid host name: labels of 1 to 63 characters, 253 in all, no blanks."""
     try:
         text.encode("idna")  # the resolver does this too, and would raise UnicodeError
     except UnicodeError:
@@ -160,8 +160,8 @@ def _serial(text: str, rest: str) -> SerialPort:
     match = _SERIAL_PATTERN.fullmatch(rest)
     if match is None or int(match[2]) == 0:
         device, colon, _ = rest.partition(":")
-        known = device.startswith("/") and (colon or not _DEVICE_PATTERN.fullmatch(text))
-        remedy = _baud_remedy(device) if known else _remedy(text)
+        is_path = device.startswith("/") and (colon or not _DEVICE_PATTERN.fullmatch(text))
+        remedy = _baud_remedy(device) if is_path else _remedy(text)
         raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD: {remedy}")
     return SerialPort(match[1], int(match[2]))
 
@@ -174,7 +174,7 @@ def _baud_remedy(path: str) -> str:
 
 
 def _remedy(text: str) -> str:
-    """How to write another program's endpoint here; if it is unknown, all notations."""
+    """How to write an endpoint of another program's notation here; else all notations."""
     text = text.strip()
     if device := _DEVICE_PATTERN.fullmatch(text):
         name, baud = device[1], device[2]

@@ -26,7 +26,7 @@ def source_of(frame: Frame) -> Address:
 
 
 def target_of(frame: Frame) -> Address:
-    """The target of a frame; everybody for a message without target, or of an unknown kind.
+    """The target of a frame; `EVERYBODY` for a message without target or of unknown id.
 
     MAVLink 2 cuts trailing zeros off a payload, so a missing field is 0.
     """

@@ -1,4 +1,4 @@
-"""Where a frame goes: learned addresses, targets, no loops (MAVLink guide, "Routing").
+"""Decides where a frame goes, by targets and learned addresses (MAVLink guide, "Routing").
 
 Nothing here sends: frames are only queued at the channels. Time comes only from the given clock.
 """
@@ -13,13 +13,13 @@ from companion.serve.network.client import Client
 from companion.serve.network.uplink import UplinkQueue
 
 _REPETITION_TIME = 0.2
-"""A frame identical to one that was forwarded within this time is a repetition, s."""
+"""Time within which a frame identical to a forwarded one is a repetition, s."""
 _MAX_REMEMBERED_FRAMES = 4096
 """Largest number of remembered frames; in a flood, only the newest are remembered."""
 
 
 _MAX_ADDRESSES = 1024
-"""Largest number of addresses that are learned of one channel: each targeted frame looks at all."""
+"""Largest number of addresses that are learned on one channel; all are searched for each frame."""
 
 Intercept = Callable[[Client, Frame], bool]
 """Called with a client's frame before forwarding; returns True if it must not be forwarded."""
@@ -49,10 +49,10 @@ class Routing:
     - A targeted frame goes to the channels on which its target was heard. A client's frame for a
       never-heard component of the vehicle's system goes to the vehicle.
     - A frame for our own component is not forwarded.
-    - A message of an unknown kind goes to all channels except the one it came from, as its
-      target is not known.
+    - A message of unknown id, whose target is unknown, goes to all channels except the one it came
+      from.
 
-    Several nodes may be behind a channel, also behind that to the vehicle.
+    Several nodes may be behind one channel, also behind the channel to the vehicle.
 
     Attributes:
         stats: counters of frames.
@@ -180,7 +180,7 @@ class _Repeats:
         self._forwarded_at: OrderedDict[bytes, float] = OrderedDict()
 
     def is_repeat(self, raw: bytes) -> bool:
-        """Whether these bytes were forwarded just before; if not, remember them."""
+        """Whether the frame `raw` was forwarded within `_REPETITION_TIME`; if not, remember it."""
         now, forwarded_at = self._clock(), self._forwarded_at
         previous = forwarded_at.pop(raw, None)
         if previous is not None and now - previous <= _REPETITION_TIME:

@@ -21,9 +21,9 @@ from companion.serve.setpoints.commanded_state import (
 from companion.serve.setpoints.request import AxisDemand
 
 _MAX_STREAM_PERIOD = 0.25
-"""Longest period of setpoints that count as a stream, whose derivatives are estimated, s."""
+"""Longest time between setpoints of a stream, s; the derivatives of a stream are estimated."""
 _DERIVATIVE_WEIGHT = 0.5
-"""Weight of a new derivative in its running estimate."""
+"""Weight of a new derivative in the exponential average."""
 _LARGEST_ACCELERATION = 15.0
 """Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
 _MAX_BRAKING_FACTOR = 2.0
@@ -39,12 +39,12 @@ _MIN_LIMIT_SHARE = 0.25
 
 
 class Continuity(NamedTuple):
-    """Largest jump of a stream that is still followed directly."""
+    """Largest jumps of a stream that are still followed directly."""
 
     position: float
-    """m or rad."""
+    """Largest jump of the position, m or rad."""
     velocity: float
-    """m/s or rad/s."""
+    """Largest jump of the velocity, m/s or rad/s."""
 
 
 class CommandFollower:
@@ -89,7 +89,8 @@ class CommandFollower:
     def stop(self, now: float, actual: AxisMotion | None = None) -> None:
         """Come to rest within limits, and stay there.
 
-        If the state is too far from `actual`, the motion of the vehicle, the stop begins there.
+        If the state is too far from `actual`, the motion of the vehicle, the stop begins at
+        `actual`.
         """
         if actual is not None:
             current = self.at(now)
@@ -106,7 +107,7 @@ class CommandFollower:
         Without a commanded position, the state stays close to `actual`, the motion of the vehicle.
 
         Raises:
-            UnplannableError: no motion leads to it; the previous command stays in force.
+            UnplannableError: no motion leads to the command; the previous one stays in force.
         """
         if demand == self._demand:
             self._repeat(demand, now, actual)
@@ -119,12 +120,12 @@ class CommandFollower:
         self._demand, self._commanded_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
-        """Follow an unchanged command; extrapolate it only for a time, as its sender may hang."""
+        """Follow an unchanged command; extrapolate it only for `timeout`: its sender may hang."""
         if demand.position is None:
             self._repeat_motion(demand, now, actual)
             return
-        moving = any(demand.velocity or ()) or any(demand.acceleration or ())
-        if moving and now - self._commanded_at > self._timeout:
+        is_moving = any(demand.velocity or ()) or any(demand.acceleration or ())
+        if is_moving and now - self._commanded_at > self._timeout:
             self._follow_position(AxisDemand(demand.position, None, None), self.at(now), now)
             self._commanded_at = inf
 
@@ -136,11 +137,11 @@ class CommandFollower:
         current = self.at(now)
         if demand.velocity is not None and now - self._commanded_at > self._timeout:
             demand = AxisDemand(None, demand.velocity, None)
-        strayed = actual is not None and are_far_apart(
+        is_far_away = actual is not None and are_far_apart(
             current.position, actual.position, _MAX_LEAD_DISTANCE
         )
         still_accelerates = demand.acceleration is None and any(self._commanded.acceleration)
-        if demand.velocity is None or strayed or still_accelerates:
+        if demand.velocity is None or is_far_away or still_accelerates:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
 
     def _follow_position(self, demand: AxisDemand, current: AxisState, now: float) -> None:
@@ -171,8 +172,8 @@ class CommandFollower:
         """A motion of the error to zero; the limits hold along `direction`, not for each axis."""
         length = hypot(*direction)
         limits = [
-            each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(along) / length))
-            for each, along in zip(self._limits, direction, strict=True)
+            each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(part) / length))
+            for each, part in zip(self._limits, direction, strict=True)
         ]
         acceleration = tuple(
             clamp(value, _MAX_BRAKING_FACTOR * each.acceleration)
@@ -218,9 +219,9 @@ def _blend(old: AxisValues, new: AxisValues) -> AxisValues:
 
 
 def _near_vehicle(current: AxisState, actual: AxisMotion | None, demand: AxisDemand) -> AxisState:
-    """The state, but the vehicle's own position or velocity where the state is too far from it.
+    """The state `current`, with position or velocity of `actual` where they are too far apart.
 
-    A commanded velocity is never replaced.
+    `actual` is the motion of the vehicle. A commanded velocity is never replaced.
     """
     if actual is None:
         return current

@@ -21,10 +21,13 @@ def decode_setpoint(
     *,
     body_yaw_is_relative: bool,
 ) -> Request:
-    """The request that a setpoint makes.
+    """Decode a client's setpoint to a request.
 
-    `targets` are the autopilot and our component; a setpoint may be addressed to either.
-    `body_yaw_is_relative`: see `local_target`.
+    Args:
+        frame: frame of the setpoint.
+        situation: position and yaw of the vehicle.
+        targets: the autopilot and our component; a setpoint may be addressed to either.
+        body_yaw_is_relative: see `local_target`.
 
     Raises:
         RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not finite,
