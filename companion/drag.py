@@ -31,7 +31,7 @@ class Drag(NamedTuple):
     def deceleration(
         self, velocity: tuple[Number, Number, Number]
     ) -> tuple[Number, Number, Number]:
-        """Deceleration vector, m/s², at the airspeed vector `velocity`, m/s; both point forward."""
+        """Deceleration vector, m/s², parallel to the airspeed vector `velocity`, m/s."""
         north, east, down = velocity
         per_velocity = self.linear + self.quadratic * _smooth_speed(velocity)
         return per_velocity * north, per_velocity * east, per_velocity * down

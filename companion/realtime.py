@@ -63,8 +63,8 @@ def frozen_objects() -> Iterator[None]:
     These objects are mostly modules and live as long as the program. If some objects were frozen
     before the block, all stay frozen after it, because Python cannot unfreeze only some.
     """
-    outermost = not _Frozen.blocks
-    if outermost and not _Frozen.by_caller:
+    is_outermost = not _Frozen.blocks
+    if is_outermost and not _Frozen.by_caller:
         _Frozen.by_caller = gc.get_freeze_count() > 0
     gc.collect()
     gc.freeze()
@@ -73,7 +73,7 @@ def frozen_objects() -> Iterator[None]:
         yield
     finally:
         _Frozen.blocks -= 1
-        if outermost and not _Frozen.by_caller:
+        if is_outermost and not _Frozen.by_caller:
             gc.unfreeze()
 
 
@@ -157,7 +157,7 @@ def _requested_settings(settings: RealtimeSettings) -> Iterator[tuple[str, str, 
 
 
 def _take_fifo(priority: int) -> _Undo:
-    before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    scheduler_before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     # Threads that start later (recording, MAVSDK) must inherit the priority: a preempted thread
     # that holds the interpreter lock would block the control loop.
     try:
@@ -166,22 +166,22 @@ def _take_fifo(priority: int) -> _Undo:
         raise Refused(f"this user lacks the permission; {_HOW_FIFO}") from None
     except OSError as error:
         raise Refused(f"{error.strerror}") from None
-    return lambda: os.sched_setscheduler(0, before, parameters)
+    return lambda: os.sched_setscheduler(0, scheduler_before, parameters)
 
 
 def _run_on(processors: tuple[int, ...]) -> _Undo:
-    before = os.sched_getaffinity(0)
-    missing = [number for number in processors if number not in before]
+    processors_before = os.sched_getaffinity(0)
+    missing = [number for number in processors if number not in processors_before]
     if missing:
         raise Refused(
             f"processor {', '.join(map(str, missing))} is not available to this program; "
-            f"available are {', '.join(map(str, sorted(before)))}"
+            f"available are {', '.join(map(str, sorted(processors_before)))}"
         )
     try:
         os.sched_setaffinity(0, processors)
     except OSError as error:
         raise Refused(f"{error.strerror}") from None
-    return lambda: os.sched_setaffinity(0, before)
+    return lambda: os.sched_setaffinity(0, processors_before)
 
 
 def _lock_memory() -> _Undo:

@@ -200,6 +200,6 @@ def _ending_phases(context: FlightContext) -> Sequence[Phase]:
 
 
 async def _end_lost_flight(session: Session, program: ProgramPlan) -> None:
-    """Hand the vehicle back if the flight still runs, because its program has ended; wait."""
+    """Hand the vehicle back if the program ended in flight; wait for the end of the flight."""
     if not program.finished.is_set() and session.interrupt("the program ended in flight"):
         await program.finished.wait()

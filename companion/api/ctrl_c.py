@@ -45,7 +45,7 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
 
 
 def _require_reaction(loop: FlightLoop, interrupt: Callable[[str], object]) -> None:
-    """In the flight's loop, hand back unless the program's loop runs in `REACTION_TIMEOUT`."""
+    """In the flight's loop, hand back unless the program's loop reacts in `REACTION_TIMEOUT`."""
     reacted = threading.Event()
     loop.post_to_program(reacted.set)
 

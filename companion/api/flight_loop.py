@@ -51,11 +51,11 @@ class SharedLoop:
         return asyncio.ensure_future(work)
 
     def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call the function at once."""
+        """Call `callback(*args)` at once."""
         callback(*args)
 
     def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call the function at once."""
+        """Call `callback(*args)` at once."""
         callback(*args)
 
     def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
@@ -102,12 +102,12 @@ class OwnThreadLoop:
         return asyncio.wrap_future(future)
 
     def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Schedule the function in the flight's loop; ignored after the flight has ended."""
+        """Schedule `callback(*args)` in the flight's loop; ignored after the flight has ended."""
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(callback, *args)
 
     def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Schedule the function in the program's loop; ignored after that loop has ended."""
+        """Schedule `callback(*args)` in the program's loop; ignored after that loop has ended."""
         with suppress(RuntimeError):
             self._program.call_soon_threadsafe(callback, *args)
 
@@ -142,8 +142,8 @@ class OwnThreadLoop:
     def _program_is_lost(self) -> bool:
         """Whether the program's loop or thread has ended, or is ending with the interpreter."""
         thread = self._program_thread
-        ending = thread.daemon and not threading.main_thread().is_alive()
-        return ending or not thread.is_alive() or self._program.is_closed()
+        is_ending = thread.daemon and not threading.main_thread().is_alive()
+        return is_ending or not thread.is_alive() or self._program.is_closed()
 
 
 _switch_interval_lock = threading.Lock()
@@ -162,10 +162,10 @@ def quick_switches() -> Iterator[None]:
         yield
     finally:
         with _switch_interval_lock:
-            before = _intervals_before[0]
+            interval_before = _intervals_before[0]
             _intervals_before.pop()
             if not _intervals_before:
-                sys.setswitchinterval(before)
+                sys.setswitchinterval(interval_before)
 
 
 FlightLoop = SharedLoop | OwnThreadLoop

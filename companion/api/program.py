@@ -140,5 +140,5 @@ class ProgramPlan:
 
 
 def flight_ended(result: str) -> FlightEnded:
-    """The exception for calls after the end of the flight; `result` is that of its summary."""
+    """The exception for calls after the end of a flight whose summary has this `result`."""
     return FlightEnded("the flight is over" if result == "ok" else result)

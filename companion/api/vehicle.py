@@ -123,7 +123,7 @@ class Vehicle:
             jerk: largest jerk, m/s³.
 
         Raises:
-            ConfigError: the configured limits or the fence do not allow it; nothing was flown.
+            ConfigError: the configured limits or the fence forbid the line; nothing was flown.
             FlightEnded: the vehicle is not under the program's control.
             TrajectoryError: a limit given here is not positive.
             ValueError: an argument is not finite, or the heading exceeds two turns.
@@ -217,7 +217,7 @@ class Vehicle:
         require_followable(context.config, maneuver, (north, east, down), context.known_drag)
 
     def _held_pose(self) -> Pose:
-        """The pose that guidance holds, or from which the present maneuver began.
+        """The pose that guidance holds, or at which its present maneuver began.
 
         Raises:
             FlightEnded: the flight has ended, or the vehicle is not under the program's control.

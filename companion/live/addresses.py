@@ -24,7 +24,7 @@ class PageSocket(NamedTuple):
     host: str
     port: int
     token: str
-    """Required to change something, and to watch from another computer."""
+    """Secret text that permits changes of values, and watching from another computer."""
     listening: socket.socket
 
     def address_text(self) -> str:

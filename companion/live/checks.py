@@ -30,11 +30,11 @@ class ChangeChecks:
 
     Attributes:
         start: the configuration with which the flight began.
-        now: the configuration after the newest change.
+        current: the configuration after the newest change.
     """
 
     def __init__(self, start: Config, *, flies_maneuvers: bool) -> None:
-        self.start = self.now = start
+        self.start = self.current = start
         self._drag = before_connecting(start)
         self._maneuvers: ManeuverSequence | None = None
         self._maneuvers_error: ConfigError | None = None
@@ -51,7 +51,7 @@ class ChangeChecks:
 
     def note(self, message: dict[str, Any]) -> None:
         """Note the changed configuration, from a message of the flight."""
-        self.now = Config.model_validate(message["config"])
+        self.current = Config.model_validate(message["config"])
 
     def note_drag(self, message: dict[str, Any]) -> None:
         """Note the drag of this vehicle; before, the drag of the vehicle flown last is assumed."""
@@ -67,12 +67,12 @@ class ChangeChecks:
             ConfigError: a check fails, a key must not change in flight, no key may change with
                 the planner or guidance of this flight, or its maneuvers could not be loaded.
         """
-        wanted = changed_in_flight(self.start, self.now, values, name)
+        wanted = changed_in_flight(self.start, self.current, values, name)
         reason = fixed_because(self.start)
         if reason is not None:
             raise ConfigError(f"{name}: {reason}")
         try:
-            require_moderate(self.now, wanted, name)
+            require_moderate(self.current, wanted, name)
             _require_margins(self.start, wanted, name)
         except (ValueError, ArithmeticError) as error:
             raise ConfigError(f"{name}: {error}") from error

@@ -55,11 +55,13 @@ class Stream:
         self._channels = [
             foxglove.Channel(
                 topic,
-                schema=foxglove.Schema(name=kind.name, encoding=SCHEMA_ENCODING, data=kind.schema),
+                schema=foxglove.Schema(
+                    name=message_type.name, encoding=SCHEMA_ENCODING, data=message_type.schema
+                ),
                 message_encoding=ENCODING,
                 context=self._context,
             )
-            for topic, kind in TOPICS.items()
+            for topic, message_type in TOPICS.items()
         ]
         self._server = foxglove.start_server(
             name="companion",

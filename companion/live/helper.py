@@ -85,7 +85,7 @@ class Helper:
             loop.remove_reader(self._channel.fileno())
 
     def close(self, reason: str) -> None:
-        """Tell the process that, and why, the flight has ended; see `until_unused` for the page."""
+        """Tell the process why the flight has ended; it ends when `until_unused` returns."""
         self._send("end", text=reason)
         self._has_ended = True
         self._channel.close()
@@ -145,8 +145,8 @@ class Helper:
         change = str(self.changes.made[-1])
         self._send("config", config=_as_json(config), can_undo=self.changes.can_undo, text=change)
 
-    def _tell_drag(self, known: KnownDrag) -> None:
-        drag, source = known.drag, known.source
+    def _tell_drag(self, known_drag: KnownDrag) -> None:
+        drag, source = known_drag.drag, known_drag.source
         self._send(
             "drag",
             drag=None if drag is None else [drag.linear, drag.quadratic],

@@ -20,8 +20,8 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 BEACON_TIMEOUT_S = 2.0
-"""Wall time without a new beacon after which the vehicle counts as gone, s; virtual time then
-advances without it.
+"""Wall time without a new beacon after which the vehicle counts as gone, s; then the event loop's
+time advances without beacons.
 """
 
 _SPIN_S = 0.0005

@@ -51,11 +51,11 @@ class Outbox:
         Raises:
             InvalidSetpoint: a value must not reach the vehicle; nothing was sent.
         """
-        sent = self._send_frame(
+        was_sent = self._send_frame(
             self._setpoint_encoder.frame(self._sequence, time_boot_ms, rates, thrust)
         )
         self.last_setpoint_at = self._loop.time()
-        return sent
+        return was_sent
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
         """Keep a setpoint as the answer of this lockstep step; a later one in the step replaces it.

@@ -142,13 +142,14 @@ class PeerRule:
 
     def set_peer(self, sender: str) -> None:
         """Make `sender`, given as HOST:PORT, the peer; count a change and report it to the user."""
-        before, self._peer = self._peer, sender
+        old_peer, self._peer = self._peer, sender
         self.renew()
-        if before is not None and before != sender:
+        if old_peer is not None and old_peer != sender:
             self._stats.peers += 1
             self._notify(
-                f"{PEER_NOTICE}the vehicle's frames now come from {sender}, before from {before}; "
-                f"to prevent this, name the vehicle's address in the endpoint (?peer=ADDRESS)"
+                f"{PEER_NOTICE}the vehicle's frames now come from {sender}, before from "
+                f"{old_peer}; to prevent this, name the vehicle's address in the endpoint "
+                "(?peer=ADDRESS)"
             )
 
     def report_ignored(self, sender: str) -> None:

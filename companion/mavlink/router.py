@@ -29,7 +29,7 @@ class Router:
         self.on_error: Callable[[Exception], None] | None = None
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
-        """Call `callback` with each decoded message of that name; return a function that ends this.
+        """Call `callback` with each decoded message of this name; return how to unsubscribe.
 
         Raises:
             UnknownMessage: the dialect has no such message.
@@ -37,7 +37,7 @@ class Router:
         return _add(self._decoded, message_id(name), callback)
 
     def subscribe_raw(self, name: str, callback: Callable[[bytes], None]) -> Unsubscribe:
-        """Call `callback` with each payload of that message; return a function that ends this.
+        """Call `callback` with each payload of this message; return how to unsubscribe.
 
         The payload is passed as it was sent: MAVLink 2 cuts trailing zeros.
 

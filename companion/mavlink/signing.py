@@ -89,12 +89,12 @@ class Signing:
         self._key = key
         self._link = bytes([link_id])
         self.file = file
-        kept, load_error = file.load() if file is not None else (Stamps(), None)
-        self._judge = StampJudge(kept, clock, monotonic_clock)
+        kept_stamps, load_error = file.load() if file is not None else (Stamps(), None)
+        self._judge = StampJudge(kept_stamps, clock, monotonic_clock)
         self.remarks, self.changed = self._judge.remarks, self._judge.changed
         if load_error is not None:
             self.remarks.append(load_error)
-        self._newest_stamp = kept.sent
+        self._newest_stamp = kept_stamps.sent
         self._timesync_requests: deque[bytes] = deque(maxlen=_MAX_REQUESTS)
         self._unproven_stamp = 0
 
@@ -161,7 +161,7 @@ class StampWriter:
 
     Args:
         signing: holds the stamps.
-        file: the file to which they are written.
+        file: the file to which the stamps are written.
     """
 
     def __init__(self, signing: Signing, file: StampFile) -> None:

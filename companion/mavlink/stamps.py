@@ -71,7 +71,7 @@ class StampJudge:
     - A stamp further ahead is refused.
 
     Args:
-        kept: the stamps kept by the last run.
+        kept_stamps: the stamps kept by the last run.
         clock: returns Unix time in s; called once.
         monotonic_clock: returns monotonic time in s.
 
@@ -82,7 +82,7 @@ class StampJudge:
 
     def __init__(
         self,
-        kept: Stamps,
+        kept_stamps: Stamps,
         clock: Callable[[], float] = time.time,
         monotonic_clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -91,11 +91,11 @@ class StampJudge:
         self._remarked: set[str] = set()
         self._monotonic_clock = monotonic_clock
         start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
-        self._check_clock(start, kept.date)
-        self._start = min(max(start, kept.date, _PROGRAM_DATE), LATEST_TICKS)
+        self._check_clock(start, kept_stamps.date)
+        self._start = min(max(start, kept_stamps.date, _PROGRAM_DATE), LATEST_TICKS)
         self._start_monotonic = monotonic_clock()
         self._ahead_limit = self._start + _DAY
-        self._kept_streams = kept.streams
+        self._kept_streams = kept_stamps.streams
         self._newest_by_stream: dict[tuple[Stream, bool], int] = {}  # the bool as in `_newest`
         self._newest = {False: 0, True: 0}  # of all streams; True: of stamps far ahead of the date
         self._date_proven = False
@@ -180,12 +180,12 @@ class StampJudge:
         stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)
 
-    def _check_clock(self, start: int, kept: int) -> None:
+    def _check_clock(self, start: int, kept_date: int) -> None:
         """Remark that this computer's clock, `start`, is before the date on disk or the release."""
-        if start < kept - _MINUTE and kept > _PROGRAM_DATE:
+        if start < kept_date - _MINUTE and kept_date > _PROGRAM_DATE:
             self._remark(
                 f"this computer's clock is wrong: it says {_date(start)}, but an earlier run ended "
-                f"at {_date(kept)}, so the later date is used; {SET_CLOCK}; if the clock was "
+                f"at {_date(kept_date)}, so the later date is used; {SET_CLOCK}; if the clock was "
                 "ahead in the earlier run, delete the file of time stamps (docs/signing.md)"
             )
         elif start < _PROGRAM_DATE:

@@ -105,7 +105,7 @@ class Component:
     def _note_unless_repeated(self, client: Client | None, text: str) -> bool:
         """Note that `text` is sent now; return False if it must not be sent.
 
-        It must not if the same text or too many texts were sent to `client` in the last 5 s.
+        A text must not be sent if it or too many others were sent to `client` in the last 5 s.
         """
         now = self._loop.time()
         self._sent_at = {

@@ -118,14 +118,14 @@ class ServedFlights:
 
     async def _fly(self, flight: ServedFlight, command: ControlRequest | None) -> None:
         """Fly, then release control; complete the record, while the next flight may begin."""
-        begun = False
+        has_begun = False
         try:
-            begun = await flight.run(command)
+            has_begun = await flight.run(command)
         finally:
             self.ownership.release()
             self._fence.keep(flight.fence_centre)
             self.current = self._task = None
-            if not begun:
+            if not has_begun:
                 self._retry_time = self._clock() + _RETRY_PAUSE
             await flight.save()
             if self.current is None and self._config.realtime.freeze_gc:  # between flights

@@ -33,14 +33,14 @@ class Ownership:
 
     Args:
         timeout: time without a setpoint after which a client counts as silent, s.
-        hold: time for which the vehicle is held for a silent owner, s.
+        hold_time: time for which the vehicle is held for a silent owner, s.
 
     Attributes:
         owner: the client in control, or None.
     """
 
-    def __init__(self, timeout: float, hold: float) -> None:
-        self._timeout, self._hold = timeout, hold
+    def __init__(self, timeout: float, hold_time: float) -> None:
+        self._timeout, self._hold_time = timeout, hold_time
         self.owner: Hashable | None = None
         self._streams: dict[Hashable, _Stream] = {}
 
@@ -100,7 +100,7 @@ class Ownership:
         overdue = now - self._streams.get(self.owner, _Stream()).newest - self._timeout
         if overdue <= 0.0:
             return ControlState.LIVE
-        return ControlState.HOLDING if overdue <= self._hold else ControlState.EXPIRED
+        return ControlState.HOLDING if overdue <= self._hold_time else ControlState.EXPIRED
 
     def _is_live(self, client: Hashable, now: float) -> bool:
         return now - self._streams.get(client, _Stream()).newest <= self._timeout

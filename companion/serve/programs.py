@@ -35,7 +35,7 @@ class Programs:
             del self._newest[next(iter(self._newest))]
 
     def newest(self, program: Program) -> Request | None:
-        """The newest request of a program; None if it has sent none, or was forgotten."""
+        """The newest request of a program; None if it has sent none, or its request was dropped."""
         return self._newest.get(program)
 
     def sender_of(self, client: Client, frame: Frame) -> Program:

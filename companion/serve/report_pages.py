@@ -63,17 +63,17 @@ class ReportPages:
             start_new_session=True,  # Ctrl-C must reach only this program
         )
         _lower_priority(self._process.pid)
-        out, errors = self._wait_for_output(self._process)
+        output, errors = self._wait_for_output(self._process)
         if self._process.returncode != 0:
             raise RuntimeError(" ".join(errors.split()) or f"exit {self._process.returncode}")
-        return out.strip()
+        return output.strip()
 
     def _wait_for_output(self, process: "subprocess.Popen[str]") -> tuple[str, str]:
         """Return the output of the process when it has ended.
 
         Raises:
-            RuntimeError: the program ends, or the time is over. The process is killed without
-                waiting for its end, because it may be blocked by a disk that hangs.
+            RuntimeError: the program ends, or the page takes too long. The process is killed
+                without waiting for its end, because it may be blocked by a disk that hangs.
         """
         deadline = time.monotonic() + _PAGE_TIMEOUT
         while True:

@@ -104,7 +104,7 @@ class ServedSource:
         return self._ownership.state(now) not in _FLOWN_STATES
 
     def _end_open_loop(self, now: float) -> None:
-        """If an attitude or rates were flown, begin the commanded motion at the vehicle."""
+        """If an attitude or rates were flown, begin the commanded motion where the vehicle is."""
         if self._open_loop_reference is not None:
             self._open_loop_reference = None
             position, velocity = self._vehicle

@@ -118,7 +118,9 @@ def _rates(planner: Planner, q: Quaternion, target: Target, body_rates: BodyRate
     try:
         return BodyRates(*map(float, planner.rates(q, target, _DT, body_rates)))
     except Exception as error:
-        raise AssertionError(f"it raised {error!r}, at q = {q} towards {target}") from error
+        raise AssertionError(
+            f"the planner raised {error!r}, at q = {q} towards {target}"
+        ) from error
 
 
 def _first_rates(planner: str | Law | type[Planner], q: Quaternion, target: Target) -> BodyRates:
@@ -137,8 +139,8 @@ def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: T
     reached = coefficients(q)
     remaining = hypot(reached.north - end.north, reached.east - end.east)
     assert remaining < _MAX_REMAINING_ERROR, (
-        f"after {_SETTLING_TIME:g} s its coefficients are {remaining:.3f} away from {end}; "
-        f"it began at {begin}"
+        f"after {_SETTLING_TIME:g} s the coefficients are {remaining:.3f} away from {end}; "
+        f"the planner began at {begin}"
     )
 
 

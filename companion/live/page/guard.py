@@ -103,8 +103,8 @@ def _is_address_or_own_name(host: str) -> bool:
     try:
         ip_address(name)
     except ValueError:
-        own = socket.gethostname().lower()
-        return name in ("localhost", own, f"{own}.local")
+        own_name = socket.gethostname().lower()
+        return name in ("localhost", own_name, f"{own_name}.local")
     return True
 
 

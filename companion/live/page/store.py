@@ -59,13 +59,13 @@ class Store:
 
     def since(self, count: int) -> list[Message]:
         """The kept states after the first `count` states."""
-        new = min(self.state_count - count, len(self.states))
-        return list(self.states)[len(self.states) - new :]
+        new_count = min(self.state_count - count, len(self.states))
+        return list(self.states)[len(self.states) - new_count :]
 
     def events_since(self, count: int) -> list[dict[str, Any]]:
         """The kept events after the first `count` events."""
-        new = min(self.event_count - count, len(self.events))
-        return list(self.events)[len(self.events) - new :]
+        new_count = min(self.event_count - count, len(self.events))
+        return list(self.events)[len(self.events) - new_count :]
 
     def values(self) -> list[ConfigKey]:
         """The keys that may change in flight, with their present values."""

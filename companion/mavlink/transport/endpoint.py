@@ -72,7 +72,7 @@ class SerialPort:
 
 Endpoint = UdpIn | UdpOut | TcpClient | TcpServer | SerialPort
 
-_NETWORK_KINDS: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
+_NETWORK_CLASSES: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
     "udpin": UdpIn,
     "udp": UdpIn,
     "udpout": UdpOut,
@@ -98,14 +98,14 @@ def parse_endpoint(text: str) -> Endpoint:
     scheme, separator, rest = text.strip().partition("://")
     if separator and scheme == "serial":
         return _serial(text, rest)
-    kind = _NETWORK_KINDS.get(scheme)
-    if not separator or kind is None:
+    endpoint_class = _NETWORK_CLASSES.get(scheme)
+    if not separator or endpoint_class is None:
         raise EndpointError(f"endpoint {text!r} is not understood: {_remedy(text)}")
     rest, question, query = rest.partition("?")
     match = _NETWORK_PATTERN.fullmatch(rest.rstrip("/"))
     if match is None:
         raise EndpointError(f"endpoint {text!r} needs HOST:PORT after {scheme}://: {_HELP}")
-    listens = kind in (UdpIn, TcpServer)
+    listens = endpoint_class in (UdpIn, TcpServer)
     host, port = match[1].strip("[]") or ("0.0.0.0" if listens else ""), int(match[2])
     if not host:
         raise EndpointError(f"endpoint {text!r} names no host to connect to: {_HELP}")
@@ -119,9 +119,9 @@ def parse_endpoint(text: str) -> Endpoint:
     if not (0 if listens else 1) <= port <= 65535:
         raise EndpointError(f"endpoint {text!r}: port {port} is outside 1..65535")
     if not question:
-        return kind(host, port)
-    if kind is UdpIn or kind is TcpServer:
-        return kind(host, port, _peers(text, query))
+        return endpoint_class(host, port)
+    if endpoint_class is UdpIn or endpoint_class is TcpServer:
+        return endpoint_class(host, port, _peers(text, query))
     raise EndpointError(
         f"endpoint {text!r}: {scheme}:// names its peer already; leave ?{query} out"
     )
@@ -174,7 +174,7 @@ def _baud_remedy(path: str) -> str:
 
 
 def _remedy(text: str) -> str:
-    """How to write an endpoint of another program's notation here; else all notations."""
+    """What to write instead of another program's notation; for an unknown text, all notations."""
     text = text.strip()
     if device := _DEVICE_PATTERN.fullmatch(text):
         name, baud = device[1], device[2]
@@ -185,12 +185,12 @@ def _remedy(text: str) -> str:
         return _baud_remedy(path)
     if address := _ADDRESS_PATTERN.fullmatch(text):
         scheme, host, port = address[1], address[2], address[3]
-        kind = _NETWORK_KINDS.get(scheme or "")
-        if kind is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
+        endpoint_class = _NETWORK_CLASSES.get(scheme or "")
+        if endpoint_class is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
             our_scheme = "udpin" if scheme == "udp" else scheme
             return f"write {our_scheme}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
-            is_host_named = host and host not in _NETWORK_KINDS
+            is_host_named = host and host not in _NETWORK_CLASSES
             udpout_hint = (
                 f", or udpout://{host}:{port} to send to {host} first" if is_host_named else ""
             )

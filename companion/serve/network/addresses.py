@@ -43,12 +43,12 @@ def target_of(frame: Frame) -> Address:
 def _target_fields() -> dict[int, tuple[int, int | None]]:
     """Offsets of target system and component in the payload, by message id."""
     fields_by_id: dict[int, tuple[int, int | None]] = {}
-    for number, kind in dialect.mavlink_map.items():
+    for number, message_class in dialect.mavlink_map.items():
         offsets, offset = {}, 0
         for name, code, count in zip(
-            kind.ordered_fieldnames,
-            kind.native_format.decode()[1:],
-            kind.array_lengths,
+            message_class.ordered_fieldnames,
+            message_class.native_format.decode()[1:],
+            message_class.array_lengths,
             strict=True,
         ):
             offsets[name] = offset

@@ -17,7 +17,7 @@ _MAX_QUEUED_BYTES = 32_768
 
 @dataclass
 class ClientStats:
-    """Counters of one client, in frames."""
+    """Counters of one client."""
 
     received: int = 0
     """Intact frames from the client."""

@@ -61,12 +61,16 @@ class Routing:
     """
 
     def __init__(
-        self, vehicle: UplinkQueue, autopilot: Address, own: Address, clock: Callable[[], float]
+        self,
+        vehicle: UplinkQueue,
+        autopilot: Address,
+        our_address: Address,
+        clock: Callable[[], float],
     ) -> None:
         self.stats = RoutingStats()
         self.intercept: Intercept = lambda *_: True
         self.on_own_frame: Callable[[Client, Frame], None] | None = None
-        self._vehicle, self._autopilot, self._own = vehicle, autopilot, own
+        self._vehicle, self._autopilot, self._our_address = vehicle, autopilot, our_address
         self._heard: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
         self._clients: tuple[Client, ...] = ()
         self._repeats = _Repeats(clock)
@@ -89,14 +93,14 @@ class Routing:
         """Forward a frame that came over the link to the vehicle."""
         source = source_of(frame)
         if source != self._autopilot:  # another component, or a station behind the autopilot
-            if source == self._own or self._repeats.is_repeat(frame.raw):
+            if source == self._our_address or self._repeats.is_repeat(frame.raw):
                 self.stats.looped += 1
                 return
             self._learn(self._vehicle, source)
         target = target_of(frame)
         if target == EVERYBODY:
             receivers = self._clients
-        elif target == self._own:
+        elif target == self._our_address:
             return
         else:
             receivers = tuple(each for each in self._clients if self._reaches(each, target))
@@ -113,7 +117,7 @@ class Routing:
         """
         source = source_of(frame)
         if (
-            source in (self._autopilot, self._own)
+            source in (self._autopilot, self._our_address)
             or client not in self._heard
             or self._repeats.is_repeat(frame.raw)
         ):
@@ -122,7 +126,7 @@ class Routing:
         if source.system != 0:
             self._learn(client, source)
         target = target_of(frame)
-        if target == self._own:
+        if target == self._our_address:
             if self.on_own_frame is not None:
                 self.on_own_frame(client, frame)
             return

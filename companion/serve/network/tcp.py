@@ -1,4 +1,4 @@
-"""Clients over TCP: those that connect to our port, or a program that listens."""
+"""Clients over TCP: those that connect to our port, or a program to whose port we connect."""
 
 import asyncio
 import socket

@@ -1,4 +1,4 @@
-"""Queues clients' frames to the vehicle: at a limited rate, in turn, without delay of setpoints."""
+"""Queues clients' frames to the vehicle; limits their rate, so that they do not delay setpoints."""
 
 from collections import deque
 from collections.abc import Callable

@@ -54,7 +54,7 @@ class CommandFollower:
         limits: limits of motions after a jump, one for each axis. A motion along several axes is
             limited along its direction.
         continuity: largest jumps that are followed directly.
-        timeout: time for which a command repeated unchanged is extrapolated, s. After it, a
+        timeout: time for which a command repeated unchanged is extrapolated, s. After this time a
             commanded position stands still, and a commanded velocity stays constant.
     """
 
@@ -75,7 +75,7 @@ class CommandFollower:
         self.stop(now)
 
     def at(self, time: float) -> AxisState:
-        """The state at a time, s."""
+        """State at a time, s: the commanded state plus the rest of the error."""
         commanded = self._commanded.at(time)
         if self._approach is None:
             return commanded

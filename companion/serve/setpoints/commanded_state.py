@@ -26,7 +26,7 @@ class CommandedState(NamedTuple):
     begin_time: float
 
     def at(self, time: float) -> AxisState:
-        """The state at a time, s."""
+        """The commanded state extrapolated to a time, s."""
         t = max(0.0, time - self.begin_time)
         position, velocity, acceleration = [], [], []
         rows = zip(self.position, self.velocity, self.acceleration, self.jerk, strict=True)

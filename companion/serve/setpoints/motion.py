@@ -67,7 +67,7 @@ class CommandedMotion:
         self._newest_yaw: tuple[float, float, float] | None = None  # request, heading demand, time
 
     def begin(self, position_ned: Vector, velocity_ned: Vector, heading: float, now: float) -> None:
-        """Start from a position (m), velocity (m/s) and heading (rad); stop until a request."""
+        """Begin at a position (m), velocity (m/s) and heading (rad), and come to rest."""
         (x, y, z), (u, v, w) = position_ned, velocity_ned
         self._horizontal.begin(AxisState((x, y), (u, v), (0.0, 0.0)), now)
         self._vertical.begin(AxisState((z,), (w,), (0.0,)), now)

@@ -116,7 +116,7 @@ _Values = tuple[float | None, ...]
 
 
 def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Values]:
-    """Position, velocity and acceleration; None for what the mask excludes."""
+    """Position, velocity and acceleration; None for each number that the mask excludes."""
     mask = message.type_mask
     if mask & _FORCE and mask & _NO_ACCELERATION != _NO_ACCELERATION:
         raise RefusedSetpoint("forces are not supported: clear FORCE_SET")

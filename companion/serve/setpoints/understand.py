@@ -42,12 +42,12 @@ def decode_setpoint(
     return local_target(message, situation, body_yaw_is_relative=body_yaw_is_relative)
 
 
-def _check_target(target: Address, autopilot: Address, own: Address) -> None:
+def _check_target(target: Address, autopilot: Address, our_address: Address) -> None:
     if target.system not in (0, autopilot.system):
         raise RefusedSetpoint(
             f"target_system is {target.system}; this vehicle is {autopilot.system}"
         )
-    if target.component not in (0, autopilot.component, own.component):
+    if target.component not in (0, autopilot.component, our_address.component):
         raise RefusedSetpoint(
             f"target_component is {target.component}; the autopilot is {autopilot.component}"
         )
