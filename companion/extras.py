@@ -31,15 +31,15 @@ def require(module: str, extra: str, purpose: str) -> None:
 def pip_command(extra: str) -> str:
     """The shell command that installs an extra into the environment that runs this program."""
     in_clone = (_CLONE_FOLDER / "pyproject.toml").is_file()
-    what = (
+    requirement = (
         f"-e '{_from_here(_CLONE_FOLDER)}[{extra}]'"
         if in_clone
         else f"'mavlink-companion[{extra}]'"
     )
-    return f"{shlex.quote(_from_here(Path(sys.executable)))} -m pip install {what}"
+    return f"{shlex.quote(_from_here(Path(sys.executable)))} -m pip install {requirement}"
 
 
 def _from_here(path: Path) -> str:
     """A path as a user in the working folder would write it."""
-    here = Path.cwd()
-    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
+    folder = Path.cwd()
+    return str(path.relative_to(folder)) if path.is_relative_to(folder) else str(path)

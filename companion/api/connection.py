@@ -190,8 +190,8 @@ async def _end_flight(program: ProgramPlan) -> None:
     """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
     if program.busy:
         program.interrupt("the program ended before its request was completed")
-    elif not program.over:
-        await program.request(_ending_phases, last=True)
+    elif not program.is_over:
+        await program.request(_ending_phases, ends_flight=True)
 
 
 def _ending_phases(context: FlightContext) -> Sequence[Phase]:

@@ -189,17 +189,17 @@ class Vehicle:
 
     async def land(self) -> None:
         """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
-        await self._request(lambda context: landing_phases(context.config.flight), last=True)
+        await self._request(lambda context: landing_phases(context.config.flight), ends_flight=True)
 
     async def hand_back(self) -> None:
         """Let the autopilot hold the vehicle; the flight ends."""
-        await self._request(lambda _: (hand_back_phase(),), last=True)
+        await self._request(lambda _: (hand_back_phase(),), ends_flight=True)
 
     def _request(
-        self, phases: Callable[[FlightContext], Sequence[Phase]], *, last: bool = False
+        self, phases: Callable[[FlightContext], Sequence[Phase]], *, ends_flight: bool = False
     ) -> asyncio.Future[None]:
         """Request phases; the future is done when they have ended."""
-        return self._loop.start(self._program.request(phases, last=last))
+        return self._loop.start(self._program.request(phases, ends_flight=ends_flight))
 
     async def _fly(self, maneuver: Maneuver) -> None:
         self._held_pose()  # raises if the vehicle is not under our control

@@ -47,7 +47,7 @@ class WatchedFile:
         self, path: Path, config_as_read: Config, check: Callable[[Values, str], None]
     ) -> None:
         self._path, self._check = path, check
-        self._accepted = self._newest_loaded = config_as_read
+        self._accepted_config = self._newest_config = config_as_read
         self._files = files_of(path)
         self._newest_signature = self._signature()
         self._checked_signature: Signature | None = None
@@ -67,13 +67,13 @@ class WatchedFile:
 
     def accept(self) -> None:
         """Accept the newest edit: later edits are compared with it."""
-        self._accepted = self._newest_loaded
+        self._accepted_config = self._newest_config
 
     def _edit(self) -> Edit | None:
         name = self._path.name
         try:
-            self._newest_loaded = load(self._path)
-            values = _values(self._accepted, self._newest_loaded)
+            self._newest_config = load(self._path)
+            values = _values(self._accepted_config, self._newest_config)
             if not values:
                 return None
             self._check(values, name)

@@ -84,7 +84,7 @@ class CommandClient:
         self._settings, self._outbox, self._registry = settings, outbox, registry
         self._texts = texts
         self._locks: dict[int, asyncio.Lock] = {}
-        self._unanswered: dict[int, deque[_Try]] = {}
+        self._unanswered_tries: dict[int, deque[_Try]] = {}
         router.subscribe("COMMAND_ACK", self._on_ack)
 
     async def send(
@@ -108,12 +108,12 @@ class CommandClient:
         """
         lock = self._locks.setdefault(command, asyncio.Lock())
         async with lock:
-            began = asyncio.get_running_loop().time()
+            start_time = asyncio.get_running_loop().time()
             with AnswerQueue[int](self._registry) as answers:
                 result = await self._exchange(command, params, timeout_s, retries, answers)
             if result != _ACCEPTED:
                 await asyncio.sleep(_REASON_DELAY_S)
-                texts = self._texts.since(began)
+                texts = self._texts.since(start_time)
                 raise CommandRefused(command_name(command), result, result_name(result), texts)
 
     async def _exchange(
@@ -177,17 +177,17 @@ class CommandClient:
             return
         if message.target_component not in (0, self._settings.source_component):
             return
-        expected = self._expected_tries(message.command)
-        if not expected:
+        expected_tries = self._expected_tries(message.command)
+        if not expected_tries:
             return
-        expected[0].answers.put(message.result)
+        expected_tries[0].answers.put(message.result)
         if message.result != _IN_PROGRESS:
-            expected.popleft()
+            expected_tries.popleft()
 
     def _expected_tries(self, command: int) -> deque[_Try]:
         """The tries of a command whose ACK may still come, oldest first."""
         now = asyncio.get_running_loop().time()
-        tries = self._unanswered.setdefault(command, deque())
+        tries = self._unanswered_tries.setdefault(command, deque())
         while tries and tries[0].deadline < now:
             tries.popleft()
         return tries

@@ -90,11 +90,11 @@ class StampJudge:
         self.changed = Event()
         self._remarked: set[str] = set()
         self._monotonic_clock = monotonic_clock
-        start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
-        self._check_clock(start, kept_stamps.date)
-        self._start = min(max(start, kept_stamps.date, _PROGRAM_DATE), LATEST_TICKS)
+        clock_date = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
+        self._check_clock(clock_date, kept_stamps.date)
+        self._start_date = min(max(clock_date, kept_stamps.date, _PROGRAM_DATE), LATEST_TICKS)
         self._start_monotonic = monotonic_clock()
-        self._ahead_limit = self._start + _DAY
+        self._ahead_limit = self._start_date + _DAY
         self._kept_streams = kept_stamps.streams
         self._newest_by_stream: dict[tuple[Stream, bool], int] = {}  # the bool as in `_newest`
         self._newest = {False: 0, True: 0}  # of all streams; True: of stamps far ahead of the date
@@ -102,7 +102,9 @@ class StampJudge:
 
     def date(self) -> int:
         """The date of this program now, ticks."""
-        return self._start + int((self._monotonic_clock() - self._start_monotonic) * TICKS_PER_S)
+        return self._start_date + int(
+            (self._monotonic_clock() - self._start_monotonic) * TICKS_PER_S
+        )
 
     def awaits_answer(self, stamp: int) -> bool:
         """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
@@ -180,18 +182,19 @@ class StampJudge:
         stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)
 
-    def _check_clock(self, start: int, kept_date: int) -> None:
-        """Remark that this computer's clock, `start`, is before the date on disk or the release."""
-        if start < kept_date - _MINUTE and kept_date > _PROGRAM_DATE:
+    def _check_clock(self, clock_date: int, kept_date: int) -> None:
+        """Remark that the clock's date, ticks, is before the date on disk or of the release."""
+        if clock_date < kept_date - _MINUTE and kept_date > _PROGRAM_DATE:
             self._remark(
-                f"this computer's clock is wrong: it says {_date(start)}, but an earlier run ended "
-                f"at {_date(kept_date)}, so the later date is used; {SET_CLOCK}; if the clock was "
-                "ahead in the earlier run, delete the file of time stamps (docs/signing.md)"
+                f"this computer's clock is wrong: it says {_date(clock_date)}, but an earlier run "
+                f"ended at {_date(kept_date)}, so the later date is used; {SET_CLOCK}; if the "
+                "clock was ahead in the earlier run, delete the file of time stamps "
+                "(docs/signing.md)"
             )
-        elif start < _PROGRAM_DATE:
+        elif clock_date < _PROGRAM_DATE:
             self._remark(
-                f"this computer's clock is wrong: it says {_date(start)}, before this program was "
-                f"released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
+                f"this computer's clock is wrong: it says {_date(clock_date)}, before this program "
+                f"was released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
             )
 
     def _remark_ahead(self, ticks: int, rest: str) -> None:

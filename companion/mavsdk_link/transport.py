@@ -93,7 +93,7 @@ class MavsdkTransport:
         # A listening UDP port knows no address to send to before it has received a frame.
         self._has_peer = not url.startswith(_SCHEMES[UdpIn])
         self._is_open = True
-        self._waiting: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
+        self._waiting_frames: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
         self._loop = asyncio.get_running_loop()
         self._wakeup = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._mavsdk = Mavsdk(Configuration.create_manual(settings.source_system, component, True))
@@ -133,13 +133,13 @@ class MavsdkTransport:
 
     def _on_frame(self, frame: bytes) -> None:
         """Pass a frame to the event loop; called in MAVSDK's thread."""
-        self._waiting.append((frame, perf_counter_ns()))
+        self._waiting_frames.append((frame, perf_counter_ns()))
         os.eventfd_write(self._wakeup, 1)
 
     def _read(self) -> None:
         os.eventfd_read(self._wakeup)
-        while self._waiting:
-            frame, received_ns = self._waiting.popleft()
+        while self._waiting_frames:
+            frame, received_ns = self._waiting_frames.popleft()
             if frame[0] != V2 or frame[_SOURCE] != self._mavsdk_source:
                 self._has_peer = True
                 self._receive(frame, received_ns)

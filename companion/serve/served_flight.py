@@ -88,7 +88,7 @@ class ServedFlight:
         self._link, self._component, self._ownership = link, component, ownership
         self._changes, self._clock = changes, asyncio.get_running_loop().time
         self._autopilot = Address(link.settings.target_system, link.settings.target_component)
-        self._owner, self._release_commanded_at = name, -inf
+        self._owner_name, self._release_commanded_at = name, -inf
         self._source = ServedSource(
             name, commanded_motion(changes.wanted), ownership, self._heading
         )
@@ -197,7 +197,7 @@ class ServedFlight:
     def _released_by(self) -> str:
         """Name of the owner if it has just commanded another mode, else an empty text."""
         is_recent = self._clock() - self._release_commanded_at <= _RELEASE_TIME
-        return self._owner if is_recent else ""
+        return self._owner_name if is_recent else ""
 
     def _tell_alarm(self, text: str) -> None:
         self._note_alarm(text)
@@ -205,13 +205,13 @@ class ServedFlight:
 
     def _tell_end(self, command: ControlRequest | None, result: str) -> None:
         if self._source.start_pose is None:
-            self._component.tell(f"control was not given to {self._owner}: {result}")
+            self._component.tell(f"control was not given to {self._owner_name}: {result}")
             self._answer(command, REJECTED)
             return
         if result == "ok":
             released = self._assembled.flight.failed_in is not None
             result = "released by the client" if released else "handed back"
-        self._component.tell(f"control by {self._owner} has ended: {result}")
+        self._component.tell(f"control by {self._owner_name} has ended: {result}")
 
     async def _answer_and_tell(self, command: ControlRequest | None) -> None:
         """Answer `command` until control begins; then tell clients of each change of control."""
@@ -222,12 +222,12 @@ class ServedFlight:
         told_owner, told_state = "", ControlState.LIVE
         while True:
             state = self._ownership.state(self._clock())
-            self._owner = str(self._ownership.owner or self._owner)
-            if self._owner != told_owner:  # also when another client goes on for a silent one
-                told_owner, told_state = self._owner, ControlState.LIVE
+            self._owner_name = str(self._ownership.owner or self._owner_name)
+            if self._owner_name != told_owner:  # also when another client goes on for a silent one
+                told_owner, told_state = self._owner_name, ControlState.LIVE
                 self._component.tell(f"{told_owner} is in control")
             elif state is not told_state and state in (ControlState.LIVE, ControlState.HOLDING):
-                self._component.tell(f"{self._owner}: {state.value}")
+                self._component.tell(f"{self._owner_name}: {state.value}")
                 told_state = state
             await asyncio.sleep(_CHECK_PERIOD)
 

@@ -75,11 +75,11 @@ class SituationKeeper:
 
         `wanted` returns rates by message name, Hz; it is called once the autopilot is known.
         """
-        newest = self._network.attitude_payload
+        newest_payload = self._network.attitude_payload
         while True:
             await asyncio.sleep(_CHECK_PERIOD)
-            before, newest = newest, self._network.attitude_payload
-            if newest != before or self._link.state.autopilot is None:
+            payload_before, newest_payload = newest_payload, self._network.attitude_payload
+            if newest_payload != payload_before or self._link.state.autopilot is None:
                 continue
             with suppress(LinkError):  # the autopilot may be booting; the request is repeated
                 await self._link.set_rates(wanted(), window_s=_COUNTING_TIME)

@@ -52,19 +52,19 @@ class ServedSource:
         self.start_pose: Pose | None = None
         self.resets = EstimatorResets()
         self._motion, self._ownership, self._heading_now = motion, ownership, heading_now
-        self._vehicle = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self._vehicle_motion = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._open_loop_reference: Reference | None = None  # a commanded attitude or body rates
         self._waiting_request: Request | None = None
-        self._stopped = False
+        self._is_stopped = False
 
     def begin(self, now: float, pose: Pose) -> None:
         """Start from the held pose, with the newest request unless the client is silent."""
         self.start_pose = pose
-        live = self._ownership.state(now) is ControlState.LIVE
+        is_live = self._ownership.state(now) is ControlState.LIVE
         self._ownership.begin(now)
-        self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
+        self._vehicle_motion = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
-        if self._waiting_request is not None and live:
+        if self._waiting_request is not None and is_live:
             with suppress(UnplannableError):  # hold; the client's next setpoint gets a refusal
                 self.give(self._waiting_request, now)
 
@@ -81,21 +81,21 @@ class ServedSource:
             before = self._open_loop_reference
             self._end_open_loop(now)
             try:
-                self._motion.command(self._without_jumps(request), now, self._vehicle)
+                self._motion.command(self._without_jumps(request), now, self._vehicle_motion)
             except UnplannableError:
                 self._open_loop_reference = before
                 raise
         else:
             self._open_loop_reference = self._make_open_loop_reference(request)
-        self._stopped = False
+        self._is_stopped = False
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The reference over time; if the client is silent, the reference comes to rest."""
-        self._vehicle = motion
-        if self._ownership.state(now) is not ControlState.LIVE and not self._stopped:
+        self._vehicle_motion = motion
+        if self._ownership.state(now) is not ControlState.LIVE and not self._is_stopped:
             self._end_open_loop(now)
             self._motion.stop(now, motion)
-            self._stopped = True
+            self._is_stopped = True
         reference = self._open_loop_reference
         return self._motion.reference if reference is None else lambda _: reference
 
@@ -107,11 +107,11 @@ class ServedSource:
         """If an attitude or rates were flown, begin the commanded motion where the vehicle is."""
         if self._open_loop_reference is not None:
             self._open_loop_reference = None
-            position, velocity = self._vehicle
+            position, velocity = self._vehicle_motion
             self._motion.begin(position, velocity, self._heading_now(), now)
 
     def _make_open_loop_reference(self, request: AttitudeRequest | RatesRequest) -> Reference:
-        position, heading_now = self._vehicle.position_ned, self._heading_now()
+        position, heading_now = self._vehicle_motion.position_ned, self._heading_now()
         thrust = ThrustCommand(request.thrust)
         if isinstance(request, RatesRequest):
             return Reference(

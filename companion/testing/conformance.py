@@ -129,18 +129,18 @@ def _first_rates(planner: str | Law | type[Planner], q: Quaternion, target: Targ
     return _rates(instance, q, target, zero_rates)
 
 
-def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: Target) -> None:
+def _check_convergence(planner: str | Law | type[Planner], start: Target, target: Target) -> None:
     instance, rates = _make_planner(planner), BodyRates(0.0, 0.0, 0.0)
-    q = attitude(Coefficients(begin.north, begin.east), begin.heading)
+    q = attitude(Coefficients(start.north, start.east), start.heading)
     instance.reset(q, rates)
     for _ in range(round(_SETTLING_TIME / _DT)):
-        rates = _rates(instance, q, end, rates)
+        rates = _rates(instance, q, target, rates)
         q = after_constant_rates(q, rates, _DT)
     reached = coefficients(q)
-    remaining = hypot(reached.north - end.north, reached.east - end.east)
+    remaining = hypot(reached.north - target.north, reached.east - target.east)
     assert remaining < _MAX_REMAINING_ERROR, (
-        f"after {_SETTLING_TIME:g} s the coefficients are {remaining:.3f} away from {end}; "
-        f"the planner began at {begin}"
+        f"after {_SETTLING_TIME:g} s the coefficients are {remaining:.3f} away from {target}; "
+        f"the planner began at {start}"
     )
 
 

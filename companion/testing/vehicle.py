@@ -93,8 +93,8 @@ class MockVehicle:
         self._simulation = Simulation(all_settings, plant=_plant(compiled))
         self._exchange = Exchange(all_settings, self._simulation)
         self._exchange.on_message = self._record_setpoint
-        self._arrived: list[Arrived] = []
-        self._begun = False
+        self._arrived_datagrams: list[Arrived] = []
+        self._has_begun = False
 
     # --- true state
 
@@ -197,9 +197,9 @@ class MockVehicle:
         """Take a datagram of the program; in lockstep the vehicle handles it in the next step."""
         relay = self.from_companion
         for each in (datagram,) if relay is None else relay(datagram):
-            self._arrived.append((each, decode(each)))
+            self._arrived_datagrams.append((each, decode(each)))
         if not self.in_lockstep:
-            arrived, self._arrived = self._arrived, []
+            arrived, self._arrived_datagrams = self._arrived_datagrams, []
             self._exchange.deliver(arrived, self._simulation.companion)
 
     def take_sent(self) -> list[bytes]:
@@ -211,9 +211,9 @@ class MockVehicle:
 
         In lockstep that is the first beacon.
         """
-        if self._begun:
+        if self._has_begun:
             return []
-        self._begun = True
+        self._has_begun = True
         if self.in_lockstep:
             beacon = self._simulation.beacon()
             return self._relayed([self._simulation.companion.sign(beacon)])
@@ -222,8 +222,8 @@ class MockVehicle:
 
     def step(self) -> list[bytes]:
         """Simulate one step; return the datagrams that the vehicle sends in it."""
-        self._begun = True
-        arrived, self._arrived = self._arrived, []
+        self._has_begun = True
+        arrived, self._arrived_datagrams = self._arrived_datagrams, []
         beacon = self._exchange.step(arrived)
         datagrams = self._exchange.outgoing(self._simulation.companion, beacon)
         for callback in tuple(self.after_step):

@@ -63,20 +63,20 @@ class CommandFollower:
     ) -> None:
         self._limits, self._continuity, self._timeout = limits, continuity, timeout
         self._zero: AxisValues = (0.0,) * len(limits)
-        self._demand: AxisDemand | None = None
+        self._newest_demand: AxisDemand | None = None
         self._commanded_at = 0.0
         self._approach: Approach | None = None
-        self._commanded = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
+        self._commanded_state = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
 
     def begin(self, state: AxisState, now: float) -> None:
         """Start from a state, and come to rest until a command comes."""
-        self._demand, self._approach = None, None
-        self._commanded = CommandedState(*state, self._zero, now)
+        self._newest_demand, self._approach = None, None
+        self._commanded_state = CommandedState(*state, self._zero, now)
         self.stop(now)
 
     def at(self, time: float) -> AxisState:
         """State at a time, s: the commanded state plus the rest of the error."""
-        commanded = self._commanded.at(time)
+        commanded = self._commanded_state.at(time)
         if self._approach is None:
             return commanded
         error = self._approach.at(time)
@@ -97,8 +97,8 @@ class CommandFollower:
             if are_far_apart(
                 current.position, actual.position, _MAX_LEAD_DISTANCE
             ) or are_far_apart(current.velocity, actual.velocity, _MAX_LEAD_SPEED):
-                self._demand, self._approach = None, None
-                self._commanded = CommandedState(*actual, self._zero, self._zero, now)
+                self._newest_demand, self._approach = None, None
+                self._commanded_state = CommandedState(*actual, self._zero, self._zero, now)
         self.command(AxisDemand(None, self._zero, None), now)
 
     def command(self, demand: AxisDemand, now: float, actual: AxisMotion | None = None) -> None:
@@ -109,7 +109,7 @@ class CommandFollower:
         Raises:
             UnplannableError: no motion leads to the command; the previous one stays in force.
         """
-        if demand == self._demand:
+        if demand == self._newest_demand:
             self._repeat(demand, now, actual)
             return
         current = self.at(now)
@@ -117,7 +117,7 @@ class CommandFollower:
             self._follow_position(demand, current, now)
         else:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
-        self._demand, self._commanded_at = demand, now
+        self._newest_demand, self._commanded_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
         """Follow an unchanged command; extrapolate it only for `timeout`: its sender may hang."""
@@ -140,7 +140,7 @@ class CommandFollower:
         is_far_away = actual is not None and are_far_apart(
             current.position, actual.position, _MAX_LEAD_DISTANCE
         )
-        still_accelerates = demand.acceleration is None and any(self._commanded.acceleration)
+        still_accelerates = demand.acceleration is None and any(self._commanded_state.acceleration)
         if demand.velocity is None or is_far_away or still_accelerates:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
 
@@ -154,7 +154,7 @@ class CommandFollower:
             approach = None
         else:
             approach = self._plan(error, error.position, now, by_velocity=False)
-        self._commanded, self._approach = target, approach
+        self._commanded_state, self._approach = target, approach
 
     def _follow_motion(self, demand: AxisDemand, current: AxisState, now: float) -> None:
         velocity = current.velocity if demand.velocity is None else demand.velocity
@@ -164,7 +164,7 @@ class CommandFollower:
         if demand.velocity is not None:
             error = target.error_of(current)
             approach = self._plan(error, error.velocity, now, by_velocity=True)
-        self._commanded, self._approach = target, approach
+        self._commanded_state, self._approach = target, approach
 
     def _plan(
         self, error: AxisState, direction: AxisValues, now: float, *, by_velocity: bool
@@ -184,7 +184,7 @@ class CommandFollower:
 
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[AxisValues, AxisValues]:
         """Acceleration and jerk of a stream; estimated if they are not commanded."""
-        before, interval = self._demand, now - self._commanded_at
+        before, interval = self._newest_demand, now - self._commanded_at
         commanded = demand.acceleration
         is_stream = (
             before is not None
@@ -197,11 +197,11 @@ class CommandFollower:
             rate = change_rate(before.velocity, demand.velocity, interval, _LARGEST_ACCELERATION)
             if rate is None:
                 return self._zero, self._zero
-            return _blend(self._commanded.acceleration, rate), self._zero
+            return _blend(self._commanded_state.acceleration, rate), self._zero
         if before.acceleration is None:
             return commanded, self._zero
         jerk = change_rate(before.acceleration, commanded, interval, LARGEST_JERK)
-        return commanded, self._zero if jerk is None else _blend(self._commanded.jerk, jerk)
+        return commanded, self._zero if jerk is None else _blend(self._commanded_state.jerk, jerk)
 
     def _is_continuous(self, error: AxisState) -> bool:
         return (

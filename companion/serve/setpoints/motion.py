@@ -80,7 +80,12 @@ class CommandedMotion:
         Raises:
             UnplannableError: no motion leads to the request; the previous one stays in force.
         """
-        before = copy(self._horizontal), copy(self._vertical), copy(self._heading), self._newest_yaw
+        state_before = (
+            copy(self._horizontal),
+            copy(self._vertical),
+            copy(self._heading),
+            self._newest_yaw,
+        )
         horizontal, vertical = _by_axes(actual)
         try:
             self._horizontal.command(request.horizontal, now, horizontal)
@@ -89,7 +94,7 @@ class CommandedMotion:
             self._vertical.command(demand, now, vertical)
             self._heading.command(self._heading_demand(request, now), now)
         except UnplannableError:
-            self._horizontal, self._vertical, self._heading, self._newest_yaw = before
+            self._horizontal, self._vertical, self._heading, self._newest_yaw = state_before
             raise
 
     def stop(self, now: float, actual: VehicleMotion) -> None:
