@@ -154,7 +154,7 @@ def test_an_end_that_broke_counts_as_closed():
             raise ConnectionResetError
 
     channel = Channel(Broken())
-    assert list(channel.arrived()) == [None]
+    assert list(channel.received_messages()) == [None]
     assert not channel.open
     assert list(datagrams(Broken(), 1)) == [b""]
 
@@ -165,7 +165,7 @@ def test_a_turn_takes_no_more_than_it_may():
     for number in range(3):
         channel.send({"number": number})
     told = Channel(theirs)
-    assert [message["number"] for message in told.arrived(2)] == [0, 1]
+    assert [message["number"] for message in told.received_messages(2)] == [0, 1]
     assert len(list(datagrams(theirs, 0))) == 0
     assert len(list(datagrams(theirs, 5))) == 1
     channel.close()
