@@ -29,9 +29,9 @@ _USAGE_ERRORS = (
     RecordError,
     SigningError,
 )
-"""The command line or the configuration is wrong, or something that it names cannot be used."""
+"""Errors of the command line, the configuration, or what they name: exit code 2."""
 _FLIGHT_ERRORS = LinkError, VehicleStoppedError
-"""The flight failed, or something that it needs failed."""
+"""Errors of the flight or of what it needs: exit code 1."""
 
 Command = Callable[[argparse.Namespace], int]
 

@@ -9,7 +9,7 @@ from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
 SECOND_CTRL_C_AFTER = 1.0
-"""A repeated Ctrl-C leaves the flight only this long after the one before, s: keys bounce."""
+"""Shortest time after the previous Ctrl-C at which another leaves the flight, s: keys bounce."""
 
 HOW_TO_LEAVE = (
     f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints at once: then the "

@@ -1,4 +1,4 @@
-"""Which kind of YAML file a user gave where another kind is wanted, and which command takes it."""
+"""Recognises a YAML file of the wrong kind, and names the command that takes it."""
 
 from collections.abc import Iterable, Mapping
 from enum import Enum
@@ -9,7 +9,7 @@ from companion.files.yaml_file import ConfigError
 
 
 class FileKind(Enum):
-    """The kinds of YAML files; the value is how messages call it."""
+    """The kinds of YAML files; each value is the name in messages."""
 
     CONFIG = "a configuration"
     TRAJECTORY = "a trajectory file"
@@ -22,7 +22,7 @@ CAMPAIGN_KEYS = (
 )  # fmt: skip
 """The keys of a campaign file. Its model, in `companion.campaign`, may not be imported here."""
 TRAJECTORY_KEYS = ("hover", "line", "circle", "helix", "figure_eight", "waypoints", "csv")
-"""The keys of a trajectory file. Its model uses this module."""
+"""The keys of a trajectory file. Its model imports this module, so it is not imported here."""
 _KEYS: Mapping[FileKind, Iterable[str]] = {
     FileKind.CONFIG: Config.model_fields,
     FileKind.TRAJECTORY: TRAJECTORY_KEYS,

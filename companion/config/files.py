@@ -243,5 +243,5 @@ def shipped(name: str) -> Path:
 
 
 def json_schema() -> str:
-    """JSON Schema of the file, for editors to complete and check while typing."""
+    """JSON Schema of a configuration file, for editors to complete and check while typing."""
     return json.dumps(Config.model_json_schema(), indent=2, ensure_ascii=False) + "\n"

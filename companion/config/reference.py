@@ -30,9 +30,9 @@ class ConfigKey(NamedTuple):
     section: str
     name: str
     value: Any
-    """Its value, as plain data that YAML can hold."""
+    """Value of the key, as plain data that YAML can hold."""
     default: Any
-    """Its default, as plain data too."""
+    """Default of the key, as plain data that YAML can hold."""
     unit: str
     """Unit such as °/s; empty without a unit."""
     allowed: str

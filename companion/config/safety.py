@@ -30,7 +30,7 @@ MOST_MONITORS = 20
 
 
 class SafetyConfig(Section):
-    """Limits of the other safety monitors (see `limits`, `deadman`), and all monitors' actions."""
+    """Actions of all safety monitors, and those limits that are not in `limits` or `deadman`."""
 
     hold_s: Annotated[float, Field(gt=0.0, le=60.0)] = 3.0
     """Longest hold after a breach. The vehicle lands as soon as the breach has ended, or after this

@@ -41,7 +41,7 @@ def seconds(milliseconds: float) -> float:
 
 
 def share(percent: float) -> float:
-    """Percent as a share of 1, by telemetry's formula: equal percentages give equal shares."""
+    """Percent as a share of 1, divided as in `companion.vehicle.state`: equal values stay equal."""
     return percent / 100.0
 
 
@@ -61,7 +61,7 @@ def converted(value: float | None, convert: Conversion) -> float | None:
 
 
 class Si(property):
-    """A value of a section in SI units, beside the key that the user writes.
+    """A key's value in SI units, as a property beside the key that the user writes.
 
     `max_tilt = Si("max_tilt_deg")` is read as `limits.max_tilt`, in rad. It is a property, so that
     pydantic does not take it for a key.

@@ -120,7 +120,7 @@ class _Dumper(yaml.SafeDumper):
     """Quotes texts that YAML 1.1 or 1.2 would read as numbers: 12e5, 0o17."""
 
     def ignore_aliases(self, data: Any) -> bool:
-        """Write no aliases: `parse` refuses them."""
+        """Always true: no alias is written, because `parse` refuses aliases."""
         return True
 
 
@@ -135,7 +135,7 @@ class _Builder:
 
     Attributes:
         root: the document so far.
-        lines: line numbers of its keys and items.
+        lines: line number of each key and each item of a list, from 1.
     """
 
     def __init__(self) -> None:

@@ -9,7 +9,7 @@ from companion.files.similar_names import name_hint
 
 _LONGEST_SHOWN = 60
 _LARGEST_HINTED = 1e12
-"""Beyond it a value has no hint of another unit; it may be too large for a float."""
+"""Larger values get no hint of a mistaken unit; they may be too large for a float."""
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
@@ -89,7 +89,7 @@ def value_fault(detail: Any, key: str | int) -> str:
 
 
 def _own_message(detail: Any) -> str:
-    """The message of a validator of ours, in small letters."""
+    """The message of a validator of ours, with a small first letter."""
     message: str = detail["msg"].removeprefix("Value error, ")
     return f"{message[:1].lower()}{message[1:]}"
 

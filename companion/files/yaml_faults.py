@@ -140,7 +140,7 @@ def _types_at(location: Location, model: type[BaseModel]) -> list[Any]:
 
 
 def _type_inside(kind: Any, part: int | str) -> Any:
-    """The type of one key or item of a section, dictionary or list; None if it has none."""
+    """Type of the key or item `part` in a section, dictionary or list; None: no such part."""
     arguments = get_args(kind)
     if isinstance(kind, type) and issubclass(kind, BaseModel) and str(part) in kind.model_fields:
         return kind.model_fields[str(part)].annotation

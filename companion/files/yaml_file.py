@@ -57,7 +57,7 @@ class Section(BaseModel):
     if not TYPE_CHECKING:  # a type checker shall see the keys as arguments
 
         def __init__(self, /, **keys: Any) -> None:
-            """Check the keys, as those of a file.
+            """Make a section in a program; the keys are checked like those of a file.
 
             Raises:
                 ConfigError: an unknown key or a bad value.
@@ -204,7 +204,7 @@ def validated(
 def _config_error(
     error: ValidationError, name: str, model: type[Section], places: Mapping[Where, Place]
 ) -> ConfigError:
-    """The error of `validated` for an error of pydantic."""
+    """The `ConfigError` for a pydantic error: up to five faults with file and line."""
     details = told_details(error.errors(include_url=False))
     faults, previous_place = [], Place("")
     for detail in details[:_MOST_FAULTS_SHOWN]:

@@ -33,7 +33,7 @@ class Invocation(NamedTuple):
 
 
 class ClosingWords(NamedTuple):
-    """The summary in words."""
+    """The summary of a flight in words."""
 
     headline: str
     """What flew, and whether it was good."""
@@ -91,7 +91,7 @@ def _beyond_limit(beyond: list[Check]) -> list[str]:
 
 
 def _by_subject(good: Sequence[Check]) -> list[str]:
-    """One line for each subject of the passed checks, with all their figures."""
+    """One line for each `Check.what` of the passed checks, with the figures of these checks."""
     found: dict[str, list[str]] = {}
     for check in good:
         found.setdefault(check.what, []).append(check.found)

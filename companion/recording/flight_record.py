@@ -74,7 +74,7 @@ class FlightRecord:
     epoch: float
     """Unix time at which our clock read 0, s; 0 if our clock is the vehicle's."""
     metadata: Mapping[str, Mapping[str, str]]
-    """"flight" (versions, start, seed and so on) and others, by name."""
+    """Metadata records by name, such as "flight" with versions, start and seed."""
 
     def rows(self, name: str) -> Rows:
         """All rows of a channel of numbers, such as "sample" or "guidance", in the file's order.
@@ -105,7 +105,7 @@ class FlightRecord:
     def fault(self) -> str | None:
         """Why the record holds less than the flight, as a sentence; None: it holds all.
 
-        If the flight was killed, it has no summary, and a record that ends there has no fault.
+        A record that ends because its flight was killed (no `summary.json`) has no fault.
         """
         if self.damage is not None:
             return (

@@ -122,7 +122,7 @@ class FlightTrace:
             self.recorder.maneuver(time, vehicle_time, name)
 
     def lost_rows_warning(self) -> str | None:
-        """A warning for the user if rows were lost; None: none were."""
+        """A warning for the user if rows were lost, else None."""
         kept = self.response, self.tracking, self.rates, self.latencies_ns, self.motion
         lost = sum(series.lost for series in kept)
         if lost == 0:

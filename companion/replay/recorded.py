@@ -43,8 +43,7 @@ class RecordedSample(NamedTuple):
     flags: LoopFlags
     """State of the control loop when the sample arrived."""
     checked: float
-    """Time of the last check of the sample's age, before sending, s on our clock; NaN: not
-    checked."""
+    """Time when the sample's age was checked before sending, s on our clock; NaN: not checked."""
     reason: str
     """"answered", or why it is unanswered; one of `UNANSWERED_CODES`."""
     setpoint: Setpoint | None
@@ -133,7 +132,7 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
 def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> RecordedStep:
     """The step in a row of `INPUT`, with its rows of `TARGET` and `GUIDANCE`.
 
-    None: the step gave no command, or had no reference.
+    `target` is None if the step gave no command, `guidance` if it had no reference.
     """
     position = None
     if not isnan(row["position_received_s"]):

@@ -55,7 +55,7 @@ class ReplayedSample(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether flight and replay sent the same setpoint to the bit, or none for one reason."""
+        """Whether flight and replay sent equal setpoints to the bit, or none for equal reasons."""
         return self.recorded == self.replayed and self.recorded_reason == self.replayed_reason
 
 
@@ -200,7 +200,7 @@ class Replay:
 
 
 def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
-    """The drag assumed for the maneuvers: as configured, otherwise as when the flight began."""
+    """The drag assumed for the maneuvers: as configured, else as recorded before the flight."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
     flight = record.metadata["flight"]

@@ -26,8 +26,8 @@ class CrossedLimit:
     key: str
     """Configuration key of the limit."""
     levels: tuple[float, ...] = ()
-    """Values of the limit, in the curve's unit. The curve must not cross them, except "latency",
-    which must not do so often."""
+    """Values of the limit, in the curve's unit. The flight ends if the curve crosses one; "latency"
+    may cross it, but not often."""
     outline: tuple[tuple[float, float], ...] = ()
     """Fence around the track, (N, 2) north and east, m; empty for other curves."""
 

@@ -30,7 +30,7 @@ class Span(NamedTuple):
     begin: float
     end: float
     name: str
-    """Shown to the user."""
+    """Name shown to the user."""
 
 
 class Curve(NamedTuple):
@@ -71,7 +71,7 @@ class FlightData:
     runs: list[StepRun] = field(default_factory=list)
     """The doublets in open loop, in vehicle time."""
     gain: float = float("nan")
-    """p of the planner, 1/s; NaN: unknown."""
+    """Gain p of the planner, 1/s; NaN: unknown."""
     end: EndMark | None = None
     """The early end of the flight; None: none, or unknown."""
 

@@ -170,8 +170,8 @@ def _error_plot(flights: Sequence[FlightData]) -> Plot:
 def _largest_error(flights: Sequence[FlightData]) -> float | None:
     """The largest error in the maneuvers that have a reference throughout, m, to scale the plot.
 
-    None: the plot shows all errors. It does so for several flights, after an early end, if there is
-    no such maneuver, and if the errors elsewhere are not larger.
+    None: the plot shows all errors, because there are several flights, the flight ended early, no
+    maneuver has a reference throughout, or no error elsewhere is larger.
     """
     flight = flights[0]
     if len(flights) > 1 or flight.end is not None or "error" not in flight.curves:

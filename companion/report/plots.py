@@ -29,7 +29,7 @@ class Plot:
     """One plot of the page."""
 
     title: str
-    """Shown above it."""
+    """Title above the plot."""
     note: str
     """Text above the plot: the quantities shown, and how a good flight looks."""
     traces: list[dict[str, Any]]
@@ -60,7 +60,7 @@ def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) ->
 
 
 def kept_indices(values: Floats) -> Any:
-    """Indices (M,) of the points to draw: the extremes of each of many slices, and their gaps."""
+    """Indices (M,) of the points to draw: the extremes of many slices, and a NaN for each gap."""
     count = len(values)
     if count <= _MAX_POINTS:
         return np.arange(count)
@@ -122,7 +122,7 @@ def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, A
 
 
 def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[dict[str, Any]]:
-    """Lines at the limit that ended a single flight early, if it bounds `curve`."""
+    """Lines at the limit that ended a single flight early, if the limit bounds `curve`."""
     end = flights[0].end if len(flights) == 1 else None
     if end is None or end.limit is None or end.limit.curve != curve:
         return []

@@ -21,10 +21,10 @@ class Table(NamedTuple):
     """A table of texts."""
 
     title: str
-    """Shown above it."""
+    """Title above the table."""
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    """One text for each column."""
+    """Rows, each with one text for each column."""
 
 
 def flight_tables(flight: FlightData) -> list[Table]:
@@ -59,7 +59,7 @@ def extremes(flight: FlightData) -> str:
 
 
 def configuration(flight: FlightData) -> Table:
-    """The keys that are not the default."""
+    """The configuration keys whose values are not the default."""
     rows = [
         (f"{key.section}.{key.name}", _value_text(key.value), _value_text(key.default), key.unit)
         for key in flight.differences or ()

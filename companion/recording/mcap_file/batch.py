@@ -1,8 +1,8 @@
 """Messages of `flight.mcap` for the live stream: several in one datagram.
 
 A datagram is a sequence of messages. Each consists of the index of its channel in `TOPICS` (uint8),
-its time in ns since 1970 (uint64; in vehicle time: since the vehicle's boot), its length (uint32),
-and its bytes.
+its time in ns since 1970 (uint64; if the flight runs in vehicle time: since the vehicle's boot),
+its length (uint32), and its bytes.
 """
 
 import struct
@@ -24,11 +24,11 @@ class StreamedMessage(NamedTuple):
     """A message of the live stream."""
 
     number: int
-    """Index of its channel in `TOPICS`."""
+    """Index in `TOPICS` of the message's channel."""
     time_ns: int
-    """Time since 1970, ns; in vehicle time since the vehicle's boot."""
+    """Time since 1970, ns; if the flight runs in vehicle time, since the vehicle's boot."""
     data: bytes
-    """Payload, as in the file."""
+    """Payload of the message, as in `flight.mcap`."""
 
 
 class Batch:

@@ -67,23 +67,23 @@ LOG = message_type(
 )
 PHASE = message_type(
     f"{PACKAGE}/Phase",
-    "# A phase of the flight began.\n# When, on our clock, s.\nfloat64 time_s\nstring name\n"
-    "# The condition that ends it.\nstring waits_for\n",
+    "# A phase of the flight began.\n# Time on our clock, s.\nfloat64 time_s\nstring name\n"
+    "# The condition that ends the phase.\nstring waits_for\n",
 )
 MANEUVER = message_type(
     f"{PACKAGE}/Maneuver",
-    "# A maneuver began; an empty name: the last one ended.\n# When, on our clock, s.\n"
-    "float64 time_s\n# The same on the vehicle's clock, s.\nfloat64 vehicle_time_s\nstring name\n",
+    "# A maneuver began; an empty name: the last one ended.\n# Time on our clock, s.\n"
+    "float64 time_s\n# Time on the vehicle's clock, s.\nfloat64 vehicle_time_s\nstring name\n",
 )
 ALARM = message_type(
     f"{PACKAGE}/Alarm",
-    "# A safety monitor raised its alarm, or its alarm is over.\n# When, on our clock, s.\n"
+    "# A safety monitor raised its alarm, or its alarm is over.\n# Time on our clock, s.\n"
     "float64 time_s\n# 1: raised, 0: over.\nfloat64 raised\nstring monitor\nstring reason\n"
     "# What the flight does about it.\nstring action\n",
 )
 CHANGE = message_type(
     f"{PACKAGE}/Change",
-    "# Values of the configuration begin to change in flight.\n# When, on our clock, s.\n"
+    "# Values of the configuration begin to change in flight.\n# Time on our clock, s.\n"
     "float64 time_s\n# 1: at once, 0: slewed.\nfloat64 at_once\n"
     "# The new values as JSON, by section and key.\nstring values\n",
 )

@@ -58,7 +58,7 @@ class Entity(NamedTuple):
     name: str
     frame: str
     follows: bool = False
-    """Whether they move with the frame until they are replaced."""
+    """Whether the shapes move with `frame` until they are replaced."""
     arrows: Sequence[Arrow] = ()
     cubes: Sequence[Cube] = ()
     cylinders: Sequence[Cylinder] = ()

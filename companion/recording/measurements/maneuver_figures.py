@@ -1,4 +1,4 @@
-"""Tracking figures, separately for each maneuver, as their errors cannot be compared."""
+"""Tracking figures of each maneuver; errors of different maneuvers cannot be compared."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,9 +14,9 @@ from companion.recording.trace import ManeuverMark
 Floats = NDArray[np.float64]
 
 SETTLING_TIME = 2.0
-"""Time left out at the beginning of a maneuver, s: the vehicle still settles from the last one."""
+"""Time left out at the beginning of a maneuver, s: the previous one still has an effect then."""
 _LARGEST_SHARE = 0.25
-"""Largest share of a maneuver that is left out."""
+"""Largest share of a maneuver's duration that is left out at its beginning."""
 _AT_REST = 0.05
 """A reference that is never faster than this is at rest, m/s."""
 
@@ -33,11 +33,11 @@ class ManeuverFigures:
     begin: float
     """Beginning of the maneuver, s since the flight began."""
     duration: float
-    """Its duration, s."""
+    """Duration of the maneuver, s."""
     open_loop: bool
-    """Whether a part of it is open loop."""
+    """Whether a part of the maneuver is open loop."""
     settling_time: float
-    """Time at the beginning left out of RMS and largest errors, s."""
+    """Time at the beginning of the maneuver that RMS and largest errors leave out, s."""
     level_rms: float
     """RMS of the horizontal error, m."""
     level_max: float
@@ -49,7 +49,7 @@ class ManeuverFigures:
     height_mean: float
     """Mean height error, m, positive above the reference."""
     settling_max: float
-    """Largest distance from the reference in that time, m."""
+    """Largest distance from the reference during `settling_time`, m."""
     drift: float
     """Largest horizontal distance from where the maneuver began, m."""
     speed: float

@@ -36,7 +36,7 @@ _REQUIRED_KEYS = frozenset(
 )
 """Keys that `summary.json` of this version must have; without them it is not used."""
 _FIRST_UNANSWERED_CODE = 2
-"""Index in `UNANSWERED_CODES` after "answered" and "control_off"."""
+"""First index in `UNANSWERED_CODES` of a reason: "answered" and "control_off" come before."""
 
 
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
@@ -172,7 +172,7 @@ def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
 
 
 def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> EarlyEnd:
-    """The end of the record, in the phase that ran."""
+    """The end of the record as an early end of the flight, in the phase that ran."""
     end = record.duration
     since = None if takeoff is None else end - takeoff
     latest = record.maneuvers[-1] if record.maneuvers else None
@@ -182,7 +182,7 @@ def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> Early
 
 
 def _takeoff_time(record: FlightRecord) -> float | None:
-    """See `FlightFacts.takeoff`; a takeover in the air has no phase of take-off."""
+    """Time of take-off or takeover, s since the flight began: see `FlightFacts.takeoff`."""
     read = record.rows("guidance_input")
     flying = ("takeoff", "offboard")
     begun = next((each.time for each in record.phases if each.name in flying), None)

@@ -29,10 +29,11 @@ class StepResponse:
     """The response to all steps; coefficients are accelerations per specific thrust."""
 
     time_constant_north_s: float
-    """Time constant of the first-order model that fits a_N best (least squares), s; NaN: no step
-    goes north or south."""
+    """Time constant of the first-order model that fits the north coefficient best (least squares),
+    s; NaN: no step goes north or south."""
     time_constant_east_s: float
-    """The same for a_E, east or west."""
+    """Time constant of the first-order model that fits the east coefficient best, s; NaN: no step
+    goes east or west."""
     step_size: float
     """Largest commanded change of the coefficients, relative to those at the beginning of the run;
     in wind the vehicle is not level there."""
@@ -42,11 +43,11 @@ class StepResponse:
     """Straightness: largest distance of the coefficients from the straight line of a step, which
     leads to its target."""
     model_deviation_max: float
-    """Largest distance from the ideal model ċ = p·(c_d − c)."""
+    """Largest distance of the coefficients c from the ideal model ċ = p·(c_d − c)."""
     second_order: SecondOrderModel
     """The second-order model with a dead time that fits best."""
     second_order_deviation_max: float
-    """Largest distance from that model."""
+    """Largest distance of the coefficients from the model `second_order`."""
 
 
 def measure_response(rows: Floats, gain: float) -> StepResponse | None:
@@ -100,7 +101,7 @@ def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
 
 
 def first_order(run: StepRun, time_constant: float) -> Floats:
-    """(n, 2), exact response of τ·ċ = c_d − c from the first sample, each target held."""
+    """(n, 2), exact response of τ·ċ = c_d − c to the targets c_d of `run`, from its first row."""
     return _first_order(run.steps(), time_constant)
 
 

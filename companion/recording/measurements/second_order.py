@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 _LONGEST_GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
 _TOO_FEW = 10
-"""Runs with this number of rows or fewer are left out."""
+"""Largest number of rows of a run that is too short to measure."""
 
 
 _COMPASS = (
@@ -97,17 +97,17 @@ class SecondOrderModel:
     """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ."""
 
     frequency: float
-    """ω, rad/s."""
+    """Natural frequency ω, rad/s."""
     damping: float
-    """ζ."""
+    """Damping ratio ζ."""
     dead_time: float
     """Time from the sample at which the target changed to the first effect, s."""
 
     def path(self, run: StepRun) -> Floats:
         """(n, 2) coefficients of the model at the rows of `run`.
 
-        It starts with the measured coefficients and speed, and keeps this speed until the first
-        target has an effect.
+        The path starts with the measured coefficients and speed, and keeps this speed until the
+        first target has an effect.
         """
         return self.path_at_rows(RunData.of(run))
 
@@ -148,7 +148,7 @@ class RunData(NamedTuple):
     start: Floats
     """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
     changes: Floats
-    """(s,), when each target came into force, on the same clock; the first one is 0."""
+    """(s,), time of each change of the target since the first row of the run, s; the first is 0."""
     targets: Floats
     """(s, 2), coefficients of each target."""
 
@@ -164,7 +164,7 @@ class RunData(NamedTuple):
 
 
 def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
-    """Least squares over ω, ζ and dead time."""
+    """The second-order model that fits the runs best: least squares over ω, ζ and dead time."""
     thinning = 1 + sum(run.time.size for run in runs) // _FITTED_ROWS
     thinned = [RunData.of(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])

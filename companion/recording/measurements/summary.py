@@ -61,11 +61,11 @@ class PredictiveFigures:
     """Counts and times of predictive control."""
 
     flown_answers: int
-    """Answers that were flown."""
+    """Number of answers of the solver that guidance used."""
     troubles: dict[str, int]
-    """Answers that were not flown, by reason."""
+    """Number of answers of the solver that guidance did not use, by reason."""
     computing_seconds: tuple[float, ...]
-    """Computing time of each flown answer in the solver's process."""
+    """Computing time in the solver's process of each answer that was used, s."""
 
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON, in milliseconds."""
@@ -80,7 +80,7 @@ class Summary:
     """The summary of a finished flight."""
 
     result: str
-    """"ok", or the reason why it ended early."""
+    """"ok", or the reason why the flight ended early."""
     phase: str
     """The phase that failed, else the last one."""
     planner: str
@@ -179,9 +179,10 @@ class Summary:
 
 
 def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
-    """Position error of the rows with a whole reference, height error of those with a height, m.
+    """RMS and largest position error, and RMS height error, m.
 
-    `rows` are the (N, 7) rows of `FlightTrace.tracking`. NaN: there are no such rows.
+    `rows` are the (N, 7) rows of `FlightTrace.tracking`; those without a reference position or
+    height do not count. NaN: no row counts.
     """
     error = rows[:, 4:7] - rows[:, 1:4]
     distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)

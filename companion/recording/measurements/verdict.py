@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from companion.attitude.planner import MODEL_FOLLOWING
 
 Figures = Mapping[str, Any]
-"""The figures; the result of `Summary.as_dict`."""
+"""Figures of a flight: the result of `Summary.as_dict`."""
 
 HORIZONTAL_RMS, HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
 """Largest RMS of the horizontal error of a maneuver: with the reference at rest, m; and the
@@ -40,16 +40,16 @@ class Check(NamedTuple):
     """One figure and its limit."""
 
     what: str
-    """Subject of the check."""
+    """Subject of the check, such as a maneuver or "latency"."""
     found: str
-    """The figure and its limit, in words."""
+    """Figure that was found, and its limit, in words."""
     good: bool
-    """Whether it is within the limit."""
+    """Whether the figure is within its limit."""
     remedy: str
-    """What to do if it is not within the limit."""
+    """What to do if the figure is beyond its limit."""
     fault: str
-    """What is wrong if it is not within the limit; without figures, so that a campaign can count
-    the flights with this fault."""
+    """What is wrong if the figure is beyond its limit; without numbers, so that a campaign can
+    count the flights with this fault."""
 
 
 def checks(figures: Figures) -> list[Check]:
