@@ -131,8 +131,8 @@ class _DoctorRun:
             except (LinkTimeout, LinkLost) as error:
                 return self._report(vehicle.unanswered_findings(error))
             drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
-            flown, refusals = _maneuvers(config, drag)
-            evidence = replace(evidence, maneuvers=flown, known_drag=drag)
+            maneuvers, refusals = _maneuvers(config, drag)
+            evidence = replace(evidence, maneuvers=maneuvers, known_drag=drag)
             findings = [*refusals, *run_checks(config, evidence), *_response(config)]
             code = self._report(findings)
             if fix:

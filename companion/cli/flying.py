@@ -118,7 +118,7 @@ def fly(
             shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
             raise
     # The vehicle is handed back and the record is complete: signals may interrupt again.
-    interrupts.raise_interrupt(interrupts.unhandled())
+    interrupts.raise_interrupt(interrupts.signals_with_default_handler())
     with suppress(OSError):
         console.print(flight_table(summary))
         console.print(f"Recorded in {folder}", soft_wrap=True)

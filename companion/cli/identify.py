@@ -126,16 +126,16 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
         _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FAILURE
     _write_fit(out, text, flown_folder=None if options.log is not None else log.parent)
-    kept = {
+    kept_values = {
         axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].flaw()}"
         for axis, keys in kept_axes(vehicle, configured_axes).items()
     }
     with suppress(OSError):
         console.print(vehicle_table(vehicle, GRAVITY))
-        for axis, words in kept.items():
+        for axis, words in kept_values.items():
             console.print(f"{axis}: {words}", style="bold yellow", soft_wrap=True)
         console.print(_how_to_include(out, options.config), soft_wrap=True)
-    result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept}
+    result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept_values}
     _print_json(options, {**result, **_figures(vehicle)})
     return EXIT_OK
 

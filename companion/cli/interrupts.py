@@ -25,7 +25,7 @@ _DEFAULT_HANDLERS: dict[signal.Signals, Handler] = {
 }
 
 
-def unhandled() -> list[signal.Signals]:
+def signals_with_default_handler() -> list[signal.Signals]:
     """Those of SIGINT, SIGTERM and SIGHUP that still have their default handler.
 
     `nohup` has SIGHUP ignored, so SIGHUP is then not among them.

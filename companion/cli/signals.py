@@ -47,11 +47,11 @@ class SignalHandler:
                 self._hand_back(number.name)
 
     def _handle_ctrl_c(self) -> None:
-        before, self._ctrl_c_at = self._ctrl_c_at, self._clock()
-        if before is None:
+        previous, self._ctrl_c_at = self._ctrl_c_at, self._clock()
+        if previous is None:
             self._hand_back("the user (Ctrl-C)")
             self._session.note(HOW_TO_LEAVE)
-        elif self._ctrl_c_at - before >= SECOND_CTRL_C_AFTER:
+        elif self._ctrl_c_at - previous >= SECOND_CTRL_C_AFTER:
             self._session.leave()
 
     def _hand_back(self, cause: str) -> None:

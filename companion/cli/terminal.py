@@ -169,7 +169,7 @@ class TerminalObserver:
             return
         with self._console.capture() as captured:
             self._write(text, markup)
-        self._live.above(captured.get())
+        self._live.write_above(captured.get())
 
     def _write(self, text: str, markup: bool) -> None:
         self._console.print(text, highlight=False, markup=markup, soft_wrap=True)

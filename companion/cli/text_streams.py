@@ -68,7 +68,7 @@ class _Output(io.TextIOWrapper):
             raise
 
 
-def lost_output() -> str | None:
+def output_fault() -> str | None:
     """Why the text printed so far does not reach standard output.
 
     Returns:

@@ -28,7 +28,7 @@ _KEYS: Mapping[FileKind, Iterable[str]] = {
     FileKind.TRAJECTORY: TRAJECTORY_KEYS,
     FileKind.CAMPAIGN: CAMPAIGN_KEYS,
 }
-_TAKEN_BY: Mapping[FileKind, str] = {
+_USED_BY: Mapping[FileKind, str] = {
     FileKind.CONFIG: "`companion fly --config` flies it, and the key `config` of a campaign file "
     "names it",
     FileKind.TRAJECTORY: "`companion fly --trajectory` flies it",
@@ -52,4 +52,4 @@ def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> Non
     found = {kind: len(given.intersection(known)) for kind, known in _KEYS.items()}
     likely = max(found, key=lambda kind: (found[kind], kind is wanted))
     if likely is not wanted:
-        raise ConfigError(f"{path} is {likely.value}, not {wanted.value}; {_TAKEN_BY[likely]}")
+        raise ConfigError(f"{path} is {likely.value}, not {wanted.value}; {_USED_BY[likely]}")

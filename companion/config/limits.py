@@ -60,7 +60,7 @@ class LimitsConfig(Section):
     min_battery = Si("min_battery_percent")
 
     @property
-    def largest_horizontal(self) -> float:
+    def max_horizontal_acceleration(self) -> float:
         """Largest horizontal acceleration by `max_tilt` at constant height, m/s²."""
         return GRAVITY * tan(self.max_tilt)
 

@@ -159,10 +159,10 @@ def _maneuver_contradictions(config: Config) -> Iterator[str]:
             "limits.max_tilt_deg"
         )
     slows_down = "trajectory" in flight.maneuvers and flight.slow_down
-    if slows_down and flight.slow_down_reserve_m_s2 >= limits.largest_horizontal:
+    if slows_down and flight.slow_down_reserve_m_s2 >= limits.max_horizontal_acceleration:
         yield (
             f"flight.slow_down_reserve_m_s2 {flight.slow_down_reserve_m_s2:g} must be less "
-            f"than the {limits.largest_horizontal:.2f} m/s² that limits.max_tilt_deg "
+            f"than the {limits.max_horizontal_acceleration:.2f} m/s² that limits.max_tilt_deg "
             f"{limits.max_tilt_deg:g} gives; lower it"
         )
     if "identify" in flight.maneuvers:

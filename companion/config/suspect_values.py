@@ -68,19 +68,22 @@ def _units(config: Config) -> Iterator[SuspectValue]:
             continue
         usual = key.default
         if usual is None:
-            usual = next((v for end, v in _USUAL_VALUES.items() if key.name.endswith(end)), None)
+            usual = next(
+                (v for suffix, v in _USUAL_VALUES.items() if key.name.endswith(suffix)), None
+            )
         if key.value == key.default or not isinstance(usual, int | float) or not usual:
             continue
-        unit, meant = mistaken_unit(key.name, key.value)
+        unit, converted = mistaken_unit(key.name, key.value)
         if (
-            meant > key.value
+            converted > key.value
             and key.value < usual * _MAX_SUSPECT_SHARE
-            and meant > usual * _MIN_MEANT_SHARE
+            and converted > usual * _MIN_MEANT_SHARE
         ):
             name = f"{key.section}.{key.name}"
             yield SuspectValue(
                 name,
                 f"{name} is {key.value:g} {key.unit}",
-                f"that is unusually small; {key.value:g} {unit} would be {meant:.4g} {key.unit}",
-                f"write {meant:.4g} if that was meant",
+                f"that is unusually small; {key.value:g} {unit} would be "
+                f"{converted:.4g} {key.unit}",
+                f"write {converted:.4g} if that was meant",
             )

@@ -28,7 +28,7 @@ Acceleration = Annotated[float, Field(ge=0.01, le=100.0)]
 Jerk = Annotated[float, Field(ge=0.01, le=1000.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
 Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-Place = tuple[Offset, Offset, Offset]
+Point = tuple[Offset, Offset, Offset]
 FixedOrAlong = Literal["fixed", "along"]
 
 
@@ -46,7 +46,7 @@ class HoverShape(Section):
 class LineShape(Section):
     """A straight line with limited jerk, rest to rest."""
 
-    to_m: Place
+    to_m: Point
     """End point: north, east, down from the start."""
     speed_m_s: Speed
     """Largest speed."""
@@ -126,7 +126,7 @@ class FigureEightShape(_LapShape):
 class WaypointsShape(Section):
     """A path through waypoints: minimum snap without stops, or straight legs with stops."""
 
-    points_m: Annotated[tuple[Place, ...], Field(min_length=1, max_length=1000)]
+    points_m: Annotated[tuple[Point, ...], Field(min_length=1, max_length=1000)]
     """Waypoints: north, east, down from the start; the start itself is left out."""
     speed_m_s: Speed
     """Largest speed."""

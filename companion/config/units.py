@@ -32,7 +32,7 @@ _UNITS = {
 
 def unit_of(name: str) -> str:
     """The unit of a key or a measured figure, from its suffix; empty without a unit."""
-    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), "")
+    return next((unit for suffix, unit in _UNITS.items() if name.endswith(suffix)), "")
 
 
 def seconds(milliseconds: float) -> float:
@@ -68,7 +68,7 @@ class Si(property):
     """
 
     def __init__(self, key: str) -> None:
-        convert = next(each for end, each in _CONVERSIONS.items() if key.endswith(end))
+        convert = next(each for suffix, each in _CONVERSIONS.items() if key.endswith(suffix))
         super().__init__(lambda section: convert(getattr(section, key)))
 
     @overload

@@ -34,7 +34,7 @@ _BOUNDS: dict[str, Callable[[float, float], bool]] = {
     "le": lambda value, bound: value <= bound,
     "lt": lambda value, bound: value < bound,
 }
-_MUST: Mapping[str, str] = {
+_REQUIREMENTS: Mapping[str, str] = {
     "greater_than_equal": "must be at least {ge:.12g}",
     "greater_than": "must be more than {gt:.12g}",
     "less_than_equal": "must be at most {le:.12g}",
@@ -62,7 +62,7 @@ def shortened(value: Any) -> str:
 def mistaken_unit(key: str, value: float) -> tuple[str, float]:
     """The unit often mistaken for the key's unit; the value converted from it to the key's unit."""
     unit, convert = next(
-        (unit, convert) for end, unit, convert in _MISTAKEN_UNITS if key.endswith(end)
+        (unit, convert) for suffix, unit, convert in _MISTAKEN_UNITS if key.endswith(suffix)
     )
     return unit, convert(value)
 
@@ -84,7 +84,7 @@ def value_fault(detail: Any, key: str | int) -> str:
     if kind == "literal_error":
         choices = re.findall(r"'([^']*)'", context["expected"])
         return f" must be {_alternatives(choices)}{got}{name_hint(value, choices)}"
-    must = _MUST.get(kind, "has a value that cannot be used here").format(**context)
+    must = _REQUIREMENTS.get(kind, "has a value that cannot be used here").format(**context)
     return f" {must}{got}{_unit_hint(detail, str(key))}"
 
 

@@ -3,7 +3,7 @@
 from math import inf
 
 from companion.config import Config
-from companion.config.in_flight import Difference, changeable, differences, shown
+from companion.config.in_flight import Difference, changeable_keys, differences, shown
 from companion.control.hold_settings import flies_identify
 from companion.control.retuning import value_in_effect
 from companion.files.yaml_file import ConfigError
@@ -37,7 +37,7 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
         ValueError: weights cannot be computed from the configuration.
     """
     for each in differences(before, after):
-        if (each.section, each.key) not in changeable():
+        if (each.section, each.key) not in changeable_keys():
             continue  # such as `include`, which is no value
         why = _refusal(before, after, each)
         if why is not None:

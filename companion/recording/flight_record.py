@@ -213,7 +213,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
         content = read_mcap(path)
     except OSError as error:
         if not (killed_at_start and isinstance(error, FileNotFoundError)):
-            raise RecordError(_not_a_flight(path, error)) from error
+            raise RecordError(_why_not_a_flight(path, error)) from error
         content = McapContent()
     flight = content.metadata.setdefault("flight", {})
     if not flight and killed_at_start and content.damage is None:
@@ -234,7 +234,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
     )
 
 
-def _not_a_flight(path: Path, error: OSError) -> str:
+def _why_not_a_flight(path: Path, error: OSError) -> str:
     """Why the record at `path` cannot be opened, and which folder was probably meant."""
     flights = sorted(path.parent.glob(f"*/{RECORD_FILE}"))
     if isinstance(error, FileNotFoundError) and flights:

@@ -25,7 +25,7 @@ Row = dict[str, Any]
 """A message of `flight.mcap`: value by column name."""
 
 _TARGET_COLUMNS = "north", "east", "heading_rad", "heading_rate_rad_s"
-_MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)  # by number in the record
+_MISFIT_BY_CODE = (None, Misfit.NOT_NEWER, Misfit.AHEAD)  # by number in the record
 
 
 class Setpoint(NamedTuple):
@@ -42,7 +42,7 @@ class RecordedSample(NamedTuple):
     """The sample; `received_ns`, from which latencies are computed, is 0."""
     flags: LoopFlags
     """State of the control loop when the sample arrived."""
-    checked: float
+    checked_at: float
     """Time when the sample's age was checked before sending, s on our clock; NaN: not checked."""
     reason: str
     """"answered", or why it is unanswered; one of `UNANSWERED_CODES`."""
@@ -119,7 +119,7 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
         _quaternion(row),
         _rates(row, "measured"),
         row["age_s"],
-        _MISFITS[row["misfit"]],
+        _MISFIT_BY_CODE[row["misfit"]],
         bool(row["age_known"]),
     )
     setpoint = None if sent is None else Setpoint(_rates(sent, "commanded"), sent["thrust"])

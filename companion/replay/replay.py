@@ -130,7 +130,7 @@ class Replay:
         if loop.awaiting_mode and not flags.awaiting_mode:
             loop.resume()
         self._accepts_setpoint = entry.reason != "not_sent"
-        self._now = sample.received if isnan(entry.checked) else entry.checked
+        self._now = sample.received if isnan(entry.checked_at) else entry.checked_at
         self._sent = None
         loop.on_sample(sample)
         self._guidance.note_attitude(sample)

@@ -36,9 +36,11 @@ def flight_tables(flight: FlightData) -> list[Table]:
 
 def events_at_end(flight: FlightData) -> list[Table]:
     """The events around the early end of a flight; no table if there was none, or no event."""
-    if flight.end is None:
+    if flight.early_end is None:
         return []
-    around = [each for each in flight.events if abs(each.time - flight.end.time) <= _END_WINDOW]
+    around = [
+        each for each in flight.events if abs(each.time - flight.early_end.time) <= _END_WINDOW
+    ]
     rows = [(f"{each.time:.1f}", each.source, each.text) for each in around[:_MAX_EVENTS]]
     title = f"Events within {_END_WINDOW:.0f} s of the end"
     return [Table(title, ("time, s", "from", "what happened"), rows)] if rows else []

@@ -124,7 +124,7 @@ def test_events_scroll_above_the_lines_and_nothing_else_remains():
     live = LiveLines(out)
     for k in range(3):
         live.show([f"phase {k}", "longer than the next" if k < 2 else "short", "third"])
-        live.above(f"event {k}\n")
+        live.write_above(f"event {k}\n")
     assert Screen().feed(out.getvalue()).lines == [
         "event 0",
         "event 1",

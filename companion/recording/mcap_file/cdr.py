@@ -5,7 +5,7 @@ Foxglove, Lichtblick and PlotJuggler recognise these types by name and draw them
 
 import struct
 
-from companion.recording.mcap_file.fields import CDR, PACKAGE, MessageType
+from companion.recording.mcap_file.fields import CDR_HEADER, PACKAGE, MessageType
 
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<iI")
@@ -95,7 +95,7 @@ class CdrMessage:
     """A growing CDR message. Values are aligned to their size, counted after the header."""
 
     def __init__(self) -> None:
-        self._bytes = bytearray(CDR)
+        self._bytes = bytearray(CDR_HEADER)
 
     def bytes(self) -> bytes:
         """The message so far."""
@@ -103,7 +103,7 @@ class CdrMessage:
 
     def align(self, size: int) -> None:
         """Pad to a multiple of `size` bytes."""
-        self._bytes += bytes(-(len(self._bytes) - len(CDR)) % size)
+        self._bytes += bytes(-(len(self._bytes) - len(CDR_HEADER)) % size)
 
     def flag(self, value: int) -> None:
         """Add a uint8."""
@@ -147,14 +147,14 @@ def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ..
         ValueError: the message does not have this form.
     """
     try:
-        found = struct.unpack_from(f"<{numbers}d", message, 4)
+        values = struct.unpack_from(f"<{numbers}d", message, 4)
         at, strings = 4 + 8 * numbers, []
         for _ in range(texts):
             text, at = _string(message, at)
             strings.append(text)
     except struct.error as error:
         raise ValueError(f"a message is too short: {error}") from error
-    return found, strings
+    return values, strings
 
 
 def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
@@ -194,11 +194,11 @@ class PoseEncoder:
         for frame in frames:
             message.text(frame)
         message.align(8)
-        self._names = message.bytes()[len(CDR) + _STAMP.size :]
+        self._names = message.bytes()[len(CDR_HEADER) + _STAMP.size :]
 
     def message(self, time_ns: int, pose: Pose) -> bytes:
         """The message for `pose` at a time in ns since 1970."""
-        return CDR + _stamp(time_ns) + self._names + _POSE.pack(*pose)
+        return CDR_HEADER + _stamp(time_ns) + self._names + _POSE.pack(*pose)
 
 
 def _stamp(time_ns: int) -> bytes:

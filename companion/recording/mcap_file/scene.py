@@ -48,7 +48,7 @@ class Line(NamedTuple):
     points: Sequence[tuple[float, float, float]]
     """(x, y, z) of each point, m."""
     color: Color
-    pairs: bool = False
+    separate_pairs: bool = False
     """True: each pair of points is a separate line. False: all points form one line."""
 
 
@@ -89,7 +89,7 @@ def _entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
         message.doubles(*one.pose, *one.size, *scales, *one.color)
 
     def line(one: Line) -> None:
-        message.flag(_LINE_LIST if one.pairs else _LINE_STRIP)
+        message.flag(_LINE_LIST if one.separate_pairs else _LINE_STRIP)
         message.doubles(*AT_ORIGIN, _THICKNESS)
         message.flag(_IN_PIXELS)
         message.count(len(one.points))

@@ -27,8 +27,8 @@ class AxisDeadTime(NamedTuple):
         """
         if self.measured is None or self.configured is None:
             return False
-        apart = abs(self.measured - self.configured)
-        return apart > max(_TOLERATED_SHARE * self.configured, _TOLERATED_DIFFERENCE)
+        difference = abs(self.measured - self.configured)
+        return difference > max(_TOLERATED_SHARE * self.configured, _TOLERATED_DIFFERENCE)
 
 
 class SampleAge(NamedTuple):

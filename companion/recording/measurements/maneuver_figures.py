@@ -112,8 +112,8 @@ def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
 def in_maneuvers(vehicle_times: Floats, marks: Sequence[ManeuverMark]) -> NDArray[np.bool_]:
     """Whether each vehicle time (N,), s, lies in a maneuver; not if it is NaN."""
     begins = np.array([mark.vehicle_time for mark in marks])
-    flown = np.array([False, *(mark.name is not None for mark in marks)])
-    inside = flown[np.searchsorted(begins, vehicle_times, side="right")]
+    in_maneuver = np.array([False, *(mark.name is not None for mark in marks)])
+    inside = in_maneuver[np.searchsorted(begins, vehicle_times, side="right")]
     return np.asarray(inside & ~np.isnan(vehicle_times))
 
 
@@ -153,25 +153,25 @@ def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     time, reference, position = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
     duration = float(time[-1] - time[0])
     open_loop, settling_time = _is_open_loop(rows), _settling_time(rows)
-    early = time < time[0] + settling_time
+    is_settling = time < time[0] + settling_time
     error = position - reference
     level, height = np.hypot(error[:, 0], error[:, 1]), -error[:, 2]
-    held = ~np.isnan(height)  # another program may command the thrust
-    held_late = height[~early & held]
-    away = position[:, :2] - position[0, :2]
+    height_known = ~np.isnan(height)  # another program may command the thrust
+    settled_height = height[~is_settling & height_known]
+    offset = position[:, :2] - position[0, :2]
     return ManeuverFigures(
         name,
         begin,
         duration,
         open_loop,
         settling_time,
-        level_rms=nan if open_loop else rms(level[~early]),
-        level_max=nan if open_loop else largest(level[~early]),
-        height_rms=rms(held_late),
-        height_max=largest(np.abs(held_late)),
-        height_mean=float(held_late.mean()) if len(held_late) else nan,
-        settling_max=largest(np.hypot(level, height)[early & held]),
-        drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
+        level_rms=nan if open_loop else rms(level[~is_settling]),
+        level_max=nan if open_loop else largest(level[~is_settling]),
+        height_rms=rms(settled_height),
+        height_max=largest(np.abs(settled_height)),
+        height_mean=float(settled_height.mean()) if len(settled_height) else nan,
+        settling_max=largest(np.hypot(level, height)[is_settling & height_known]),
+        drift=float(np.hypot(offset[:, 0], offset[:, 1]).max()),
         speed=_largest_speed(time, reference),
     )
 

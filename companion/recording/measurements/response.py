@@ -112,8 +112,8 @@ def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
     for step in steps:
         start = target + (start - target) * np.exp(-(step.time[0] - since) / time_constant)
         since, target = step.time[0], step.target[0]
-        left = np.exp(-(step.time - since) / time_constant)
-        parts.append(target + np.outer(left, start - target))
+        decay = np.exp(-(step.time - since) / time_constant)
+        parts.append(target + np.outer(decay, start - target))
     return np.concatenate(parts)
 
 
@@ -129,16 +129,16 @@ def _largest_deviation(step: StepRun) -> float:
 
 def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     """The time constant in s that fits one axis best, searched from `start`; NaN without a step."""
-    stepped = [
+    axis_runs = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs
         if np.abs(run.changes[:, axis]).max() > _MIN_SHARE * run.size
     ]
-    if not stepped:
+    if not axis_runs:
         return nan
 
-    steps = [run.steps() for run in stepped]
-    measured = np.concatenate([run.measured for run in stepped])
+    steps = [run.steps() for run in axis_runs]
+    measured = np.concatenate([run.measured for run in axis_runs])
 
     def residuals(unknown: Floats) -> tuple[Floats, Floats]:
         tau = float(np.exp(unknown[0]))
