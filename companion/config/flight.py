@@ -75,7 +75,7 @@ class StepsConfig(Section):
 
 
 class CornersConfig(Section):
-    """Maneuver `corners`: acceleration steps that avoid level, to show how planners differ."""
+    """Maneuver `corners`: acceleration steps that never pass level, to compare planners."""
 
     north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
     """Magnitude of each corner's north coefficient. The tilt's sine is √(north² + east²)."""

@@ -30,10 +30,10 @@ class Difference(NamedTuple):
         return f"{self.section}.{self.key}".rstrip(".")
 
     def __str__(self) -> str:
-        return f"{self.name} from {shown(self.before)} to {shown(self.after)}"
+        return f"{self.name} from {value_text(self.before)} to {value_text(self.after)}"
 
 
-def shown(value: Any) -> str:
+def value_text(value: Any) -> str:
     """A value as YAML writes it, numbers without trailing zeros."""
     return "null" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 

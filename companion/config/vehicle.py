@@ -42,7 +42,10 @@ class AxisKeys(NamedTuple):
         return converted(self.acceleration_limit_deg_s2, radians)
 
     def overridden_by(self, *keys: float | None) -> "AxisKeys":
-        """A copy with those `keys` that are not None; with a new lag the old damping is dropped."""
+        """A copy with new values, given in the order of the fields, where they are not None.
+
+        A new lag without a damping makes the response first order.
+        """
         base = self if keys[0] is None else self._replace(damping=None)
         return AxisKeys(*(a if b is None else b for a, b in zip(base, keys, strict=True)))
 
@@ -89,7 +92,10 @@ class VehicleConfig(Section):
 
     @property
     def axes(self) -> "dict[str, AxisKeys]":
-        """The known response of each axis, by name; null for pitch or yaw: the value of roll."""
+        """The known response of roll, pitch and yaw; null for pitch or yaw: the value of roll.
+
+        Yaw is always first order.
+        """
         roll = AxisKeys(
             self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
         )

@@ -122,9 +122,9 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
     words = f"predictive control: {figures.flown_answers} answers flown"
     if figures.flown_answers:
         words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
-    replaced = ", ".join(f"{count} {name}" for name, count in figures.troubles.items())
+    replaced = ", ".join(f"{count} {name}" for name, count in figures.replaced_answers.items())
     if replaced:
-        words += f"; linear guidance replaced {sum(figures.troubles.values())}: {replaced}"
+        words += f"; linear guidance replaced {sum(figures.replaced_answers.values())}: {replaced}"
     return Text(words)
 
 

@@ -105,7 +105,7 @@ class CdrMessage:
         """Pad to a multiple of `size` bytes."""
         self._bytes += bytes(-(len(self._bytes) - len(CDR_HEADER)) % size)
 
-    def flag(self, value: int) -> None:
+    def uint8(self, value: int) -> None:
         """Add a uint8."""
         self._bytes.append(value)
 
@@ -161,7 +161,7 @@ def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
     """Encode a message of type LOG at a time in ns since 1970."""
     message = CdrMessage()
     message.time(time_ns)
-    message.flag(level)
+    message.uint8(level)
     for each in (text, name, ""):  # the last one: no source file
         message.text(each)
     message.count(0)  # no line of it

@@ -89,9 +89,9 @@ def _entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
         message.doubles(*one.pose, *one.size, *scales, *one.color)
 
     def line(one: Line) -> None:
-        message.flag(_LINE_LIST if one.separate_pairs else _LINE_STRIP)
+        message.uint8(_LINE_LIST if one.separate_pairs else _LINE_STRIP)
         message.doubles(*AT_ORIGIN, _THICKNESS)
-        message.flag(_IN_PIXELS)
+        message.uint8(_IN_PIXELS)
         message.count(len(one.points))
         if one.points:
             message.doubles(*(value for point in one.points for value in point))
@@ -103,7 +103,7 @@ def _entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
     message.text(entity.frame)
     message.text(entity.name)
     message.time(0)  # lifetime: until it is replaced
-    message.flag(entity.follows)
+    message.uint8(entity.follows)
     message.count(0)  # metadata
     _each(message, entity.arrows, arrow)
     _each(message, entity.cubes, box)

@@ -37,7 +37,7 @@ class StepResponse:
     step_size: float
     """Largest commanded change of the coefficients, relative to those at the beginning of the run;
     in wind the vehicle is not level there."""
-    asked_tilt: float
+    target_tilt: float
     """Largest tilt of a target, rad, before the tilt limit of the planner."""
     cross_axis_max: float
     """Straightness: largest distance of the coefficients from the straight line of a step, which
@@ -63,7 +63,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
         step_size=max(run.size for run in runs),
-        asked_tilt=asin(min(1.0, max(largest_norm(run.target) for run in runs))),
+        target_tilt=asin(min(1.0, max(largest_norm(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(
             largest_norm(run.measured - first_order(run, 1.0 / gain)) for run in runs
@@ -88,7 +88,7 @@ def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
             {"north": response.time_constant_north_s, "east": response.time_constant_east_s}
         ),
         "step_size": response.step_size,
-        "asked_tilt_deg": degrees(response.asked_tilt),
+        "asked_tilt_deg": degrees(response.target_tilt),
         "cross_axis_max": response.cross_axis_max,
         "model_deviation_max": response.model_deviation_max,
         "second_order": {

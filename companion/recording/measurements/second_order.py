@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 
 _LONGEST_GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
-_MOST_ROWS_OF_SHORT_RUN = 10
+_MAX_ROWS_OF_SHORT_RUN = 10
 """Largest number of rows of a run that is too short to measure."""
 
 
@@ -77,7 +77,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
     return [
         StepRun(part[:, 0], np.array([coefficients(tuple(row[1:5])) for row in part]), part[:, 5:7])
         for part in parts
-        if len(part) > _MOST_ROWS_OF_SHORT_RUN
+        if len(part) > _MAX_ROWS_OF_SHORT_RUN
     ]
 
 

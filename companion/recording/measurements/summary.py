@@ -53,7 +53,7 @@ class LoopCounts:
     unanswered: dict[str, int] = field(default_factory=dict)
     """Unanswered samples, by reason."""
     rate_hz: float = 0.0
-    """Rate of setpoints in vehicle time during the maneuvers, Hz."""
+    """Rate of setpoints during the maneuvers, Hz."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class PredictiveFigures:
 
     flown_answers: int
     """Number of answers of the solver that guidance used."""
-    troubles: dict[str, int]
+    replaced_answers: dict[str, int]
     """Number of answers of the solver that guidance did not use, by reason."""
     computing_seconds: tuple[float, ...]
     """Computing time in the solver's process of each answer that was used, s."""
@@ -72,7 +72,7 @@ class PredictiveFigures:
         seconds, flown = self.computing_seconds, self.flown_answers
         p50, p99 = np.percentile(seconds, (50, 99)) if seconds else (math.nan, math.nan)
         times = {"p50": 1e3 * float(p50), "p99": 1e3 * float(p99)}
-        return {"flown": flown, "troubles": self.troubles, "solve_ms": without_nan(times)}
+        return {"flown": flown, "troubles": self.replaced_answers, "solve_ms": without_nan(times)}
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Summary:
     """The flight's folder."""
     dead_times: DeadTimes = field(default_factory=DeadTimes)
     predictive: PredictiveFigures | None = None
-    """Counts of predictive control; None: it did not fly."""
+    """Figures of predictive control; None: predictive control did not fly."""
     realtime: dict[str, str] = field(default_factory=dict)
     """Each real-time request to the operating system: "granted", or the reason why not."""
     facts: FlightFacts = field(default_factory=FlightFacts)
