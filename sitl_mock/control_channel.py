@@ -18,7 +18,7 @@ from typing import Any, TypedDict
 from pydantic import ValidationError
 
 from sitl_mock.config.faults import Fault, fault_adapter
-from sitl_mock.config.section import ConfigError, wrong_member, wrong_value
+from sitl_mock.config.section import ConfigError, describe_wrong_member, describe_wrong_value
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.simulation import Simulation
 
@@ -35,7 +35,7 @@ class Truth(TypedDict):
     """Vehicle time since boot, s."""
     armed: bool
     mode: str
-    """PX4's mode names or ArduCopter's."""
+    """Flight mode, by PX4's or ArduCopter's name."""
     intended_mode: str
     """The mode that the user chose last. A failsafe of PX4 does not change it; on ArduPilot it is
     always ``mode``."""
@@ -82,7 +82,7 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     except ValidationError as error:
         detail = error.errors()[0]
         where = ".".join(str(part) for part in detail["loc"])
-        refused = wrong_member(detail, Fault) or f" {where}{wrong_value(error)}"
+        refused = describe_wrong_member(detail, Fault) or f" {where}{describe_wrong_value(error)}"
         raise ConfigError(f"fault{refused}") from error
     simulation.faults.add(valid, simulation.time_us)
 
@@ -110,7 +110,8 @@ def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:
 def truth(simulation: Simulation) -> Truth:
     """Return the true state of the vehicle, and what its autopilot reports."""
     state, stream = simulation.state, simulation.stream
-    true = simulation.vehicle.truth
+    true_state = simulation.vehicle.truth
+    touchdown_speed = true_state.touchdown_speed
     signing = simulation.companion.signing
     return {
         "time": state.time_s,
@@ -120,15 +121,15 @@ def truth(simulation: Simulation) -> Truth:
         "failsafe": state.failsafe,
         "landed": state.landed,
         "aborted": state.aborted,
-        "position": true.position_ned,
-        "velocity": true.velocity_ned,
-        "q": true.q,
-        "rates": true.body_rates,
-        "on_ground": true.on_ground,
-        "crashed": true.crashed,
-        "touchdown_speed": None if isnan(true.touchdown_speed) else true.touchdown_speed,
+        "position": true_state.position_ned,
+        "velocity": true_state.velocity_ned,
+        "q": true_state.q,
+        "rates": true_state.body_rates,
+        "on_ground": true_state.on_ground,
+        "crashed": true_state.crashed,
+        "touchdown_speed": None if isnan(touchdown_speed) else touchdown_speed,
         "battery": simulation.vehicle.battery.remaining,
-        "setpoints": stream.received,
+        "setpoints": stream.setpoint_count,
         "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
         "signing": None if signing is None else signing.counts(),
     }

@@ -101,7 +101,7 @@ class Exchange:
         )
 
     def is_repeated_answer(self, messages: list[Message]) -> bool:
-        """Whether this datagram only answers an earlier beacon, which was sent twice.
+        """Whether a datagram is only a second answer to an earlier beacon, which was sent twice.
 
         The number of beacons depends on the wall clock. The link faults draw a random number for
         each datagram, so a second answer would make the flight depend on the wall clock, too.

@@ -51,16 +51,16 @@ class Server:
         self._companion = self._connections.companion
         self._lockstep = settings.lockstep.enabled
         self._beacon = b""
-        self._answered = False
+        self._beacon_answered = False
         self._collected: list[Arrived] = []
         self._origin_wall_s = 0.0
         self._origin_us = 0
         self._simulation.set_clock(self._clock_ns)
 
     @property
-    def where(self) -> str:
-        """Address of the companion endpoint, for the user."""
-        return self._companion.where
+    def address(self) -> str:
+        """Address of the companion endpoint, as text for the user."""
+        return self._companion.address
 
     def run(self) -> None:
         """Run until an exception, such as `KeyboardInterrupt`, ends the run."""
@@ -88,7 +88,7 @@ class Server:
         collected, self._collected = self._collected, []
         beacon = self._exchange.step(collected)
         if beacon is not None:
-            self._beacon, self._answered = beacon, False
+            self._beacon, self._beacon_answered = beacon, False
         self._connections.flush(beacon)
         if self._lockstep:
             self._await_answer()
@@ -105,26 +105,26 @@ class Server:
         self._beacon = self._simulation.beacon()
         self._connections.send_beacon(self._beacon)
         heard_at: float | None = None
-        while not self._answered:
+        while not self._beacon_answered:
             self._collect(FIRST_BEACON_PERIOD_S)
             self._connections.send_beacon(self._beacon)
             now = time.monotonic()
-            if heard_at is None and self._companion.heard:
+            if heard_at is None and self._companion.has_received:
                 heard_at = now
             if heard_at is not None and now - heard_at > self._settings.lockstep.patience_s:
                 self._lockstep = False
                 return
 
     def _await_answer(self) -> None:
-        """Wait for the answer; after ``patience_s`` continue in real time."""
+        """Wait for the answer to the latest beacon; after ``patience_s`` continue in real time."""
         self._collect(BEACON_PERIOD_S)
-        if self._answered:
+        if self._beacon_answered:
             return
         deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_PERIOD_S
-        while not self._answered and time.monotonic() < deadline:
+        while not self._beacon_answered and time.monotonic() < deadline:
             self._connections.send_beacon(self._beacon)
             self._collect(BEACON_PERIOD_S)
-        if not self._answered:
+        if not self._beacon_answered:
             self._lockstep = False
             self._reset_origin()
 
@@ -137,10 +137,10 @@ class Server:
         began = time.monotonic()
         self._collect_companion()  # frames already buffered from a byte stream do not wake select
         self._poll(0.0)
-        while not self._answered and time.monotonic() - began < SPIN_S:
+        while not self._beacon_answered and time.monotonic() - began < SPIN_S:
             self._collect_companion()
             os.sched_yield()  # let another process use this core
-        while not self._answered:
+        while not self._beacon_answered:
             remaining_s = began + timeout_s - time.monotonic()
             if remaining_s <= 0.0:
                 return
@@ -156,7 +156,7 @@ class Server:
 
     def _collect_companion(self) -> None:
         """Read the companion's datagrams up to and including the answer."""
-        while not self._answered:
+        while not self._beacon_answered:
             received = self._companion.receive()
             if received is None:
                 return
@@ -166,7 +166,7 @@ class Server:
                 continue
             self._collected.append((datagram, messages))
             if from_partner and self._exchange.is_answer(messages):
-                self._answered = True
+                self._beacon_answered = True
 
     # Real time
 
@@ -176,7 +176,7 @@ class Server:
             self._connections.ready(BEACON_PERIOD_S)
 
     def _reset_origin(self) -> None:
-        """Make the present the origin of real time."""
+        """Restart the time from which real time is counted at the present vehicle time."""
         self._origin_wall_s = time.monotonic()
         self._origin_us = self._simulation.time_us
 
@@ -208,7 +208,7 @@ class Server:
             in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
             if in_lockstep and from_partner and self._exchange.is_answer(messages):
                 # The latest beacon is answered: lockstep resumes.
-                self._answered = self._lockstep = True
+                self._beacon_answered = self._lockstep = True
         self._connections.flush()
 
     def _clock_ns(self) -> int:

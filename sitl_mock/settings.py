@@ -51,8 +51,8 @@ def _with_ekf(section: dict[str, Any]) -> object:
     sensors = section.get("sensors", {})
     if not isinstance(sensors, dict):
         return sensors
-    filled = {"ekf": section.get("autopilot", "px4"), **sensors}
-    return filled if filled["ekf"] in (None, "none") else {**SENSORS_WITH_FILTER, **filled}
+    completed = {"ekf": section.get("autopilot", "px4"), **sensors}
+    return completed if completed["ekf"] in (None, "none") else {**SENSORS_WITH_FILTER, **completed}
 
 
 def load_settings(

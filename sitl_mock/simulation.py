@@ -36,10 +36,10 @@ class Simulation:
         plant: computes the physics, see `Vehicle`.
 
     Attributes:
-        vehicle: the true vehicle.
+        vehicle: the simulated vehicle: true motion, battery and sensors.
         state: the estimate, modes and targets of its autopilot.
         parameters: parameters of the autopilot.
-        stream: the latest offboard setpoint that the autopilot accepted, and their number.
+        stream: the latest accepted offboard setpoint, and the number of accepted ones.
         commander: arming and modes of the autopilot.
         companion: link to the companion.
         gcs: link to the ground station; nothing is sent on it if ``gcs_port`` is 0.
@@ -165,15 +165,17 @@ class Simulation:
         if state.time_us >= self._next_commander_us:
             self._next_commander_us += COMMANDER_PERIOD_US
             state.battery_remaining = vehicle.battery.remaining
-            self.effects.watch_position(rules.converged_us, rules.position_timeout_us())
+            self.effects.update_position_valid(
+                rules.position_valid_from_us, rules.position_timeout_us()
+            )
             rules.commander.step(crashed=vehicle.crashed)
 
     def _send_due(self, slot_us: int) -> None:
-        builders, silenced = self._rules.builders, self.effects.silenced
+        builders, is_stopped = self._rules.builders, self.effects.is_stopped
         for link in self.links:
             for message_id in link.streams.due(slot_us, self.state.status_us):
                 builder = builders.get(message_id)
-                if builder is None or silenced(message_id):
+                if builder is None or is_stopped(message_id):
                     continue
                 message = builder()
                 if message is not None:

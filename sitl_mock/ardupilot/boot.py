@@ -14,7 +14,7 @@ INITIALISED_S = 2.4
 ORIGIN_S = 20.0
 """Time after boot, s, from which the estimator has an origin."""
 HOME_S = 23.5
-"""Time after boot, s, from which the pre-arm checks pass in modes that need no position."""
+"""Time after boot, s, from which home is set, so that modes without position can be armed."""
 RUNTIME_PERIOD_US = 30_000_000
 """Period at which STAT_RUNTIME is sent, us."""
 
@@ -92,12 +92,12 @@ class Boot:
 
     @property
     def origin_set(self) -> bool:
-        """Whether the estimator has an origin, and thus home a position."""
+        """Whether the estimator has an origin, so that the position of home is known."""
         return self.reached(ORIGIN_S)
 
     @property
     def home_set(self) -> bool:
-        """Whether home is set for the pre-arm checks."""
+        """Whether the pre-arm checks accept home as set."""
         return self.reached(HOME_S)
 
     def step(self) -> None:

@@ -98,10 +98,10 @@ class ArduPilotCommands(Commands):
             return DENIED
         message_id, interval_us = int(command.parameters[0]), command.parameters[1]
         if message_id in self._builders:
-            refused = link.streams.set_interval(message_id, interval_us, self._state.time_us)
+            refusal = link.streams.set_interval(message_id, interval_us, self._state.time_us)
         else:
-            refused = f"No ap_message for mavlink id ({message_id})"
-        if refused is None:
+            refusal = f"No ap_message for mavlink id ({message_id})"
+        if refusal is None:
             return ACCEPTED
-        self._announce.say(refused, INFO)
+        self._announce.say(refusal, INFO)
         return DENIED

@@ -13,9 +13,9 @@ from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 STOPPING_S = 0.65
-"""The held point is the position plus the velocity times this, s (recorded on entering LAND)."""
-_HEIGHT_INTEGRAL = 1.0
-"""Acceleration per climb rate error and second, 1/s^2; chosen for a steady hover, not measured."""
+"""Distance from the vehicle to the held point per speed, s (recorded on entering LAND)."""
+_CLIMB_RATE_INTEGRAL_GAIN = 1.0
+"""Integral gain of the climb rate, 1/s^2; chosen for a steady hover, not measured."""
 _CLIMB_LIMIT = 10.0
 """Largest climb and descent of the height controller, m/s. It is high, because the callers limit
 the climb rate that they ask for."""
@@ -107,7 +107,7 @@ class PositionHold:
         return self.follow(demand, dt)
 
     def follow(self, demand: PositionDemand, dt: float) -> PositionOutput:
-        """Return attitude and thrust of one period of ``dt`` s for a demand, not for the hold."""
+        """Return attitude and thrust of one period of ``dt`` s that follow any position demand."""
         state = self._state
         estimate = state.estimate
         output = self._controller.step(demand, estimate.position_ned, estimate.velocity_ned, dt)
@@ -124,7 +124,7 @@ class PositionHold:
             parameters["PSC_VELXY_P"],
             parameters["PSC_VELZ_P"],
             parameters["PSC_VELXY_I"],
-            _HEIGHT_INTEGRAL,
+            _CLIMB_RATE_INTEGRAL_GAIN,
             radians(0.01 * parameters["ANGLE_MAX"]),
             parameters["MOT_THST_HOVER"],
             0.0,

@@ -14,15 +14,14 @@ from sitl_mock.physics.quaternion import Vector, from_yaw
 from sitl_mock.physics.vehicle import STILL, ActuatorCommand
 
 TOUCHDOWN_THRUST_RATE = 0.43
-"""After contact in LAND the normalised thrust decreases by this per second (recorded: landed after
-1.6 s)."""
+"""Decrease of the normalised thrust after contact in LAND, 1/s (recorded: landed after 1.6 s)."""
 
 
 class ArduPilotModeControl:
     """The `ModeControl` of ArduCopter.
 
     Args:
-        state: the autopilot's state; the echoes of the targets are written here.
+        state: the autopilot's state; its command and targets are written here.
         parameters: gains, limits and speeds; MOT_THST_HOVER is learned.
         guided: the task of GUIDED.
         throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
@@ -65,7 +64,7 @@ class ArduPilotModeControl:
 
     @property
     def taking_off(self) -> bool:
-        """Whether GUIDED takes off."""
+        """Whether a take-off in GUIDED is under way."""
         return self._output.taking_off
 
     def hover_throttle(self) -> float:

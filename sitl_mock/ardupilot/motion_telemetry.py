@@ -46,7 +46,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         )
 
     def scaled_pressure(self) -> Message:
-        """Return SCALED_PRESSURE."""
+        """Return SCALED_PRESSURE at the estimated height, at 35 degrees C."""
         return dialect.MAVLink_scaled_pressure_message(
             self._boot_ms, self.pressure_hpa(), 0.0, 3500
         )

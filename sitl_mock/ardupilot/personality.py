@@ -89,7 +89,7 @@ class ArduPilot:
             announce,
             send_home=lambda: _send_once(commands, _HOME_MESSAGES, links),
             send_parameter=lambda name: protocol.send_changed(
-                name, [link for link in links if link.heard]
+                name, [link for link in links if link.client_heard]
             ),
         )
         boot = Boot(state, notifier, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
@@ -112,7 +112,7 @@ class ArduPilot:
             ),
             builders,
             handlers={"REQUEST_DATA_STREAM": commands.data_stream},
-            converged_us=parts.ready_us,
+            position_valid_from_us=parts.ready_us,
             position_timeout_us=lambda: POSITION_TIMEOUT_US,
         )
 

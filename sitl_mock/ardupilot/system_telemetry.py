@@ -84,7 +84,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         return int(dialect.MAV_STATE_STANDBY if state.landed else dialect.MAV_STATE_ACTIVE)
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS."""
+        """Return SYS_STATUS, with the bits of running controllers and, while armed, of logging."""
         state = self._state
         controllers = _HEIGHT_CONTROL if state.height_controlled else 0
         controllers |= _POSITION_CONTROL if state.position_controlled else 0

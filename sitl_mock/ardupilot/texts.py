@@ -46,11 +46,11 @@ class ArduPilotAnnouncer:
             self.say(event.text.format(detail), event.severity)
 
     def say(self, text: str, severity: int) -> None:
-        """Send a text; only one that needs several messages has an id (recorded)."""
+        """Send a text; STATUSTEXT.id is 0 unless the text needs several messages (recorded)."""
         text_id = 0
         if len(text.encode()) > TEXT_BYTES:
             self._long_texts += 1
             text_id = self._long_texts
         for link in self._links:
-            if link.heard:
+            if link.client_heard:
                 link.send_text(text, severity, text_id)

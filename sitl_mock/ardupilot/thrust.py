@@ -38,8 +38,8 @@ def angle_boosted(thrust: float, cos_tilt: float) -> float:
 
     Near 90 degrees of tilt and beyond, the thrust decreases to zero.
     """
-    upright = max(0.0, min(1.0, 10.0 * cos_tilt))
-    return thrust * upright / max(0.1, min(1.0, cos_tilt))
+    upright_factor = max(0.0, min(1.0, 10.0 * cos_tilt))
+    return thrust * upright_factor / max(0.1, min(1.0, cos_tilt))
 
 
 def thrust_of_setpoint(thrust: float) -> float:

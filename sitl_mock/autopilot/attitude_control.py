@@ -1,4 +1,4 @@
-"""PX4's attitude controller: quaternion error with a reduced yaw weight to body rates (pure)."""
+"""PX4's attitude controller: body rates from the quaternion error, with a reduced yaw weight."""
 
 from math import acos, asin, copysign, cos, isnan, sin, sqrt
 from typing import NamedTuple
@@ -73,8 +73,8 @@ def attitude_rates(
 def is_usable(q: Quaternion) -> bool:
     """Whether a quaternion has no NaN, and a length between 0.001 and 1000."""
     w, x, y, z = q
-    square = w * w + x * x + y * y + z * z
-    return not isnan(square) and 1e-6 < square < 1e6
+    squared_length = w * w + x * x + y * y + z * z
+    return not isnan(squared_length) and 1e-6 < squared_length < 1e6
 
 
 def _shortest_arc(q: Quaternion, target: Quaternion) -> Quaternion:

@@ -21,7 +21,7 @@ class Commander(Protocol):
 
     refusal: str | None
     """Reason with which a fault refuses arming, None without such a fault."""
-    pilot: bool
+    pilot_simulated: bool
     """Whether a fault simulates a pilot at the sticks."""
 
     @property
@@ -41,7 +41,7 @@ class Commander(Protocol):
         """Change the mode, and return a MAV_RESULT."""
 
     def take_over(self, mode: Mode) -> None:
-        """Let the pilot take over in a mode (fault injection)."""
+        """Enter a mode as a pilot who takes over would (fault injection)."""
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
         """Record the heartbeat of another system or component, to notice when it is lost."""

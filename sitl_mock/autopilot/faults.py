@@ -29,12 +29,12 @@ from sitl_mock.physics.vehicle import Vehicle
 
 @dataclass
 class _Entry:
-    """A fault, and whether it is active or over. ``injected_us``: vehicle time of its injection."""
+    """A fault, its state, and the vehicle time at which it was injected, us."""
 
     fault: LinkFault | VehicleFault
     injected_us: int
     active: bool = False
-    over: bool = False
+    has_ended: bool = False
 
 
 class FaultSchedule:
@@ -82,11 +82,11 @@ class FaultSchedule:
                 continue
             changed = True
             entry.active = active
-            entry.over = not active
+            entry.has_ended = not active
             if not isinstance(entry.fault, LinkFault):
                 (began if active else ended).append(entry.fault)
         if changed:
-            self._entries = [entry for entry in self._entries if not entry.over]
+            self._entries = [entry for entry in self._entries if not entry.has_ended]
             self.link = tuple(
                 e.fault for e in self._entries if e.active and isinstance(e.fault, LinkFault)
             )
@@ -148,28 +148,28 @@ class FaultEffects:
             self._end(fault)
 
     def take_slip(self) -> float:
-        """Return the wall time that the clock has lost by `SlipClock` since the last call, s."""
+        """Return the wall time that `SlipClock` faults have taken since the last call, s."""
         slipped, self._slipped_s = self._slipped_s, 0.0
         return slipped
 
-    def silenced(self, message_id: int) -> bool:
-        """Whether a fault stops this message now."""
+    def is_stopped(self, message_id: int) -> bool:
+        """Whether a `StopTelemetry` fault stops this message now."""
         if not self._telemetry_stops:
             return False
-        kind = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
-        name = kind.msgname
+        message_class = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
+        name = message_class.msgname
         return any(not fault.messages or name in fault.messages for fault in self._telemetry_stops)
 
-    def watch_position(self, converged_us: float, timeout_us: float) -> None:
+    def update_position_valid(self, position_valid_from_us: float, timeout_us: float) -> None:
         """Update ``position_valid`` of the autopilot's state.
 
         Args:
-            converged_us: vehicle time from which on the position is valid.
+            position_valid_from_us: vehicle time from which on the position is valid.
             timeout_us: time for which it stays valid without GPS.
         """
         state = self._state
         lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us
-        state.position_valid = state.time_us >= converged_us and not lost
+        state.position_valid = state.time_us >= position_valid_from_us and not lost
 
     def _begin(self, fault: VehicleFault) -> None:
         match fault:
@@ -206,7 +206,7 @@ class FaultEffects:
                 self._nan_fields.remove(fault)
                 self._set_link_hooks()
             case PilotTakeover():
-                self._commander.pilot = False
+                self._commander.pilot_simulated = False
             case RefuseArming():
                 self._commander.refusal = None
             case GpsLoss():

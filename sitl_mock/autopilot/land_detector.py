@@ -13,7 +13,7 @@ LOW_THRUST_SHARE = 0.3
 
 
 class LandDetector:
-    """Updates ``contact``, ``landed``, ``landed_state`` and ``flown`` of the state.
+    """Updates ``contact``, ``landed``, ``landed_state`` and ``took_off`` of the state.
 
     Args:
         state: the autopilot's state.
@@ -55,7 +55,7 @@ class LandDetector:
         if not contact or self._thrust_is_high():
             self._resting_since_us = state.time_us
             state.landed = False
-            state.flown = state.flown or not contact
+            state.took_off = state.took_off or not contact
         elif not state.armed or state.time_us - self._resting_since_us >= self._landed_after_us:
             state.landed = True
 

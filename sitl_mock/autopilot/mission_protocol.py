@@ -13,7 +13,7 @@ from sitl_mock.link.link import Link
 
 _ACCEPTED = dialect.MAV_MISSION_ACCEPTED
 _PLAN_TYPES = range(3)
-"""Mission, fence and rally points."""
+"""MAV_MISSION_TYPE of mission, fence and rally points."""
 _MOST_ITEMS = 1000
 """Largest number of items in a plan."""
 
@@ -31,7 +31,7 @@ class MissionProtocol:
     """Keeps one plan of each type, and returns it unchanged."""
 
     def __init__(self) -> None:
-        self.plans: dict[int, list[Message]] = {kind: [] for kind in _PLAN_TYPES}
+        self.plans: dict[int, list[Message]] = {mission_type: [] for mission_type in _PLAN_TYPES}
         self._upload: _Upload | None = None
         self.handlers: dict[str, Callable[[Message, Link], None]] = {
             "MISSION_REQUEST_LIST": self._send_count,
@@ -87,14 +87,14 @@ class MissionProtocol:
 
     @staticmethod
     def _request_item(link: Link, upload: _Upload) -> None:
-        number, kind = len(upload.items), upload.mission_type
-        link.send(dialect.MAVLink_mission_request_int_message(*upload.client, number, kind))
+        number, mission_type = len(upload.items), upload.mission_type
+        link.send(dialect.MAVLink_mission_request_int_message(*upload.client, number, mission_type))
 
     def _clear(self, message: Message, link: Link) -> None:
         clears_all = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
         cleared = _PLAN_TYPES if clears_all else self.plans.keys() & {message.mission_type}
-        for kind in cleared:
-            self.plans[kind] = []
+        for mission_type in cleared:
+            self.plans[mission_type] = []
         result = _ACCEPTED if cleared else dialect.MAV_MISSION_UNSUPPORTED
         _acknowledge(message, link, result)
 

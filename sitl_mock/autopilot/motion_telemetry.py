@@ -44,7 +44,7 @@ class MotionTelemetry:
         self._slips = slips
 
     airspeed = nan
-    """Airspeed in VFR_HUD; there is no airspeed sensor."""
+    """Airspeed in VFR_HUD, m/s; NaN because there is no airspeed sensor."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -73,7 +73,7 @@ class MotionTelemetry:
         return self._origin.altitude_m - self._state.estimate.position_ned[2]
 
     def attitude(self) -> Message:
-        """Return ATTITUDE."""
+        """Return ATTITUDE, with the estimated attitude and body rates."""
         estimate = self._state.estimate
         roll, pitch, heading = euler(estimate.q)
         return dialect.MAVLink_attitude_message(
@@ -81,25 +81,25 @@ class MotionTelemetry:
         )
 
     def attitude_quaternion(self) -> Message:
-        """Return ATTITUDE_QUATERNION."""
+        """Return ATTITUDE_QUATERNION, with the estimated attitude and body rates."""
         estimate = self._state.estimate
         return dialect.MAVLink_attitude_quaternion_message(
             self._boot_ms, *estimate.q, *estimate.body_rates
         )
 
     def local_position_ned(self) -> Message | None:
-        """Return LOCAL_POSITION_NED."""
+        """Return LOCAL_POSITION_NED, None without a valid position."""
         if not self._state.position_valid:
             return None
         estimate = self._state.estimate
         return dialect.MAVLink_local_position_ned_message(
-            self._boot_ms - self._slips.at(self._state.shown_us),
+            self._boot_ms - self._slips.lag_ms(self._state.shown_us),
             *estimate.position_ned,
             *estimate.velocity_ned,
         )
 
     def global_position_int(self) -> Message | None:
-        """Return GLOBAL_POSITION_INT."""
+        """Return GLOBAL_POSITION_INT, None without a valid position."""
         state = self._state
         if not state.position_valid:
             return None
@@ -157,7 +157,7 @@ class MotionTelemetry:
         )
 
     def highres_imu(self) -> Message:
-        """Return HIGHRES_IMU."""
+        """Return HIGHRES_IMU; the magnetic field is that of a level vehicle heading north."""
         estimate = self._state.estimate
         return dialect.MAVLink_highres_imu_message(
             self._state.shown_us,
@@ -172,11 +172,11 @@ class MotionTelemetry:
         )
 
     def pressure_hpa(self) -> float:
-        """Return the air pressure at the estimated height (ICAO standard atmosphere)."""
+        """Return the air pressure at the estimated altitude, hPa (ICAO standard atmosphere)."""
         return float(_SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * self._altitude) ** 5.25588)
 
     def vfr_hud(self) -> Message:
-        """Return VFR_HUD."""
+        """Return VFR_HUD; the groundspeed is horizontal."""
         state = self._state
         vx, vy, vz = state.estimate.velocity_ned
         thrust = state.attitude_target.thrust
@@ -186,7 +186,7 @@ class MotionTelemetry:
         )
 
     def altitude(self) -> Message:
-        """Return ALTITUDE."""
+        """Return ALTITUDE; altitude_terrain is always 0."""
         state = self._state
         up, altitude = -state.estimate.position_ned[2], self._altitude
         return dialect.MAVLink_altitude_message(

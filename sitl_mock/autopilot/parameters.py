@@ -30,15 +30,15 @@ class ParameterRefusedError(Exception):
 class Encoding(Protocol):
     """How an autopilot encodes parameters in messages."""
 
-    hashed: bool
+    has_hash: bool
     """Whether the list begins with a hash of all values."""
-    indexed: bool
-    """Whether the answer to a read by name, or to a set, has the index."""
+    sends_index: bool
+    """Whether the answer to a read by name, or to a set, contains the parameter's index."""
 
     def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
         """Return (param_value, param_type)."""
 
-    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+    def from_wire(self, name: str, value: float, param_type: int) -> int | float:
         """Return the value carried by a PARAM_SET.
 
         Raises:
@@ -49,8 +49,8 @@ class Encoding(Protocol):
 class BytewiseEncoding:
     """PX4's encoding: the float field carries the bytes of an integer."""
 
-    hashed = True
-    indexed = True
+    has_hash = True
+    sends_index = True
 
     def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
         """Return (param_value, param_type)."""
@@ -58,19 +58,19 @@ class BytewiseEncoding:
             return float(struct.unpack("<f", struct.pack("<i", value))[0]), INT32
         return value, REAL32
 
-    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+    def from_wire(self, name: str, value: float, param_type: int) -> int | float:
         """Return the value carried by a PARAM_SET.
 
         Raises:
             ParameterRefusedError: a type that PX4 does not have, or a value that is not finite.
         """
-        if kind == INT32:
+        if param_type == INT32:
             return int(struct.unpack("<i", struct.pack("<f", value))[0])
-        if kind == REAL32:
+        if param_type == REAL32:
             if not math.isfinite(value):
                 raise ParameterRefusedError("the value is not finite")
             return value
-        raise ParameterRefusedError(f"parameter type {kind} is neither INT32 nor REAL32")
+        raise ParameterRefusedError(f"parameter type {param_type} is neither INT32 nor REAL32")
 
 
 class FloatEncoding:
@@ -80,8 +80,8 @@ class FloatEncoding:
         types: MAV_PARAM_TYPE by name.
     """
 
-    hashed = False
-    indexed = False
+    has_hash = False
+    sends_index = False
 
     def __init__(self, types: Mapping[str, int]) -> None:
         self._types = types
@@ -90,7 +90,7 @@ class FloatEncoding:
         """Return (param_value, param_type)."""
         return float(value), self._types[name]
 
-    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+    def from_wire(self, name: str, value: float, param_type: int) -> int | float:
         """Return the value carried by a PARAM_SET; its type field is ignored.
 
         Raises:

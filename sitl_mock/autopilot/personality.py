@@ -61,14 +61,14 @@ class Rules(NamedTuple):
     """Message id -> builder."""
     handlers: dict[str, Callable[[Message, Link], None]]
     """Message name -> handler, for messages that only this autopilot handles."""
-    converged_us: float
+    position_valid_from_us: float
     """Vehicle time at which the position becomes valid, us."""
     position_timeout_us: Callable[[], float]
     """Time for which the position stays valid without GPS, us."""
 
 
 class Personality(Protocol):
-    """One autopilot."""
+    """A simulated autopilot, such as PX4: its numbers, and its behaviour as `Rules`."""
 
     boot_mode: Mode
     system_id_parameter: str

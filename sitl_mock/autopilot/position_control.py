@@ -38,7 +38,7 @@ def setpoint_demand(
     Args:
         setpoint: the setpoint. If it has no yaw, its yaw rate changes ``yaw``.
         q: present attitude, for a setpoint relative to the heading (``in_body_heading``).
-        yaw: yaw of the demand before this one, rad.
+        yaw: yaw of the previous demand, rad.
         speeds: limits of the speed: horizontal, up, down, m/s.
         dt: the period, s.
     """
@@ -62,7 +62,7 @@ class PositionOutput(NamedTuple):
 
 
 class PositionGains(NamedTuple):
-    """Gains and limits; thrusts are normalised, 0..1."""
+    """Gains (1/s, integrals 1/s^2), tilt limit (rad) and normalised thrusts (0..1)."""
 
     horizontal_position: float  # velocity per position error, 1/s
     vertical_position: float

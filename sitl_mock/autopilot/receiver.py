@@ -70,7 +70,7 @@ class Receiver:
         """
         if not link.accepts(message):
             return
-        link.heard = True
+        link.client_heard = True
         handler = self._handlers.get(message.get_type())
         if handler is not None and self._for_us(message):
             handler(message, link)

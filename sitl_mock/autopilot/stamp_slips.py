@@ -18,8 +18,8 @@ class StampSlips:
         self._slipped = False
         self._next_us = self._next_slip_us(0.0)
 
-    def at(self, now_us: int) -> int:
-        """Return how far the stamp is behind `now_us`, 0 or 1 ms. Times must not decrease."""
+    def lag_ms(self, now_us: int) -> int:
+        """Return the time stamp's lag behind ``now_us`` (which must not decrease), 0 or 1 ms."""
         if now_us >= self._next_us:
             self._slipped = not self._slipped
             self._next_us = self._next_slip_us(now_us)

@@ -48,11 +48,11 @@ class AirframeConfig(Section):
     rotational_drag_n_m_s: NonNegative = 0.025
     """Aerodynamic damping torque in N m per rad/s, equal about all axes."""
     thrust_slope_m_s2: Positive = 19.55
-    """Slope of the linear part: specific thrust (T/m) per throttle."""
+    """Slope of the thrust curve's linear part: specific thrust (thrust / mass) per throttle."""
     thrust_offset_m_s2: NonNegative = 0.22
-    """Specific thrust of the linear part, extrapolated to throttle 0."""
+    """Specific thrust at throttle 0 if the linear part of the thrust curve is extrapolated."""
     thrust_linear_from: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.15
-    """From this throttle on, slope and offset give the thrust; below it, a straight line from 0."""
+    """Throttle from which the thrust curve is its linear part; below, a straight line from 0."""
     rotor_lag_ms: Positive = 50.0
     """Time constant of each rotor's thrust (first order)."""
     rotor_arm_m: Positive = 0.2

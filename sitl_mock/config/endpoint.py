@@ -12,7 +12,7 @@ _EXAMPLES = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 @dataclass(frozen=True)
 class Udp:
-    """UDP; the key ``port`` sets the ports."""
+    """UDP; the key ``mock.port`` sets the ports of vehicle and companion."""
 
 
 @dataclass(frozen=True)

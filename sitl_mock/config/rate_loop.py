@@ -12,10 +12,10 @@ class AxisShaping(Section):
     """Shaping of one axis's rate setpoint before the controller (ArduPilot)."""
 
     acceleration_limit_rad_s2: Positive
-    """Limit on the change of the shaped rate."""
+    """Largest angular acceleration of the shaped rate."""
     attitude_gain_1_s: NonNegative = 4.5
-    """Body rate per angle between attitude and attitude target, for small angles. For larger ones
-    the rate is that which half the acceleration limit brings to zero at the target."""
+    """Body rate per angle between attitude and attitude target. At large angles the rate is lower,
+    so that braking at half the acceleration limit ends at the target."""
     delay_ms: NonNegative = 0.0
     """Delay from the arrival of a rate setpoint to its shaping."""
 

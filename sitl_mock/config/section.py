@@ -14,7 +14,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 _MOST_NAMES_LISTED = 20
 """Largest number of known names that a message lists."""
-_MUST = {
+_REQUIREMENTS = {
     "greater_than_equal": "must be at least {ge:.12g}",
     "greater_than": "must be more than {gt:.12g}",
     "less_than_equal": "must be at most {le:.12g}",
@@ -70,19 +70,19 @@ class ConfigError(Exception):
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return ``; did you mean ...?`` with the known name that is most like ``word``.
 
-    If none is like it: ``; known are ...`` with all names, or nothing if they are more than 20.
+    If none is similar: ``; known are ...`` with all names; with more than 20 names, no text.
     """
     names = list(known)
-    near = _nearest(word, names)
-    if near:
-        return f"; did you mean {near}?"
+    nearest = _nearest(word, names)
+    if nearest:
+        return f"; did you mean {nearest}?"
     return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_NAMES_LISTED else ""
 
 
 def _nearest(word: str, names: list[str]) -> str | None:
     """Return the name that is most like a mistyped word; None if none is similar enough."""
-    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
-    return near[0] if near else None
+    nearest = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    return nearest[0] if nearest else None
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
@@ -100,12 +100,12 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
         return f"unknown key {where}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
         return f"{where} must be a number: {_number_advice(str(detail['input']))}"
-    if fault := wrong_member(detail, model):
+    if fault := describe_wrong_member(detail, model):
         return f"{where}{fault}"
-    return f"{where}{wrong_value(error)} (got {detail['input']!r:.60})"
+    return f"{where}{describe_wrong_value(error)} (got {detail['input']!r:.60})"
 
 
-def wrong_value(error: ValidationError) -> str:
+def describe_wrong_value(error: ValidationError) -> str:
     """Return what is wrong with the value of the first error, to be put after its path."""
     details = error.errors()
     kind, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
@@ -117,23 +117,23 @@ def wrong_value(error: ValidationError) -> str:
         return " is missing"
     if kind == "literal_error":
         return f" must be {context['expected'].replace(chr(39), '')}"
-    if kind in _MUST:
-        return f" {_MUST[kind].format(**context)}"
+    if kind in _REQUIREMENTS:
+        return f" {_REQUIREMENTS[kind].format(**context)}"
     message = details[0]["msg"].removeprefix("Value error, ")
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     return f": {message}"
 
 
-def wrong_member(detail: Any, annotation: Any) -> str:
-    """Return the message about a value, as of `faults`, that is no mapping or has no known kind.
+def describe_wrong_member(detail: Any, annotation: Any) -> str:
+    """Return why a value such as a fault is wrong: it is no mapping, or its ``kind`` is unknown.
 
     Args:
         detail: error reported by pydantic.
-        annotation: the union of the kinds of faults, or a section that has it in a key.
+        annotation: the union of the possible models, or a section with a key of this type.
 
     Returns:
-        The message to put after the path of the fault; empty if the error is another one.
+        the text to put after the path of the value; empty for other errors.
     """
     if detail["type"] == "model_attributes_type":
         return f" must be a mapping of keys to values (got {detail['input']!r:.60})"
@@ -146,8 +146,8 @@ def wrong_member(detail: Any, annotation: Any) -> str:
     if detail["type"] == "union_tag_not_found":
         return f" needs a kind; {listed}"
     tag = detail["ctx"]["tag"]
-    near = _nearest(tag, kinds)
-    hint = f"did you mean {near}?; " if near else ""
+    nearest = _nearest(tag, kinds)
+    hint = f"did you mean {nearest}?; " if nearest else ""
     return f": there is no kind {tag!r:.40}; {hint}{listed}"
 
 

@@ -25,7 +25,7 @@ class HomeConfig(Section):
     latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 47.3977433
     longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.5455942
     altitude_m: Finite = 489.4
-    """Above mean sea level."""
+    """Altitude of home above mean sea level."""
     heading_deg: Finite = 0.0
 
 
@@ -50,9 +50,8 @@ class SigningConfig(Section):
     """The first line is the passphrase. The key is its SHA-256, as in ground stations. A relative
     path is relative to the file that names it."""
     accept_unsigned: bool | None = None
-    """Accept unsigned frames; frames with a wrong signature are never accepted. Null: as the
-    autopilot does: ArduPilot accepts them on the companion link (its SERIAL0), PX4 on no link.
-    """
+    """Accept unsigned frames; frames with a wrong signature are never accepted. Null:
+    yes on ArduPilot's companion link (its SERIAL0), no on its other link and on PX4's links."""
     link_id: Annotated[int, Field(ge=0, le=254)] = 0
     """Link id of the companion link in signatures; the ground station link has the next."""
 
@@ -69,7 +68,7 @@ class VehicleSettings(Section):
     """The companion link: udp (see ``port``); tcpin://HOST:PORT, for one client, boots when the
     client connects; serial:///PATH, a pseudo-terminal with a symbolic link at PATH."""
     gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
-    """0 = no ground station link."""
+    """UDP port of the ground station; 0 = no ground station link."""
     control_port: Port = 0
     """UDP port of the JSON control channel on 127.0.0.1; 0 = none."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1

@@ -13,11 +13,11 @@ class Endpoint(Protocol):
     """
 
     @property
-    def where(self) -> str:
-        """Address, for the user."""
+    def address(self) -> str:
+        """Address of the endpoint, as text for the user."""
 
     @property
-    def heard(self) -> bool:
+    def has_received(self) -> bool:
         """Whether anything was received yet."""
 
     @property
@@ -31,7 +31,7 @@ class Endpoint(Protocol):
     def receive(self) -> tuple[bytes, bool] | None:
         """Return the next datagram (of a byte stream: the next frame), None if there is none.
 
-        The flag says whether it came from the client to which we send.
+        The flag: whether the bytes came from the client to which the endpoint sends.
         """
 
     def send(self, datagrams: list[bytes]) -> None:

@@ -59,9 +59,9 @@ class EventRequest:
         return self.frame[6]
 
 
-def event_request(unknown: Any) -> EventRequest | None:
+def event_request(message: Any) -> EventRequest | None:
     """Decode a message unknown to pymavlink; None if it is not a valid REQUEST_EVENT."""
-    frame = bytes(unknown.get_msgbuf())
+    frame = bytes(message.get_msgbuf())
     if frame[0] != 0xFD or int.from_bytes(frame[7:10], "little") != REQUEST_EVENT.message_id:
         return None
     end = _HEADER_BYTES + frame[1]

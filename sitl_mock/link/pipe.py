@@ -31,20 +31,22 @@ class DatagramPipe:
     ) -> list[bytes]:
         """Accept datagrams; return those to deliver now, delayed ones first."""
         active = [fault for fault in faults if fault.direction in (self._direction, "both")]
-        out = []
+        to_deliver = []
         while self._delayed and self._delayed[0][0] <= now_us:
-            out.append(heapq.heappop(self._delayed)[2])
+            to_deliver.append(heapq.heappop(self._delayed)[2])
         for datagram in datagrams:
             survivors = [datagram]
             for fault in active:
                 survivors = [
-                    passed for one in survivors for passed in self._apply(one, fault, now_us)
+                    passed
+                    for survivor in survivors
+                    for passed in self._apply(survivor, fault, now_us)
                 ]
             if survivors and self._held_back is not None:
                 survivors.append(self._held_back)
                 self._held_back = None
-            out.extend(survivors)
-        return out
+            to_deliver.extend(survivors)
+        return to_deliver
 
     def _apply(self, datagram: bytes, fault: LinkFault, now_us: int) -> list[bytes]:
         """Apply one fault to one datagram; return the datagrams to deliver now."""

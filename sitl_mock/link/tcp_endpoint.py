@@ -28,8 +28,8 @@ class TcpEndpoint:
         self._listener.setblocking(False)
         self._client: socket.socket | None = None
         self._stream: ByteStream | None = None
-        self.where = f"TCP {host}:{port}"
-        self.heard = False
+        self.address = f"TCP {host}:{port}"
+        self.has_received = False
 
     @property
     def connected(self) -> bool:
@@ -54,7 +54,7 @@ class TcpEndpoint:
         self._release_client()
         if frame is None:
             return None
-        self.heard = True
+        self.has_received = True
         return frame, True
 
     def send(self, datagrams: list[bytes]) -> None:

@@ -39,7 +39,7 @@ def bound_socket(port: int, option: str) -> socket.socket:
 class UdpEndpoint:
     """Sends to ``remote_port`` on this machine until it receives, then to the first sender only.
 
-    It receives from other senders, but does not send to them.
+    The first sender is the partner. The endpoint receives from others, but does not send to them.
 
     Args:
         local_port: port to bind.
@@ -52,8 +52,8 @@ class UdpEndpoint:
 
     def __init__(self, local_port: int, remote_port: int, option: str) -> None:
         self.socket = bound_socket(local_port, option)
-        self.where = f"UDP {HOST}:{local_port}"
-        self.heard = False
+        self.address = f"UDP {HOST}:{local_port}"
+        self.has_received = False
         self._partner = (HOST, remote_port)
 
     @property
@@ -63,7 +63,7 @@ class UdpEndpoint:
 
     @property
     def readable(self) -> list[int]:
-        """The socket."""
+        """File descriptor of the socket."""
         return [self.socket.fileno()]
 
     def receive(self) -> tuple[bytes, bool] | None:
@@ -72,8 +72,8 @@ class UdpEndpoint:
             datagram, sender = self.socket.recvfrom(MAX_DATAGRAM)
         except OSError:
             return None
-        if not self.heard:
-            self.heard = True
+        if not self.has_received:
+            self.has_received = True
             self._partner = sender
         return datagram, sender == self._partner
 

@@ -19,7 +19,7 @@ _PROTOCOL_VERSION_CRC = 217
 _PROTOCOL_VERSION = bytes((200, 0, 100, 0, 200, 0)) + bytes(16)
 """Payload: version 200, smallest 100, largest 200, no hashes."""
 _CHANGE_MODE = 1
-"""Flag in param2 of DO_REPOSITION."""
+"""Flag in param2 of DO_REPOSITION: change to LOITER if in another mode."""
 
 
 class Px4Commands(Commands):
@@ -85,7 +85,7 @@ class Px4Commands(Commands):
         return self._px4_commander.request_mode(Mode.LOITER, hold=self._position(command))
 
     def _position(self, command: Command) -> Vector:
-        """Return the local position in parameters 5 to 7; NaN keeps the present value."""
+        """Return the position in parameters 5 to 7, m NED; NaN keeps the present value."""
         latitude, longitude, altitude = command.parameters[4:]
         north, east, down = self._state.estimate.position_ned
         if isfinite(latitude) and isfinite(longitude):
@@ -111,5 +111,5 @@ class Px4Commands(Commands):
         message_id, interval_us = command.parameters[:2]
         if not (isfinite(message_id) and isfinite(interval_us)):
             return ACCEPTED
-        refused = link.streams.set_interval(int(message_id), interval_us, self._state.time_us)
-        return ACCEPTED if refused is None else FAILED
+        refusal = link.streams.set_interval(int(message_id), interval_us, self._state.time_us)
+        return ACCEPTED if refusal is None else FAILED

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
-from sitl_mock.px4.modes import NEEDS_POSITION, custom_mode
+from sitl_mock.px4.modes import POSITION_MODES, custom_mode
 
 _ENTER_HOLD_LAYOUT = struct.Struct("<IBHB")
 _ENTER_LAYOUT = struct.Struct("<IBB")
@@ -55,12 +55,12 @@ class Cause(Enum):
 
     @property
     def severity(self) -> int:
-        """Severity; higher is worse."""
+        """Severity of the cause; higher is worse."""
         return self.value[0]
 
     @property
     def number(self) -> int:
-        """Its number in PX4's events."""
+        """Number of the cause in PX4's events; 0 = none."""
         return self.value[1]
 
 
@@ -110,7 +110,7 @@ class FailsafeActions:
 
     @property
     def holds_before_acting(self) -> bool:
-        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end this."""
+        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; moved sticks do not end the wait."""
         return (
             self._announced is not None
             and self._announced[1] is HOLD
@@ -128,7 +128,7 @@ class FailsafeActions:
         if self.cause is not None and self.cause.severity > cause.severity:
             return
         state = self._state
-        if not state.position_valid and action.mode in NEEDS_POSITION:
+        if not state.position_valid and action.mode in POSITION_MODES:
             action = LAND
         if self._announced != (cause, action):
             self._announce_action(cause, action, then)

@@ -12,7 +12,7 @@ from sitl_mock.physics.rigid_body import GRAVITY
 CRAWL_HEIGHT_M = 0.65
 """Below this height LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
-"""The held point lies ahead of the position by the velocity times this, s."""
+"""Distance from the vehicle to the held point per speed, s."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
 """Acceleration demand of a vehicle that stays level without holding its horizontal position."""
 
@@ -68,7 +68,7 @@ class FlightTasks:
 
     @property
     def takeoff_reached(self) -> bool:
-        """Whether TAKEOFF is almost at its height."""
+        """Whether TAKEOFF is less than 0.3 m below the height at which it ends."""
         return self._state.estimate.position_ned[2] - self._takeoff_z < 0.3
 
     @property

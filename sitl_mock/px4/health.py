@@ -1,7 +1,7 @@
 """PX4's health report: events with the failing checks, and the modes that can be armed.
 
-The bytes of the events are those that a PX4 sent. An event's id is a hash of its name; where a
-name in PX4's source has this hash, it stands here.
+The bytes of the events are those that a PX4 sent. An event's id is a hash of its name; the names
+here are those in PX4's source that have this hash.
 """
 
 import struct
@@ -74,13 +74,13 @@ class HealthReport:
         self._reported_us = 0
 
     def step(
-        self, *, offboard_alive: bool, pilot: bool, gcs_alive: bool, gcs_required: bool
+        self, *, offboard_alive: bool, pilot_present: bool, gcs_alive: bool, gcs_required: bool
     ) -> None:
         """Send a report if it changed and is due; also step the events (`EventLog.step`).
 
         Args:
             offboard_alive: whether offboard setpoints arrive.
-            pilot: whether a pilot holds the sticks.
+            pilot_present: whether a pilot holds the sticks.
             gcs_alive: whether a ground station is connected.
             gcs_required: whether arming needs a ground station.
         """
@@ -96,7 +96,7 @@ class HealthReport:
             None if self._position_ready else _LOCAL_POSITION,
             None if self._position_ready else _GLOBAL_POSITION,
             _MISSION,
-            None if pilot else _NO_PILOT,
+            None if pilot_present else _NO_PILOT,
             gcs,
         )
         failing = tuple(check for check in candidates if check is not None)

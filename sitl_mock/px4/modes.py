@@ -34,10 +34,10 @@ _STANDARD_MODES = {
     Mode.TAKEOFF: dialect.MAV_STANDARD_MODE_TAKEOFF,
 }
 
-PILOTED = frozenset({Mode.MANUAL, Mode.ALTCTL, Mode.POSCTL, Mode.STABILIZED})
+PILOTED_MODES = frozenset({Mode.MANUAL, Mode.ALTCTL, Mode.POSCTL, Mode.STABILIZED})
 """Modes that need a pilot's sticks."""
 
-NEEDS_POSITION = frozenset({Mode.POSCTL, Mode.LOITER, Mode.TAKEOFF, Mode.RTL})
+POSITION_MODES = frozenset({Mode.POSCTL, Mode.LOITER, Mode.TAKEOFF, Mode.RTL})
 """Modes that need a horizontal position."""
 
 MODES_BY_COMMAND: dict[tuple[int, int], Mode] = {

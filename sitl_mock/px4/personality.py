@@ -25,7 +25,7 @@ from sitl_mock.px4.parameters import PX4_PARAMETERS
 from sitl_mock.px4.streams import SLOT_US, Px4Streams
 from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
 
-CONVERGED_SHARE = 0.7
+POSITION_VALID_SHARE = 0.7
 """The position becomes valid at this share of ``prearm_delay_s`` (recorded: after 3.2 s)."""
 LANDED_AFTER_US = 1_100_000
 """Contact with low thrust for this time, us, is a landing (measured: 1.1 s)."""
@@ -147,6 +147,6 @@ class Px4:
                 "MANUAL_CONTROL": commander.manual_control,
                 "REQUEST_EVENT": events.answer_request,
             },
-            converged_us=CONVERGED_SHARE * parts.ready_us,
+            position_valid_from_us=POSITION_VALID_SHARE * parts.ready_us,
             position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],
         )

@@ -47,7 +47,7 @@ class Sticks:
         limit = self._parameters["COM_RC_LOSS_T"] * 1e6
         return self._last_us is not None and now_us - self._last_us <= limit
 
-    def override(self, now_us: int) -> bool:
+    def are_overriding(self, now_us: int) -> bool:
         """Whether a stick moves faster than MAN_OVERRIDE_SPD (half travels/s; negative: never).
 
         As in PX4, a low pass of 0.1 s filters the speed.

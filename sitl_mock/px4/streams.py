@@ -31,9 +31,9 @@ class _Stream:
         self.interval_us = interval_us
         self.due_us = due_us
         self.sent_us: int | None = None
-        """The latest slot in which the message was sent, us."""
+        """Vehicle time of the latest slot in which the message was sent, us."""
         self.status_us = -1
-        """``status_us`` of `Px4Streams.due` when the message was last sent."""
+        """Vehicle time of the latest status published before the message was last sent, us."""
 
 
 class Px4Streams:

@@ -60,7 +60,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         }
 
     def heartbeat(self) -> Message:
-        """Return HEARTBEAT."""
+        """Return HEARTBEAT, with the mode that is active (a failsafe may have chosen it)."""
         state = self._state
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR,
@@ -98,17 +98,17 @@ class Px4SystemTelemetry(SystemTelemetry):
         )
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS."""
+        """Return SYS_STATUS with the recorded sensors."""
         return self._sys_status(_SENSORS_PRESENT, _SENSORS_ENABLED, _SENSORS_HEALTHY, 100)
 
     def battery_status(self) -> Message:
-        """Return BATTERY_STATUS, without the used energy."""
+        """Return BATTERY_STATUS, with 0 mAh used and no used energy."""
         return self._battery_status(
             dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, 0, -1
         )
 
     def gps_raw_int(self) -> Message:
-        """Return GPS_RAW_INT."""
+        """Return GPS_RAW_INT: a 3D fix, or no fix without GPS."""
         state = self._state
         time_us = state.shown_us
         if not state.gps_ok:
@@ -130,6 +130,6 @@ class Px4SystemTelemetry(SystemTelemetry):
         return dialect.MAVLink_estimator_status_message(state.shown_us, flags, *ratios)
 
     def ping(self) -> Message:
-        """Return a PING request."""
+        """Return a PING request, with a new sequence number."""
         self._next_ping += 1
         return dialect.MAVLink_ping_message(self._state.shown_us, self._next_ping - 1, 0, 0)

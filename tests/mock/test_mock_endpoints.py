@@ -35,7 +35,7 @@ def soon(condition):
 @pytest.fixture
 def tcp():
     endpoint = TcpEndpoint(HOST, free_port())
-    endpoint.port = int(endpoint.where.rpartition(":")[2])
+    endpoint.port = int(endpoint.address.rpartition(":")[2])
     yield endpoint
     endpoint.close()
 
