@@ -53,7 +53,7 @@ class Truth(TypedDict):
     touchdown_speed: float | None
     """Sink speed of the last touchdown, m/s; None before the first."""
     battery: float
-    """Charge, 0..1."""
+    """Battery charge, 0..1."""
     setpoints: int
     """Number of setpoints that the autopilot accepted."""
     last_setpoint: float | None

@@ -12,9 +12,9 @@ from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
 FIRST_BEACON_PERIOD_S = 0.05
-"""Without an answer, the first beacon is sent again after this wall time, s."""
+"""Wall time after which an unanswered first beacon is sent again, s."""
 BEACON_PERIOD_S = 0.2
-"""Without an answer, a beacon after the first is sent again after this wall time, s."""
+"""Wall time after which an unanswered later beacon is sent again, s."""
 MAX_LAG_S = 1.0
 """Largest lag behind real time that the server makes up, s. A busy computer causes lags of tenths
 of a second. If they were dropped, the link would seem slower to the companion.
@@ -155,7 +155,7 @@ class Server:
                 self._serve(endpoint)
 
     def _collect_companion(self) -> None:
-        """Read the companion's datagrams up to and including the answer."""
+        """Read the companion's datagrams up to and including the answer to the latest beacon."""
         while not self._beacon_answered:
             received = self._companion.receive()
             if received is None:
@@ -176,7 +176,7 @@ class Server:
             self._connections.ready(BEACON_PERIOD_S)
 
     def _reset_origin(self) -> None:
-        """Restart the time from which real time is counted at the present vehicle time."""
+        """Let the present wall-clock time correspond to the present vehicle time."""
         self._origin_wall_s = time.monotonic()
         self._origin_us = self._simulation.time_us
 
@@ -215,7 +215,7 @@ class Server:
         """Return vehicle time for TIMESYNC, ns.
 
         In real time it advances between slots with the wall clock, up to the next slot. While a
-        fault freezes the clock, it stands still.
+        fault freezes the clock, it does not advance.
         """
         simulation = self._simulation
         if self._lockstep or simulation.effects.clock_frozen:

@@ -29,7 +29,7 @@ class ArduPilotCommander:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         vehicle: the vehicle, for its battery.
         control: begins each mode that is entered.
         guided: the task of GUIDED.
@@ -190,7 +190,7 @@ class ArduPilotCommander:
             self._disarm_on_ground()
 
     def _align_yaw(self) -> None:
-        """Announce the alignment of the heading in the air, at sufficient height."""
+        """Announce the heading alignment in the air, above `YAW_ALIGNMENT_HEIGHT_M`."""
         state = self._state
         height = state.home_ned[2] - state.estimate.position_ned[2]
         if self._yaw_aligned or height < YAW_ALIGNMENT_HEIGHT_M:
@@ -200,7 +200,7 @@ class ArduPilotCommander:
             self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
 
     def _update_prearm_problem(self) -> str | None:
-        """Store in the state why arming is refused now, None if it is allowed; return the same."""
+        """Store in the state and return why arming is refused now; None if it is allowed."""
         state = self._state
         state.prearm_problem = arming_problem(
             state,

@@ -1,8 +1,8 @@
 """ArduCopter's parameters, and the defaults of its simulated vehicle (measured).
 
 Parameters have the types and defaults of its simulated quadrotor, and the names of 4.7 where they
-were recorded. Those marked * have an effect in the mock. The others exist because clients read them
-or users look for them.
+were recorded. Parameters marked * have an effect in the mock. The others exist because clients read
+them or users look for them.
 """
 
 from typing import Any
@@ -98,8 +98,8 @@ ARDUPILOT_TYPES = {name: int(param_type) for name, _, param_type in _PARAMETERS}
 BURST_MS = 5.6
 """Period of the bursts of the simulator's telemetry, ms (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
-"""Time constant of the specific thrust, ms. It replaces the measured dead time of 15 ms and lag of
-5 ms together."""
+"""Time constant of the specific thrust, ms: one lag in place of the measured dead time of 15 ms and
+lag of 5 ms."""
 
 RATE_LAG_MS = 11.0
 """Delay of the gyro's low pass, ms (measured)."""

@@ -39,7 +39,7 @@ class ArduPilotFailsafe:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         vehicle: for the battery's voltage.
         announce: sends texts.
         act: enters the mode of a failsafe, or disarms a vehicle that is on the ground.

@@ -15,7 +15,7 @@ from sitl_mock.link.framing import Message
 
 _ALL_RATES_IGNORED = ROLL_OR_PITCH_RATE_IGNORED | YAW_RATE_IGNORED
 _UNIT_LENGTH_TOLERANCE = 1e-3
-"""Largest difference of the squared length of a quaternion from 1."""
+"""Largest accepted difference of a quaternion's squared length from 1."""
 
 
 class FatalSetpointError(Exception):
@@ -65,7 +65,7 @@ class Guided:
     def __init__(self) -> None:
         self.task = Task.HOLD
         self.takeoff_height = 0.0
-        """Height of TAKE_OFF, m above home."""
+        """Height at which a take-off ends, m above home."""
         self.setpoint: Setpoint | None = None
         """The latest setpoint."""
         self.setpoint_us = 0

@@ -53,7 +53,7 @@ class GuidedFlight:
         self._timed_out = False
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
         guided = self._guided
         began, guided.task_changed = guided.task_changed, False
         if began:

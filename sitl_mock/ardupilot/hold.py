@@ -36,7 +36,7 @@ class ClimbProfile:
         self.acceleration = 0.0
 
     def step(self, climb_rate: float, acceleration: float, dt: float) -> None:
-        """Advance by ``dt`` s towards a climb rate, with at most this ``acceleration``."""
+        """Advance by ``dt`` s towards a climb rate, with at most ``acceleration``, m/s^2."""
         largest_change = acceleration * dt
         change = max(-largest_change, min(largest_change, climb_rate - self.rate))
         self.acceleration = change / dt
@@ -78,7 +78,7 @@ class PositionHold:
         self._controller.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift point, height and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         dx, dy, dz = position_step
         self.point = (self.point[0] + dx, self.point[1] + dy)
         self.climb.height -= dz
@@ -107,7 +107,7 @@ class PositionHold:
         return self.follow(demand, dt)
 
     def follow(self, demand: PositionDemand, dt: float) -> PositionOutput:
-        """Return attitude and thrust of one period of ``dt`` s that follow any position demand."""
+        """Return attitude and thrust of one period of ``dt`` s for a position demand."""
         state = self._state
         estimate = state.estimate
         output = self._controller.step(demand, estimate.position_ned, estimate.velocity_ned, dt)

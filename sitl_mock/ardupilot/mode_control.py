@@ -72,7 +72,7 @@ class ArduPilotModeControl:
         return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
         state = self._state
         state.position_target.active = False
         # Modes that hold a position report it even when disarmed (recorded in GUIDED).

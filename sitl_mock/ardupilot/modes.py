@@ -1,4 +1,4 @@
-"""ArduCopter's modes: their numbers, what each needs, and whether it may be armed."""
+"""ArduCopter's modes: their numbers, what each needs, and what forbids arming."""
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -65,7 +65,7 @@ def arming_problem(
         home_set: whether home is set.
         crashed: whether the vehicle has crashed.
         gcs_failsafe: whether the ground station failsafe is active.
-        refusal: the reason that a fault gives, None without such a fault.
+        refusal: reason of an active `RefuseArming` fault, None without one.
     """
     mode: Mode = state.mode
     problems = (

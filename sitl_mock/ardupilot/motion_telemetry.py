@@ -36,7 +36,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         return super().global_position_int() or zeros
 
     def raw_imu(self) -> Message:
-        """Return RAW_IMU: mg, mrad/s, mgauss."""
+        """Return RAW_IMU in mg, mrad/s and mgauss (the field of a level vehicle heading north)."""
         estimate = self._state.estimate
         return dialect.MAVLink_raw_imu_message(
             self._state.shown_us,

@@ -31,7 +31,7 @@ from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
 
 LANDED_AFTER_US = 1_000_000
-"""A contact with low thrust for this time, us, is a landing."""
+"""Time of ground contact with low thrust after which the vehicle has landed, us."""
 POSITION_TIMEOUT_US = 10_000_000
 """Time for which the position stays valid without GPS, us; not measured."""
 DEFAULT_LOOP_HZ = 400.0

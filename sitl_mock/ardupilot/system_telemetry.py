@@ -30,7 +30,7 @@ _EKF_NO_POSITION = (
     | ardupilotmega.EKF_CONST_POS_MODE
 )
 _STICKS_US = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
-"""The sticks of the simulated transmitter at rest."""
+"""RC channels 1 to 8 of the simulated transmitter with its sticks at rest, us."""
 
 
 class ArduPilotSystemTelemetry(SystemTelemetry):
@@ -127,5 +127,5 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         return self._home_position((nan, nan, nan, nan)) if self._boot.origin_set else None
 
     def gps_global_origin(self) -> Message | None:
-        """Return GPS_GLOBAL_ORIGIN; None before it is set."""
+        """Return GPS_GLOBAL_ORIGIN; None before the origin is set."""
         return super().gps_global_origin() if self._boot.origin_set else None

@@ -1,4 +1,4 @@
-"""ArduCopter's texts. It has no numbered events, and announces only those listed here."""
+"""ArduCopter's texts. The autopilot sends no EVENT, and announces only the events listed here."""
 
 from collections.abc import Iterable
 
@@ -40,7 +40,7 @@ class ArduPilotAnnouncer:
         self._long_texts = 0
 
     def __call__(self, kind: EventKind, detail: str) -> None:
-        """Announce an event if ArduCopter has a text for it."""
+        """Announce an event, with a detail in its text, if ArduCopter has a text for it."""
         event = ARDUPILOT_EVENTS.get(kind)
         if event is not None:
             self.say(event.text.format(detail), event.severity)

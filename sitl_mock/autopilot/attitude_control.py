@@ -6,8 +6,8 @@ from typing import NamedTuple
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 
 _OPPOSITE_MARGIN = 1e-5
-"""Two axes count as opposite if the cosine of the angle between them is below -1 plus this. Then no
-arc between them is the shortest."""
+"""Two axes count as opposite (no shortest arc between them) if the cosine of their angle is less than
+this margin above -1."""
 
 
 class AttitudeGains(NamedTuple):
@@ -39,7 +39,7 @@ def attitude_rates(
 
     As PX4's AttitudeControl: the rotation of the thrust axis along the shortest arc has priority.
     The angle of the remaining rotation about this axis is multiplied by ``yaw_weight``, and the yaw
-    gain is divided by it.
+    gain is divided by ``yaw_weight``.
 
     Args:
         q: present attitude.

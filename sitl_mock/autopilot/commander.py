@@ -17,10 +17,10 @@ FAILED = int(dialect.MAV_RESULT_FAILED)
 
 
 class Commander(Protocol):
-    """Decides ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
+    """Sets ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
 
     refusal: str | None
-    """Reason with which a fault refuses arming, None without such a fault."""
+    """Reason of an active `RefuseArming` fault, None without one."""
     pilot_simulated: bool
     """Whether a fault simulates a pilot at the sticks."""
 
@@ -57,7 +57,7 @@ class ModeControl(Protocol):
     """Computes the actuator command of each period from mode, estimate and setpoints."""
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift the held position and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""

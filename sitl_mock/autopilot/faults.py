@@ -113,10 +113,10 @@ class FaultEffects:
 
     Args:
         state: the autopilot's state.
-        vehicle: receives faults of estimate and battery.
-        commander: receives faults of arming and mode.
+        vehicle: changed by faults of the estimate and the battery.
+        commander: changed by faults of arming and mode.
         control: its held position and heading follow an estimator reset.
-        links: receive faults of messages.
+        links: changed by faults of messages.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class FaultEffects:
         links: list[Link],
     ) -> None:
         self.offboard_us: int | None = None
-        """Vehicle time when setpoints first controlled the vehicle, us."""
+        """Vehicle time when setpoints first controlled the vehicle, us; None: not yet."""
         self.clock_frozen = False
         self._state = state
         self._vehicle = vehicle
@@ -148,12 +148,12 @@ class FaultEffects:
             self._end(fault)
 
     def take_slip(self) -> float:
-        """Return the wall time that `SlipClock` faults have taken since the last call, s."""
+        """Return the wall time lost to `SlipClock` faults since the last call, s."""
         slipped, self._slipped_s = self._slipped_s, 0.0
         return slipped
 
     def is_stopped(self, message_id: int) -> bool:
-        """Whether a `StopTelemetry` fault stops this message now."""
+        """Whether a `StopTelemetry` fault stops a message now."""
         if not self._telemetry_stops:
             return False
         message_class = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
@@ -165,7 +165,7 @@ class FaultEffects:
 
         Args:
             position_valid_from_us: vehicle time from which on the position is valid.
-            timeout_us: time for which it stays valid without GPS.
+            timeout_us: time for which the position stays valid without GPS.
         """
         state = self._state
         lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us

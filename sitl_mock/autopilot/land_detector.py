@@ -1,4 +1,4 @@
-"""Land detector: contact with low thrust for some time is a landing; disarmed, contact suffices.
+"""Land detector: a landing is contact with low thrust for some time, or contact while disarmed.
 
 Without contact, or with more thrust, the vehicle counts as taken off at once.
 """
@@ -9,7 +9,7 @@ from sitl_mock.autopilot.events import Announce, EventKind
 from sitl_mock.autopilot.state import Landed, Mode, State
 
 LOW_THRUST_SHARE = 0.3
-"""Thrust below this share of the hover thrust is low."""
+"""Share of the hover thrust below which the thrust counts as low."""
 
 
 class LandDetector:

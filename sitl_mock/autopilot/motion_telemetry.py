@@ -34,7 +34,7 @@ class MotionTelemetry:
         state: the autopilot's state.
         vehicle: the vehicle, for rotors, reset counter and ArduPilot's shaped attitude target.
         origin: origin of the local frame.
-        slips: how far the time stamp of LOCAL_POSITION_NED is behind the true time.
+        slips: lag of the time stamp of LOCAL_POSITION_NED behind the true time.
     """
 
     def __init__(self, state: State, vehicle: Vehicle, origin: Geodetic, slips: StampSlips) -> None:
@@ -141,7 +141,7 @@ class MotionTelemetry:
         )
 
     def position_target_local_ned(self) -> Message | None:
-        """Return POSITION_TARGET_LOCAL_NED while a position controller runs."""
+        """Return POSITION_TARGET_LOCAL_NED, None unless a position controller runs."""
         target = self._state.position_target
         if not target.active:
             return None

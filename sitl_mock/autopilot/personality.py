@@ -46,7 +46,7 @@ class VehicleParts(NamedTuple):
     """Vehicle time at which the boot ends (`mock.prearm_delay_s`), us; before it, arming is refused
     in modes that need a position, on PX4 in all modes."""
     slips: StampSlips
-    """How far the time stamp of LOCAL_POSITION_NED is behind the true time."""
+    """Lag of the time stamp of LOCAL_POSITION_NED behind the true time."""
 
 
 class Rules(NamedTuple):

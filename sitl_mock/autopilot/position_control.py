@@ -11,7 +11,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, along_heading, norm
 from sitl_mock.physics.rigid_body import GRAVITY
 
 _LARGEST_TILT = radians(80.0)
-"""Upper bound of the tilt limit."""
+"""Upper bound of the tilt limit, rad."""
 
 
 class PositionDemand(NamedTuple):
@@ -129,7 +129,7 @@ class PositionController:
 
 
 def _velocity_setpoint(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
-    """Return the velocity setpoint, NED; NaN = none."""
+    """Return the velocity setpoint, m/s NED; NaN = none."""
     factors = (gains.horizontal_position, gains.horizontal_position, gains.vertical_position)
     velocity_setpoint = []
     for axis in range(3):

@@ -62,7 +62,7 @@ def position_setpoint(message: Message) -> PositionSetpoint | None:
     """Decode a SET_POSITION_TARGET_LOCAL_NED; None if it controls nothing or is not supported.
 
     Supported are MAV_FRAME_LOCAL_NED, and MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
-    Forces are not.
+    Forces are not supported.
     """
     mask = message.type_mask
     in_body = message.coordinate_frame in _BODY_FRAMES

@@ -5,7 +5,7 @@ from random import Random
 
 
 class StampSlips:
-    """How far a time stamp is behind the true time: 0 or 1 ms, which changes at random times.
+    """Lag of a time stamp behind the true time: 0 or 1 ms, changing at random times.
 
     Args:
         rate_hz: mean number of changes (slips) per second; 0 = none.

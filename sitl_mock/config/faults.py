@@ -22,13 +22,14 @@ MessageName = Annotated[str, AfterValidator(_known_message)]
 
 
 class Timed(Section):
-    """Start and duration of a fault, in vehicle time; without a start it begins at once."""
+    """Start and duration of a fault, in vehicle time; without a start the fault begins at once."""
 
     at_s: NonNegative | None = None
-    """Vehicle time at which the fault begins; a fault that is injected later begins at once."""
+    """Vehicle time at which the fault begins; if this time is over, the fault begins at once."""
     after_offboard_s: NonNegative | None = None
-    """Time from the first control by setpoints to the fault. On PX4 that is the first time armed in
-    OFFBOARD; on ArduPilot the first time in the air in GUIDED under SET_ATTITUDE_TARGET."""
+    """Time from the moment when setpoints first control the vehicle to the fault. The moment is on
+    PX4 the first time armed in OFFBOARD, on ArduPilot the first time in the air in GUIDED under
+    SET_ATTITUDE_TARGET."""
     duration_s: Positive | None = None
     """Duration of the fault; without it, the fault does not end."""
 
@@ -103,11 +104,11 @@ class PilotTakeover(Timed):
 
     kind: Literal["pilot_takeover"]
     mode: Literal["POSCTL", "ALTCTL", "STABILIZED", "MANUAL"] = "POSCTL"
-    """PX4's mode names; ArduCopter enters LOITER, ALT_HOLD, STABILIZE, STABILIZE."""
+    """Mode of the pilot, by PX4's name; ArduCopter enters LOITER, ALT_HOLD or (twice) STABILIZE."""
 
 
 class EstimatorReset(Timed):
-    """The estimate jumps, and the reset counter increments, which only PX4 sends (in ODOMETRY)."""
+    """The estimate jumps, and the reset counter (only PX4 sends it, in ODOMETRY) increments."""
 
     kind: Literal["estimator_reset"]
     yaw_deg: Finite = 0.0

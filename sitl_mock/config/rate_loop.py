@@ -26,17 +26,17 @@ class AxisGains(Section):
     proportional_n_m_s: NonNegative
     """Torque per rate error, N m per rad/s."""
     integral_n_m: NonNegative = 0.0
-    """Torque gained per second and rate error, N m per rad."""
+    """Torque per integrated rate error, N m per rad."""
     feed_forward_n_m_s: Finite = 0.0
     """Torque per rate setpoint, N m per rad/s."""
     damping_n_m_s2: NonNegative = 0.0
     """Torque against the angular acceleration, N m per rad/s^2 (PX4's D term)."""
     integral_limit_n_m: NonNegative = 0.3
-    """Limit on the torque of the integral."""
+    """Largest torque of the integral term."""
     torque_filter_ms: NonNegative = 0.0
     """Time constant of the low pass on this axis's torque (PX4's MC_YAW_TQ_CUTOFF); 0 = none."""
     setpoint_delay_ms: NonNegative = 4.0
-    """Delay from the arrival of a rate setpoint, or from its shaping, to the controller."""
+    """Delay from the arrival of a rate setpoint, or from the end of its shaping, to the controller."""
     shaping: AxisShaping | None = None
     """Shaping before the controller; give it for all three axes or for none."""
 

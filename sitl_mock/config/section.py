@@ -106,7 +106,7 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def describe_wrong_value(error: ValidationError) -> str:
-    """Return what is wrong with the value of the first error, to be put after its path."""
+    """Return what is wrong with the first wrong value, to be put after the path of its key."""
     details = error.errors()
     kind, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
     if kind == "missing" and isinstance(details[0]["input"], list | tuple):
@@ -157,7 +157,7 @@ def error_path(error: ValidationError) -> list[str]:
 
 
 def _number_advice(text: str) -> str:
-    """Return the advice on a text that stands for a number: drop the unit, or write digits."""
+    """Return advice for a text in place of a number: drop the unit, or write digits."""
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         return f"write digits, not {text!r:.60}"
@@ -167,7 +167,7 @@ def _number_advice(text: str) -> str:
 
 
 def _valid_paths(key: str, model: type[BaseModel]) -> list[str]:
-    """Return the paths at which this key is valid: at the top of ``mock``, or in its sections."""
+    """Return the paths at which a key is valid: at the top of ``mock``, or in its sections."""
     paths = [f"mock.{key}"] if key in model.model_fields else []
     for section, field in model.model_fields.items():
         sections = [

@@ -14,7 +14,7 @@ class EkfConfig(Section):
     """Errors of the navigation filter, and the gains with which satellite fixes correct them.
 
     The filter integrates an acceleration that is wrong because its attitude is wrong. Delayed
-    satellite fixes correct it. Noise is given as standard deviation; the defaults are PX4's.
+    fixes correct the errors. Noise is given as standard deviation; the defaults are PX4's.
     """
 
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
@@ -35,19 +35,19 @@ class EkfConfig(Section):
     velocity_noise_m_s: NonNegative = 0.0238
     """Standard deviation of the noise of a fix's horizontal velocity, on each axis."""
     noise_time_s: Positive = 0.25
-    """Correlation time of the noise of position and velocity."""
+    """Correlation time of the noise of a fix's position and velocity."""
     tilt_noise_deg: NonNegative = 0.028
     """Standard deviation of the random walk of roll and pitch in 1 s; the fixes limit it."""
     tilt_bias_deg: tuple[Finite, Finite] = (0.0, 0.0)
     """Constant error of the attitude, as a rotation about north and east. The estimated bias of the
     accelerometer hides it in level flight; a horizontal acceleration causes a climb rate error."""
     yaw_error_deg: NonNegative = 0.3
-    """Error of the heading; it rotates the integrated acceleration."""
+    """Standard deviation of the heading error, which rotates the integrated acceleration."""
     yaw_time_s: Positive = 15.0
     """Correlation time of the heading error."""
     turn_yaw_ms: Finite = -4.0
     """Heading error in a turn per turn rate of the course, sign reversed; delayed fixes cause it.
-    It builds up over seconds, faster at a larger acceleration."""
+    The error builds up over seconds, faster at a larger acceleration."""
     compass_error_deg: Finite = 0.0
     """Heading error that the compass causes without acceleration; an acceleration reduces it."""
     yaw_rate_bias_deg_s: Finite = 0.0
@@ -72,11 +72,11 @@ class EkfConfig(Section):
     height_noise_time_s: Positive = 6.0
     """Correlation time of the slow noise of the height."""
     position_gains: InnovationGains = (0.0774, 0.0494)
-    """Gains of the position, m per m and m per m/s."""
+    """Gains of the position for an innovation of position and velocity, m per m and m per m/s."""
     velocity_gains: InnovationGains = (0.0316, 0.0411)
-    """Gains of the velocity, m/s per m and m/s per m/s."""
+    """Gains of the velocity for an innovation of position and velocity, 1/s and m/s per m/s."""
     acceleration_gains: InnovationGains = (0.0056, 0.0102)
-    """Gains of the acceleration error, m/s^2 per m and m/s^2 per m/s."""
+    """Gains of the acceleration error for an innovation of position and velocity, 1/s^2 and 1/s."""
     predictor_ms: Positive = 250.0
     """Time constant with which the output predictor applies a correction of position or speed."""
     heading_predictor_ms: Positive = 250.0
@@ -147,8 +147,8 @@ class SensorConfig(Section):
     """Age of the estimated position and velocity."""
     stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     """How often per second the time stamp of LOCAL_POSITION_NED slips by 1 ms against its position,
-    back or forth. ArduPilot takes the time, in whole ms, when it writes the message; its default
-    is 1.6."""
+    back or forth. ArduPilot takes the time, in whole ms, when it writes the message; the
+    default for ArduPilot is 1.6."""
 
     @field_validator("ekf", mode="before")
     @classmethod

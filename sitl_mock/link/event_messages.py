@@ -23,13 +23,14 @@ class Layout(NamedTuple):
 
 
 EVENT = Layout(410, 160, struct.Struct("<IIHBBB40s"))
-"""id, event_time_boot_ms, sequence, destination component and system, log_levels, arguments."""
+"""Fields: id, event_time_boot_ms, sequence, destination component and system, log_levels,
+arguments."""
 CURRENT_EVENT_SEQUENCE = Layout(411, 106, struct.Struct("<HB"))
-"""sequence, flags."""
+"""Fields: sequence, flags."""
 REQUEST_EVENT = Layout(412, 33, struct.Struct("<HHBB"))
-"""first_sequence, last_sequence, target system and component."""
+"""Fields: first_sequence, last_sequence, target system and component."""
 RESPONSE_EVENT_ERROR = Layout(413, 77, struct.Struct("<HHBBB"))
-"""sequence, sequence_oldest_available, target system and component, reason."""
+"""Fields: sequence, sequence_oldest_available, target system and component, reason."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class TcpEndpoint:
 
     @property
     def readable(self) -> list[int]:
-        """The listening socket and the client's connection."""
+        """File descriptors of the listening socket and of the client's connection."""
         descriptors = [self._listener.fileno()]
         if self._client is not None:
             descriptors.append(self._client.fileno())

@@ -8,9 +8,9 @@ from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.modes import PILOTED_MODES
 
 UNARMABLE_MODES = frozenset({Mode.RTL, Mode.LAND})
-"""PX4 cannot be armed in these modes, and does not return to them when it disarms."""
+"""Modes in which PX4 cannot be armed, and to which it does not return when it disarms."""
 PREFLIGHT_MARGIN_US = 1_000_000
-"""A vehicle that was armed and does not take off disarms after COM_DISARM_PRFLT plus this, us
+"""Delay beyond COM_DISARM_PRFLT after which an armed vehicle that has not taken off disarms, us
 (measured: 11 s for 10 s)."""
 
 
@@ -51,12 +51,12 @@ class ArmingChecks:
     def find_problem(
         self, *, gcs_alive: bool, pilot_present: bool, refusal: str | None
     ) -> str | None:
-        """Store in the state why arming is refused now, None if it is allowed; return the same.
+        """Store in the state and return why arming is refused now; None if it is allowed.
 
         Args:
             gcs_alive: whether a ground station is connected.
             pilot_present: whether a pilot holds the sticks.
-            refusal: the reason that a fault gives, None without such a fault.
+            refusal: reason of an active `RefuseArming` fault, None without one.
         """
         state = self._state
         problems = (

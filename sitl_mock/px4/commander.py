@@ -27,7 +27,7 @@ class Px4Commander:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         control: begins each mode that is entered.
         stream: the offboard setpoints.
         announce: sends texts and events.
@@ -116,7 +116,7 @@ class Px4Commander:
         return ACCEPTED
 
     def land(self) -> int:
-        """Land here; return a MAV_RESULT. PX4 sends a text for this command, not for the mode."""
+        """Execute NAV_LAND, and return a MAV_RESULT. A mode request for LAND is not announced."""
         result = self.request_mode(Mode.LAND)
         if result == ACCEPTED:
             self._announce(EventKind.LANDING_COMMANDED, "")
@@ -207,7 +207,7 @@ class Px4Commander:
     def _set_intended(self, mode: Mode) -> None:
         """Set the mode that the user intends.
 
-        Disarming returns to the last intended mode that can be armed, but not TAKEOFF (measured).
+        Disarming returns to the last intended mode that can be armed, except TAKEOFF (measured).
         """
         self._state.intended_mode = mode
         if mode not in UNARMABLE_MODES and mode is not Mode.TAKEOFF:

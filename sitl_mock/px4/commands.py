@@ -17,7 +17,7 @@ from sitl_mock.px4.modes import MODES_BY_COMMAND
 _PROTOCOL_VERSION_ID = 300
 _PROTOCOL_VERSION_CRC = 217
 _PROTOCOL_VERSION = bytes((200, 0, 100, 0, 200, 0)) + bytes(16)
-"""Payload: version 200, smallest 100, largest 200, no hashes."""
+"""Payload of PROTOCOL_VERSION: version 200, smallest 100, largest 200, no hashes."""
 _CHANGE_MODE = 1
 """Flag in param2 of DO_REPOSITION: change to LOITER if in another mode."""
 

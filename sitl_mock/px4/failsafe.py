@@ -24,11 +24,11 @@ _NO_MANUAL_CONTROL = 4
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
 """Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT: no failsafe in automatic modes, in OFFBOARD."""
 _GCS_MARGIN_US = 2_000_000
-"""The loss of the ground station is detected this long after COM_DL_LOSS_T (measured)."""
+"""Delay beyond COM_DL_LOSS_T after which the ground station counts as lost, us (measured)."""
 _ACTED_ALREADY = -1
 """Value that replaces the time of a loss once its failsafe has acted, so that it acts only once."""
 _COMPANION_MARGIN_US = 1_500_000
-"""The loss of the companion is announced this long after COM_OBC_LOSS_T (measured)."""
+"""Delay beyond COM_OBC_LOSS_T after which the companion counts as lost, us (measured)."""
 _WARNINGS = {
     BatteryWarning.LOW: EventKind.BATTERY_LOW,
     BatteryWarning.CRITICAL: EventKind.BATTERY_CRITICAL,
@@ -42,7 +42,7 @@ class Failsafe:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         stream: the offboard setpoints.
         announce: sends texts and events.
         enter: enters a mode and leaves the intended mode as it is.
@@ -83,7 +83,7 @@ class Failsafe:
             self._pilot_lost_us = _ACTED_ALREADY
 
     def receive_heartbeat(self, heartbeat_type: int) -> None:
-        """Record a heartbeat of a MAV_TYPE."""
+        """Record a heartbeat, whose MAV_TYPE is ``heartbeat_type``."""
         now = self._state.time_us
         if heartbeat_type == dialect.MAV_TYPE_GCS:
             self._gcs_heartbeat_us = now

@@ -36,7 +36,7 @@ OFFBOARD_ACTIONS = {
     6: TERMINATE,
     7: DISARM,
 }
-"""COM_OBL_RC_ACT -> action; without a pilot RETURN replaces those that need one (measured)."""
+"""COM_OBL_RC_ACT -> action; without a pilot, RETURN replaces actions that need one (measured)."""
 LINK_ACTIONS = {1: HOLD, 2: RETURN, 3: LAND, 5: TERMINATE, 6: DISARM}
 """NAV_DLL_ACT and NAV_RCL_ACT -> action."""
 
@@ -44,7 +44,7 @@ LINK_ACTIONS = {1: HOLD, 2: RETURN, 3: LAND, 5: TERMINATE, 6: DISARM}
 class Cause(Enum):
     """Cause of a failsafe: its severity, and its number in PX4's events (0 = none).
 
-    A cause does not replace one of higher severity.
+    A new cause does not replace an active one of higher severity.
     """
 
     OFFBOARD_LOST = (1, 0)
@@ -157,7 +157,7 @@ class FailsafeActions:
             self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T.
+        """Execute the action that a parameter selects, after COM_FAIL_ACT_T if it is RTL or LAND.
 
         Args:
             cause: cause of the failsafe.

@@ -10,7 +10,7 @@ from sitl_mock.physics.quaternion import Vector, yaw
 from sitl_mock.physics.rigid_body import GRAVITY
 
 CRAWL_HEIGHT_M = 0.65
-"""Below this height LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
+"""Height below which LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
 """Distance from the vehicle to the held point per speed, s."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
@@ -59,7 +59,7 @@ class FlightTasks:
             self._begin_return()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift the held position and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         x, y, z = self._hold
         dx, dy, dz = position_step
         self._hold = (x + dx, y + dy, z + dz)
@@ -137,7 +137,7 @@ class FlightTasks:
     def _begin_return(self) -> None:
         """Choose the return height: by the cone around home, at most RTL_RETURN_ALT.
 
-        It is at least the present height; within NAV_ACC_RAD of home it is the present one.
+        The return height is at least the present one; within NAV_ACC_RAD of home they are equal.
         """
         parameters, state = self._parameters, self._state
         home = state.home_ned

@@ -52,7 +52,7 @@ class Px4ModeControl:
         self._position.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift the held position and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         self._tasks.shift(yaw_step, position_step)
 
     @property
@@ -61,7 +61,7 @@ class Px4ModeControl:
         return self._tasks.takeoff_reached
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
         state = self._state
         state.position_target.active = False
         fresh = self._stream.take_fresh()

@@ -60,7 +60,7 @@ def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
     Args:
         mode: the flight mode.
         armed: whether the motors may turn.
-        attitude_controlled: whether OFFBOARD has setpoints above body rates.
+        attitude_controlled: whether OFFBOARD follows an attitude or a position, not body rates.
     """
     flags = _CUSTOM | (_ARMED if armed else 0)
     if mode is Mode.OFFBOARD:

@@ -26,9 +26,9 @@ from sitl_mock.px4.streams import SLOT_US, Px4Streams
 from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
 
 POSITION_VALID_SHARE = 0.7
-"""The position becomes valid at this share of ``prearm_delay_s`` (recorded: after 3.2 s)."""
+"""Share of ``prearm_delay_s`` after which the position becomes valid (recorded: 3.2 s)."""
 LANDED_AFTER_US = 1_100_000
-"""Contact with low thrust for this time, us, is a landing (measured: 1.1 s)."""
+"""Time of ground contact with low thrust after which the vehicle has landed, us (measured)."""
 
 _COMPANION_RATES: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,

@@ -41,8 +41,8 @@ class Px4Streams:
 
     Args:
         rates: message id -> Hz, the rates at boot.
-        random: draws the slots that a stream at the full slot rate misses, and lets positions
-            wait for a new value; None = no slot is missed.
+        random: draws the slots that a stream at the full slot rate misses; positions then also
+            wait for a new value. None = no slot is missed.
     """
 
     def __init__(self, rates: Mapping[int, float], *, random: Random | None) -> None:
@@ -100,7 +100,7 @@ class Px4Streams:
         return due
 
     def _misses_slot(self, stream: _Stream, slot_us: int) -> bool:
-        """Whether a due message misses this slot."""
+        """Whether a due message misses the slot at ``slot_us``."""
         if self._random is None:
             return False
         if slot_us % VALUE_PERIOD_US.get(stream.message_id, 1):

@@ -89,7 +89,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         return setpoint is not None
 
     def current_mode(self) -> Message:
-        """Return CURRENT_MODE, with the mode that the user intends."""
+        """Return CURRENT_MODE, with the active mode and the mode that the user intends."""
         state = self._state
         return dialect.MAVLink_current_mode_message(
             standard_mode(state.mode),
