@@ -78,13 +78,15 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     if not isinstance(fault, Mapping):
         raise ConfigError(f"a fault is written as {{'kind': 'gps_loss'}}, not as {fault!r}")
     try:
-        valid = fault_adapter.validate_python(dict(fault))
+        valid_fault = fault_adapter.validate_python(dict(fault))
     except ValidationError as error:
         detail = error.errors()[0]
-        where = ".".join(str(part) for part in detail["loc"])
-        refused = describe_wrong_member(detail, Fault) or f" {where}{describe_wrong_value(error)}"
-        raise ConfigError(f"fault{refused}") from error
-    simulation.faults.add(valid, simulation.time_us)
+        key_path = ".".join(str(part) for part in detail["loc"])
+        problem = (
+            describe_wrong_member(detail, Fault) or f" {key_path}{describe_wrong_value(error)}"
+        )
+        raise ConfigError(f"fault{problem}") from error
+    simulation.faults.add(valid_fault, simulation.time_us)
 
 
 def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 
 from sitl_mock.connections import Connections
-from sitl_mock.exchange import Arrived, Exchange, burst_time
+from sitl_mock.exchange import Exchange, ReceivedDatagram, burst_time
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.framing import decode
 from sitl_mock.settings import MockSettings
@@ -30,7 +30,7 @@ class Server:
     Args:
         settings: settings of this vehicle (see `MockSettings.for_vehicle`).
         system_id: MAVLink system id.
-        status: shows the running vehicle after each slot, None = headless.
+        show_status: shows the running vehicle after each slot, None = headless.
 
     Raises:
         ConfigError: an endpoint cannot be opened (see `Connections`), or the signing passphrase
@@ -41,10 +41,10 @@ class Server:
         self,
         settings: MockSettings,
         system_id: int = 1,
-        status: Callable[[Simulation], None] | None = None,
+        show_status: Callable[[Simulation], None] | None = None,
     ) -> None:
         self._settings = settings
-        self._status = status
+        self._show_status = show_status
         self._simulation = Simulation(settings, system_id)
         self._exchange = Exchange(settings, self._simulation)
         self._connections = Connections(settings, self._simulation, self._exchange)
@@ -52,7 +52,7 @@ class Server:
         self._lockstep = settings.lockstep.enabled
         self._beacon = b""
         self._beacon_answered = False
-        self._collected: list[Arrived] = []
+        self._collected: list[ReceivedDatagram] = []
         self._origin_wall_s = 0.0
         self._origin_us = 0
         self._simulation.set_clock(self._clock_ns)
@@ -92,8 +92,8 @@ class Server:
         self._connections.flush(beacon)
         if self._lockstep:
             self._await_answer()
-        if self._status is not None:
-            self._status(self._simulation)
+        if self._show_status is not None:
+            self._show_status(self._simulation)
 
     # Lockstep
 
@@ -188,14 +188,14 @@ class Server:
         self._origin_wall_s += self._simulation.effects.take_slip()
         speed = self._settings.speed
         elapsed_s = (self._simulation.next_us - self._origin_us) / speed / 1e6
-        due = self._origin_wall_s + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
-        remaining_s = due - time.monotonic()
+        due_s = self._origin_wall_s + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
+        remaining_s = due_s - time.monotonic()
         if remaining_s < -MAX_LAG_S:
             self._reset_origin()
         while True:
             for endpoint in self._connections.ready(max(0.0, remaining_s)):
                 self._serve(endpoint)
-            remaining_s = due - time.monotonic()
+            remaining_s = due_s - time.monotonic()
             if remaining_s <= 0.0 or self._lockstep:
                 return
 
@@ -219,7 +219,7 @@ class Server:
         """
         simulation = self._simulation
         if self._lockstep or simulation.effects.clock_frozen:
-            return simulation.state.shown_us * 1000
+            return simulation.state.stamp_us * 1000
         wall_us = (time.monotonic() - self._origin_wall_s) * 1e6 * self._settings.speed
         now_us = min(self._origin_us + wall_us, simulation.next_us)
         return round(max(now_us, simulation.time_us) * 1000)

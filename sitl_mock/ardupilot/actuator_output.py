@@ -57,11 +57,11 @@ class ActuatorOutput:
         """Cosine of the angle between the body's down axis and the vertical."""
         return body_z(self._state.estimate.q)[2]
 
-    def follow(self, output: PositionOutput, dt: float) -> ActuatorCommand:
+    def position_command(self, output: PositionOutput, dt: float) -> ActuatorCommand:
         """Return the command for the position controller's output of a period of ``dt`` s."""
         self.thrust = output.thrust
         self._learn_hover(output, dt)
-        return self.attitude(output.q, output.thrust)
+        return self.attitude_command(output.q, output.thrust)
 
     def _learn_hover(self, output: PositionOutput, dt: float) -> None:
         """Move MOT_THST_HOVER towards the thrust of a level hover, if MOT_HOVER_LEARN is set."""
@@ -72,20 +72,20 @@ class ActuatorOutput:
             change = dt / HOVER_LEARNING_TIME_S * (output.thrust - hover)
             parameters.set("MOT_THST_HOVER", hover + change)
 
-    def attitude(self, target: Quaternion, thrust: float) -> ActuatorCommand:
+    def attitude_command(self, target: Quaternion, thrust: float) -> ActuatorCommand:
         """Return the command that turns to an attitude, with ArduPilot's normalised thrust.
 
         ATTITUDE_TARGET reports `self.thrust`, which has no angle boost.
         """
         self._state.attitude_target.q = target
         self._state.attitude_target.thrust = self.thrust
-        return self.rates(self.rates_towards(target), thrust)
+        return self.rate_command(self.rates_towards(target), thrust)
 
     def rates_towards(self, target: Quaternion) -> Vector:
         """Return the body rates that turn to an attitude, rad/s."""
         return attitude_rates(self._state.estimate.q, target, 0.0, _ATTITUDE_GAINS)
 
-    def rates(self, rates: Vector, thrust: float) -> ActuatorCommand:
+    def rate_command(self, rates: Vector, thrust: float) -> ActuatorCommand:
         """Return the command for rates (rad/s) and normalised thrust.
 
         On the ground the thrust is 0, except during a take-off in GUIDED.

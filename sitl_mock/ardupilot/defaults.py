@@ -160,12 +160,12 @@ def _with_rotor_lag(gains: AxisGains, inertia: float) -> AxisGains:
 
 
 def _rate_loop() -> RateLoopConfig:
-    measured = RateLoopConfig.ardupilot()
+    measured_loop = RateLoopConfig.ardupilot()
     x, y, z = AirframeConfig().inertia_kg_m2
     return RateLoopConfig(
-        roll=_with_rotor_lag(measured.roll, x),
-        pitch=_with_rotor_lag(measured.pitch, y),
-        yaw=_with_rotor_lag(measured.yaw, z),
+        roll=_with_rotor_lag(measured_loop.roll, x),
+        pitch=_with_rotor_lag(measured_loop.pitch, y),
+        yaw=_with_rotor_lag(measured_loop.yaw, z),
     )
 
 

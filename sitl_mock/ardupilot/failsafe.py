@@ -137,8 +137,8 @@ class ArduPilotFailsafe:
         """Land if the position is lost in a mode that needs it and FS_EKF_ACTION demands it."""
         state = self._state
         lost = state.armed and not state.position_valid
-        began = lost and not self._position_lost and state.mode in POSITION_MODES
-        self._position_lost = lost and (self._position_lost or began)
-        if began and self._parameters["FS_EKF_ACTION"]:
+        loss_began = lost and not self._position_lost and state.mode in POSITION_MODES
+        self._position_lost = lost and (self._position_lost or loss_began)
+        if loss_began and self._parameters["FS_EKF_ACTION"]:
             self._announce(EventKind.POSITION_LOST, "")
             self._act(Mode.LAND)

@@ -55,38 +55,38 @@ class GuidedFlight:
     def command(self, dt: float) -> ActuatorCommand:
         """Return the actuator command for the next ``dt`` s."""
         guided = self._guided
-        began, guided.task_changed = guided.task_changed, False
-        if began:
+        task_began, guided.task_changed = guided.task_changed, False
+        if task_began:
             self._hold.begin()
             self._spooling_since_us = self._state.time_us
         match guided.task, guided.setpoint:
             case Task.TAKE_OFF, _:
                 return self._take_off(dt)
             case Task.ANGLE, AttitudeSetpoint() as setpoint:
-                return self._follow_angle(setpoint, dt, began=began)
+                return self._follow_angle(setpoint, dt, task_began=task_began)
             case Task.POSITION, PositionSetpoint() as setpoint:
                 return self._follow_position(setpoint, dt)
-        return self._output.follow(self._hold.step(0.0, dt), dt)
+        return self._output.position_command(self._hold.step(0.0, dt), dt)
 
     def _take_off(self, dt: float) -> ActuatorCommand:
         state, guided = self._state, self._guided
         if state.landed and state.time_us - self._spooling_since_us < SPOOL_UP_US:
             self._hold.begin()
-            return self._output.rates((0.0, 0.0, 0.0), 0.0)
+            return self._output.rate_command((0.0, 0.0, 0.0), 0.0)
         remaining = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
-        fastest = 0.01 * self._parameters["WPNAV_SPEED_UP"]
-        speed = max(_MIN_CLIMB_RATE, approach_speed(remaining, ARRIVAL_DECELERATION, fastest))
+        max_speed = 0.01 * self._parameters["WPNAV_SPEED_UP"]
+        speed = max(_MIN_CLIMB_RATE, approach_speed(remaining, ARRIVAL_DECELERATION, max_speed))
         if remaining < ARRIVAL_TOLERANCE_M:
             guided.end_takeoff()
-        return self._output.follow(self._hold.step(speed, dt), dt)
+        return self._output.position_command(self._hold.step(speed, dt), dt)
 
     def _follow_angle(
-        self, setpoint: AttitudeSetpoint, dt: float, *, began: bool
+        self, setpoint: AttitudeSetpoint, dt: float, *, task_began: bool
     ) -> ActuatorCommand:
         """Follow rates or an attitude; after GUID_TIMEOUT level the vehicle and hold its height."""
         state, parameters = self._state, self._parameters
         state.position_controlled = False
-        was_timed_out = self._timed_out and not began
+        was_timed_out = self._timed_out and not task_began
         self._timed_out = self._guided.setpoint_timed_out(state.time_us, parameters["GUID_TIMEOUT"])
         is_thrust = bool(int(parameters["GUID_OPTIONS"]) & THRUST_AS_THRUST)
         is_climb_rate = self._timed_out or not is_thrust
@@ -106,21 +106,21 @@ class GuidedFlight:
         if is_climb_rate or parameters["ATC_ANGLE_BOOST"]:
             thrust = angle_boosted(thrust, self._output.cos_tilt)
         if self._timed_out:
-            return self._output.attitude(from_yaw(self._hold.yaw), thrust)
+            return self._output.attitude_command(from_yaw(self._hold.yaw), thrust)
         rates = setpoint.rates or (0.0, 0.0, 0.0)
         if setpoint.q is None:
             state.attitude_target.q = state.estimate.q
-            return self._output.rates(rates, thrust)
+            return self._output.rate_command(rates, thrust)
         p, q, r = self._output.rates_towards(setpoint.q)
         state.attitude_target.q = setpoint.q
-        return self._output.rates((p + rates[0], q + rates[1], r + rates[2]), thrust)
+        return self._output.rate_command((p + rates[0], q + rates[1], r + rates[2]), thrust)
 
     def _follow_position(self, setpoint: PositionSetpoint, dt: float) -> ActuatorCommand:
         guided, parameters = self._guided, self._parameters
         timed_out = guided.setpoint_timed_out(self._state.time_us, parameters["GUID_TIMEOUT"])
         if timed_out and isnan(setpoint.position[0]):
             guided.hold()
-            return self._output.follow(self._hold.step(0.0, dt), dt)
+            return self._output.position_command(self._hold.step(0.0, dt), dt)
         hold = self._hold
         speeds = (
             0.01 * parameters["WPNAV_SPEED"],
@@ -129,4 +129,4 @@ class GuidedFlight:
         )
         demand = setpoint_demand(setpoint, self._state.estimate.q, hold.yaw, speeds, dt)
         hold.yaw = demand.yaw
-        return self._output.follow(hold.follow(demand, dt), dt)
+        return self._output.position_command(hold.follow(demand, dt), dt)

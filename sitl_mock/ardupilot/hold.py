@@ -44,9 +44,9 @@ class ClimbProfile:
         self.height += self.rate * dt
 
 
-def approach_speed(distance: float, deceleration: float, fastest: float) -> float:
-    """Return the largest speed that can stop within the distance, at most ``fastest``, m/s."""
-    return min(fastest, sqrt(2.0 * deceleration * max(0.0, distance)))
+def approach_speed(distance: float, deceleration: float, max_speed: float) -> float:
+    """Return the largest speed that can stop within the distance, at most ``max_speed``, m/s."""
+    return min(max_speed, sqrt(2.0 * deceleration * max(0.0, distance)))
 
 
 class PositionHold:

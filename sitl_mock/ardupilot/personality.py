@@ -25,7 +25,7 @@ from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import FloatEncoding
-from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
+from sitl_mock.autopilot.personality import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
@@ -78,7 +78,7 @@ class ArduPilot:
         """Return the mode of a custom_mode, None if the mock does not have it."""
         return MODES_BY_NUMBER.get(custom_mode)
 
-    def rules(self, parts: VehicleParts) -> Rules:
+    def behaviour(self, parts: VehicleParts) -> Behaviour:
         """Build ArduCopter's behaviour for one vehicle."""
         state, parameters, links = parts.state, parts.parameters, parts.links
         announce = ArduPilotAnnouncer(links)
@@ -98,7 +98,7 @@ class ArduPilot:
         )
         builders = self._builders(parts, boot)
         commands = ArduPilotCommands(state, commander, builders, announce)
-        return Rules(
+        return Behaviour(
             control,
             commander,
             commands,
@@ -108,7 +108,7 @@ class ArduPilot:
                 announce,
                 hover_thrust=control.hover_throttle,
                 landed_after_us=LANDED_AFTER_US,
-                climbing=lambda: control.taking_off,
+                is_climbing=lambda: control.taking_off,
             ),
             builders,
             handlers={"REQUEST_DATA_STREAM": commands.data_stream},

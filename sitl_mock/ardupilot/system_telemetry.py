@@ -64,11 +64,11 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def heartbeat(self) -> Message:
         """Return HEARTBEAT; during the boot the guided bit is set (recorded: 89)."""
         state = self._state
-        controlled = state.position_controlled or not self._boot.initialised
+        position_controlled = state.position_controlled or not self._boot.initialised
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR,
             dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
-            base_mode(armed=state.armed, position_controlled=controlled),
+            base_mode(armed=state.armed, position_controlled=position_controlled),
             MODE_NUMBERS[state.mode],
             self.system_status(),
             3,
@@ -120,7 +120,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def rc_channels(self) -> Message:
         """Return RC_CHANNELS: the sticks at rest."""
         channels = [*_STICKS_US, *(0,) * 10]
-        return dialect.MAVLink_rc_channels_message(self._state.shown_us // 1000, 16, *channels, 255)
+        return dialect.MAVLink_rc_channels_message(self._state.stamp_us // 1000, 16, *channels, 255)
 
     def home_position(self) -> Message | None:
         """Return HOME_POSITION, without attitude (recorded); None before home is set."""

@@ -28,7 +28,7 @@ from sitl_mock.physics.vehicle import Vehicle
 
 
 @dataclass
-class _Entry:
+class _ScheduledFault:
     """A fault, its state, and the vehicle time at which it was injected, us."""
 
     fault: LinkFault | VehicleFault
@@ -44,22 +44,22 @@ class FaultSchedule:
         faults: faults of the configuration.
 
     Attributes:
-        link: the link faults that are active now.
+        link_faults: the link faults that are active now.
     """
 
     def __init__(self, faults: tuple[LinkFault | VehicleFault, ...]) -> None:
-        self._entries = [_Entry(fault, 0) for fault in faults]
-        self.link: tuple[LinkFault, ...] = ()
+        self._entries = [_ScheduledFault(fault, 0) for fault in faults]
+        self.link_faults: tuple[LinkFault, ...] = ()
 
     def add(self, fault: LinkFault | VehicleFault, now_us: int) -> None:
         """Add a fault; without a start it begins at the next update."""
-        self._entries.append(_Entry(fault, now_us))
+        self._entries.append(_ScheduledFault(fault, now_us))
 
     def clear(self) -> list[VehicleFault]:
         """Remove all faults; return the vehicle faults that were active."""
         active = [e.fault for e in self._entries if e.active and not isinstance(e.fault, LinkFault)]
         self._entries = []
-        self.link = ()
+        self.link_faults = ()
         return active
 
     def update(
@@ -87,13 +87,13 @@ class FaultSchedule:
                 (began if active else ended).append(entry.fault)
         if changed:
             self._entries = [entry for entry in self._entries if not entry.has_ended]
-            self.link = tuple(
+            self.link_faults = tuple(
                 e.fault for e in self._entries if e.active and isinstance(e.fault, LinkFault)
             )
         return began, ended
 
     @staticmethod
-    def _is_active(entry: _Entry, now_us: int, offboard_us: int | None) -> bool:
+    def _is_active(entry: _ScheduledFault, now_us: int, offboard_us: int | None) -> bool:
         fault = entry.fault
         if fault.after_offboard_s is not None:
             if offboard_us is None:

@@ -20,7 +20,7 @@ class LandDetector:
         announce: announces take-off and landing.
         hover_thrust: returns the thrust command that hovers, 0..1.
         landed_after_us: contact with low thrust for this time is a landing.
-        climbing: returns whether a take-off is under way and has not reached its height.
+        is_climbing: returns whether a take-off is under way and has not reached its height.
     """
 
     def __init__(
@@ -30,13 +30,13 @@ class LandDetector:
         *,
         hover_thrust: Callable[[], float],
         landed_after_us: int,
-        climbing: Callable[[], bool],
+        is_climbing: Callable[[], bool],
     ) -> None:
         self._state = state
         self._announce = announce
         self._hover_thrust = hover_thrust
         self._landed_after_us = landed_after_us
-        self._climbing = climbing
+        self._is_climbing = is_climbing
         self._resting_since_us = 0
 
     def step(self, *, contact: bool) -> None:
@@ -69,7 +69,7 @@ class LandDetector:
         state = self._state
         if state.landed:
             return Landed.ON_GROUND
-        if self._climbing():
+        if self._is_climbing():
             return Landed.TAKEOFF
         if state.mode is Mode.LAND:
             return Landed.LANDING

@@ -65,7 +65,7 @@ class MotionTelemetry:
 
     @property
     def _boot_ms(self) -> int:
-        return self._state.shown_us // 1000
+        return self._state.stamp_us // 1000
 
     @property
     def _altitude(self) -> float:
@@ -93,7 +93,7 @@ class MotionTelemetry:
             return None
         estimate = self._state.estimate
         return dialect.MAVLink_local_position_ned_message(
-            self._boot_ms - self._slips.lag_ms(self._state.shown_us),
+            self._boot_ms - self._slips.lag_ms(self._state.stamp_us),
             *estimate.position_ned,
             *estimate.velocity_ned,
         )
@@ -119,7 +119,7 @@ class MotionTelemetry:
         """Return ODOMETRY; velocity is in the local frame, as PX4 sends it."""
         estimate = self._state.estimate
         return dialect.MAVLink_odometry_message(
-            self._state.shown_us,
+            self._state.stamp_us,
             dialect.MAV_FRAME_LOCAL_NED,
             dialect.MAV_FRAME_LOCAL_NED,
             *estimate.position_ned,
@@ -160,7 +160,7 @@ class MotionTelemetry:
         """Return HIGHRES_IMU; the magnetic field is that of a level vehicle heading north."""
         estimate = self._state.estimate
         return dialect.MAVLink_highres_imu_message(
-            self._state.shown_us,
+            self._state.stamp_us,
             *estimate.specific_force_frd,
             *estimate.body_rates,
             *MAGNETIC_FIELD_NED,
@@ -190,7 +190,7 @@ class MotionTelemetry:
         state = self._state
         up, altitude = -state.estimate.position_ned[2], self._altitude
         return dialect.MAVLink_altitude_message(
-            state.shown_us, altitude, altitude, up, up + state.home_ned[2], 0.0, up
+            state.stamp_us, altitude, altitude, up, up + state.home_ned[2], 0.0, up
         )
 
     def servo_output_raw(self) -> Message:
@@ -199,12 +199,12 @@ class MotionTelemetry:
         outputs = [900] * 16
         if state.armed:
             throttles = self._vehicle.truth.throttles
-            outputs[: len(throttles)] = [1000 + round(1000 * share) for share in throttles]
-        return dialect.MAVLink_servo_output_raw_message(state.shown_us & 0xFFFFFFFF, 0, *outputs)
+            outputs[: len(throttles)] = [1000 + round(1000 * throttle) for throttle in throttles]
+        return dialect.MAVLink_servo_output_raw_message(state.stamp_us & 0xFFFFFFFF, 0, *outputs)
 
     def vibration(self) -> Message:
         """Return VIBRATION; the simulated airframe does not vibrate."""
-        return dialect.MAVLink_vibration_message(self._state.shown_us, 0.0, 0.01, 0.11, 0, 0, 0)
+        return dialect.MAVLink_vibration_message(self._state.stamp_us, 0.0, 0.01, 0.11, 0, 0, 0)
 
     def _heading_deg(self) -> float:
         return degrees(yaw(self._state.estimate.q)) % 360.0

@@ -100,8 +100,10 @@ class ParameterProtocol:
 
     def _send_alone(self, name: str, link: Link) -> None:
         """Send a parameter that is not part of a list."""
-        indexed = self._encoding.sends_index
-        self._send(name, self._parameters.index_of(name) if indexed else _NO_INDEX_UNSIGNED, link)
+        sends_index = self._encoding.sends_index
+        self._send(
+            name, self._parameters.index_of(name) if sends_index else _NO_INDEX_UNSIGNED, link
+        )
 
     def _send(self, name: str, index: int, link: Link) -> None:
         value, param_type = self._encoding.to_wire(name, self._parameters[name])

@@ -116,16 +116,16 @@ class ParameterTable:
     def __init__(self, defaults: Iterable[Parameter], overrides: dict[str, float]) -> None:
         self._values = dict(sorted(defaults))
         self._names = list(self._values)
-        self._index = {name: index for index, name in enumerate(self._names)}
+        self._index_by_name = {name: index for index, name in enumerate(self._names)}
         for name, value in overrides.items():
-            whole = isinstance(self._values[name], int) and float(value).is_integer()
-            self.set(name, int(value) if whole else float(value))
+            is_integer = isinstance(self._values[name], int) and float(value).is_integer()
+            self.set(name, int(value) if is_integer else float(value))
 
     def __len__(self) -> int:
         return len(self._names)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._index
+        return name in self._index_by_name
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -145,7 +145,7 @@ class ParameterTable:
 
     def index_of(self, name: str) -> int:
         """Return a parameter's index."""
-        return self._index[name]
+        return self._index_by_name[name]
 
     def set(self, name: str, value: int | float) -> None:
         """Change a value.
@@ -156,8 +156,8 @@ class ParameterTable:
                 into 32 bits.
         """
         if type(value) is not type(self._values[name]):
-            kind = "an integer" if isinstance(self._values[name], int) else "a float"
-            raise ParameterRefusedError(f"{name} is {kind}")
+            type_name = "an integer" if isinstance(self._values[name], int) else "a float"
+            raise ParameterRefusedError(f"{name} is {type_name}")
         layout = "<f" if isinstance(value, float) else "<i"
         try:
             self._values[name] = struct.unpack(layout, struct.pack(layout, value))[0]
@@ -169,6 +169,6 @@ class ParameterTable:
         """Return PX4's ``_HASH_CHECK``: the CRC-32 over all names and values, in index order."""
         crc = 0xFFFFFFFF  # zlib inverts before and after; PX4 does not
         for name, value in self._values.items():
-            kind = "<i" if isinstance(value, int) else "<f"
-            crc = zlib.crc32(name.encode() + struct.pack(kind, value), crc)
+            layout = "<i" if isinstance(value, int) else "<f"
+            crc = zlib.crc32(name.encode() + struct.pack(layout, value), crc)
         return crc ^ 0xFFFFFFFF

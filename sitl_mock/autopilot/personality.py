@@ -1,7 +1,7 @@
 """The interface of a simulated autopilot: everything in which PX4 and ArduPilot differ.
 
-A personality has its own numbers and texts. It builds its behaviour (`Rules`) from the parts that
-every vehicle has (`VehicleParts`).
+A personality has its own numbers and texts. It builds its `Behaviour` from the parts that every
+vehicle has (`VehicleParts`).
 """
 
 from collections.abc import Callable, Collection
@@ -49,7 +49,7 @@ class VehicleParts(NamedTuple):
     """Lag of the time stamp of LOCAL_POSITION_NED behind the true time."""
 
 
-class Rules(NamedTuple):
+class Behaviour(NamedTuple):
     """The behaviour of an autopilot, built for one vehicle."""
 
     control: ModeControl
@@ -68,7 +68,7 @@ class Rules(NamedTuple):
 
 
 class Personality(Protocol):
-    """A simulated autopilot, such as PX4: its numbers, and its behaviour as `Rules`."""
+    """A simulated autopilot, such as PX4: its numbers, and how to build its `Behaviour`."""
 
     boot_mode: Mode
     system_id_parameter: str
@@ -92,5 +92,5 @@ class Personality(Protocol):
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Return the mode of a custom_mode, None if there is no such mode."""
 
-    def rules(self, parts: VehicleParts) -> Rules:
+    def behaviour(self, parts: VehicleParts) -> Behaviour:
         """Build the behaviour for one vehicle."""

@@ -72,13 +72,13 @@ class State:
 
     estimate: Estimate
     time_us: int = 0
-    shown_us: int = 0
+    stamp_us: int = 0
     """Time in telemetry; it differs from ``time_us`` only while a fault freezes the clock."""
     armed: bool = False
     armed_at_us: int = 0
     mode: Mode = Mode.LOITER
     intended_mode: Mode = Mode.LOITER
-    after_disarming: Mode = Mode.LOITER
+    mode_after_disarming: Mode = Mode.LOITER
     """The mode that PX4 enters when it disarms."""
     status_us: int = 0
     """Vehicle time at which PX4 last published its status (mode and arming), us."""

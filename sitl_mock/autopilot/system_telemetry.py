@@ -105,7 +105,7 @@ class SystemTelemetry:
         position = to_geodetic(self._origin, state.estimate.position_ned).as_integers()
         vx, vy, _ = state.estimate.velocity_ned
         return dialect.MAVLink_gps_raw_int_message(
-            state.shown_us,
+            state.stamp_us,
             fix,
             *position,
             *dilutions,
@@ -138,12 +138,12 @@ class SystemTelemetry:
 
     def system_time(self) -> Message:
         """Return SYSTEM_TIME: Unix time and time since boot."""
-        shown = self._state.shown_us
-        return dialect.MAVLink_system_time_message(UNIX_AT_BOOT_US + shown, shown // 1000)
+        stamp_us = self._state.stamp_us
+        return dialect.MAVLink_system_time_message(UNIX_AT_BOOT_US + stamp_us, stamp_us // 1000)
 
     def timesync(self) -> Message:
         """Return a TIMESYNC request with the vehicle's clock, ns."""
-        return dialect.MAVLink_timesync_message(0, self._state.shown_us * 1000)
+        return dialect.MAVLink_timesync_message(0, self._state.stamp_us * 1000)
 
     def mission_current(self) -> Message:
         """Return MISSION_CURRENT: there is no mission."""

@@ -36,7 +36,7 @@ class AxisGains(Section):
     torque_filter_ms: NonNegative = 0.0
     """Time constant of the low pass on this axis's torque (PX4's MC_YAW_TQ_CUTOFF); 0 = none."""
     setpoint_delay_ms: NonNegative = 4.0
-    """Delay from the arrival of a rate setpoint, or from the end of its shaping, to the controller."""
+    """Delay from the arrival of a rate setpoint, or from its shaping if any, to the controller."""
     shaping: AxisShaping | None = None
     """Shaping before the controller; give it for all three axes or for none."""
 

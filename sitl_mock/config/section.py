@@ -89,36 +89,36 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
     """Return the first validation error as one sentence: the key, and what is wrong with it."""
     detail = error.errors()[0]
     path = [str(part) for part in detail["loc"]]
-    where = ".".join(["mock", *path])
+    full_key = ".".join(["mock", *path])
     if detail["type"] == "extra_forbidden":
         owner = _model_at(model, path[:-1])
         sibling_keys = owner.model_fields if owner else ()
-        other_paths = [other for other in _valid_paths(path[-1], model) if other != where]
+        other_paths = [other for other in _valid_paths(path[-1], model) if other != full_key]
         if other_paths and not any(key.startswith(f"{path[-1]}_") for key in sibling_keys):
-            return f"{where} is in the wrong section; write {' or '.join(other_paths)}"
+            return f"{full_key} is in the wrong section; write {' or '.join(other_paths)}"
         hint = suggestion(path[-1], sibling_keys) if owner else ""
-        return f"unknown key {where}{hint}"
+        return f"unknown key {full_key}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
-        return f"{where} must be a number: {_number_advice(str(detail['input']))}"
-    if fault := describe_wrong_member(detail, model):
-        return f"{where}{fault}"
-    return f"{where}{describe_wrong_value(error)} (got {detail['input']!r:.60})"
+        return f"{full_key} must be a number: {_number_advice(str(detail['input']))}"
+    if member_error := describe_wrong_member(detail, model):
+        return f"{full_key}{member_error}"
+    return f"{full_key}{describe_wrong_value(error)} (got {detail['input']!r:.60})"
 
 
 def describe_wrong_value(error: ValidationError) -> str:
     """Return what is wrong with the first wrong value, to be put after the path of its key."""
     details = error.errors()
-    kind, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
-    if kind == "missing" and isinstance(details[0]["input"], list | tuple):
+    error_type, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
+    if error_type == "missing" and isinstance(details[0]["input"], list | tuple):
         count = len(details[0]["input"])
         missing = [each for each in details if each["loc"][:-1] == path[:-1]]
         return f" is missing: the list has {count} values and needs {count + len(missing)}"
-    if kind == "missing":
+    if error_type == "missing":
         return " is missing"
-    if kind == "literal_error":
+    if error_type == "literal_error":
         return f" must be {context['expected'].replace(chr(39), '')}"
-    if kind in _REQUIREMENTS:
-        return f" {_REQUIREMENTS[kind].format(**context)}"
+    if error_type in _REQUIREMENTS:
+        return f" {_REQUIREMENTS[error_type].format(**context)}"
     message = details[0]["msg"].removeprefix("Value error, ")
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
@@ -142,13 +142,13 @@ def describe_wrong_member(detail: Any, annotation: Any) -> str:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         annotation = annotation.model_fields[detail["loc"][0]].annotation
     kinds = [kind for each in _models_of(annotation) for kind in _kinds(each)]
-    listed = f"kinds are {', '.join(kinds)}"
+    known_kinds = f"kinds are {', '.join(kinds)}"
     if detail["type"] == "union_tag_not_found":
-        return f" needs a kind; {listed}"
+        return f" needs a kind; {known_kinds}"
     tag = detail["ctx"]["tag"]
     nearest = _nearest(tag, kinds)
     hint = f"did you mean {nearest}?; " if nearest else ""
-    return f": there is no kind {tag!r:.40}; {hint}{listed}"
+    return f": there is no kind {tag!r:.40}; {hint}{known_kinds}"
 
 
 def error_path(error: ValidationError) -> list[str]:

@@ -25,7 +25,7 @@ class Endpoint(Protocol):
         """Whether a client is connected; True where that cannot be known."""
 
     @property
-    def readable(self) -> list[int]:
+    def descriptors(self) -> list[int]:
         """File descriptors for select."""
 
     def receive(self) -> tuple[bytes, bool] | None:

@@ -44,7 +44,7 @@ class SerialEndpoint:
         return True
 
     @property
-    def readable(self) -> list[int]:
+    def descriptors(self) -> list[int]:
         """File descriptor for select; none while the other end is closed: select would not wait."""
         return [self._master] if self._other_end_open() else []
 

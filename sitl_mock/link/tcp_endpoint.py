@@ -38,7 +38,7 @@ class TcpEndpoint:
         return self._stream is not None
 
     @property
-    def readable(self) -> list[int]:
+    def descriptors(self) -> list[int]:
         """File descriptors of the listening socket and of the client's connection."""
         descriptors = [self._listener.fileno()]
         if self._client is not None:
@@ -71,15 +71,15 @@ class TcpEndpoint:
 
     def _accept(self) -> None:
         try:
-            caller, _ = self._listener.accept()
+            connection, _ = self._listener.accept()
         except OSError:
             return
         if self._client is not None:
-            caller.close()
+            connection.close()
             return
-        caller.setblocking(False)
-        caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._client, self._stream = caller, ByteStream(caller.fileno())
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._client, self._stream = connection, ByteStream(connection.fileno())
 
     def _release_client(self) -> None:
         """Close the connection of a client that has disconnected."""

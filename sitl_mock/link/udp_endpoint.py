@@ -62,7 +62,7 @@ class UdpEndpoint:
         return True
 
     @property
-    def readable(self) -> list[int]:
+    def descriptors(self) -> list[int]:
         """File descriptor of the socket."""
         return [self.socket.fileno()]
 

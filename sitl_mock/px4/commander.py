@@ -199,7 +199,7 @@ class Px4Commander:
         state = self._state
         state.armed = False
         # Measured: a landing from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
-        state.intended_mode = state.after_disarming
+        state.intended_mode = state.mode_after_disarming
         self.failsafe.clear()
         self._enter_mode(state.intended_mode)
         self._announce(kind, "")
@@ -211,7 +211,7 @@ class Px4Commander:
         """
         self._state.intended_mode = mode
         if mode not in UNARMABLE_MODES and mode is not Mode.TAKEOFF:
-            self._state.after_disarming = mode
+            self._state.mode_after_disarming = mode
 
     def _publish_status(self) -> None:
         """Publish the status when it changed, else twice a second."""
@@ -239,6 +239,6 @@ class Px4Commander:
             return self._requested_takeoff_z
         altitude = self._parameters["MIS_TAKEOFF_ALT"]
         if self._state.armed:
-            packed = struct.pack("<f", altitude)
-            self._announce(EventKind.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
+            packed_altitude = struct.pack("<f", altitude)
+            self._announce(EventKind.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed_altitude)
         return self._state.home_ned[2] - altitude

@@ -62,13 +62,13 @@ class EventLog:
             internal: MAV_SEVERITY for the vehicle's log; None = the same.
             arguments: packed arguments.
         """
-        first = not self._sent_events
+        is_first = not self._sent_events
         self._latest_sequence = (self._latest_sequence + 1) & 0xFFFF
-        if first:
+        if is_first:
             self._send_sequence(_SEQUENCE_RESET)
         levels = (severity if internal is None else internal) << 4 | severity
         payload = EVENT.payload.pack(
-            event_id, self._state.shown_us // 1000, self._latest_sequence, 0, 0, levels, arguments
+            event_id, self._state.stamp_us // 1000, self._latest_sequence, 0, 0, levels, arguments
         )
         self._sent_events.append(_SentEvent(self._latest_sequence, payload))
         for link in self._links:

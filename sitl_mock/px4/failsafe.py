@@ -132,12 +132,14 @@ class Failsafe:
         self._pilot_present = pilot_present
         # A pilot who was not present at arming is optional until he appears.
         self._pilot_optional = not pilot_present and (self._pilot_optional or not state.armed)
-        expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
-        optional = not expected or self._pilot_optional or self._is_exempt("COM_RCL_EXCEPT")
+        sticks_expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
+        sticks_optional = (
+            not sticks_expected or self._pilot_optional or self._is_exempt("COM_RCL_EXCEPT")
+        )
         if (
             pilot_present
             or not state.armed
-            or (optional and state.intended_mode not in PILOTED_MODES)
+            or (sticks_optional and state.intended_mode not in PILOTED_MODES)
         ):
             return
         if self._pilot_lost_us is None:
@@ -181,8 +183,8 @@ class Failsafe:
         if self._gcs_lost_us is None:
             self._gcs_lost_us = state.time_us
             self._announce(EventKind.GCS_LOST, "")
-        ignored = state.intended_mode is Mode.LAND or self._is_exempt("COM_DLL_EXCEPT")
-        if state.armed and not ignored and self._gcs_lost_us != _ACTED_ALREADY:
+        loss_ignored = state.intended_mode is Mode.LAND or self._is_exempt("COM_DLL_EXCEPT")
+        if state.armed and not loss_ignored and self._gcs_lost_us != _ACTED_ALREADY:
             self._actions.act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
 
     def _watch_companion(self) -> None:
@@ -209,9 +211,9 @@ class Failsafe:
             warning = BatteryWarning.LOW
         else:
             warning = BatteryWarning.OK
-        worse = warning > state.battery_warning
+        is_worse = warning > state.battery_warning
         state.battery_warning = warning
-        if not worse:
+        if not is_worse:
             return
         self._announce(_WARNINGS[warning], "")
         action = int(parameters["COM_LOW_BAT_ACT"])

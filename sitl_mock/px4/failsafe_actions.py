@@ -157,7 +157,7 @@ class FailsafeActions:
             self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Execute the action that a parameter selects, after COM_FAIL_ACT_T if it is RTL or LAND.
+        """Execute the action that a parameter selects; before RTL or LAND, hold for COM_FAIL_ACT_T.
 
         Args:
             cause: cause of the failsafe.

@@ -70,8 +70,8 @@ class HealthReport:
         self._state = state
         self._events = events
         self._ready_us = ready_us
-        self._reported: tuple[tuple[_Check, ...], int] | None = None
-        self._reported_us = 0
+        self._last_report: tuple[tuple[_Check, ...], int] | None = None
+        self._last_report_us = 0
 
     def step(
         self, *, offboard_alive: bool, pilot_present: bool, gcs_alive: bool, gcs_required: bool
@@ -86,9 +86,9 @@ class HealthReport:
         """
         state = self._state
         self._events.step()
-        if state.time_us - self._reported_us < _PERIOD_US:
+        if state.time_us - self._last_report_us < _PERIOD_US:
             return
-        gcs = None if gcs_alive else _GCS_REQUIRED if gcs_required else _NO_GCS
+        gcs_check = None if gcs_alive else _GCS_REQUIRED if gcs_required else _NO_GCS
         candidates = (
             _HEADING if state.time_us < self._ready_us // 2 else None,
             None if offboard_alive else _OFFBOARD,
@@ -97,16 +97,18 @@ class HealthReport:
             None if self._position_ready else _GLOBAL_POSITION,
             _MISSION,
             None if pilot_present else _NO_PILOT,
-            gcs,
+            gcs_check,
         )
         failing = tuple(check for check in candidates if check is not None)
-        gps = state.gps_ok and state.position_valid
+        gps_present = state.gps_ok and state.position_valid
         present = (
-            _SENSORS_PRESENT | (_GPS_PRESENT if gps else 0) | (_GCS_PRESENT if gcs_alive else 0)
+            _SENSORS_PRESENT
+            | (_GPS_PRESENT if gps_present else 0)
+            | (_GCS_PRESENT if gcs_alive else 0)
         )
-        if (failing, present) != self._reported:
-            self._reported = (failing, present)
-            self._reported_us = state.time_us
+        if (failing, present) != self._last_report:
+            self._last_report = (failing, present)
+            self._last_report_us = state.time_us
             self._send(failing, present)
 
     @property

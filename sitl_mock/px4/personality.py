@@ -10,7 +10,7 @@ from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import BytewiseEncoding
-from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
+from sitl_mock.autopilot.personality import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import StreamSchedule
@@ -115,7 +115,7 @@ class Px4:
         """Return the mode of a custom_mode (see `modes.custom_mode`), None if there is none."""
         return MODES_BY_COMMAND.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
 
-    def rules(self, parts: VehicleParts) -> Rules:
+    def behaviour(self, parts: VehicleParts) -> Behaviour:
         """Build PX4's behaviour for one vehicle."""
         state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
         events = EventLog(state, parts.links)
@@ -130,7 +130,7 @@ class Px4:
                 state, parts.origin, self.identity, vehicle, parts.stream
             ).builders(),
         }
-        return Rules(
+        return Behaviour(
             control,
             commander,
             Px4Commands(state, commander, builders, parts.origin),
@@ -140,7 +140,7 @@ class Px4:
                 announce,
                 hover_thrust=lambda: parameters["MPC_THR_HOVER"],
                 landed_after_us=LANDED_AFTER_US,
-                climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
+                is_climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
             ),
             builders,
             handlers={

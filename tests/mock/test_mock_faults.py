@@ -237,7 +237,7 @@ def test_clear_undoes_what_can_be_undone():
     rig.simulation.clear_faults()
     rig.run(1.0)
     assert rig.state.gps_ok
-    assert rig.state.shown_us == rig.state.time_us
+    assert rig.state.stamp_us == rig.state.time_us
     assert rig.arm() == ACCEPTED
 
 
