@@ -49,10 +49,10 @@ class Server:
         self._exchange = Exchange(settings, self._simulation)
         self._connections = Connections(settings, self._simulation, self._exchange)
         self._companion = self._connections.companion
-        self._lockstep = settings.lockstep.enabled
+        self._in_lockstep = settings.lockstep.enabled
         self._beacon = b""
         self._beacon_answered = False
-        self._collected: list[ReceivedDatagram] = []
+        self._collected_datagrams: list[ReceivedDatagram] = []
         self._origin_wall_s = 0.0
         self._origin_us = 0
         self._simulation.set_clock(self._clock_ns)
@@ -83,14 +83,14 @@ class Server:
 
     def _step(self) -> None:
         """Simulate one slot: in lockstep after the latest answer, else when it is due."""
-        if not self._lockstep:
+        if not self._in_lockstep:
             self._wait_for_time()
-        collected, self._collected = self._collected, []
-        beacon = self._exchange.step(collected)
+        datagrams, self._collected_datagrams = self._collected_datagrams, []
+        beacon = self._exchange.step(datagrams)
         if beacon is not None:
             self._beacon, self._beacon_answered = beacon, False
         self._connections.flush(beacon)
-        if self._lockstep:
+        if self._in_lockstep:
             self._await_answer()
         if self._show_status is not None:
             self._show_status(self._simulation)
@@ -104,15 +104,18 @@ class Server:
         """
         self._beacon = self._simulation.beacon()
         self._connections.send_beacon(self._beacon)
-        heard_at: float | None = None
+        first_bytes_at: float | None = None
         while not self._beacon_answered:
             self._collect(FIRST_BEACON_PERIOD_S)
             self._connections.send_beacon(self._beacon)
             now = time.monotonic()
-            if heard_at is None and self._companion.has_received:
-                heard_at = now
-            if heard_at is not None and now - heard_at > self._settings.lockstep.patience_s:
-                self._lockstep = False
+            if first_bytes_at is None and self._companion.has_received:
+                first_bytes_at = now
+            if (
+                first_bytes_at is not None
+                and now - first_bytes_at > self._settings.lockstep.patience_s
+            ):
+                self._in_lockstep = False
                 return
 
     def _await_answer(self) -> None:
@@ -125,7 +128,7 @@ class Server:
             self._connections.send_beacon(self._beacon)
             self._collect(BEACON_PERIOD_S)
         if not self._beacon_answered:
-            self._lockstep = False
+            self._in_lockstep = False
             self._reset_origin()
 
     def _collect(self, timeout_s: float) -> None:
@@ -164,7 +167,7 @@ class Server:
             messages = decode(datagram)
             if from_partner and self._exchange.is_repeated_answer(messages):
                 continue
-            self._collected.append((datagram, messages))
+            self._collected_datagrams.append((datagram, messages))
             if from_partner and self._exchange.is_answer(messages):
                 self._beacon_answered = True
 
@@ -196,7 +199,7 @@ class Server:
             for endpoint in self._connections.ready(max(0.0, remaining_s)):
                 self._serve(endpoint)
             remaining_s = due_s - time.monotonic()
-            if remaining_s <= 0.0 or self._lockstep:
+            if remaining_s <= 0.0 or self._in_lockstep:
                 return
 
     def _serve(self, endpoint: Endpoint) -> None:
@@ -208,7 +211,7 @@ class Server:
             in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
             if in_lockstep and from_partner and self._exchange.is_answer(messages):
                 # The latest beacon is answered: lockstep resumes.
-                self._beacon_answered = self._lockstep = True
+                self._beacon_answered = self._in_lockstep = True
         self._connections.flush()
 
     def _clock_ns(self) -> int:
@@ -218,7 +221,7 @@ class Server:
         fault freezes the clock, it does not advance.
         """
         simulation = self._simulation
-        if self._lockstep or simulation.effects.clock_frozen:
+        if self._in_lockstep or simulation.effects.clock_frozen:
             return simulation.state.stamp_us * 1000
         wall_us = (time.monotonic() - self._origin_wall_s) * 1e6 * self._settings.speed
         now_us = min(self._origin_us + wall_us, simulation.next_us)

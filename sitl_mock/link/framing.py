@@ -45,8 +45,10 @@ def decode(datagram: bytes) -> list[Message]:
             start += 1
             continue
         frame = datagram[start : start + length]
-        known = dialect.mavlink_map.get(_message_id(frame)) if frame[0] == _MAGIC_V2 else None
-        valid, message = _decode_other(frame) if known is None else _decode_known(frame, known)
+        known_class = dialect.mavlink_map.get(_message_id(frame)) if frame[0] == _MAGIC_V2 else None
+        valid, message = (
+            _decode_other(frame) if known_class is None else _decode_known(frame, known_class)
+        )
         start += length if valid else 1
         if message is not None:
             messages.append(message)

@@ -20,20 +20,20 @@ def bound_socket(port: int, option: str) -> socket.socket:
     Raises:
         ConfigError: there is no such port, or it cannot be bound, for example because it is in use.
     """
-    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        bound.bind((HOST, port))
+        udp_socket.bind((HOST, port))
     except OverflowError as error:
-        bound.close()
+        udp_socket.close()
         raise ConfigError(f"there is no UDP port {port}; choose a smaller {option}") from error
     except OSError as error:
-        bound.close()
+        udp_socket.close()
         raise ConfigError(
             f"UDP port {port} on {HOST} cannot be used ({error.strerror}): is another mock running?"
             f" Choose a different {option}"
         ) from error
-    bound.setblocking(False)
-    return bound
+    udp_socket.setblocking(False)
+    return udp_socket
 
 
 class UdpEndpoint:

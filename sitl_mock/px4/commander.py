@@ -105,8 +105,8 @@ class Px4Commander:
         """
         state = self._state
         if state.armed and not self._can_run(mode):
-            requested = struct.pack("<I", custom_mode(mode))
-            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), requested)
+            packed_mode = struct.pack("<I", custom_mode(mode))
+            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), packed_mode)
             return TEMPORARILY_REJECTED
         self._set_intended(mode)
         self.failsafe.clear()

@@ -64,12 +64,12 @@ class Px4Commands(Commands):
         return super().send(message_id, link)
 
     def _set_mode(self, command: Command, _: Link) -> int:
-        base, main, sub = command.parameters[:3]
-        if not all(map(isfinite, (base, main, sub))):
+        base_mode, main_mode, sub_mode = command.parameters[:3]
+        if not all(map(isfinite, (base_mode, main_mode, sub_mode))):
             return DENIED
-        if not int(base) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        if not int(base_mode) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return TEMPORARILY_REJECTED
-        mode = MODES_BY_COMMAND.get((int(main), int(sub)))
+        mode = MODES_BY_COMMAND.get((int(main_mode), int(sub_mode)))
         return TEMPORARILY_REJECTED if mode is None else self._px4_commander.request_mode(mode)
 
     def _takeoff(self, command: Command, _: Link) -> int:

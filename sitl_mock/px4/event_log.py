@@ -89,11 +89,11 @@ class EventLog:
         if count > _MAX_KEPT_EVENTS:
             self._refuse(first, request, link)
             first = last - _MAX_KEPT_EVENTS + 1
-        kept = {sent.sequence: sent.payload for sent in self._sent_events}
+        payloads = {sent.sequence: sent.payload for sent in self._sent_events}
         for number in range(first, first + min(count, _MAX_KEPT_EVENTS)):
             sequence = number & 0xFFFF
-            if sequence in kept:
-                _send(link, EVENT, kept[sequence])
+            if sequence in payloads:
+                _send(link, EVENT, payloads[sequence])
             else:
                 self._refuse(sequence, request, link)
 

@@ -99,40 +99,40 @@ class FailsafeActions:
         self._announce = announce
         self._enter = enter
         self._stop = stop
-        self._announced: tuple[Cause, Action] | None = None
+        self._announced_action: tuple[Cause, Action] | None = None
         self.cause: Cause | None = None
         """Cause of the active failsafe, None if none is active."""
 
     def clear(self) -> None:
         """End the active failsafe."""
-        self.cause = self._announced = None
+        self.cause = self._announced_action = None
         self._state.failsafe = False
 
     @property
     def holds_before_acting(self) -> bool:
         """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; moved sticks do not end the wait."""
         return (
-            self._announced is not None
-            and self._announced[1] is HOLD
+            self._announced_action is not None
+            and self._announced_action[1] is HOLD
             and self.cause in _DELAYED_CAUSES
         )
 
-    def act(self, cause: Cause, action: Action, then: Action | None = None) -> None:
+    def act(self, cause: Cause, action: Action, next_action: Action | None = None) -> None:
         """Execute an action unless a more severe cause is active; announce it if it is new.
 
         Args:
             cause: cause of the failsafe.
             action: action to execute now.
-            then: action after COM_FAIL_ACT_T, None if ``action`` is the last.
+            next_action: action after COM_FAIL_ACT_T, None if ``action`` is the last.
         """
         if self.cause is not None and self.cause.severity > cause.severity:
             return
         state = self._state
         if not state.position_valid and action.mode in POSITION_MODES:
             action = LAND
-        if self._announced != (cause, action):
-            self._announce_action(cause, action, then)
-        self.cause, self._announced = cause, (cause, action)
+        if self._announced_action != (cause, action):
+            self._announce_action(cause, action, next_action)
+        self.cause, self._announced_action = cause, (cause, action)
         state.failsafe = True
         mode = action.mode
         if mode is None:
@@ -143,17 +143,19 @@ class FailsafeActions:
         if state.mode is not mode:
             self._enter(mode)
 
-    def _announce_action(self, cause: Cause, action: Action, then: Action | None) -> None:
-        intended = custom_mode(self._state.intended_mode)
-        if then is not None:
+    def _announce_action(self, cause: Cause, action: Action, next_action: Action | None) -> None:
+        intended_mode = custom_mode(self._state.intended_mode)
+        if next_action is not None:
             delay = round(self._parameters["COM_FAIL_ACT_T"])
-            arguments = _ENTER_HOLD_LAYOUT.pack(intended, then.number, delay, cause.number)
+            arguments = _ENTER_HOLD_LAYOUT.pack(
+                intended_mode, next_action.number, delay, cause.number
+            )
             self._announce(EventKind.FAILSAFE_HOLD, str(delay), arguments)
         elif cause.number:
-            arguments = _ENTER_LAYOUT.pack(intended, action.number, cause.number)
+            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, cause.number)
             self._announce(EventKind.FAILSAFE, "", arguments)
         else:
-            arguments = _ENTER_LAYOUT.pack(intended, action.number, 0)
+            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, 0)
             self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
@@ -171,4 +173,4 @@ class FailsafeActions:
         if delay_over or action in (HOLD, DISARM, TERMINATE):
             self.act(cause, action)
         else:
-            self.act(cause, HOLD, then=action)
+            self.act(cause, HOLD, next_action=action)

@@ -99,32 +99,32 @@ class HealthReport:
             None if pilot_present else _NO_PILOT,
             gcs_check,
         )
-        failing = tuple(check for check in candidates if check is not None)
+        failing_checks = tuple(check for check in candidates if check is not None)
         gps_present = state.gps_ok and state.position_valid
         present = (
             _SENSORS_PRESENT
             | (_GPS_PRESENT if gps_present else 0)
             | (_GCS_PRESENT if gcs_alive else 0)
         )
-        if (failing, present) != self._last_report:
-            self._last_report = (failing, present)
+        if (failing_checks, present) != self._last_report:
+            self._last_report = (failing_checks, present)
             self._last_report_us = state.time_us
-            self._send(failing, present)
+            self._send(failing_checks, present)
 
     @property
     def _position_ready(self) -> bool:
         return self._state.position_valid and self._state.time_us >= self._ready_us
 
-    def _send(self, failing: tuple[_Check, ...], present: int) -> None:
-        errors = [check for check in failing if check.severity <= _ERROR]
-        warnings = [check for check in failing if check.severity == _WARNING]
+    def _send(self, failing_checks: tuple[_Check, ...], present: int) -> None:
+        errors = [check for check in failing_checks if check.severity <= _ERROR]
+        warnings = [check for check in failing_checks if check.severity == _WARNING]
         modes = _ARMABLE_MODES
         for check in errors:
             modes &= ~check.modes
         summary = _SUMMARY_LAYOUT.pack(0, _components(errors), _components(warnings), modes, modes)
         send = self._events.send
         send(event_id("commander_arming_check_summary"), _PROTOCOL, arguments=summary)
-        for check in failing:
+        for check in failing_checks:
             send(
                 check.event_id,
                 check.severity,

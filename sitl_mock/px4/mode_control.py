@@ -78,8 +78,8 @@ class Px4ModeControl:
             self._position.reset()
             command = self._rate_command((0.0, 0.0, 0.0), 0.0)
         elif state.mode in (Mode.MANUAL, Mode.STABILIZED):
-            hover = float(self._parameters["MPC_THR_HOVER"])
-            command = self._attitude_command(from_yaw(self._tasks.yaw), 0.0, hover)
+            hover_thrust = float(self._parameters["MPC_THR_HOVER"])
+            command = self._attitude_command(from_yaw(self._tasks.yaw), 0.0, hover_thrust)
         else:
             if state.mode is Mode.TAKEOFF and state.contact:
                 self._position.reset()

@@ -107,8 +107,8 @@ class Px4:
         rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
         if lockstep and link == "companion":
             del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # in lockstep this message is the beacon
-        exact = lockstep if settings.exact_rates is None else settings.exact_rates
-        skips_slots = settings.inner_loop_hz == 250 and not exact
+        exact_rates = lockstep if settings.exact_rates is None else settings.exact_rates
+        skips_slots = settings.inner_loop_hz == 250 and not exact_rates
         return Px4Streams(rates, random=Random(f"{settings.seed}/{link}") if skips_slots else None)
 
     def mode_of(self, custom_mode: int) -> Mode | None:
