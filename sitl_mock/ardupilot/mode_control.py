@@ -22,7 +22,7 @@ class ArduPilotModeControl:
 
     Args:
         state: the autopilot's state; its command and targets are written here.
-        parameters: gains, limits and speeds; MOT_THST_HOVER is learned.
+        parameters: gains, limits and speeds; MOT_THST_HOVER is written here.
         guided: the task of GUIDED.
         throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """

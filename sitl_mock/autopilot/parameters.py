@@ -157,7 +157,7 @@ class ParameterTable:
         """
         if type(value) is not type(self._values[name]):
             type_name = "an integer" if isinstance(self._values[name], int) else "a float"
-            raise ParameterRefusedError(f"{name} is {type_name}")
+            raise ParameterRefusedError(f"{name} must be {type_name}")
         layout = "<f" if isinstance(value, float) else "<i"
         try:
             self._values[name] = struct.unpack(layout, struct.pack(layout, value))[0]

@@ -9,7 +9,7 @@ MAX_BUNDLE = 1400
 class Endpoint(Protocol):
     """Sends and receives bytes without blocking. Frames that cannot be sent at once are dropped.
 
-    Only a byte stream keeps the rest of a batch when the kernel takes a part of it.
+    If the kernel takes only a part of a batch, a byte stream keeps the rest; UDP drops it.
     """
 
     @property
