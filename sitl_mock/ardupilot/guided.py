@@ -60,7 +60,7 @@ class Task(Enum):
 
 
 class Guided:
-    """The task of GUIDED and its setpoint. A new task replaces any other at once, also a take-off."""
+    """The task of GUIDED and its setpoint. A new task replaces any other, even a take-off."""
 
     def __init__(self) -> None:
         self.task = Task.HOLD

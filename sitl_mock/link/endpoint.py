@@ -9,7 +9,7 @@ MAX_BUNDLE = 1400
 class Endpoint(Protocol):
     """Sends and receives bytes without blocking. Frames that cannot be sent at once are dropped.
 
-    If the kernel takes only a part of a batch, a byte stream keeps the rest; UDP drops it.
+    If the kernel takes only a part of a batch, a byte stream keeps the rest.
     """
 
     @property
