@@ -159,9 +159,9 @@ class Simulation:
         behaviour.land_detector.step(contact=vehicle.on_ground)
         if behaviour.commander.under_setpoints and self.effects.offboard_us is None:
             self.effects.offboard_us = state.time_us
-        began, ended = self.faults.update(state.time_us, self.effects.offboard_us)
-        if began or ended:
-            self.effects.apply(began, ended)
+        begun_faults, ended_faults = self.faults.update(state.time_us, self.effects.offboard_us)
+        if begun_faults or ended_faults:
+            self.effects.apply(begun_faults, ended_faults)
         if state.time_us >= self._next_commander_us:
             self._next_commander_us += COMMANDER_PERIOD_US
             state.battery_remaining = vehicle.battery.remaining

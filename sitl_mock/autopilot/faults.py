@@ -73,8 +73,8 @@ class FaultSchedule:
         """
         if not self._entries:
             return [], []
-        began: list[VehicleFault] = []
-        ended: list[VehicleFault] = []
+        begun_faults: list[VehicleFault] = []
+        ended_faults: list[VehicleFault] = []
         changed = False
         for entry in self._entries:
             active = self._is_active(entry, now_us, offboard_us)
@@ -84,13 +84,13 @@ class FaultSchedule:
             entry.active = active
             entry.has_ended = not active
             if not isinstance(entry.fault, LinkFault):
-                (began if active else ended).append(entry.fault)
+                (begun_faults if active else ended_faults).append(entry.fault)
         if changed:
             self._entries = [entry for entry in self._entries if not entry.has_ended]
             self.link_faults = tuple(
                 e.fault for e in self._entries if e.active and isinstance(e.fault, LinkFault)
             )
-        return began, ended
+        return begun_faults, ended_faults
 
     @staticmethod
     def _is_active(entry: _ScheduledFault, now_us: int, offboard_us: int | None) -> bool:
@@ -138,19 +138,19 @@ class FaultEffects:
         self._telemetry_stops: list[StopTelemetry] = []
         self._nan_fields: list[NanField] = []
         self._gps_lost_us = 0
-        self._slipped_s = 0.0
+        self._lost_s = 0.0
 
-    def apply(self, began: list[VehicleFault], ended: list[VehicleFault]) -> None:
+    def apply(self, begun_faults: list[VehicleFault], ended_faults: list[VehicleFault]) -> None:
         """Apply the faults that began, and undo those that ended, as far as they can be undone."""
-        for fault in began:
+        for fault in begun_faults:
             self._begin(fault)
-        for fault in ended:
+        for fault in ended_faults:
             self._end(fault)
 
     def take_slip(self) -> float:
         """Return the wall time lost to `SlipClock` faults since the last call, s."""
-        slipped, self._slipped_s = self._slipped_s, 0.0
-        return slipped
+        lost_s, self._lost_s = self._lost_s, 0.0
+        return lost_s
 
     def is_stopped(self, message_id: int) -> bool:
         """Whether a `StopTelemetry` fault stops a message now."""
@@ -178,7 +178,7 @@ class FaultEffects:
             case FreezeClock():
                 self.clock_frozen = True
             case SlipClock():
-                self._slipped_s += fault.slip_ms * 1e-3
+                self._lost_s += fault.slip_ms * 1e-3
             case NanField():
                 self._nan_fields.append(fault)
                 self._set_link_hooks()

@@ -135,8 +135,8 @@ class FlightTasks:
         slow_height, fast_height = parameters["MPC_LAND_ALT2"], parameters["MPC_LAND_ALT1"]
         if height < CRAWL_HEIGHT_M:
             return min(land_speed, parameters["MPC_LAND_CRWL"])
-        share = max(0.0, min(1.0, (height - slow_height) / max(fast_height - slow_height, 0.1)))
-        return land_speed + (max_speed - land_speed) * share
+        fraction = max(0.0, min(1.0, (height - slow_height) / max(fast_height - slow_height, 0.1)))
+        return land_speed + (max_speed - land_speed) * fraction
 
     def _begin_return(self) -> None:
         """Choose the return height: by the cone around home, at most RTL_RETURN_ALT.
