@@ -13,7 +13,7 @@ MISTAKES = {
     "wind: {speed: 3}": ("mock.wind.speed", "did you mean speed_m_s?"),
     "lockstep: {enable: true}": ("mock.lockstep.enable", "did you mean enabled?"),
     "parameters: {COM_OBL_RC_AC: 3}": ("COM_OBL_RC_AC", "did you mean COM_OBL_RC_ACT?"),
-    "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT is an integer",),
+    "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT must be an integer",),
     "parameters: {MPC_XY_VEL_MAX: 1.0e+300}": (
         "1e+300 does not fit into the 32 bits of MPC_XY_VEL_MAX",
     ),
