@@ -36,6 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         settings = load_settings(options.config, _overrides(options))
         if options.check:
+            Simulation(settings)  # it also reads the passphrase of the signing
             sys.stdout.write("configuration is valid\n")
             return EXIT_OK
         servers = _servers(settings, options)

@@ -162,7 +162,7 @@ def _number_advice(text: str) -> str:
     if match is None:
         return f"write digits, not {text!r:.60}"
     number, unit = match[1].replace(",", "."), match[2].strip()
-    without_unit = f" without {unit!r:.20}, because the key's name has the unit" if unit else ""
+    without_unit = f" without {unit!r:.20}" if unit else ""
     return f"write {number}{without_unit} (got {text!r:.60})"
 
 

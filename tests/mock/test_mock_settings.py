@@ -109,6 +109,13 @@ def test_each_vehicle_has_its_own_ports_and_luck():
     assert MockSettings(gcs_port=0).for_vehicle(2).gcs_port == 0
 
 
+def test_check_reads_the_passphrase(tmp_path, capsys):
+    path = tmp_path / "mock.yaml"
+    path.write_text("mock: {signing: {passphrase_file: none.txt}}\n")
+    assert main(["--config", str(path), "--check"]) == 2
+    assert "mock.signing.passphrase_file: " in capsys.readouterr().err
+
+
 def test_check_says_so(capsys):
     assert main(["--check"]) == 0
     assert "valid" in capsys.readouterr().out
