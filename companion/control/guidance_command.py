@@ -13,7 +13,7 @@ class GuidanceCommand(NamedTuple):
     target: Target
     """Target of the planner; only its heading is in the frame without estimator resets."""
     acceleration_down: float
-    """Acceleration downwards that thrust and gravity shall give, m/s²."""
+    """Wanted vertical acceleration by thrust and gravity together, positive down, m/s²."""
     made_at: float
     """When guidance made the command, s of event-loop time."""
     idle: bool = False
@@ -29,8 +29,8 @@ class GuidanceCommand(NamedTuple):
     frame: HeadingFrame = HeadingFrame()
     """The frame without estimator resets, as it was when the command was made."""
     later: Target | None = None
-    """The target `period` after `made_at`; the target moves there on a straight line and then
-    stays. None: the target is constant."""
+    """Target at the time `made_at` + `period`; in between, the target is interpolated linearly,
+    and later it is constant. None: the target is constant from the beginning."""
     period: float = 0.0
     """Period of the guidance loop, s."""
 

@@ -15,12 +15,11 @@ _CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
 _USUAL_RATE_LOOP_DELAY = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
 _STIFF_HOLD_DELAYS = 0.065, 0.08
-"""Delays of the rate loop between which the hold changes from stiff to normal, s: dead time, plus
-half the lag, plus half the time in which the rate loop slews to the largest roll-pitch rate."""
+"""Delay of the rate loop up to which the hold is stiff, and from which it is normal, s: dead time
++ half the lag + half the time to slew to the largest roll-pitch rate."""
 _SHORTEST_DELAY = 0.275
-"""Shortest delay T that sets the weights of the hold, s; a shorter one counts as this. Higher
-weights would amplify the noise of the estimate: the rate loop would always slew, and the vehicle
-would swing."""
+"""Lower bound of the delay T from which the weights of the hold follow, s. Higher weights would
+amplify the noise of the estimate: the rate loop would always slew, and the vehicle would swing."""
 _SECOND_ORDER_SHARE = 0.2
 """Share of a second-order lag that is added to the delay T of the hold. The hold then keeps the
 stability margins that it has with a first-order model of PX4's rate loop."""
@@ -44,8 +43,7 @@ ArduPilot's estimators the vehicle then moves 5 to 25 % less."""
 _CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_FILTER_TIMES = 0.1, 0.04
-"""Time constant of the two low-pass filters on the position correction in motion, with a normal and
-a quick observer, s."""
+"""`CorrectionSettings.filter_time` with a normal and with a quick observer, s."""
 _LARGEST_CORRECTION = 0.2
 """Largest anticipated correction, m: the noise of a bad GPS must not move the vehicle."""
 
@@ -66,10 +64,10 @@ def hold_weights(config: Config) -> Weights:
     )
 
 
-def _falling_share(value: float, one_and_zero: tuple[float, float]) -> float:
-    """Share that is 1 up to the first of two values and 0 from the second on; linear between."""
-    one, zero = one_and_zero
-    return min(max(0.0, (zero - value) / (zero - one)), 1.0)
+def _falling_share(value: float, bounds: tuple[float, float]) -> float:
+    """Share that is 1 up to the lower bound and 0 from the upper one on; linear in between."""
+    lower, upper = bounds
+    return min(max(0.0, (upper - value) / (upper - lower)), 1.0)
 
 
 def _hold_stiffness(config: Config) -> float:
@@ -87,8 +85,8 @@ def slewing_delay(config: Config) -> float:
     It is 0 if no slew limit is known.
     """
     axes = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
-    slews = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
-    return 0.5 * config.limits.max_tilt_rate / min(slews) if slews else 0.0
+    limits = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
+    return 0.5 * config.limits.max_tilt_rate / min(limits) if limits else 0.0
 
 
 def _rate_loop_delay(config: Config) -> float:
@@ -119,7 +117,7 @@ def observer_quickness(config: Config) -> float:
 
 
 def _gain_quickness(config: Config) -> float:
-    """How quick an observer the planner's gain allows, 0..1: the gain amplifies its noise.
+    """How quick an observer the planner's gain allows, 0..1; the gain amplifies the noise.
 
     The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of 7.5 and a quick
     observer.

@@ -40,7 +40,7 @@ class HoverLearning:
     @property
     def hover(self) -> float:
         """Learned normalised thrust at hover, at the battery voltage just after take-off, 0..1."""
-        return self._hover_thrust.learned
+        return self._hover_thrust.learned_hover
 
     @property
     def present_hover(self) -> float:
@@ -53,8 +53,8 @@ class HoverLearning:
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""
-        most = sin(self.largest_tilt(acceleration_down))
-        north, east = limited(target.north, target.east, most)
+        largest = sin(self.largest_tilt(acceleration_down))
+        north, east = limited(target.north, target.east, largest)
         return target._replace(north=north, east=east)
 
     def on_ground(self) -> None:
@@ -78,19 +78,20 @@ class HoverLearning:
         if battery is not None:
             self._hover_thrust.note_voltage(battery.received, battery.voltage_v)
         self._had_control = self._had_control or offboard_active
-        learns = (
+        can_learn = (
             steady
             if offboard_active
             else not self._had_control and self._note_autopilot_thrust(now, q)
         )
-        if learns and position is not None:
+        if can_learn and position is not None:
             self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
         else:
             self._hover_thrust.pause()
 
     def mismatch_warning(self) -> str | None:
         """Advice to set thrust.hover_thrust, if the learned one differs by over 15 %; else None."""
-        configured, learned = self._hover_thrust.configured, self._hover_thrust.learned
+        hover_thrust = self._hover_thrust
+        configured, learned = hover_thrust.configured_hover, hover_thrust.learned_hover
         if not self._had_control or abs(learned - configured) <= _MISMATCH_SHARE * configured:
             return None
         return (

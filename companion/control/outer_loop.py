@@ -61,11 +61,11 @@ def make_guidance(config: Config) -> Guidance:
     factory = plugin("guidance.kind", plugins.GUIDANCE, kind)
     try:
         # Guidance may remember the trial, so the one that flies is another.
-        tried, flown = factory(settings), factory(settings)
+        trial_guidance, flight_guidance = factory(settings), factory(settings)
     except Exception as error:
         raise ConfigError(f"guidance.kind: {kind} cannot be made: {error!r}") from error
-    _require_command(kind, tried, thrust_limits(config))
-    return PluginGuidance(flown)
+    _require_command(kind, trial_guidance, thrust_limits(config))
+    return PluginGuidance(flight_guidance)
 
 
 def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:
@@ -141,7 +141,7 @@ def motion_estimate(
     )
 
 
-def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Predictive:
+def predictive(config: Config, maneuver: Follow, note: Callable[[str], None]) -> Predictive:
     """Predictive control of one trajectory; starts its process.
 
     Raises:
@@ -150,7 +150,7 @@ def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Pre
     """
     settings = predictive_settings(config)
     return Predictive(
-        lambda report: Solver(settings, part.trajectory, report),
+        lambda report: Solver(settings, maneuver.trajectory, report),
         period=settings.lead,
         lockstep=config.link.lockstep,
         note=note,

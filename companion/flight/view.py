@@ -83,7 +83,7 @@ def _motion_values(context: FlightContext, now: float) -> dict[str, float | None
 def _reference(context: FlightContext, now: float) -> Reference | None:
     """The reference that is flown, if the autopilot obeys us and there is one."""
     guidance_loop = context.guidance_loop
-    flown, motion = guidance_loop.flown, guidance_loop.motion
+    flown, motion = guidance_loop.flown_source, guidance_loop.motion
     if not context.loop.offboard_active or flown.pose is None or motion is None:
         return None
     return flown.reference(now, motion, 0.0)(now)

@@ -164,7 +164,7 @@ class ManeuverSequence:
     """Maneuvers one after the other, all from the same starting pose.
 
     Attributes:
-        parts: the maneuvers; empty if none is known before the flight: it must not be flown then.
+        parts: the maneuvers; empty: none is known before the flight, and nothing can be flown.
     """
 
     parts: Sequence[Maneuver]
@@ -182,7 +182,7 @@ class ManeuverSequence:
     def part_at(self, time: float) -> tuple[Maneuver, float]:
         """The part that is flown at `time`, and the time since that part began.
 
-        Before the beginning it is the first part, after the end the last one.
+        Before the beginning the first part is returned, after the end the last one.
 
         Raises:
             ValueError: the sequence is empty.

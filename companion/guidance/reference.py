@@ -49,8 +49,8 @@ class TiltCommand(NamedTuple):
 
     Attributes:
         coefficients: north and east; the sine of the tilt is their length.
-        trimmed: whether guidance adds the trim: the mean target of the latest time in
-            `HorizontalMode.ACCELERATION`. It balances wind and the error of the estimated attitude.
+        trimmed: whether guidance adds the trim, which balances wind and the error of the estimated
+            attitude: the mean target of the latest time in `HorizontalMode.ACCELERATION`.
     """
 
     coefficients: Coefficients
@@ -99,7 +99,7 @@ class Reference(NamedTuple):
         velocity_ned: velocity in m/s.
         acceleration_ned: acceleration in m/s².
         heading: heading in rad.
-        heading_rate: its rate in rad/s.
+        heading_rate: derivative of the heading in rad/s.
         horizontal: how the horizontal motion is commanded: in closed loop by position or by
             acceleration; in open loop by tilt or by body rates in rad/s, which command the
             heading, too.
@@ -167,12 +167,12 @@ def minus(left: Vector, right: Vector) -> Vector:
     return left[0] - right[0], left[1] - right[1], left[2] - right[2]
 
 
-def limited(north: float, east: float, most: float) -> Horizontal:
-    """The vector, shortened to `most` if it is longer; its direction is kept."""
+def limited(north: float, east: float, largest: float) -> Horizontal:
+    """The vector, shortened to the length `largest` if it is longer; its direction is kept."""
     length = hypot(north, east)
-    if length <= most:
+    if length <= largest:
         return north, east
-    return north * most / length, east * most / length
+    return north * largest / length, east * largest / length
 
 
 def rotated(north: float, east: float, angle: float) -> Horizontal:
@@ -182,15 +182,15 @@ def rotated(north: float, east: float, angle: float) -> Horizontal:
 
 
 def change_rate(
-    old: Sequence[float], new: Sequence[float], since: float, most: float
+    old: Sequence[float], new: Sequence[float], dt: float, largest: float
 ) -> tuple[float, ...] | None:
     """Rate of change of a commanded vector; None if it has jumped.
 
     Args:
         old: components in the previous command.
         new: components in the present command.
-        since: time between the two commands, s.
-        most: largest rate of change that does not count as a jump.
+        dt: time between the two commands, s.
+        largest: largest rate of change that does not count as a jump.
     """
-    rate = tuple((b - a) / since for a, b in zip(old, new, strict=True))
-    return rate if hypot(*rate) <= most else None
+    rate = tuple((b - a) / dt for a, b in zip(old, new, strict=True))
+    return rate if hypot(*rate) <= largest else None
