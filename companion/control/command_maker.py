@@ -65,7 +65,7 @@ class CommandMaker:
         The command is None if the guidance (a plug-in, for example) returned NaN or infinity.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             inputs: motion of the vehicle, wind, drag and thrust limits.
             heading: present heading of the vehicle, rad.
             frame: the frame without heading resets.

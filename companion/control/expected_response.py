@@ -31,8 +31,8 @@ class ExpectedResponse:
     time_constant: float
     """Time until 63 % of the step is covered, s."""
     time_constants_without: dict[str, float]
-    """Name of a cause of delay -> time constant (s) if this cause changes: with twice the gain, or
-    without the rate limit, the lag or the dead time."""
+    """Time constant (s) by the name of a cause of delay if only this cause changes: with twice the
+    gain, or without the rate limit, the lag or the dead time."""
     gain: float
     """Gain p of the planner, 1/s."""
     largest_gain: float | None

@@ -41,13 +41,13 @@ class FlownSource:
         self.pose, self._braking = Pose(braking.stop, braking.heading), braking
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
-        """Fly `source` from `pose`; `now` in s of event-loop time."""
+        """Fly `source` from `pose`; `now` is event-loop time, s."""
         source.begin(now, pose)
         self.pose, self.source, self.begun_at, self._braking = pose, source, now, None
 
     def remaining_braking_time(self, now: float) -> float:
-        """Time until the vehicle has come to rest for a hold, s; `now` in s of event-loop time."""
-        return 0.0 if self._braking is None else max(0.0, self._braking.ends - now)
+        """Time until the vehicle has come to rest for a hold, s; `now` is event-loop time, s."""
+        return 0.0 if self._braking is None else max(0.0, self._braking.end_time - now)
 
     def finished(self, now: float) -> bool:
         """Whether there is a source and it has reached its end."""
@@ -59,7 +59,7 @@ class FlownSource:
         Without source and pose the reference is the present position of the vehicle.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             motion: present motion of the vehicle.
             heading: present heading of the vehicle, rad.
         """
@@ -95,7 +95,7 @@ class FlownSource:
     def tracking_error(
         self, now: float, reference: Reference, motion: VehicleMotion
     ) -> float | None:
-        """Distance from the reference, m; `now` in s of event-loop time.
+        """Distance from the reference, m; `now` is event-loop time, s.
 
         None without a pose, and in open loop (the reference does not hold the position). After open
         loop it stays None until the vehicle has returned to its reference, at most for

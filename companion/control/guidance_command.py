@@ -11,7 +11,7 @@ class GuidanceCommand(NamedTuple):
     """One command from guidance; it holds until the next one."""
 
     target: Target
-    """Target of the planner; only its heading is in the frame without estimator resets."""
+    """Target of the planner: north and east in the estimator's frame, heading in `frame`."""
     acceleration_down: float
     """Wanted vertical acceleration by thrust and gravity together, positive down, m/s²."""
     made_at: float
@@ -19,7 +19,7 @@ class GuidanceCommand(NamedTuple):
     idle: bool = False
     """Whether zero body rates and zero thrust are sent; only on the ground."""
     is_step: bool = False
-    """Whether this is an open-loop step whose response is measured."""
+    """Whether the command is part of an open-loop step whose response is measured."""
     body_rates: BodyRates | None = None
     """Body rates that replace the planner's, within the limits, rad/s; None: the planner's are
     sent."""

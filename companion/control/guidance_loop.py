@@ -30,9 +30,9 @@ class GuidanceLoop:
     """Writes a new `GuidanceCommand` to the control loop at a steady rate while position is fresh.
 
     On the ground the command is idle until a take-off is commanded. After that, guidance damps the
-    motion while it has no pose. `hold_here` stops and holds a pose; `follow` flies a source from
-    it. If open-loop rates tilt the vehicle too far, the source ends, and the vehicle brakes and
-    holds. Poses and references are in the frame without resets, so no reset moves the vehicle.
+    motion until it gets a pose. `hold_here` stops and holds a pose; `follow` flies a source from
+    that pose. If open-loop rates tilt the vehicle too far, the source ends, and the vehicle brakes
+    and holds. Poses and references are in the frame without resets, so no reset moves the vehicle.
 
     Attributes:
         flown_source: the held pose and the source that is flown from it.
@@ -154,7 +154,7 @@ class GuidanceLoop:
         return self.flown_source.finished(self._clock())
 
     async def run(self) -> None:
-        """Make commands until cancelled; missed steps are not repeated."""
+        """Make commands until cancelled; missed steps are skipped."""
         while True:
             self.step()
             await self._ticker.tick()
@@ -195,7 +195,7 @@ class GuidanceLoop:
     def _step(
         self, now: float, position: LocalPosition | None, *, standing: bool, may_idle: bool
     ) -> StepOutput | None:
-        """Make one command; return what it was computed from, or None if none was computed."""
+        """Make one command; return its inputs and reference, or None if none was computed."""
         if position is None:
             self.learning.pause()
             return None
@@ -223,10 +223,10 @@ class GuidanceLoop:
                 offboard_active=self._loop.offboard_active,
                 steady=reference.thrust_is_steady,
             )
-        measured_at = self.estimate.vehicle_time(now, position)
+        vehicle_time = self.estimate.vehicle_time(now, position)
         if self._loop.offboard_active:
-            self.record.add(now, measured_at, reference, inputs.now)
-        return StepOutput(measured_at, self._q, inputs, reference, self.tracking_error)
+            self.record.add(now, vehicle_time, reference, inputs.now)
+        return StepOutput(vehicle_time, self._q, inputs, reference, self.tracking_error)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`, unless it would not be finite; return the reference."""

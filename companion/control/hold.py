@@ -12,7 +12,7 @@ from companion.guidance.braking import AssumedBraking, brake
 
 
 class Hold:
-    """Begins a hold when it is asked to, or when open-loop rates tilt the vehicle too far.
+    """Begins a hold on request, or when open-loop body rates tilt the vehicle too far.
 
     Args:
         flown_source: what guidance flies; the hold replaces it.

@@ -35,8 +35,8 @@ _CALM_BANDWIDTH = 1.0
 _POSITION_TIME_CONSTANT = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
 _POSITION_PULL = 4.0, 8.0
-"""`ObserverSettings.position_pull` with a slow and with a quick rate loop, 1/s. It is needed
-because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
+"""`ObserverSettings.position_pull` with a slow and with a quick rate loop, 1/s. Without this pull,
+the velocities of PX4 and ArduPilot, off by 0.05 m/s for seconds (measured), would be trusted."""
 _TRUSTED_PULL_INCREASE = 5.0
 """`ObserverSettings.pull_increase` with a quick rate loop, 1/s. With recorded errors of PX4's and
 ArduPilot's estimators the vehicle then moves 5 to 25 % less."""
@@ -80,10 +80,7 @@ def _hold_stiffness(config: Config) -> float:
 
 
 def slewing_delay(config: Config) -> float:
-    """Half the time in which the rate loop slews to the largest roll-pitch rate, s.
-
-    It is 0 if no slew limit is known.
-    """
+    """Half the time in which the rate loop slews to the largest roll-pitch rate, s; 0: no limit."""
     axes = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
     limits = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
     return 0.5 * config.limits.max_tilt_rate / min(limits) if limits else 0.0
@@ -103,11 +100,11 @@ def _rate_loop_delay(config: Config) -> float:
 def observer_quickness(config: Config) -> float:
     """How quick a motion observer the rate loop and the planner's gain allow: 0 normal, 1 quick.
 
-    It is 0 if the bandwidth of the wind estimate is configured, or in a flight that identifies the
+    Always 0 if the bandwidth of the wind estimate is configured, or in a flight that identifies the
     vehicle.
 
     A quick observer follows the corrected position, so errors of the autopilot's velocity matter
-    less. Its commands are less calm: on a rate loop like PX4's, body rates in hover double.
+    less. The commands are less calm then: on a rate loop like PX4's, body rates in hover double.
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
@@ -161,7 +158,7 @@ def disturbance_bandwidth(config: Config) -> float:
 def attitude_delay(config: Config) -> float:
     """Delay of the attitude behind its target, s; assumes a usual rate loop if none is identified.
 
-    A gain above the largest sensible one is replaced by it: more gain hardly makes the attitude
+    The gain counts as at most the largest sensible gain: more gain hardly makes the attitude
     quicker, and a stiffer hold would oscillate.
     """
     excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s

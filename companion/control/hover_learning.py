@@ -1,4 +1,4 @@
-"""Learns the hover thrust from the motion, the thrust that was flown, and the voltage."""
+"""Learns the hover thrust from the motion, the thrust setpoints and the battery voltage."""
 
 from math import sin
 
@@ -33,12 +33,12 @@ class HoverLearning:
 
     @property
     def thrust_limits(self) -> tuple[float, float]:
-        """Smallest and largest available specific thrust by the learned hover thrust, m/s²."""
+        """Smallest and largest available specific thrust, from the learned hover thrust, m/s²."""
         hover_thrust = self._hover_thrust
         return hover_thrust.smallest_specific_thrust, hover_thrust.largest_specific_thrust
 
     @property
-    def hover(self) -> float:
+    def learned_hover(self) -> float:
         """Learned normalised thrust at hover, at the battery voltage just after take-off, 0..1."""
         return self._hover_thrust.learned_hover
 
@@ -48,7 +48,7 @@ class HoverLearning:
         return self._hover_thrust.present_hover
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
-        """Largest tilt at which 95 % of the largest thrust give `acceleration_down` (m/s²), rad."""
+        """Largest tilt, rad, at which 95 % of the largest thrust give `acceleration_down`, m/s²."""
         return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted_thrust)
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
@@ -69,7 +69,7 @@ class HoverLearning:
         """Learn from the newest telemetry.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             q: newest attitude.
             offboard_active: whether the autopilot obeys the setpoints.
             steady: whether the commanded thrust is steady; the rotors lag behind a changing thrust.

@@ -72,9 +72,9 @@ def plugin(key: str, group: str, name: str) -> Any:
     """Load a class or function of another package.
 
     Args:
-        key: configuration key that names it, for messages.
-        group: its group of entry points.
-        name: its name in this group.
+        key: configuration key that names the plug-in, for messages.
+        group: group of entry points of the plug-in.
+        name: name of the plug-in in this group.
 
     Raises:
         ConfigError: the plug-in is not installed or cannot be loaded.

@@ -12,7 +12,7 @@ from companion.vehicle.records import AttitudeSample
 _KEPT_SETPOINTS = 512
 """Number of latest setpoints that are kept; at 400 Hz more than a second."""
 _KEPT_GAPS = 32
-"""Number of latest gaps that are kept; far fewer gaps end a flight."""
+"""Number of latest gaps that are kept; a flight ends after far fewer gaps."""
 
 
 class Unanswered(Enum):
@@ -101,7 +101,7 @@ class LoopRecord:
     last_sample: float = -inf
     """When the newest sample arrived, s of event-loop time."""
     last_vehicle_time: float = -inf
-    """Vehicle time of the newest usable sample, s."""
+    """Vehicle time of the newest sample that fits the vehicle's clock, s."""
     last_answer: float = -inf
     """When the newest answered sample arrived, s of event-loop time."""
     gap_from: float = inf
@@ -115,7 +115,7 @@ class LoopRecord:
     """Time from each setpoint to the next one, without gaps, s."""
 
     def note_arrival(self, sample: AttitudeSample) -> float:
-        """Note an arrived sample; return the vehicle time since the last usable one, s."""
+        """Note an arrived sample; return the time since `last_vehicle_time`, s of vehicle time."""
         self.last_sample = sample.received
         period = sample.vehicle_time - self.last_vehicle_time
         if sample.misfit is None:

@@ -30,7 +30,7 @@ _DRAG_MISMATCH = 0.15
 
 
 class MotionEstimate:
-    """Feeds the motion observer on the vehicle's clock, and predicts the motion.
+    """Passes measurements to the motion observer, on the vehicle's clock; predicts the motion.
 
     Args:
         observer: estimates position, velocity and disturbance.
@@ -124,7 +124,7 @@ class MotionEstimate:
         """The motion at `now` and `ahead` seconds later, with thrust, disturbance and drag.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             ahead: prediction time, s.
             thrust_limits: smallest and largest available specific thrust, m/s².
 
@@ -167,7 +167,7 @@ class MotionEstimate:
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """`now` (s of event-loop time) on the vehicle's clock, s.
+        """Convert `now` from event-loop time to the time of the vehicle's clock, s.
 
         Before the offset of that clock is known, `position` counts as measured when it arrived.
         """

@@ -37,7 +37,7 @@ class PlannerRunner:
 
     Attributes:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
-            along its axes, or None.
+            along the axes of that target (ArduPilot), or None.
         on_attitude_target: called with each new ATTITUDE_TARGET before the planner gets it.
         planner_input: attitude and target that the planner last got, or None.
     """

@@ -19,7 +19,7 @@ class SampleRecorder:
 
     Args:
         recorder: recorder of the flight, or None.
-        planner: provides the planner's input; calls back with each new ATTITUDE_TARGET.
+        planner: provides the planner's input, and reports each new ATTITUDE_TARGET.
         limits: limits of the body rates.
         thrust_limits: smallest and largest thrust that is sent, 0..1.
         clock: returns event-loop time, s.

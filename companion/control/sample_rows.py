@@ -42,14 +42,14 @@ class LoopFlags(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A setpoint that was sent, and its inputs."""
+    """A setpoint that was sent, and the inputs from which it was computed."""
 
     rates: BodyRates
     """Body rates, rad/s."""
     thrust: float
     """Thrust, 0..1."""
     latency_ns: int
-    """Time since the sample's arrival, ns."""
+    """Time from the sample's arrival to the setpoint, ns."""
     planner_input: tuple[Quaternion, Target] | None
     """Attitude and target that the planner got; None: the planner was not asked, because guidance
     commanded body rates or idle."""

@@ -26,7 +26,7 @@ class Slew:
         self._stepped_at = 0.0
 
     def jump(self, wanted: Config) -> None:
-        """Take the wanted values at once, because no loop flies yet or any more."""
+        """Take the wanted values at once, because control has not begun yet or has ended."""
         self._present_config = self._wanted_config = self.settled_config = wanted
         self._began_at = None
 

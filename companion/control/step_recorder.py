@@ -32,7 +32,7 @@ class StepRecorder:
 
         Args:
             flags: state of the vehicle at the step.
-            now: s of event-loop time.
+            now: event-loop time, s.
             output: result of the step, or None.
             command: the command for the control loop; None: no new command.
         """

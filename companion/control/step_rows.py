@@ -61,7 +61,7 @@ class StepInput(NamedTuple):
 class StepOutput(NamedTuple):
     """The result of a guidance step."""
 
-    measured_at: float
+    vehicle_time: float
     """When the step began, on the vehicle's clock, s."""
     q: Quaternion
     """Newest attitude."""
@@ -70,7 +70,7 @@ class StepOutput(NamedTuple):
     reference: Reference
     """Reference of the step."""
     error: float | None
-    """Distance from the reference, m, or None."""
+    """Distance from the reference, m; None as in `FlownSource.tracking_error`."""
 
 
 class StepEntry(NamedTuple):
@@ -166,7 +166,7 @@ def _target_row(command: GuidanceCommand) -> tuple[float, ...]:
 def _guidance_row(output: StepOutput) -> tuple[float, ...]:
     inputs, reference = output.inputs, output.reference
     return (
-        output.measured_at,
+        output.vehicle_time,
         *reference.position_ned,
         *reference.velocity_ned,
         reference.heading,

@@ -25,7 +25,7 @@ class Ticker:
             _wake(self._waiting)
 
     async def tick(self) -> None:
-        """Wait for the next period or for `trigger`; missed periods are not repeated."""
+        """Wait for the next period or for `trigger`; missed periods are skipped."""
         self._next_start = max(self._next_start + self._period, self._clock())
         if not self._triggered:
             await self._sleep(self._next_start - self._clock())

@@ -57,7 +57,7 @@ class TrackingRecord:
         """Record one step of guidance.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             vehicle_time: the same time on the vehicle's clock, s.
             reference: reference at this time.
             motion: motion of the vehicle at this time.

@@ -21,7 +21,7 @@ class AssumedBraking(NamedTuple):
 
     Attributes:
         reaction: delay before the vehicle brakes, s (`safety.reaction_s`).
-        deceleration: constant deceleration after it, m/s² (`safety.braking_m_s2`).
+        deceleration: constant deceleration after this delay, m/s² (`safety.braking_m_s2`).
     """
 
     reaction: float
@@ -69,14 +69,14 @@ class Braking(NamedTuple):
     duration: float
 
     @property
-    def ends(self) -> float:
+    def end_time(self) -> float:
         """When the vehicle is at rest, s of event-loop time."""
         return self.begun_at + self.duration
 
     @property
     def stop(self) -> Vector:
         """Place where the vehicle stops, m NED."""
-        return self.at(self.ends).position_ned
+        return self.at(self.end_time).position_ned
 
     def at(self, time: float) -> Reference:
         """The reference at `time`, s of event-loop time."""
@@ -103,7 +103,7 @@ def brake(
     """The braking that begins now.
 
     Args:
-        now: s of event-loop time.
+        now: event-loop time, s.
         motion: motion of the vehicle.
         heading: the heading to keep, rad.
         acceleration: largest horizontal acceleration, m/s².

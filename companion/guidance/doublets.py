@@ -21,7 +21,7 @@ class _Doublet(NamedTuple):
 
     Attributes:
         step: T, s.
-        body_rates: A of a doublet of body rates, rad/s; None: it is one of vertical acceleration.
+        body_rates: A of a doublet of body rates, rad/s; None: a doublet of vertical acceleration.
         climb_acceleration: A of a doublet of vertical acceleration, m/s², positive up.
     """
 

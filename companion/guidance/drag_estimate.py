@@ -150,7 +150,7 @@ class DragEstimate:
     def _drag_within_bounds(self) -> Drag:
         """The most likely drag within the bounds.
 
-        If the quadratic drag is clamped, the linear drag is the most likely one with it.
+        If the quadratic drag is clamped, the linear drag is the most likely one for that value.
         """
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
         clamped = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)

@@ -42,7 +42,7 @@ class Breach(NamedTuple):
 
     Attributes:
         limit: the configuration key of the limit that is breached.
-        relation: word between `where` and `limit` in the message, such as "beyond".
+        relation: words between `where` and `limit` in the message, such as "beyond".
         where: the place in words, such as "12.0 m above where control began".
         distance_outside: distance outside the fence, m; negative for a place inside the fence but
             within the margin; 0: not computed (polygon without a margin, unknown origin).
@@ -136,8 +136,8 @@ class Fence:
         Args:
             offset: position of the vehicle relative to where control began, m NED; numbers, or
                 arrays of them.
-            velocity: m/s NED; numbers, or arrays of them.
-            acceleration: north and east, m/s²; numbers, or arrays of them.
+            velocity: velocity, m/s NED; numbers, or arrays of them.
+            acceleration: acceleration north and east, m/s²; numbers, or arrays of them.
         """
         (north, east, down), twice_deceleration = velocity, 2.0 * self.deceleration
         reaction = self.reaction + self.estimate_delay

@@ -84,7 +84,7 @@ class Follow:
 
     @property
     def duration(self) -> float:
-        """Duration with the turn before the trajectory, s; a full turn until the start is known."""
+        """Duration with the turn before the trajectory, s; before the start, with a full turn."""
         if self._with_turn is not None:
             return self._with_turn.duration
         longest_turn = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate

@@ -111,7 +111,7 @@ class HoverThrust:
         Args:
             acceleration_down: wanted acceleration by thrust and gravity, m/s², positive down.
             q: attitude.
-            body_rates: rad/s.
+            body_rates: measured body rates, rad/s.
         """
         settings = self._settings
         cosine = cos_tilt_ahead(q, body_rates, settings.lag)

@@ -57,7 +57,7 @@ class Steps:
 
     Attributes:
         coefficient: length of the coefficients c: the sine of the tilt.
-        step: T, s.
+        step: T, the duration of the first part of a doublet, s.
         settle: time of position hold after each doublet, s.
     """
 
@@ -105,7 +105,7 @@ class Steps:
 class Corners:
     """Acceleration steps between the corners of a rectangle, none of them through level.
 
-    Such steps show the differences between the planners, as in the paper's figure 2; a step through
+    Such steps show the differences between the planners, as in figure 2 of Xu & Pei; a step through
     level is straight with every planner. Before the first step the position hold pauses, so that
     the attitude comes to rest. The corners are added to the coefficients of this attitude. The
     acceleration goes round the rectangle twice, the second time mirrored. With an ideal response
@@ -114,7 +114,7 @@ class Corners:
 
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
-            √(north² + east²). 0.4 and 0.5 give the step of the paper's figure 2.
+            √(north² + east²). 0.4 and 0.5 give the step of that figure 2.
         step: duration of each corner, s; the one at which the second round begins lasts twice that.
         settle: time of position hold at the end, s.
     """

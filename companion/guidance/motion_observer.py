@@ -1,4 +1,4 @@
-"""Observer of horizontal position, velocity and disturbance (wind, bias); history of the tilt."""
+"""Observer of horizontal position, velocity and disturbance (wind, bias); history of the slope."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class ObserverGains(NamedTuple):
     of the velocity plus `ObserverSettings.pull` times the error of the position.
 
     Attributes:
-        position: m per m.
-        velocity: m/s per m/s.
-        disturbance: m/s² per m/s.
+        position: correction of the position per error, m per m.
+        velocity: correction of the velocity per error, m/s per m/s.
+        disturbance: correction of the disturbance per error, m/s² per m/s.
     """
 
     position: float
@@ -99,8 +99,8 @@ class MotionObserver:
     ) -> None:
         """Take a measured position and velocity.
 
-        The first measurement replaces the estimate. So does one that comes 1 s or more after the
-        last one, or that is not newer than it.
+        The first measurement replaces the estimate, and so does a measurement that is not newer
+        than the last one or comes 1 s or more after it.
 
         Args:
             time: vehicle time of the measurement, s.

@@ -31,7 +31,7 @@ class CorrectionSettings:
     """How much of the estimator's correction is anticipated.
 
     Attributes:
-        estimator_time: time constant of the estimator's correction, s: 1/(its position gain).
+        estimator_time: time constant of the estimator's correction, s: 1/(position gain).
         filter_time: time constant of each of the two low-pass filters while the vehicle moves and
             its positions are smooth, s, positive; at rest it is twice that.
         largest_correction: largest anticipated correction, m.

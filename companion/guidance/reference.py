@@ -18,14 +18,14 @@ LARGEST_JERK = 50.0
 
 
 class Pose(NamedTuple):
-    """Position (m) and heading (rad) that is held, or from which a maneuver begins."""
+    """Position (m NED) and heading (rad) that is held, or from which a maneuver begins."""
 
     position_ned: Vector
     heading: float
 
 
 class VehicleMotion(NamedTuple):
-    """Position in m and velocity in m/s of the vehicle."""
+    """Position (m NED) and velocity (m/s NED) of the vehicle."""
 
     position_ned: Vector
     velocity_ned: Vector
@@ -35,9 +35,9 @@ class HorizontalMode(Enum):
     """How guidance follows the horizontal part of a reference in closed loop.
 
     Attributes:
-        POSITION: it corrects errors of position, velocity and acceleration.
-        ACCELERATION: it commands the acceleration alone. Position and velocity are not corrected;
-            drag at the reference's velocity and the disturbance are compensated.
+        POSITION: guidance corrects errors of position, velocity and acceleration.
+        ACCELERATION: guidance commands the acceleration alone. Position and velocity are not
+            corrected; drag at the reference's velocity and the disturbance are compensated.
     """
 
     POSITION = auto()
@@ -65,10 +65,10 @@ class VerticalMode(Enum):
     """How guidance follows the vertical part of a reference.
 
     Attributes:
-        HEIGHT: it corrects errors of height and climb rate.
-        HEIGHT_IN_STEPS: the same, but the vertical acceleration jumps. The rotors do not follow
+        HEIGHT: guidance corrects errors of height and climb rate.
+        HEIGHT_IN_STEPS: as HEIGHT, but the vertical acceleration jumps. The rotors do not follow
             jumps, so the hover thrust is not learned meanwhile.
-        ACCELERATION: it commands the acceleration alone, without drag and feedback.
+        ACCELERATION: guidance commands the acceleration alone, without drag and feedback.
     """
 
     HEIGHT = auto()
@@ -77,12 +77,12 @@ class VerticalMode(Enum):
 
 
 class ThrustCommand(NamedTuple):
-    """Normalised thrust that replaces the one guidance computes.
+    """Normalised thrust that replaces the thrust that guidance computes.
 
     Guidance still computes the vertical acceleration as in `VerticalMode.HEIGHT`.
 
     Attributes:
-        thrust: 0..1.
+        thrust: normalised thrust, 0..1.
     """
 
     thrust: float

@@ -97,8 +97,8 @@ class ManeuverSource:
 class CommandedSource:
     """References that another program or the user's code gives one by one.
 
-    After each reference the source extrapolates it by its velocity, acceleration and jerk. If a
-    reference becomes older than `max_age` before the next one comes, the source fails: the vehicle
+    Until the next reference the source extrapolates the newest one by its velocity, acceleration
+    and jerk. If the newest reference becomes older than `max_age`, the source fails: the vehicle
     holds its position, and later references are not flown.
 
     Args:
@@ -134,7 +134,7 @@ class CommandedSource:
 
         Args:
             reference: the reference at `now`.
-            now: s of event-loop time.
+            now: event-loop time, s.
             jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
                 an earlier reference; 0 for the first reference, after a jump of the acceleration,
                 and if the two are commanded in different ways (`_loops_closed`).

@@ -153,7 +153,7 @@ def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
 
 
 def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Gerono that reaches `half_width` metres to both sides along `laps.direction`.
+    """A lemniscate of Gerono, `half_width` metres to both sides along `laps.direction`.
 
     Its phase advances at a steady rate, as is usual in the literature, so the vehicle is fastest in
     the middle.
@@ -165,7 +165,7 @@ def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
 
 
 def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Bernoulli that reaches `half_width` metres to both sides.
+    """A lemniscate of Bernoulli, `half_width` metres to both sides along `laps.direction`.
 
     Its phase advances at a steady rate, so the vehicle is fastest at the tips.
 

@@ -118,8 +118,8 @@ def _require_times(times: Sequence[float], duration: float) -> None:
         and abs(times[-1] - duration) <= tolerance
     ):
         raise TrajectoryError(
-            f"its check_times() must ascend from 0 to its duration, {duration:g} s, as times at "
-            "which limits and fence are checked"
+            f"its check_times() must ascend from 0 to its duration, {duration:g} s: limits and "
+            "fence are checked at these times"
         )
 
 

@@ -187,10 +187,7 @@ def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
 def _law_of_width(
     motion: Motion, needed: Floats, length: float, width: float, envelope: Envelope
 ) -> SlowerTime | None:
-    """The stretch factor with pieces of `width` s that keeps all limits; None if none is found.
-
-    `needed` is the needed factor of each moment, (m,); `length` the original duration, s.
-    """
+    """The stretch factor, at least `needed` (m,), with pieces of `width` s; None: not found."""
     count = int(np.ceil(length / width))
     piece = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
     needed_by_piece = np.ones(count)
@@ -215,7 +212,10 @@ def _law_of_width(
 
 
 def _largest_of_four(values: Floats, outside: float) -> Floats:
-    """For each coefficient (n + 3,), the largest value (n,) of its four pieces; `outside`: none."""
+    """For each coefficient (n + 3,), the largest value (n,) of its four pieces.
+
+    Pieces beyond the ends have the value `outside`.
+    """
     padded = np.concatenate(([outside] * 3, values, [outside] * 3))
     largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
     return largest

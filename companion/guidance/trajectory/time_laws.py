@@ -88,11 +88,11 @@ class TimeLaw(Protocol):
 
 
 Ramp = Callable[[float, float, float], Progress]
-"""Progress while the rate rises from 0: (steady rate per s, duration, s, time, s) → Progress."""
+"""(steady rate, 1/s; duration, s; time, s) → progress while the rate rises from 0."""
 
 
 def septic_ramp(rate: float, duration: float, time: float) -> Progress:
-    """Progress with the rate 35u⁴ − 84u⁵ + 70u⁶ − 20u⁷, u = time/duration: snap is continuous."""
+    """Progress at `rate`·(35u⁴ − 84u⁵ + 70u⁶ − 20u⁷), u = time/duration; snap is continuous."""
     u = time / duration
     v = 1.0 - u
     u3 = u * u * u
@@ -127,8 +127,8 @@ class Cruise:
         rate: steady rate of the phase, per s.
         rise_time: time in which the rate rises, s.
         fall_time: time in which the rate falls, s.
-        ramp: how the rate rises and, mirrored, falls: (rate, duration of the ramp in s, time in s)
-            → progress. The mean rate of a ramp is half the steady rate.
+        ramp: how the rate rises and, mirrored, falls. The mean rate of a ramp must be half the
+            steady rate.
     """
 
     length: float
