@@ -101,7 +101,7 @@ class ControlLoop:
     def on_sample(self, sample: AttitudeSample) -> None:
         """Answer an arrived sample, or count why not (in lockstep: called when its step ends)."""
         if not self._recorder.on:
-            self._take(sample)
+            self._handle_sample(sample)
             return
         flags = LoopFlags(
             self.on,
@@ -111,10 +111,10 @@ class ControlLoop:
             self.is_same_vehicle(),
         )
         self._recorder.begin()
-        self._take(sample)
+        self._handle_sample(sample)
         self._recorder.end(sample, flags, self.record.reason)
 
-    def _take(self, sample: AttitudeSample) -> None:
+    def _handle_sample(self, sample: AttitudeSample) -> None:
         if sample.misfit is None and self.resets.on_attitude(sample):
             self.planner.restart()
         record = self.record
@@ -160,7 +160,7 @@ class ControlLoop:
     ) -> Unanswered | None:
         """Send the setpoint for a sample; return why it could not be sent, or None."""
         try:
-            rates, thrust = self._answer(sample, command, period)
+            rates, thrust = self._compute_setpoint(sample, command, period)
             # This process may have been stopped since the sample came.
             now = self._recorder.checked_at = self._clock()
             if sample.age + now - sample.received > self._deadlines.telemetry_stale:
@@ -174,7 +174,7 @@ class ControlLoop:
         self._note_answer(sample, command, rates, thrust)
         return None
 
-    def _answer(
+    def _compute_setpoint(
         self, sample: AttitudeSample, command: GuidanceCommand, period: float
     ) -> tuple[BodyRates, float]:
         """Body rates and thrust for a sample.

@@ -88,17 +88,17 @@ class Steps:
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
         index = min(max(int(time / self._doublet_period), 0), len(self.DIRECTIONS) - 1)
-        within = time - index * self._doublet_period - _HOLD_PAUSE
-        rest = Reference(start.position_ned, heading=start.heading)
-        if within < 0.0:
-            return rest._replace(horizontal=HorizontalMode.ACCELERATION)
-        if within >= 4.0 * self.step:
-            return rest
-        sign = -1.0 if self.step <= within < 3.0 * self.step else 1.0
+        doublet_time = time - index * self._doublet_period - _HOLD_PAUSE
+        hold = Reference(start.position_ned, heading=start.heading)
+        if doublet_time < 0.0:
+            return hold._replace(horizontal=HorizontalMode.ACCELERATION)
+        if doublet_time >= 4.0 * self.step:
+            return hold
+        sign = -1.0 if self.step <= doublet_time < 3.0 * self.step else 1.0
         north, east = self.DIRECTIONS[index]
         c = sign * self.coefficient
         coefficients = Coefficients(c * north, c * east)
-        return rest._replace(horizontal=TiltCommand(coefficients, trimmed=True))
+        return hold._replace(horizontal=TiltCommand(coefficients, trimmed=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,15 +148,15 @@ class Corners:
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, steps of the acceleration coefficients to each corner, a hold."""
-        rest = Reference(start.position_ned, heading=start.heading)
+        hold = Reference(start.position_ned, heading=start.heading)
         if time < _HOLD_PAUSE:
-            return rest._replace(horizontal=HorizontalMode.ACCELERATION)
+            return hold._replace(horizontal=HorizontalMode.ACCELERATION)
         index = int((time - _HOLD_PAUSE) / self.step)
         if index >= len(self.CORNERS):
-            return rest
+            return hold
         north, east = self.CORNERS[index]
         coefficients = Coefficients(self.north * north, self.east * east)
-        return rest._replace(horizontal=TiltCommand(coefficients, trimmed=True))
+        return hold._replace(horizontal=TiltCommand(coefficients, trimmed=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,5 +197,5 @@ class ManeuverSequence:
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference of the part that is flown at `time`."""
-        part, within = self.part_at(time)
-        return part.at(within, start)
+        part, part_time = self.part_at(time)
+        return part.at(part_time, start)

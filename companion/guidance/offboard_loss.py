@@ -135,17 +135,17 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     step = duration / _INTEGRATION_STEPS
     specific_thrust = hypot(*at_loss.thrust)
     axis: Vector = _scaled(at_loss.thrust, 1.0 / specific_thrust)
-    along = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
-    across: Vector = _plus_scaled(at_loss.thrust_rate, axis, -along)
-    rate = hypot(*across) / specific_thrust
-    ahead = _scaled(across, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
+    axial = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
+    lateral: Vector = _plus_scaled(at_loss.thrust_rate, axis, -axial)
+    rate = hypot(*lateral) / specific_thrust
+    direction = _scaled(lateral, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
     rate = min(rate, loss.max_tilt_rate)
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
     displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     feedback_displacement = feedback_speed = highest = 0.0
     for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
-        thrust = _plus_scaled(_scaled(axis, cos(angle)), ahead, sin(angle))
+        thrust = _plus_scaled(_scaled(axis, cos(angle)), direction, sin(angle))
         velocity = _plus_scaled(
             _after_drag(velocity, loss.drag, step), thrust, specific_thrust * step
         )

@@ -49,11 +49,11 @@ def predict(
     before, open_loop = 0.0, _OpenLoop(heading, drag)
     for time in maneuver.check_times():
         reference = maneuver.at(time, start)
-        between = maneuver.at(0.5 * (before + time), start)
+        midway = maneuver.at(0.5 * (before + time), start)
         moment = PredictedMotion(
             time, reference.position_ned, reference.velocity_ned, reference.acceleration_ned
         )
-        yield moment if between.closed_loop else open_loop.advance(moment, between, time - before)
+        yield moment if midway.closed_loop else open_loop.advance(moment, midway, time - before)
         if reference.closed_loop:
             open_loop = _OpenLoop(heading, drag)
         before = time

@@ -61,7 +61,7 @@ def _sample(trajectory: Trajectory, time: float) -> Sample:
     """
     sample = trajectory.at(time)
     try:
-        plain = _plain(sample)
+        plain = _as_floats(sample)
     except (TypeError, ValueError):
         raise TypeError(f"at({time:g}) returned {sample!r}, which is no Sample") from None
     if not _is_finite(plain):
@@ -69,7 +69,7 @@ def _sample(trajectory: Trajectory, time: float) -> Sample:
     return plain
 
 
-def _plain(sample: Sample) -> Sample:
+def _as_floats(sample: Sample) -> Sample:
     """The sample as plain floats.
 
     Raises:
@@ -77,16 +77,16 @@ def _plain(sample: Sample) -> Sample:
     """
     sample = Sample(*sample)
     return Sample(
-        _plain_vector(sample.position),
-        _plain_vector(sample.velocity),
-        _plain_vector(sample.acceleration),
-        _plain_vector(sample.jerk),
+        _float_vector(sample.position),
+        _float_vector(sample.velocity),
+        _float_vector(sample.acceleration),
+        _float_vector(sample.jerk),
         float(sample.heading),
         float(sample.heading_rate),
     )
 
 
-def _plain_vector(vector: Vector) -> Vector:
+def _float_vector(vector: Vector) -> Vector:
     north, east, down = vector
     return float(north), float(east), float(down)
 
@@ -178,7 +178,7 @@ class UserTrajectory:
             UserCodeError: the trajectory raised, or returned something else than finite numbers.
         """
         with naming_user_code(_ROLE, self.trajectory):
-            sample = _plain(self.trajectory.at(time))
+            sample = _as_floats(self.trajectory.at(time))
             if not _is_finite(sample):
                 raise ValueError(
                     f"at({time:g}) returned {sample}, with a number that is not finite"

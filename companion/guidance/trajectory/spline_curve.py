@@ -56,8 +56,8 @@ class SplineCurve:
         fractions = np.linspace(0.0, 1.0, 17)
         times = (knots[:-1, None] + spans[:, None] * fractions).ravel()
         velocity = self.spline.along(times)[:, :, 1]
-        fastest = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
-        counts = np.ceil(np.maximum(spans * fastest * 1.05 / PATH_STEP, spans / self.longest_step))
+        speeds = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
+        counts = np.ceil(np.maximum(spans * speeds * 1.05 / PATH_STEP, spans / self.longest_step))
         counts = np.maximum(counts, self.checks_per_piece)
         require_checkable(float(counts.sum()))
         grids = [
@@ -82,8 +82,8 @@ class SplineHeading:
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Heading and its derivative at the spline's time `phase`."""
-        ((heading, heading_rate, _, _),) = self.spline.at(phase)
-        return heading, heading_rate
+        ((heading, slope, _, _),) = self.spline.at(phase)
+        return heading, slope
 
 
 def smoothed(

@@ -148,9 +148,9 @@ class TangentHeading:
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Heading of the tangent, and its derivative by the phase."""
         (north, east, _), (north2, east2, _) = point.first, point.second
-        turn = (north * east2 - east * north2) / (north * north + east * east)
+        slope = (north * east2 - east * north2) / (north * north + east * east)
         middle = self.middle + self.winding * phase
-        return middle + remainder(atan2(east, north) - middle, tau), turn
+        return middle + remainder(atan2(east, north) - middle, tau), slope
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,5 +194,5 @@ class TimedCurve:
         progress = self.law.at(time)
         point = self.curve.at(progress.phase)
         velocity, acceleration, jerk = derivatives(progress, *point[1:])
-        heading, turn = self.heading.at(progress.phase, point)
-        return Sample(point.position, velocity, acceleration, jerk, heading, turn * progress.first)
+        heading, slope = self.heading.at(progress.phase, point)
+        return Sample(point.position, velocity, acceleration, jerk, heading, slope * progress.first)
