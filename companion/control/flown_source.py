@@ -68,12 +68,12 @@ class FlownSource:
             return source.reference(now, motion)
         if self._braking is not None:
             return self._braking.at
-        held = (
+        held_reference = (
             Reference(motion.position_ned, heading=heading)
             if pose is None
             else Reference(pose.position_ned, heading=pose.heading)
         )
-        return lambda _: held
+        return lambda _: held_reference
 
     def followed_trajectory(self, now: float) -> FollowedTrajectory | None:
         """The trajectory that is followed at `now`, s of event-loop time; None if none is."""
