@@ -12,7 +12,7 @@ from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
-from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.loop_channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
@@ -93,7 +93,7 @@ class SampleRows:
         sample, reason, flags, checked_at, answer = entry
         code = _REASON_CODES[reason] if flags.on else CONTROL_OFF
         data = SAMPLE.packing.pack(
-            CDR,
+            CDR_HEADER,
             sample.received,
             sample.vehicle_time,
             sample.time_boot_ms,
@@ -108,12 +108,12 @@ class SampleRows:
         )
         writer.message("/sample", time_ns, data)
         if answer is not None:
-            data = SETPOINT.packing.pack(CDR, *self._setpoint(sample, flags, answer))
+            data = SETPOINT.packing.pack(CDR_HEADER, *self._setpoint(sample, flags, answer))
             writer.message("/setpoint", time_ns, data)
 
     def attitude_target(self, writer: McapWriter, time_ns: int, target: AttitudeTarget) -> None:
         """Write a new ATTITUDE_TARGET."""
-        data = ATTITUDE_TARGET.packing.pack(CDR, target.time_boot_ms, *target.q)
+        data = ATTITUDE_TARGET.packing.pack(CDR_HEADER, target.time_boot_ms, *target.q)
         writer.message("/attitude_target", time_ns, data)
 
     def _setpoint(

@@ -12,7 +12,7 @@ from companion.control.scene_rows import SceneRows
 from companion.guidance import GuidanceInput, Reference
 from companion.guidance.reference import Vector
 from companion.recording.mcap_file import cdr
-from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.loop_channels import GUIDANCE, INPUT, TARGET
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
@@ -96,14 +96,16 @@ class StepRows:
     def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
         """Write the inputs, the result and the command of a step."""
         inputs, output, command = entry
-        writer.message("/guidance_input", time_ns, INPUT.packing.pack(CDR, *_input_row(inputs)))
+        writer.message(
+            "/guidance_input", time_ns, INPUT.packing.pack(CDR_HEADER, *_input_row(inputs))
+        )
         if command is not None:
-            data = TARGET.packing.pack(CDR, *_target_row(command))
+            data = TARGET.packing.pack(CDR_HEADER, *_target_row(command))
             writer.message("/target", time_ns, data)
             self._scene.note_command(command)
         if output is not None:
             data = GUIDANCE.packing.pack(
-                CDR, inputs.time, *_guidance_row(output), inputs.flags.offboard_active
+                CDR_HEADER, inputs.time, *_guidance_row(output), inputs.flags.offboard_active
             )
             writer.message("/guidance", time_ns, data)
             self._count += 1

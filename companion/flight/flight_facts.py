@@ -70,7 +70,7 @@ def facts_of(
         vehicle_uid=context.same_vehicle.uid,
         armed=state.armed,
         mode=state.mode,
-        unheard=_silence_duration(context, now),
+        silence=_silence_duration(context, now),
         battery=(reporter.battery_at_takeoff, end),
         min_battery=config.limits.min_battery,
         max_tilt=config.limits.max_tilt,

@@ -6,7 +6,7 @@ from math import isfinite
 import numpy as np
 
 from companion.drag import Drag
-from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
+from companion.guidance.reference import GRAVITY, Reference, VehicleMotion, VerticalMode
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,11 +108,11 @@ def acceleration_down(
         reference: the reference now.
         motion: the present motion.
         ahead: the reference one rotor lag later; its acceleration and velocity are fed forward.
-        drag: drag of the vehicle, which thrust balances in climb and descent. If the reference does
-            not hold the height, its vertical acceleration is commanded without drag and feedback.
+        drag: drag of the vehicle, which thrust balances in climb and descent; with
+            `VerticalMode.ACCELERATION` neither drag nor feedback is added.
     """
     wanted = ahead.acceleration_ned[2]
-    if reference.holds_height:
+    if reference.vertical is not VerticalMode.ACCELERATION:
         error = reference.position_ned[2] - motion.position_ned[2]
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)

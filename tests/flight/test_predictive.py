@@ -107,7 +107,7 @@ class FakeSolver:
 
 def bench():
     notes = []
-    predictive = Predictive(FakeSolver, period=0.02, lockstep=False, note=notes.append)
+    predictive = Predictive(FakeSolver, period=0.02, vehicle_waits=False, note=notes.append)
     return predictive, predictive._solver, notes
 
 
