@@ -130,7 +130,7 @@ def test_a_second_change_counts_together_with_one_that_still_takes_effect():
 
     class Loops:
         @contextmanager
-        def stepped_by(self, _):
+        def before_each_step(self, _):
             yield
 
         def apply(self, _):
