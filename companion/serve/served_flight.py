@@ -117,8 +117,8 @@ class ServedFlight:
     def is_ending(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
         has_begun = self._source.start_pose is not None
-        flown_source = self._assembled.context.guidance_loop.flown.source
-        is_replaced = has_begun and flown_source is not self._source
+        flown = self._assembled.context.guidance_loop.flown_source
+        is_replaced = has_begun and flown.source is not self._source
         return is_replaced or self._assembled.flight.failed_in is not None
 
     @property
