@@ -9,8 +9,8 @@ _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
 FIRST_ORDER_SHARE = 0.63
-"""Share of the lag of PX4's second-order response that is the lag of the closest first-order model;
-the rest of the lag acts nearly like a dead time."""
+"""Lag of the first-order model closest to PX4's second-order response, divided by the lag of that
+response; the rest of the lag acts nearly like a dead time."""
 SHARE_OF_LARGEST_GAIN = 0.25
 """Largest feedback gain, as a share of the largest stable gain: a gain margin of 4."""
 

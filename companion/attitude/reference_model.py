@@ -59,7 +59,7 @@ def braking_lead(gain: float, lag: float) -> float:
 
 
 def model_response(gain: float, lag: float) -> tuple[float, float]:
-    """P' (1/s) and τ' (s) of the reference model in the form τ'·c̈ + ċ = p'·(c_d − c).
+    """Gain p' (1/s) and lag τ' (s) of the reference model as τ'·c̈ + ċ = p'·(c_d − c).
 
     `gain` is p and `lag` is τ of `ReferenceModel`; its braking κ makes p' and τ' smaller.
     """

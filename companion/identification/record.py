@@ -19,7 +19,7 @@ _WINDOW_DURATION = 10.0
 """A long record is cut into windows of this length, s; the fit uses those with the most
 excitation."""
 _WINDOW_LEAD = 1.5
-"""Time before a window from which on its commands are kept, s: more than the longest dead time plus
+"""Duration before a window in which commands are kept, too, s: more than the longest dead time plus
 the longest slew-limited change of command that is searched."""
 
 

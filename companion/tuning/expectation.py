@@ -105,7 +105,10 @@ def stability(config: Config, error: ModelError = EXACT) -> Margins:
 
 
 def loop_margins(loop: Loop) -> Margins:
-    """Margins of a loop at `frequencies`; of those at rate and acceleration the smaller of each."""
+    """Of each margin of a loop the smaller value: opened at the rate, or at the acceleration.
+
+    `loop` is computed at `frequencies`.
+    """
     return smaller_margins(
         margins(loop.s, loop.gain_at_rate), margins(loop.s, loop.gain_at_acceleration)
     )

@@ -66,7 +66,7 @@ class Loop:
     """Linear drag, 1/s."""
 
     def by_acceleration(self) -> tuple[Complex, Complex]:
-        """Responses of position (m) and commanded rate (rad/s) to a disturbance, m/s²."""
+        """Responses of position (m) and rate command (rad/s) to a disturbing acceleration, m/s²."""
         velocity_response = 1.0 / (self.s + self.drag)
         tilt = self._tilt((self.velocity + self.position / self.s) * velocity_response)
         return (GRAVITY * tilt + 1.0) * velocity_response / self.s, tilt / self.rate_response

@@ -28,7 +28,7 @@ class Proposal:
     after: Expectation
     """Expected behaviour of `tuned`."""
     margins_with_errors: tuple[tuple[ModelError, Margins], ...]
-    """Errors of lag and dead time, each with the margins that `tuned` has with this error."""
+    """Errors of lag and dead time, and the margins of `tuned` with each of these errors."""
     disturbances: Disturbances
     """Disturbances of the vehicle."""
     aims: Aims

@@ -15,8 +15,7 @@ from companion.tuning.margins import Margins, frequencies, margins
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
 """First and last step size of the search: change of the natural logarithm of a value."""
 _COST_OF_MISSED_AIM = 30.0
-"""Weight of a shortfall (`_shortfall`) in the cost, which is added to the natural logarithm of the
-expected position error."""
+"""Cost per unit of `_shortfall`; it is added to the natural logarithm of the expected error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +195,7 @@ def errors_to_tolerate(config: Config, aims: Aims) -> list[ModelError]:
 def _shortfall(actual: Margins, gain_db: float, phase_deg: float) -> float:
     """Sum of the shortfalls of gain margin (in units of 6 dB) and phase margin (in units of 30°).
 
-    For an unstable loop: 1 plus its distances from stability in these units.
+    For an unstable loop: 1 plus the distances of gain and phase from stability, in these units.
     """
     if not actual.stable:
         return 1.0 + actual.gain_db / 6.0 + actual.phase_deg / 30.0

@@ -59,8 +59,8 @@ def rotation_vector(q: Quaternion) -> Vector:
 def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
     """Return the rate that corrects an angle error, rad/s, as ArduPilot's sqrt_controller does.
 
-    For small errors the rate is proportional to the error. For larger ones it is the rate that
-    `acceleration` brings to zero together with the error. It has the sign of the error.
+    The rate has the sign of the error. For small errors it is proportional to the error. For larger
+    ones it is the rate that `acceleration` brings to zero together with the error.
 
     Args:
         angle: angle error, rad.
