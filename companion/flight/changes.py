@@ -32,11 +32,11 @@ class Change(NamedTuple):
     """A change that was made."""
 
     time: float
-    """Time when it began, s on our clock."""
+    """Time when the change began, s on our clock."""
     by: str
-    """Who made it, such as "the live page"."""
+    """Who made the change, such as "the live page"."""
     keys: tuple[Difference, ...]
-    """Changed keys."""
+    """Changed keys, with the values before and after."""
 
     def __str__(self) -> str:
         return f"changed by {self.by}: {', '.join(map(str, self.keys))}"

@@ -32,12 +32,12 @@ _MARGIN_WINDOW = 1.0
 
 
 async def maneuvers(context: FlightContext) -> None:
-    """Fly the flight's maneuvers to their end, or until guidance gives them up."""
+    """Fly the flight's maneuvers to their end, or until guidance aborts them."""
     await fly_maneuvers(context, context.maneuvers)
 
 
 async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> None:
-    """Fly `sequence` to its end, or until guidance gives it up."""
+    """Fly `sequence` to its end, or until guidance aborts it."""
     now = asyncio.get_running_loop().time
     began = now()
 
@@ -62,7 +62,7 @@ async def fly_commanded(context: FlightContext, commands: Source) -> None:
 
 
 async def _fly(context: FlightContext, source: Source, progress: Callable[[], str]) -> None:
-    """Wait until the vehicle has stopped, then fly a source until it is finished.
+    """Wait until the vehicle has stopped, then fly the references of `source` until it is finished.
 
     Raises:
         FlightEnded: guidance gave up, the source failed, or the thrust is too small to steer.
@@ -206,7 +206,7 @@ def _require_landing(context: FlightContext) -> None:
     """Release control if the pilot ends the landing; a disarmed vehicle may be in any mode.
 
     PX4 changes its mode when it disarms, and reports the new mode first. So a mode counts only
-    together with a heartbeat, which tells both.
+    together with a heartbeat, which contains both mode and arming state.
     """
     if context.armed() and context.link.state.heartbeat_is_newest:
         require_role(context.link, {Role.LAND})

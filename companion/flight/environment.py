@@ -24,8 +24,7 @@ class Environment:
     """True: real time, and the section `realtime` is requested from the operating system. False: a
     virtual clock."""
     stream: SendBatch | None = None
-    """Takes the messages that the flight records, in batches, in the recording thread; None:
-    nothing does."""
+    """Takes batches of the messages that the flight records, in the recording thread; or None."""
 
 
 THIS_COMPUTER = Environment()

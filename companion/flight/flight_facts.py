@@ -84,7 +84,10 @@ def facts_of(
 
 
 def _silence_duration(context: FlightContext, now: float) -> float | None:
-    """Time since the last heartbeat if it is overdue, else since the last frame, s; None: heard."""
+    """Time since the last heartbeat if it is overdue, else since the last frame, s.
+
+    None: frames arrive without a pause, or no heartbeat ever came.
+    """
     heartbeat = context.link.state.heartbeat
     if heartbeat is None:
         return None

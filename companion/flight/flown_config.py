@@ -29,7 +29,7 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
     copied; they are named by their absolute path.
 
     Args:
-        config: configuration of the flight; its trajectory can be read.
+        config: configuration of the flight, whose trajectory was read without error.
         folder: folder of the flight.
         follows: whether the maneuvers of the configuration are flown, including its trajectory.
 

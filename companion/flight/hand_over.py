@@ -18,7 +18,7 @@ from companion.safety.actions import FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _REPETITION_PAUSE = 1.0
-"""Time from a landing that failed to the next request, s: the reason may be gone by then."""
+"""Time from a refused or unanswered landing command to the next one, s: the reason may be gone."""
 
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 """Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
@@ -26,7 +26,7 @@ ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFB
 _OBEYS_OR_LANDS = frozenset({Role.OFFBOARD, Role.LAND})
 
 _PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
-"""Called with the error of a request: raises it, or returns the `RequireOurs` of the next one."""
+"""Called with the error of a mode command: raises it, or returns `require_ours` for the retry."""
 
 
 async def hand_over_to_hold(context: FlightContext) -> None:
@@ -53,7 +53,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     """Ask the autopilot to land until it does, even if it refuses; then release.
 
     Before each repetition, a vehicle that still obeys us is asked to hold: ArduPilot would not hold
-    its position after our last setpoint. A hold that others command then is respected.
+    its position after our last setpoint. If others command a hold meanwhile, they keep control.
 
     Raises:
         FlightEnded: somebody else has the vehicle.
@@ -89,7 +89,7 @@ async def _hand_over(
     """Stop the motion, and command a mode until the autopilot has entered it; then release.
 
     A command that has no effect is sent again until the phase is over: a vehicle whose uplink loses
-    frames must not be left in the air. It is held where it is then, because it may have drifted.
+    frames must not be left in the air. Before each try, the vehicle is held at its present place.
     """
     releasing = asyncio.create_task(_release_once_left(context))
     try:
@@ -116,7 +116,7 @@ async def _release_once_left(context: FlightContext) -> None:
 
 
 async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
-    """Ask the autopilot to hold; go on without it if it does not, or if it lands meanwhile."""
+    """Ask the autopilot to hold, then release; do nothing more if that fails or it lands."""
     try:
         await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
     except (CommandRefused, CommandTimeout, LinkLost):

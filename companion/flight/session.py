@@ -137,7 +137,7 @@ class Session:
 
     @staticmethod
     async def _report_status(assembled: AssembledFlight) -> None:
-        """Record and show the state of the flight; a fault in it does not end the flight."""
+        """Record and show the state of the flight; an exception here does not end the flight."""
         try:
             await assembled.reporter.run()
         except Exception as error:

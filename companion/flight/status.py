@@ -23,7 +23,7 @@ _STATUS_PERIOD = 0.1
 _RATE_WINDOW = 1.0
 """Time over which the rate of setpoints is counted, s."""
 _MAX_TELEMETRY_AGE = 1.0
-"""A position or attitude that was received longer ago is unknown by now, s."""
+"""Age above which a position or attitude counts as unknown, s."""
 
 
 class FlightStatus(NamedTuple):
@@ -38,19 +38,19 @@ class FlightStatus(NamedTuple):
     detail: str
     """What the phase waits for."""
     elapsed: float
-    """Time in this phase, s."""
+    """Time since the phase began, s."""
     timeout: float
-    """Timeout of this phase, s; may be infinite."""
+    """Timeout of the phase, s; may be infinite."""
     maneuver: str | None = None
     """Name of the maneuver that is flown."""
     maneuver_elapsed: float = 0.0
-    """Time in this maneuver, s."""
+    """Time since the maneuver began, s."""
     maneuver_duration: float | None = None
-    """Duration of this maneuver, s; None: another program ends it."""
+    """Duration of the maneuver, s; None: no maneuver, or another program ends it."""
     height: float | None = None
     """Height above home, m."""
     speed: float | None = None
-    """Speed, m/s."""
+    """Speed, horizontal and vertical together, m/s."""
     tilt: float | None = None
     """Tilt, rad."""
     error: float | None = None
@@ -82,7 +82,7 @@ class StatusReporter:
 
     Args:
         context: context of the flight.
-        ladder: the safety monitors.
+        ladder: tells which safety monitors have raised an alarm.
         trace: receives the motion.
         began: when the flight began, s on our clock.
         phase: returns the running phase, and when it began, s on our clock.
@@ -121,7 +121,7 @@ class StatusReporter:
             await asyncio.sleep(due - self._clock())
 
     def _show_status(self) -> None:
-        """Show the state; after a fault of the observer it is only recorded."""
+        """Show the state; once the observer has raised an exception, show no more states."""
         if self._show is None:
             return
         try:

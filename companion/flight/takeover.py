@@ -87,7 +87,7 @@ def _require_armed_on_ground(context: FlightContext) -> None:
 
 
 async def offboard(context: FlightContext) -> None:
-    """Check the vehicle again, take over, and settle."""
+    """Check the vehicle again, take over, and hold for `_SETTLE_TIME`."""
     context.detail = "the preflight checks before the takeover"
     await context.preflight.require(Stage.AIRBORNE)
     await _wait_until_held(context)

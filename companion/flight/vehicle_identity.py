@@ -54,7 +54,7 @@ class SameVehicle:
     def commit(self) -> None:
         """Note that the vehicle is being armed: from now on a replacement ends the flight.
 
-        Silence is then a matter of the watch and the safety monitors.
+        From then on, only the watch and the safety monitors judge silence.
         """
         self._committed, self._past_silence = True, 0.0
 
@@ -153,7 +153,7 @@ class DragMemory:
         self.on_known: Callable[[KnownDrag], None] = lambda _: None
 
     def load(self, identity: Identity) -> KnownDrag:
-        """What is known of this vehicle's drag; it is read when the vehicle is first identified."""
+        """Return what is known of this vehicle's drag; the file is read only for a new vehicle."""
         if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid
             self._known_drag = of_vehicle(self._config, self._directory, identity.uid)

@@ -23,7 +23,7 @@ PX4 sends one every 0.5 s.
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
 _COUNTING_TIME = 0.1
-"""Time over which `set_rates` counts messages, s; nothing waits for it."""
+"""Time over which `set_rates` counts messages, s; the counts are not used."""
 
 
 class RateRequester:
@@ -134,12 +134,15 @@ class Watch:
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
     def ask_mode(self) -> None:
-        """Request a heartbeat; let the loop resume after a gap if its mode still obeys us."""
+        """Request a heartbeat; resume the setpoints after a gap if its mode obeys them."""
         # Without an answer the silence monitor ends the flight.
         self._mode_request = asyncio.create_task(self._confirm_control())
 
     async def _confirm_control(self) -> None:
-        """Wait for a fresh heartbeat, because one from the backlog may carry an old mode."""
+        """Wait for a fresh heartbeat; resume the setpoints if its mode obeys or awaits them.
+
+        A heartbeat from the backlog may carry an old mode.
+        """
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state
         roles = roles_of(self._context.link)
@@ -150,7 +153,7 @@ class Watch:
             loop.resume()
 
     def _judge_snapshot(self, now: float) -> None:
-        """Give the ladder a snapshot and carry out its verdict."""
+        """Let the safety ladder judge a snapshot, and take the action that it demands."""
         self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
         if snapshot.health.foreign:  # it may also be the autopilot's own setpoint, in a new mode
@@ -172,8 +175,8 @@ class Watch:
     def _judge_heartbeat(self, now: float) -> None:
         """Judge the age of the mode and of the heartbeat at `now`, the time of this judgement.
 
-        Unless we are in control, our own stalls do not count: what came meanwhile is read after
-        them, and a vehicle that takes off must not be left for a stall of ours.
+        While the autopilot does not obey us, stalls of this program do not count as age: heartbeats
+        that came during a stall are read after it, and a stall must not end a take-off.
         """
         state, loop = self._context.link.state, self._context.loop
         # While taking over, it may obey the first setpoint although no heartbeat has told so.

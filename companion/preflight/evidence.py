@@ -36,7 +36,7 @@ class Identity(NamedTuple):
     version: str | None = None
     """Version of the flight software, such as 4.7.0-dev."""
     capabilities: int | None = None
-    """MAV_PROTOCOL_CAPABILITY."""
+    """Bits of MAV_PROTOCOL_CAPABILITY."""
     uid: str | None = None
     """Hardware id in hexadecimal digits; `None` if the hardware has none."""
 
@@ -81,7 +81,7 @@ class SampleTimes(NamedTuple):
     clock_rate: float | None = None
     """Vehicle seconds per second of ours; `None` for too few samples."""
     age: float | None = None
-    """Median age of the samples at arrival, s; `None`: unknown (`VehicleClock`)."""
+    """Median age of the samples at arrival, s; `None`: TIMESYNC does not measure it."""
     clock_change: str = ""
     """Description of a jump or restart of the vehicle's clock; empty: none."""
     unusable: int = 0
@@ -153,7 +153,7 @@ class Evidence:
 
     @property
     def awaited(self) -> tuple[str, ...]:
-        """Messages that the vehicle cannot send yet."""
+        """Messages that the vehicle will send only when it has booted or has a position."""
         if not self.awaits_position:
             return ()
         return tuple(

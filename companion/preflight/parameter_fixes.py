@@ -118,11 +118,11 @@ Ask = Callable[[Finding], Awaitable[Answer]]
 
 
 class ChangeOutcome(NamedTuple):
-    """The outcome of a change."""
+    """Whether a parameter change was made, and why not."""
 
     change: ParameterChange
     refusal: str = ""
-    """Why it was not made; empty if it was made."""
+    """Why the change was not made; empty if it was made."""
 
 
 class VehicleArmedError(LinkError):

@@ -1,4 +1,4 @@
-"""Reads the parameters that matter to a flight from a vehicle."""
+"""Reads from a vehicle the parameters that matter to a flight."""
 
 import asyncio
 from collections.abc import Iterable, Mapping

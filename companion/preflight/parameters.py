@@ -34,7 +34,7 @@ def companion_settings(config: Config) -> CompanionSettings:
 
 
 def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Judge the parameters that were read, and those that were not."""
+    """Judge the values of the parameters, and report parameters that were not received."""
     rules, survey = evidence.autopilot.parameters, evidence.survey
     if not survey.values:
         yield Finding(

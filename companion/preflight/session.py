@@ -32,7 +32,7 @@ _POLL_PERIOD = 0.05
 _WARNING_SEVERITY = 4
 """MAV_SEVERITY of a warning; a lower number is worse."""
 _RELEASE_SUFFIXES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
-"""FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
+"""Version suffix by FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
 
 
 def wanted_rates(config: Config, link: Link) -> dict[str, float]:

@@ -79,7 +79,7 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset in the last 30 s; only a warning: references move with a reset."""
+    """The estimator was reset in the last 30 s: a warning only, as references move with a reset."""
     found = snapshot.resets
     if found.recent == 0:
         return None

@@ -22,12 +22,12 @@ class Verdict(NamedTuple):
 class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
-    The action HOLD gives up the maneuver, and the flight with it. If all breaches with this action
-    end within `hold_time`, the vehicle lands. Otherwise the action `Monitor.then` of a breach that
-    has not ended follows, the most severe one of several.
+    The action HOLD aborts the maneuver and ends the flight. If all breaches with this action end
+    within `hold_time`, the vehicle lands. Otherwise the most severe `Monitor.then` of the breaches
+    that have not ended is the next action.
 
     Args:
-        monitors: the table; among equally severe breaches the first row decides.
+        monitors: the monitors of the flight; among equally severe breaches the first one decides.
         hold_time: time allowed for a hold to end its breach, s.
 
     Attributes:

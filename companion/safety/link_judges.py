@@ -91,7 +91,7 @@ def round_trip(most: float) -> Judge:
 
 
 def late_setpoints(stale: float) -> Judge:
-    """Each probe answered in the last 0.7 s was answered later than after 1.5 times `stale`, s.
+    """Every probe answered in the last 0.7 s had a round trip longer than 1.5 times `stale`, s.
 
     `stale` is the largest age of a sample that is answered. If its setpoint takes as long again,
     the vehicle tilts in growing swings, while all telemetry still looks good.

@@ -91,7 +91,7 @@ def thrust(lowest: float, highest: float) -> Judge:
 
 
 def outside(fence: Fence) -> Judge:
-    """The vehicle is outside the fence, or, for one in latitude and longitude, that is unknown."""
+    """The vehicle is outside the fence, or its place is unknown and the fence is in degrees."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion

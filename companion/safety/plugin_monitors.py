@@ -1,8 +1,8 @@
 """Monitors of other packages: they run beside ours, and cannot stop or soften them.
 
-Each stands in the table twice: as it was made, and as a monitor of its own faults. A judge that
-raises is not asked again, and the vehicle is handed back: a flight that was to be watched must not
-go on unwatched.
+Each one has two rows in the table: the monitor itself, and a second monitor whose breach is an
+exception of the first one's judge. A judge that raises is not called again, and the vehicle is
+handed back, because the flight must not go on without a monitor that the user wanted.
 """
 
 from collections.abc import Callable
@@ -28,8 +28,8 @@ def plugin_monitors(config: Config) -> tuple[Monitor, ...]:
     """The monitors that `safety.monitors` names, two rows for each.
 
     Raises:
-        ConfigError: one cannot be loaded or made, or its judge fails on a snapshot in which nothing
-            is known.
+        ConfigError: a monitor cannot be loaded or made, or its judge fails on a snapshot in which
+            nothing is known.
     """
     return tuple(row for name in config.safety.monitors for row in _rows(name, config))
 

@@ -1,4 +1,4 @@
-"""Finds setpoints of another program, in what the autopilot reports that it obeys."""
+"""Detects setpoints of another program in the ATTITUDE_TARGET that the autopilot reports."""
 
 from collections import deque
 from math import isfinite
@@ -10,17 +10,16 @@ from companion.vehicle.autopilot import Autopilot
 _COUNTING_TIME = 5.0
 _KEPT_REPORTS = 256
 _THRUST_ROUNDING, _RATE_ROUNDING = 1e-7, 1e-6
-"""Largest difference from a setpoint of ours: ATTITUDE_TARGET has numbers of single precision.
-Thrust is a share of the full thrust, rates up to 10 rad/s."""
+"""Largest difference of a reported thrust (0..1) and body rate (rad/s) from our setpoint, because
+ATTITUDE_TARGET has single precision."""
 
 
 class SetpointEcho:
     """Compares the autopilot's ATTITUDE_TARGET with the setpoints that this program sent.
 
     While an autopilot obeys body rates, it reports the rates of the newest setpoint (PX4) or its
-    thrust (ArduPilot). In recorded flights of both real autopilots every report did. So one that
-    fits no setpoint of ours shows that another program sends setpoints, too: an autopilot obeys
-    whoever sends.
+    thrust (ArduPilot), as every report of recorded flights confirms. So a report that fits no
+    setpoint of ours shows that another program sends setpoints, too; the autopilot obeys both.
 
     Args:
         sent: the latest setpoints of this program, the newest last; they are appended elsewhere.
@@ -49,7 +48,8 @@ class SetpointEcho:
     def foreign_reports(self, now: float) -> int:
         """Number of reports of the last 5 s that show a setpoint of another program.
 
-        It remains 0 until a report has shown a setpoint of ours: the autopilot may change them.
+        The number remains 0 until a report has matched one of our setpoints, because an autopilot
+        may report changed setpoints.
         """
         return sum(now - at <= _COUNTING_TIME for at in self._foreign)
 

@@ -34,9 +34,9 @@ class Motion(NamedTuple):
     body_rates: Vector = (0.0, 0.0, 0.0)
     """Measured rates about the body axes, rad/s."""
     offset: Vector | None = None
-    """Position relative to the fence's centre, which is usually where control began, m, or None."""
+    """Position relative to the fence's centre (usually where control began), m NED, or None."""
     velocity: Vector = (0.0, 0.0, 0.0)
-    """m/s."""
+    """Velocity, m/s NED."""
     height: float | None = None
     """Height above home, m, or None; in the autopilot's frame, with estimator resets."""
     tracking_error: float | None = None
@@ -96,7 +96,7 @@ class Health(NamedTuple):
     position_rate: float | None = None
     """Rate of positions, Hz."""
     uplink: Uplink = Uplink()
-    """The way to the vehicle, over the last moments."""
+    """Present delay and loss on the link to the vehicle."""
     foreign: int = 0
     """Number of reports of the last 5 s in which the autopilot obeyed another program's setpoint
     (`SetpointEcho`)."""

@@ -29,7 +29,7 @@ _MIN_CLOCK_SETBACK = 0.5
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
 _TIMESYNC_WAIT = 3.0
-"""Time allowed for TIMESYNC after the first sample, s; then an unknown age is reported."""
+"""Time from the first sample to the report that TIMESYNC does not measure ages, s."""
 
 
 class VehicleClock:
@@ -169,7 +169,7 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _adapt_to(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Take a misfit, or the first stamp that fits again; return why it is not used, or None."""
+        """Adapt to a misfit or to the first stamp after misfits; return the misfit, or None."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
@@ -226,7 +226,7 @@ class VehicleClock:
             self._accept_jump(-late, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
-        """Drop the misfits; the first time that one was stamped ahead of the clock, report it."""
+        """Drop the misfits; report the first one ever that is stamped ahead of the clock."""
         ahead = any(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True

@@ -82,7 +82,7 @@ class ClockRate:
 
 
 class DelayUnknown(Enum):
-    """Why the delay is not known."""
+    """Why the delay of the quickest sample is not known."""
 
     UNANSWERED = "the autopilot does not answer TIMESYNC"
     OTHER_CLOCK = "TIMESYNC uses a different clock than time_boot_ms"
@@ -94,7 +94,7 @@ class _Exchange(NamedTuple):
     at: float
     """Event-loop time of the answer, s."""
     first_error: float
-    """Largest error of the delay at that time, s."""
+    """Largest error of `delay` at the time `at`, s."""
     delay: float
     """TIMESYNC's offset minus the quickest sample's, s."""
 

@@ -86,7 +86,7 @@ class _Reader:
     rates_with_euler: list[Row] = field(default_factory=list)
     """Body rates from ATTITUDE."""
     specific_thrust: list[Row] = field(default_factory=list)
-    """From the accelerometer."""
+    """The accelerometer's −z axis; see `FlightLog.specific_thrust`."""
     _autopilot: Autopilot | None = None
     _obeying: bool = False
     _unconfirmed: list[Row] = field(default_factory=list)

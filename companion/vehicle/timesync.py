@@ -26,7 +26,8 @@ _UPLINK_WINDOW = 0.7 * _NS_PER_S
 """Window of `Uplink.round_trip`, ns: it uses only probes answered in the last 0.7 s. A link that
 becomes slow is noticed after about this time: until then the answers from before still count."""
 _MIN_PROBES = 6
-"""Fewer probes sent in this window say nothing: probing has just begun, or begun again."""
+"""Smallest number of probes sent in `_UPLINK_WINDOW` to judge the link: with fewer, probing has
+just begun."""
 _KEPT_REQUESTS = 16
 """Number of unanswered requests of each kind that are kept, and of round trips."""
 
@@ -43,7 +44,7 @@ class Uplink(NamedTuple):
 
 
 class _Requests:
-    """Our requests of one kind: the unanswered ones, and the round trips of the latest others.
+    """Our requests of one kind: the unanswered ones, and the latest round trips of answered ones.
 
     All times are event-loop times, ns.
     """
@@ -58,7 +59,7 @@ class _Requests:
         self._unanswered.append(stamp)
 
     def take_answer(self, stamp: int, now: int) -> bool:
-        """Take the answer to the request sent at `stamp`; return False if there is none."""
+        """Take the answer to the request sent at `stamp`; return False if there is no such one."""
         if stamp not in self._unanswered:
             return False
         self._unanswered.remove(stamp)
