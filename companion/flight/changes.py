@@ -191,9 +191,9 @@ class Changes:
         Raises:
             ChangeRefusedError: nothing can change in this flight, or the values are equal.
         """
-        fixed = fixed_because(self.start)
-        if fixed is not None:
-            raise ChangeRefusedError(f"{by}: {fixed}; nothing has changed")
+        why_fixed = fixed_because(self.start)
+        if why_fixed is not None:
+            raise ChangeRefusedError(f"{by}: {why_fixed}; nothing has changed")
         keys = tuple(differences(self.wanted, wanted))
         if not keys:
             raise ChangeRefusedError(

@@ -59,15 +59,15 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         FlightEnded: somebody else has the vehicle.
     """
     require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
-    refused = False
+    refusal_noted = False
 
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
 
     async def prepare(error: LinkError) -> RequireOurs:
-        nonlocal refused
-        if isinstance(error, CommandRefused) and not refused:
-            refused = True
+        nonlocal refusal_noted
+        if isinstance(error, CommandRefused) and not refusal_noted:
+            refusal_noted = True
             context.note(f"{error}; the landing is requested again every second")
         obeyed = in_role(context.link, Role.OFFBOARD)
         await asyncio.sleep(_REPETITION_PAUSE)
@@ -91,7 +91,7 @@ async def _hand_over(
     A command that has no effect is sent again until the phase is over: a vehicle whose uplink loses
     frames must not be left in the air. Before each try, the vehicle is held at its present place.
     """
-    releasing = asyncio.create_task(_release_once_left(context))
+    release_task = asyncio.create_task(_release_once_left(context))
     try:
         while True:
             _stop_moving(context)
@@ -104,7 +104,7 @@ async def _hand_over(
             if done():
                 break
     finally:
-        await cancel(releasing)
+        await cancel(release_task)
     context.release()
 
 

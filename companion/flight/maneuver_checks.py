@@ -98,21 +98,21 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
             raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
 
 
-def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDrag) -> None:
+def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: KnownDrag) -> None:
     """Check the maneuvers again, because the limits or the vehicle have changed.
 
     The check uses the trajectory that is flown; it is not read or slowed down again.
 
     Args:
-        config: the changed configuration; its maneuvers are those of `flown`.
-        flown: the maneuvers that were made when the flight began.
+        config: the changed configuration; its maneuvers are those of `sequence`.
+        sequence: the maneuvers that were made when the flight began.
         drag: drag of the vehicle.
 
     Raises:
         ConfigError: a maneuver cannot be computed, or not be flown within the limits and the
             fence.
     """
-    for part in flown.parts:
+    for part in sequence.parts:
         if not isinstance(part, Follow):
             require_flyable(config, part, drag)
             continue
@@ -200,8 +200,8 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
 
 def with_reserve(config: Config, envelope: Envelope) -> Envelope:
     """The limits with a tilt that keeps `flight.slow_down_reserve_m_s2` of acceleration unused."""
-    most = config.limits.largest_horizontal - config.flight.slow_down_reserve_m_s2
-    return replace(envelope, max_tilt=atan(most / GRAVITY))
+    max_acceleration = config.limits.largest_horizontal - config.flight.slow_down_reserve_m_s2
+    return replace(envelope, max_tilt=atan(max_acceleration / GRAVITY))
 
 
 def _fence_check(config: Config, origin: Place | None) -> FenceCheck:

@@ -95,7 +95,7 @@ class Session:
         environment = self._environment
         config = self.changes.begin_flight()
         record = FlightFiles(
-            config, self._folder, environment, self.note, follows=self._plan is None
+            config, self._folder, environment, self.note, flies_maneuvers=self._plan is None
         )
         settings = realtime_settings(self._config) if environment.realtime else RealtimeSettings()
         with realtime.requested(settings) as grants, record:

@@ -89,7 +89,7 @@ class Watch:
         self._rate_requester = rate_requester
         # Whether setpoints were stopped while the autopilot obeyed them: it may still wait for us.
         self._stopped_in_control = False
-        self._status_at = self._heartbeat_asked_at = -inf
+        self._current_mode_at = self._heartbeat_asked_at = -inf
         self._heartbeat_request: asyncio.Task[None] | None = None
         self._mode_request: asyncio.Task[None] | None = None
 
@@ -121,15 +121,15 @@ class Watch:
             FlightEnded: the phase must end; see `judge`.
         """
         now = self._clock()
-        early, self._status_at = now - self._status_at < _CURRENT_MODE_PERIOD, now
-        if early:
+        is_early, self._current_mode_at = now - self._current_mode_at < _CURRENT_MODE_PERIOD, now
+        if is_early:
             self._request_heartbeat(now)
         self.judge(phase)
 
     def _request_heartbeat(self, now: float) -> None:
         """Request a heartbeat, unless one was requested within `_HEARTBEAT_REQUEST_PERIOD`."""
-        asking = self._heartbeat_request is not None and not self._heartbeat_request.done()
-        if not asking and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
+        is_requesting = self._heartbeat_request is not None and not self._heartbeat_request.done()
+        if not is_requesting and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
             self._heartbeat_asked_at = now
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
@@ -148,15 +148,16 @@ class Watch:
         roles = roles_of(self._context.link)
         # The takeover needs the stream before offboard is entered. During a failsafe the stream
         # must not resume, because it would end the failsafe.
-        entering = loop.taking_over and Role.READY in roles and not state.failsafe
-        if loop.awaiting_mode and (Role.OFFBOARD in roles or entering):
+        may_enter = loop.taking_over and Role.READY in roles and not state.failsafe
+        if loop.awaiting_mode and (Role.OFFBOARD in roles or may_enter):
             loop.resume()
 
     def _judge_snapshot(self, now: float) -> None:
         """Let the safety ladder judge a snapshot, and take the action that it demands."""
         self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
-        if snapshot.health.foreign:  # it may also be the autopilot's own setpoint, in a new mode
+        # A foreign setpoint may also be the autopilot's own, in a new mode.
+        if snapshot.health.foreign_reports:
             self._request_heartbeat(now)
         self._rate_requester.check(snapshot.health)
         verdict = self._safety_ladder.step(snapshot)

@@ -99,12 +99,12 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     yield from failsafe(state)
     ready = state.readiness
     if stage is Stage.AIRBORNE:  # the pre-arm checks no longer apply
-        ready = ready._replace(prearm_good=True)
+        ready = ready._replace(prearm_passed=True)
     missing = evidence.autopilot.not_ready(ready)
     texts = "; ".join(dict.fromkeys(evidence.warnings))
     if missing is not None:
-        silent = evidence.awaited
-        unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
+        awaited = evidence.awaited_messages
+        unsent = f", and does not send {', '.join(awaited)} yet" if awaited else ""
         yield Finding(
             Key.READY,
             NOT_READY,
@@ -166,13 +166,12 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the attitude samples are usable."""
-    samples = evidence.samples
-    if samples.unusable:
+    unusable, count = evidence.samples.unusable_count, evidence.samples.sample_count
+    if unusable:
         yield Finding(
             Key.ATTITUDE,
-            UNSAFE if samples.unusable > _MAX_UNUSABLE_SHARE * samples.received else INEFFECTIVE,
-            f"{samples.unusable} of {samples.received} attitude samples are no unit quaternion of "
-            "finite numbers",
+            UNSAFE if unusable > _MAX_UNUSABLE_SHARE * count else INEFFECTIVE,
+            f"{unusable} of {count} attitude samples are no unit quaternion of finite numbers",
             "they are not answered, and if that lasts, control is given back",
             "wait until the estimator has settled; if this goes on, do not fly",
             "ATTITUDE_QUATERNION",

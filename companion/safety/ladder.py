@@ -44,10 +44,10 @@ class SafetyLadder:
         self._alarms = [Alarm(monitor) for monitor in monitors]
         self._hold_time = hold_time
         self._held_at: float | None = None
-        self._held_for = ""
+        self._hold_reason = ""
 
     @property
-    def raised(self) -> tuple[str, ...]:
+    def raised_alarms(self) -> tuple[str, ...]:
         """The names of the monitors with a raised alarm."""
         return tuple(alarm.monitor.name for alarm in self._alarms if alarm.reason is not None)
 
@@ -62,7 +62,7 @@ class SafetyLadder:
         if self._held_at is not None:
             return self._after_hold(snapshot.now, self._held_at)
         if worst is not None and worst.monitor.action is Action.HOLD:
-            self._held_at, self._held_for = snapshot.now, worst.reason or ""
+            self._held_at, self._hold_reason = snapshot.now, worst.reason or ""
             return _verdict(worst, Action.HOLD)
         return None
 
@@ -70,7 +70,7 @@ class SafetyLadder:
         """The verdict after the hold has ended its breach or `hold_time` is over; else None."""
         breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
         if not breaches:
-            return Verdict(Action.LAND, self._held_for)
+            return Verdict(Action.LAND, self._hold_reason)
         if now - held_at < self._hold_time:
             return None
         worst = max(breaches, key=lambda alarm: alarm.monitor.then.severity)

@@ -97,8 +97,8 @@ def outside(fence: Fence) -> Judge:
         motion = snapshot.motion
         if motion.offset is None:
             return None
-        found = fence.breach(motion.offset, motion.height, motion.origin)
-        return None if found is None else str(found)
+        breach = fence.breach(motion.offset, motion.height, motion.origin)
+        return None if breach is None else str(breach)
 
     return judge
 
@@ -111,9 +111,9 @@ def braking(fence: Fence) -> Judge:
         offset, velocity, height = motion.offset, motion.velocity, motion.height
         if offset is None or fence.breach(offset, height, motion.origin) is not None:
             return None
-        found = fence.stop_breach(
+        breach = fence.stop_breach(
             offset, velocity, height, motion.origin, acceleration=motion.acceleration
         )
-        return None if found is None else f"braking now would end {found}"
+        return None if breach is None else f"braking now would end {breach}"
 
     return judge

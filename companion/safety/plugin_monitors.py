@@ -35,30 +35,32 @@ def plugin_monitors(config: Config) -> tuple[Monitor, ...]:
 
 
 def _rows(name: str, config: Config) -> tuple[Monitor, Monitor]:
-    where = f"safety.monitors: {name}"
+    setting = f"safety.monitors: {name}"
     try:
         factory = plugins.load(plugins.MONITORS, name)
         with naming_user_code("monitor", factory):
             monitor = factory(config)
     except (plugins.PluginError, UserCodeError) as error:
-        raise ConfigError(f"{where}: {error}") from error
+        raise ConfigError(f"{setting}: {error}") from error
     if not isinstance(monitor, Monitor):
-        raise ConfigError(f"{where} made no companion.safety.monitor.Monitor but {monitor!r}")
+        raise ConfigError(f"{setting} made no companion.safety.monitor.Monitor but {monitor!r}")
     if monitor.action not in _ACTIONS or monitor.then not in _AFTER_HOLD:
         raise ConfigError(
-            f"{where}: its action must be WARN, HOLD, HAND_BACK or LAND, and what follows a hold "
+            f"{setting}: its action must be WARN, HOLD, HAND_BACK or LAND, and what follows a hold "
             "HAND_BACK or LAND"
         )
-    guarded = GuardedJudge(monitor)
-    guarded.judge(Snapshot(0.0), False)
-    if guarded.fault is not None:
-        raise ConfigError(f"{where} cannot be used where a value is not known: {guarded.fault}")
+    guarded_judge = GuardedJudge(monitor)
+    guarded_judge.judge(Snapshot(0.0), False)
+    if guarded_judge.fault is not None:
+        raise ConfigError(
+            f"{setting} cannot be used where a value is not known: {guarded_judge.fault}"
+        )
     return (
-        replace(monitor, name=name, judge=guarded.judge, stream=Stream.CONTINUES),
+        replace(monitor, name=name, judge=guarded_judge.judge, stream=Stream.CONTINUES),
         replace(
             monitor,
             name=f"{name} (its fault)",
-            judge=guarded.judge_fault,
+            judge=guarded_judge.judge_fault,
             action=Action.HAND_BACK,
             lasts=0.0,
             stream=Stream.CONTINUES,

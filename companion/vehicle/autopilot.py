@@ -30,13 +30,13 @@ class Role(Enum):
 class Readiness(NamedTuple):
     """Telemetry that decides whether a vehicle can be armed and flown; `None`: not known now."""
 
-    prearm_good: bool | None
+    prearm_passed: bool | None
     """Whether the autopilot's own pre-arm checks pass."""
     estimator_flags: int | None
     """ESTIMATOR_STATUS_FLAGS."""
-    position: bool
+    has_position: bool
     """Whether a finite local position was received in the last 5 s."""
-    home: bool
+    has_home: bool
     """Whether the home position was received."""
 
 

@@ -52,7 +52,7 @@ class VehicleClock:
     """
 
     def __init__(self, *, lockstep: bool = False) -> None:
-        self.rate = ClockRate(fixed=lockstep)
+        self.rate = ClockRate(same_clock=lockstep)
         self.delay = TelemetryDelay()
         self.changes = self.restarts = 0
         self.last_change = ""
@@ -103,7 +103,7 @@ class VehicleClock:
         """
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
-        quickest = self._quickest + self.rate.slowest * (received - self._received)
+        quickest = self._quickest + self.rate.lowest_rate * (received - self._received)
         fits = time > self._newest and ahead <= quickest + SMALLEST_JUMP
         if not fits or self._misfits.stamps:
             misfit = self._adapt_to(Stamp(time, ahead, received), time_boot_ms, quickest)
@@ -115,7 +115,7 @@ class VehicleClock:
         if late < 0.0:
             quickest, late = ahead, 0.0
         self._quickest, self._received, self._newest, self._late = quickest, received, time, late
-        if received >= self.rate.due:
+        if received >= self.rate.note_due:
             self.rate.note(received, quickest)
         return SampleTiming(time, late + self.delay.seconds)
 
@@ -162,7 +162,7 @@ class VehicleClock:
         self._reported_unknown = not self.age_known
         if self._reported_unknown:
             self.on_event(
-                f"the age of telemetry is not known, because {self.delay.unknown.value}; "
+                f"the age of telemetry is not known, because {self.delay.why_unknown.value}; "
                 "a sample that arrives later than the others is noticed, but not a delay of all"
             )
         else:
@@ -196,8 +196,8 @@ class VehicleClock:
         Exchanges after the last sample that fitted do not count, because the clock may have jumped
         before them.
         """
-        most = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
-        return stamp.time > self._newest and stamp.ahead - quickest <= most
+        largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
+        return stamp.time > self._newest and stamp.ahead - quickest <= largest_delay
 
     def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
         """Add a misfit to the others; if they show a jump of the clock, accept it, return None."""

@@ -88,7 +88,7 @@ class ParameterRule:
     universal: bool = False
     """Whether every supported version has the parameter, with some unsafe values. If it was not
     received on a link that loses frames, it may have such a value."""
-    instead: str = ""
+    alternative: str = ""
     """Name of the rule for the parameter that other versions have in its place."""
     reboot: bool = False
     """Whether a change takes effect only after the autopilot restarts."""

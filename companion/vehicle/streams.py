@@ -22,7 +22,7 @@ _ROUNDING = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not l
 class StreamRate(NamedTuple):
     """The rate of one message, as requested, granted and measured, Hz."""
 
-    asked: float
+    requested: float
     """Requested rate; 0 requests that the message stops."""
     granted: float
     """Rate that the autopilot accepted; 0 if it refused all rates."""

@@ -66,11 +66,11 @@ class _Requests:
         self._round_trips.append((now, now - stamp))
         return True
 
-    def unanswered_since(self, stamp: int) -> int:
-        """Number of unanswered requests sent after `stamp`."""
-        return sum(sent > stamp for sent in self._unanswered)
+    def unanswered_count(self, since: int) -> int:
+        """Number of unanswered requests sent after `since`."""
+        return sum(sent > since for sent in self._unanswered)
 
-    def sent(self, since: float) -> int:
+    def sent_count(self, since: float) -> int:
         """Number of requests sent at `since` or later."""
         answered = sum(ended - trip >= since for ended, trip in self._round_trips)
         return answered + sum(stamp >= since for stamp in self._unanswered)
@@ -147,11 +147,11 @@ class TimeSync:
         after 16 s.
         """
         since = self._now_ns() - _UPLINK_WINDOW
-        judged = self._probes.sent(since) >= _MIN_PROBES
-        answered = self._newest_answered
+        enough_probes = self._probes.sent_count(since) >= _MIN_PROBES
+        newest_answered = self._newest_answered
         return Uplink(
-            min(self._probes.round_trips(since), default=None) if judged else None,
-            None if answered is None else self._probes.unanswered_since(answered),
+            min(self._probes.round_trips(since), default=None) if enough_probes else None,
+            None if newest_answered is None else self._probes.unanswered_count(newest_answered),
         )
 
     def _send_request(self, requests: _Requests, stamp: int) -> None:
