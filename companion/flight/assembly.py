@@ -147,7 +147,7 @@ def _reporter(
     *,
     real_time: bool,
 ) -> StatusReporter:
-    """The reporter of the flight's state; it shows the state only if an observer uses it."""
+    """The reporter of the flight's state, which is shown only if an observer uses it."""
 
     def phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began

@@ -1,4 +1,4 @@
-"""Bounds of a change in flight, in addition to the types and ranges of the keys."""
+"""Bounds on changes of values in flight, in addition to the types and ranges of the keys."""
 
 from math import inf
 

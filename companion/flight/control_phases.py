@@ -25,7 +25,7 @@ _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
 _MIN_HOLDING_TILT = 5.0
-"""Tilt that the thrust must at least allow, °: the vehicle must hold against a breeze."""
+"""Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
 
 _MARGIN_WINDOW = 1.0
 """Window over which `_TiltMargin` takes the maximum of the allowed tilt, s."""

@@ -21,8 +21,8 @@ class Environment:
     clock_ns: Callable[[], int] = perf_counter_ns
     """Clock for latencies and for the arrival stamps of transports, ns."""
     realtime: bool = True
-    """True: real time, and the section `realtime` is requested from the operating system. False: a
-    virtual clock."""
+    """Whether the flight runs in real time, and requests the section `realtime` from the operating
+    system. False: a virtual clock."""
     stream: SendBatch | None = None
     """Takes batches of the messages that the flight records, in the recording thread; or None."""
 

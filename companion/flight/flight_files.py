@@ -22,7 +22,7 @@ from companion.recording.recorder import FlightRecorder
 from companion.recording.tlog import TlogWriter
 
 _SUMMARY_RESERVE = 1 << 18
-"""Room kept for `summary.json`, bytes; most take less than 10 kB, and every event adds to them."""
+"""Disk space reserved for `summary.json`, bytes; most need less than 10 kB."""
 
 
 class FlightFiles:
@@ -60,12 +60,12 @@ class FlightFiles:
         self._config, self.folder, self._note = config, folder, note
         self._counted_before: dict[str, int] = {}
         self._ended_at = 0.0
-        self._failure_reported = self._opened = False
+        self._failure_reported = self._is_open = False
         self.tap: TlogWriter | None = None
         self.mcap: FlightRecorder | None = None
         if folder is not None:
             flown_config.record(config, folder, flies_maneuvers=flies_maneuvers)
-            self._room = ReservedSpace(folder, _SUMMARY_RESERVE)
+            self._reserved_space = ReservedSpace(folder, _SUMMARY_RESERVE)
             loop = asyncio.get_running_loop()
             in_vehicle_time = config.link.lockstep or not environment.realtime
             epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
@@ -90,17 +90,17 @@ class FlightFiles:
         """Create `flight.tlog` and `flight.mcap`, both or none.
 
         Raises:
-            OSError: one cannot be created.
+            OSError: a file cannot be created.
         """
         with ExitStack() as opened:
             for file in (self.tap, self.mcap):
                 if file is not None:
                     opened.enter_context(file)
             opened.pop_all()
-        self._opened = True
+        self._is_open = True
 
     def __enter__(self) -> "FlightFiles":
-        if not self._opened:
+        if not self._is_open:
             self.open()
         return self
 
@@ -116,7 +116,7 @@ class FlightFiles:
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """An observer that records phases and events (STATUSTEXTs), and passes them on."""
+        """An observer that records phases and events, as STATUSTEXTs, too, and passes them on."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
@@ -150,7 +150,7 @@ class FlightFiles:
             grants: which requested real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
-        dead_times = assembled.dead_time_watch.over_the_flight()
+        dead_times = assembled.dead_time_watch.measure_whole_flight()
         advised = advice(assembled, dead_times)
         for text in advised:  # shown with the figures, not here
             if text == dead_times.warning():
@@ -193,7 +193,7 @@ class FlightFiles:
         if folder is None:
             return completed
         text = completed.as_json() + "\n"
-        self._room.free()
+        self._reserved_space.free()
         failure = write_with_timeout(folder / "summary.json", text)
         if failure is not None:
             self._note(f"{folder}: summary.json was not written: {failure}")

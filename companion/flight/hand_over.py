@@ -69,12 +69,12 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         if isinstance(error, CommandRefused) and not refusal_noted:
             refusal_noted = True
             context.note(f"{error}; the landing is requested again every second")
-        obeyed = in_role(context.link, Role.OFFBOARD)
+        was_offboard = in_role(context.link, Role.OFFBOARD)
         await asyncio.sleep(_REPETITION_PAUSE)
-        if obeyed and not landing():
+        if was_offboard and not landing():
             await _hold_meanwhile(context, landing)
-        obeys = in_role(context.link, Role.OFFBOARD)
-        return requiring_roles(context.link, _OBEYS_OR_LANDS) if obeys else require_ours
+        is_offboard = in_role(context.link, Role.OFFBOARD)
+        return requiring_roles(context.link, _OBEYS_OR_LANDS) if is_offboard else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 

@@ -27,7 +27,7 @@ _COUNTING_TIME = 0.1
 
 
 class RateRequester:
-    """Requests a message again if its rate has become too low, as another station may cause.
+    """Requests a message again if its rate has become too low: another station may have changed it.
 
     It sends SET_MESSAGE_INTERVAL at most once a flight for each message, and does not block.
 

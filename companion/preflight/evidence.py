@@ -79,7 +79,7 @@ class SampleTimes(NamedTuple):
     not_newer_count: int = 0
     """Number of samples stamped no later than the one before."""
     clock_rate: float | None = None
-    """Vehicle seconds per second of ours; `None` for too few samples."""
+    """Seconds of the vehicle's clock per second of ours; `None` for too few samples."""
     age: float | None = None
     """Median age of the samples at arrival, s; `None`: TIMESYNC does not measure it."""
     clock_change: str = ""

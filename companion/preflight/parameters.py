@@ -55,8 +55,8 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 + evidence.autopilot.name,
             )
     yield from _missing_parameters(evidence)
-    for found in judge(rules, survey.values, companion_settings(config)):
-        yield _finding(found, survey.names[found.rule.name])
+    for result in judge(rules, survey.values, companion_settings(config)):
+        yield _finding(result, survey.names[result.rule.name])
 
 
 def _unknown(rule: ParameterRule, found: str, fix: str) -> Finding:
@@ -99,19 +99,19 @@ def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
     return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread)
 
 
-def _finding(found: ParameterFinding, name: str) -> Finding:
+def _finding(result: ParameterFinding, name: str) -> Finding:
     change, fix = None, ""
-    if found.set_to is not None:
-        change = ParameterChange(name, found.value, found.set_to, found.rule.reboot)
-        fix = f"set {name} to {found.set_to:g}"
-        if found.rule.reboot:
+    if result.set_to is not None:
+        change = ParameterChange(name, result.value, result.set_to, result.rule.reboot)
+        fix = f"set {name} to {result.set_to:g}"
+        if result.rule.reboot:
             fix += " and restart the autopilot"
     return Finding(
-        found.rule.name,
-        found.result,
-        f"{name} is {found.value:g}",
-        found.because or found.rule.meaning,
+        result.rule.name,
+        result.result,
+        f"{name} is {result.value:g}",
+        result.because or result.rule.meaning,
         fix,
-        found.rule.source,
+        result.rule.source,
         change,
     )

@@ -11,7 +11,7 @@ from companion.vehicle.streams import StreamRate
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _MIN_RATE_SHARE = 0.7
-"""Smallest share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
+"""Smallest accepted share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
 _FULL_RATE_SHARE = 0.95
 """Share of the requested rate from which a rate counts as reached."""
 _MIN_EXPECTED_COUNT = 5.0

@@ -49,7 +49,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
             Key.BATTERY,
             INEFFECTIVE,
             "the vehicle does not report its battery's charge",
-            "limits.min_battery_percent protects nothing",
+            "limits.min_battery_percent has no effect",
             "set the battery's capacity or number of cells in the autopilot",
             source,
         )
@@ -131,7 +131,7 @@ def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE,
             fault if seen is None else f"{fault}; satellites in its last message: {seen}",
             "the vehicle does not know where it is",
-            "wait for its fix, in the open",
+            "wait for a GPS fix, with a clear view of the sky",
             source,
         )
 

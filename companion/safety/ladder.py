@@ -80,7 +80,7 @@ class SafetyLadder:
         """Report that an alarm was raised or ended; return whether it was raised."""
         name = alarm.monitor.name
         if alarm.reason is None:
-            self.note(f"safety: {name} is over")
+            self.note(f"safety: {name} alarm is over")
             self.on_change(False, name, "", "")
         else:
             self.breaches[alarm.reason] = name

@@ -114,11 +114,11 @@ def late_setpoints(stale: float) -> Judge:
 def lost_setpoints(max_unanswered: int) -> Judge:
     """More than `max_unanswered` TIMESYNC probes in a row were sent and not answered.
 
-    The telemetry still comes, otherwise `silence` has ended control before.
+    Telemetry still arrives: without it, the judge `silence` would have ended control earlier.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
-        unanswered = snapshot.health.uplink.unanswered
+        unanswered = snapshot.health.uplink.unanswered_count
         if unanswered is None or unanswered <= max_unanswered:
             return None
         return (

@@ -21,7 +21,7 @@ _ACTIONS = (Action.WARN, Action.HOLD, Action.HAND_BACK, Action.LAND)
 _AFTER_HOLD = (Action.HAND_BACK, Action.LAND)
 
 MonitorFactory = Callable[[Config], Monitor]
-"""What an entry point in `companion.monitors` names: makes a monitor for a configuration."""
+"""Makes a monitor for a configuration; entry points in `companion.monitors` name such functions."""
 
 
 def plugin_monitors(config: Config) -> tuple[Monitor, ...]:
@@ -46,8 +46,8 @@ def _rows(name: str, config: Config) -> tuple[Monitor, Monitor]:
         raise ConfigError(f"{setting} made no companion.safety.monitor.Monitor but {monitor!r}")
     if monitor.action not in _ACTIONS or monitor.then not in _AFTER_HOLD:
         raise ConfigError(
-            f"{setting}: its action must be WARN, HOLD, HAND_BACK or LAND, and what follows a hold "
-            "HAND_BACK or LAND"
+            f"{setting}: its action must be WARN, HOLD, HAND_BACK or LAND, and "
+            "`then`, its action after a hold, HAND_BACK or LAND"
         )
     guarded_judge = GuardedJudge(monitor)
     guarded_judge.judge(Snapshot(0.0), False)

@@ -70,7 +70,7 @@ class Control(NamedTuple):
     last_heard: float = inf
     """When the arrival of a frame of any kind from the vehicle was last noticed."""
     position_fresh: bool = True
-    """Whether the newest position is fresh."""
+    """Whether the newest position is not older than deadman.position_stale_ms."""
     clock_change: str | None = None
     """Latest jump, stop or restart of the vehicle's clock since control began, in words, or
     None."""

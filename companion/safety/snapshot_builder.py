@@ -98,7 +98,7 @@ class SnapshotBuilder:
         return silence if silence > UNHEARD_S else None
 
     def listen(self, now: float) -> None:
-        """Take the counters at `now`; the watch calls this at least 50 times a second."""
+        """Read the counters at `now`; the watch calls this at least 50 times a second."""
         frames = self._link.stats.frames
         if frames != self._frames_heard:
             self._frames_heard, self._heard_at = frames, now

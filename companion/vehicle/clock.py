@@ -163,7 +163,7 @@ class VehicleClock:
         if self._reported_unknown:
             self.on_event(
                 f"the age of telemetry is not known, because {self.delay.why_unknown.value}; "
-                "a sample that arrives later than the others is noticed, but not a delay of all"
+                "a single late sample is noticed, but a delay of all samples is not"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")

@@ -38,7 +38,7 @@ class Uplink(NamedTuple):
     round_trip: float | None = None
     """Shortest round trip of the probes answered in the last 0.7 s, s; None: none was, or fewer
     than six were sent."""
-    unanswered: int | None = None
+    unanswered_count: int | None = None
     """Number of probes sent since the newest request that was answered, at most 16; None: the
     vehicle has not answered any TIMESYNC request."""
 

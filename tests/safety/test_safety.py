@@ -262,7 +262,7 @@ def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
     assert verdict.action is LAND
     assert "6.0 m from its reference" in verdict.reason
     assert after == pytest.approx(1.0, abs=0.021)
-    assert climb.told[-1] == "safety: tracking is over"
+    assert climb.told[-1] == "safety: tracking alarm is over"
 
 
 def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
@@ -281,7 +281,7 @@ def test_a_warning_is_told_once_and_when_it_is_over():
     climb = Climb()
     assert climb.see(health(lost_share=0.5), 4.0) == (None, None)
     assert climb.see(FINE, 4.0) == (None, None)
-    assert [text.split(":")[1] for text in climb.told] == [" link loss", " link loss is over"]
+    assert [text.split(":")[1] for text in climb.told] == [" link loss", " link loss alarm is over"]
 
 
 def test_an_action_can_be_set_but_not_everywhere_to_a_warning():
