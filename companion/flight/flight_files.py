@@ -151,8 +151,8 @@ class FlightFiles:
         """
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.measure_whole_flight()
-        advised = advice(assembled, dead_times)
-        for text in advised:  # shown with the figures, not here
+        advice_texts = advice(assembled, dead_times)
+        for text in advice_texts:  # shown with the figures, not here
             if text == dead_times.warning():
                 continue  # already reported in flight
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
@@ -175,7 +175,7 @@ class FlightFiles:
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            facts=facts_of(assembled, recorder.phases, result, advised),
+            facts=facts_of(assembled, recorder.phases, result, advice_texts),
         )
 
     def save(self, summary: Summary) -> Summary:

@@ -134,7 +134,7 @@ class Watch:
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
     def ask_mode(self) -> None:
-        """Request a heartbeat; resume the setpoints after a gap if its mode obeys them."""
+        """After a gap in the setpoints, request a heartbeat; resume them if its mode obeys us."""
         # Without an answer the silence monitor ends the flight.
         self._mode_request = asyncio.create_task(self._confirm_control())
 

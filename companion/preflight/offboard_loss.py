@@ -205,7 +205,9 @@ def _tilt_step(
     if reference.coefficients is not None:
         tilt_goal = reference.coefficients
         remaining_share = exp(-gain * period)
-        north_error, east_error = (goal - now for goal, now in zip(tilt_goal, tilt, strict=True))
+        north_error, east_error = (
+            goal - present for goal, present in zip(tilt_goal, tilt, strict=True)
+        )
         tilt_after = (
             tilt_goal[0] - north_error * remaining_share,
             tilt_goal[1] - east_error * remaining_share,

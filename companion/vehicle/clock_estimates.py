@@ -93,14 +93,14 @@ class _Exchange(NamedTuple):
 
     at: float
     """Event-loop time of the answer, s."""
-    error_at_first: float
+    initial_error: float
     """Largest error of `delay` at the time `at`, s."""
     delay: float
     """TIMESYNC's offset minus the quickest sample's, s."""
 
     def error(self, now: float) -> float:
         """Largest error of the delay at the event-loop time `now`, s."""
-        return self.error_at_first + MOST_DRIFT * (now - self.at)
+        return self.initial_error + MOST_DRIFT * (now - self.at)
 
 
 class TelemetryDelay:
@@ -149,7 +149,7 @@ class TelemetryDelay:
         before, self._implausible = self._implausible, exchange
         if before is None:
             return None
-        if abs(before.delay - delay) > before.error_at_first + error + _MAX_TIMESYNC_LAG:
+        if abs(before.delay - delay) > before.initial_error + error + _MAX_TIMESYNC_LAG:
             return None
         self._implausible = None
         if self._exchanges and delay < 0.0:
