@@ -37,8 +37,8 @@ from companion.guidance.plugin_guidance import PluginGuidance
 from companion.guidance.position_correction import PositionCorrection
 from companion.nmpc import Settings, Solver
 
-_LOCKSTEP_DEADLINE = 1.0
-"""Deadline of the solver in lockstep, where the vehicle waits, s of wall time."""
+_PATIENT_DEADLINE = 1.0
+"""Deadline of the solver if the vehicle waits for it, s of wall time."""
 
 
 def make_guidance(config: Config) -> Guidance:
@@ -141,24 +141,37 @@ def motion_estimate(
     )
 
 
-def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Predictive:
+def predictive(
+    config: Config, part: Follow, note: Callable[[str], None], *, waits: bool
+) -> Predictive:
     """Predictive control of one trajectory; starts its process.
+
+    Args:
+        config: configuration of the flight.
+        part: the trajectory as a maneuver.
+        note: called with messages for the user.
+        waits: whether the vehicle waits for the solver: in lockstep or on a virtual clock.
 
     Raises:
         ConfigError: see `predictive_settings`.
         MissingExtraError: the solver is not installed.
     """
-    settings = predictive_settings(config)
+    settings = predictive_settings(config, waits=waits)
     return Predictive(
         lambda report: Solver(settings, part.trajectory, report),
         period=settings.lead,
-        lockstep=config.link.lockstep,
+        waits=waits,
         note=note,
     )
 
 
-def predictive_settings(config: Config) -> Settings:
+def predictive_settings(config: Config, *, waits: bool = False) -> Settings:
     """The settings of predictive control: response and limits of the vehicle.
+
+    Args:
+        config: configuration of the flight.
+        waits: whether the vehicle waits for the solver, which then has no deadline within the
+            period of guidance.
 
     Raises:
         ConfigError: the planner's response is too fast for the steps of the horizon, or gravity
@@ -179,7 +192,7 @@ def predictive_settings(config: Config) -> Settings:
             min_thrust=min_thrust,
             max_thrust=max_thrust,
             lead=period,
-            deadline=_LOCKSTEP_DEADLINE if config.link.lockstep else period,
+            deadline=_PATIENT_DEADLINE if waits else period,
         )
     except ValueError as error:
         raise ConfigError(

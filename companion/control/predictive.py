@@ -15,9 +15,9 @@ from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
 
 _LONGEST_SOLVER_START = 30.0
-"""In lockstep, longest wait for the solver to start, s of wall time."""
+"""If the vehicle waits, longest wait for the solver to start, s of wall time."""
 _LONGEST_ANSWER_WAIT = 1.0
-"""In lockstep, longest wait for an answer, s of wall time."""
+"""If the vehicle waits, longest wait for an answer, s of wall time."""
 
 
 class Following(NamedTuple):
@@ -52,7 +52,8 @@ class Predictive:
     Args:
         solver: starts the solver's process; its argument is called with each trouble.
         period: period of guidance, s.
-        lockstep: whether to wait for the solver's answers, because the vehicle waits, too.
+        waits: whether to wait for the solver's answers, because the vehicle waits, too: in
+            lockstep or on a virtual clock.
         note: called with messages for the user.
 
     Attributes:
@@ -64,13 +65,13 @@ class Predictive:
         solver: Callable[[Callable[[Trouble, str], None]], Solver],
         *,
         period: float,
-        lockstep: bool,
+        waits: bool,
         note: Callable[[str], None],
     ) -> None:
         self.record = PredictiveRecord()
         self._note = note
         self._period = period
-        self._lockstep = lockstep
+        self._waits = waits
         self._number = 0
         self._inputs: deque[Input] = deque(maxlen=50)
         self._solver = solver(self._report)
@@ -113,9 +114,9 @@ class Predictive:
         return LinearCommand(target, target, down)
 
     def _answer(self, now: float) -> Answer | None:
-        if self._lockstep:
+        if self._waits:
             self._wait_until_ready()
-        answer = self._solver.take(_LONGEST_ANSWER_WAIT if self._lockstep else 0.0)
+        answer = self._solver.take(_LONGEST_ANSWER_WAIT if self._waits else 0.0)
         # The answer may be for an earlier step, if guidance has missed steps.
         if answer is None or abs(answer.time - now) > self._period:
             return None

@@ -6,7 +6,7 @@ from math import isfinite
 import numpy as np
 
 from companion.drag import Drag
-from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
+from companion.guidance.reference import GRAVITY, Reference, VehicleMotion, VerticalMode
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +112,7 @@ def acceleration_down(
             not hold the height, its vertical acceleration is commanded without drag and feedback.
     """
     wanted = ahead.acceleration_ned[2]
-    if reference.holds_height:
+    if reference.vertical is not VerticalMode.ACCELERATION:
         error = reference.position_ned[2] - motion.position_ned[2]
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)

@@ -141,8 +141,8 @@ class Reference(NamedTuple):
 
     @property
     def holds_height(self) -> bool:
-        """Whether the vertical acceleration contains a correction of the height."""
-        return self.vertical is not VerticalMode.ACCELERATION
+        """Whether the vehicle should be at the height of the reference."""
+        return self.vertical in (VerticalMode.HEIGHT, VerticalMode.HEIGHT_IN_STEPS)
 
     @property
     def thrust_is_steady(self) -> bool:

@@ -1,31 +1,38 @@
 """Monitors of other packages: they run beside ours, and cannot stop or soften them.
 
-Each one has two rows in the table: the monitor itself, and a second monitor whose breach is an
-exception of the first one's judge. A judge that raises is not called again, and the vehicle is
-handed back, because the flight must not go on without a monitor that the user wanted.
+Each one has three rows in the table: the monitor itself, one for exceptions of its judge, and one
+for the time that the judge takes. A judge that raises is not called again, and the vehicle
+is handed back, because the flight must not go on without a monitor that the user wanted. A slow
+judge delays the answers to samples, and a warning names it.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
+from time import perf_counter
 
 from companion import plugins
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.safety.actions import Action, Stream
-from companion.safety.monitor import Monitor
+from companion.safety.monitor import Monitor, with_hysteresis
 from companion.safety.snapshot import Snapshot
 from companion.user_code import UserCodeError, naming_user_code
 
 _ACTIONS = (Action.WARN, Action.HOLD, Action.HAND_BACK, Action.LAND)
 """The actions that a monitor of another package may have."""
 _AFTER_HOLD = (Action.HAND_BACK, Action.LAND)
+_MAX_JUDGING_TIME = 0.003
+"""Longest time that a judge may take, s: a sample comes every 4 ms, and must be answered."""
+_SLOW_DURATION = 0.5
+"""Time for which every call of a judge must be too slow before the warning, s; on a busy computer,
+only some are."""
 
 MonitorFactory = Callable[[Config], Monitor]
 """Makes a monitor for a configuration; entry points in `companion.monitors` name such functions."""
 
 
 def plugin_monitors(config: Config) -> tuple[Monitor, ...]:
-    """The monitors that `safety.monitors` names, two rows for each.
+    """The monitors that `safety.monitors` names, three rows for each.
 
     Raises:
         ConfigError: a monitor cannot be loaded or made, or its judge fails on a snapshot in which
@@ -34,7 +41,7 @@ def plugin_monitors(config: Config) -> tuple[Monitor, ...]:
     return tuple(row for name in config.safety.monitors for row in _rows(name, config))
 
 
-def _rows(name: str, config: Config) -> tuple[Monitor, Monitor]:
+def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
     setting = f"safety.monitors: {name}"
     try:
         factory = plugins.load(plugins.MONITORS, name)
@@ -65,6 +72,7 @@ def _rows(name: str, config: Config) -> tuple[Monitor, Monitor]:
             lasts=0.0,
             stream=Stream.CONTINUES,
         ),
+        Monitor(f"{name} (its time)", guarded_judge.judge_time, Action.WARN, lasts=_SLOW_DURATION),
     )
 
 
@@ -78,11 +86,13 @@ class GuardedJudge:
     def __init__(self, monitor: Monitor) -> None:
         self.fault: str | None = None
         self._judge = monitor.judge
+        self._judging_time = 0.0
 
     def judge(self, snapshot: Snapshot, raised: bool) -> str | None:
         """What the judge returns; None from its first fault on."""
         if self.fault is not None:
             return None
+        began = perf_counter()
         try:
             with naming_user_code("judge", self._judge):
                 breach = self._judge(snapshot, raised)
@@ -92,7 +102,15 @@ class GuardedJudge:
         except UserCodeError as error:
             self.fault = str(error)
             return None
+        finally:
+            self._judging_time = perf_counter() - began
 
     def judge_fault(self, snapshot: Snapshot, raised: bool) -> str | None:
         """The fault of the judge as a breach."""
         return None if self.fault is None else f"{self.fault}; the vehicle is handed back"
+
+    def judge_time(self, snapshot: Snapshot, raised: bool) -> str | None:
+        """A breach if the latest call of the judge took too long."""
+        if self._judging_time <= with_hysteresis(_MAX_JUDGING_TIME, raised):
+            return None
+        return f"it takes {1e3 * self._judging_time:.0f} ms to judge, and delays the setpoints"

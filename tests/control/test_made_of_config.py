@@ -247,8 +247,7 @@ def test_predictive_control():
     assert made.max_yaw_rate == pytest.approx(radians(50.0))
     assert (made.min_thrust, made.max_thrust) == thrust_limits(CONFIG)
     assert (made.lead, made.deadline) == (0.025, 0.025)
-    link = CONFIG.link.model_copy(update={"lockstep": True})
-    assert predictive_settings(CONFIG.model_copy(update={"link": link})).deadline == 1.0
+    assert predictive_settings(CONFIG, waits=True).deadline == 1.0
     slow = CONFIG.vehicle.model_copy(update={"lag_ms": 5.0, "pitch_lag_ms": 5.0})
     with pytest.raises(ConfigError, match=r"^guidance.kind: nmpc does not work .*lag must be"):
         predictive_settings(CONFIG.model_copy(update={"vehicle": slow}))

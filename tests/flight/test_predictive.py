@@ -106,7 +106,7 @@ class FakeSolver:
 
 def bench():
     notes = []
-    predictive = Predictive(FakeSolver, period=0.02, lockstep=False, note=notes.append)
+    predictive = Predictive(FakeSolver, period=0.02, waits=False, note=notes.append)
     return predictive, predictive._solver, notes
 
 
