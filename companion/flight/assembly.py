@@ -131,7 +131,7 @@ def _drag_memory(
 def _prepare_trajectories(
     context: FlightContext, note: Callable[[str], None], *, real_time: bool
 ) -> None:
-    """Report how trajectory files were read, and start the solver that follows them, if any."""
+    """Report how trajectory files were read; with `guidance.kind: nmpc`, start its solver."""
     for part in context.maneuvers.parts:
         if isinstance(part, Follow):
             for text in part.notes:

@@ -98,7 +98,7 @@ class Changes:
         return self.at_flight_start
 
     def change(self, values: Values, by: str) -> str:
-        """Begin to change to these values; return the change in words.
+        """Begin to change to `values`; return the change in words.
 
         If another change is still under way, both together must not be too large.
 

@@ -1,4 +1,4 @@
-"""The phases under our control and the endings, one coroutine each."""
+"""The phases in which we control the vehicle or end the control, one coroutine each."""
 
 import asyncio
 from collections import deque

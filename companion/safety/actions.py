@@ -53,7 +53,7 @@ class Exit(Enum):
 
 
 class Stream(Enum):
-    """What a breach that ends control does to the stream of setpoints, before its exit begins."""
+    """What a breach that ends control does to the stream of setpoints, before the exit begins."""
 
     CONTINUES = "continues"
     """The exit ends the stream, once the autopilot obeys the exit's command."""

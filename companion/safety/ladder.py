@@ -67,7 +67,7 @@ class SafetyLadder:
         return None
 
     def _after_hold(self, now: float, held_at: float) -> Verdict | None:
-        """The verdict after the hold has ended its breach or `hold_time` is over; else None."""
+        """The verdict if all breaches with HOLD have ended or `hold_time` is over; else None."""
         breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
         if not breaches:
             return Verdict(Action.LAND, self._hold_reason)

@@ -50,7 +50,7 @@ class Motion(NamedTuple):
 
 
 class Control(NamedTuple):
-    """When data last arrived, which sample was last answered, and why the newest one is not.
+    """When data last arrived, which sample was last answered, and why the newest sample is not.
 
     Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
     """

@@ -200,7 +200,7 @@ class VehicleClock:
         return stamp.time > self._newest and stamp.ahead - quickest <= largest_delay
 
     def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Add a misfit to the others; if they show a jump of the clock, accept it, return None."""
+        """Add a misfit; if the misfits show a jump of the clock, accept it and return None."""
         if not self._misfits.continued_by(stamp):
             self._drop_misfits()
         self._misfits.stamps.append(stamp)

@@ -20,7 +20,7 @@ _STANDARD_GRAVITY = 9.80665
 _RECENT_SAMPLES = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
 _MAX_CLOCK_DIFFERENCE = 1.0
-"""Stamps of accelerometer and attitude that differ by more than this, s, are of two clocks."""
+"""Stamps of accelerometer and attitude that differ by more than this, s, come from two clocks."""
 _MESSAGE_NAMES = {
     "HEARTBEAT",
     "SET_ATTITUDE_TARGET",

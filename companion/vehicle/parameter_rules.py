@@ -81,7 +81,7 @@ class ParameterRule:
     check: Check
     """Judges the value; returns `None` if the value is right."""
     source: str
-    """Where this rule comes from."""
+    """Source of the rule: a reference or a measurement."""
     vital: bool = False
     """Whether a vehicle that does not send the parameter is not flown: without it, the effect of a
     setpoint, or how long the autopilot holds it, is unknown."""

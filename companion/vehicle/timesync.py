@@ -59,7 +59,7 @@ class _Requests:
         self._unanswered.append(stamp)
 
     def take_answer(self, stamp: int, now: int) -> bool:
-        """Take the answer to the request sent at `stamp`; return False if there is no such one."""
+        """Take the answer to the request sent at `stamp`; False if that request is not open."""
         if stamp not in self._unanswered:
             return False
         self._unanswered.remove(stamp)

@@ -160,7 +160,7 @@ def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
     for step in range(60):  # of 20 ms; every fifth answer is quick at first
         taken = 0.001 if step < 30 and step % 5 == 0 else 0.015
         ladder.step(Snapshot(10.0 + 0.02 * step))
-        assert ("slow (its time)" in ladder.raised) is (step >= 51)
+        assert ("slow (its time)" in ladder.raised_alarms) is (step >= 51)
     assert notes[-1] == (
         "safety: slow (its time): it takes 15 ms to judge, and delays the setpoints → warn"
     )
