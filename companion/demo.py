@@ -19,7 +19,7 @@ from companion.mavlink.transport.endpoint import (
 from companion.mavlink.transport.free_port import free_port
 
 _LOCAL_PORT_OFFSET = 40
-"""Distance from the companion's UDP port to the mock vehicle's own port."""
+"""Number of the mock vehicle's own UDP port minus that of this program's port."""
 
 _READY_LINE = "ready on "
 """First words of the vehicle's output when its ports are open."""
@@ -29,12 +29,12 @@ _START_TIMEOUT = 20.0
 
 
 class Wire(NamedTuple):
-    """The connection between the program and the mock vehicle."""
+    """The UDP, TCP or serial connection between this program and the mock vehicle."""
 
     endpoint: str
-    """Our end, in the notation of `link.endpoint`."""
+    """Endpoint of this program, in the notation of `link.endpoint`."""
     vehicle_arguments: tuple[str, ...]
-    """The vehicle's end, as arguments of its command line."""
+    """Endpoint of the mock vehicle, as arguments of its command line."""
 
 
 class VehicleStoppedError(Exception):
@@ -42,7 +42,7 @@ class VehicleStoppedError(Exception):
 
 
 def udp_wire() -> Wire:
-    """A connection by free UDP ports.
+    """A UDP connection on free ports.
 
     Raises:
         LinkError: there are no free ports.
@@ -53,7 +53,7 @@ def udp_wire() -> Wire:
 
 @contextmanager
 def wire_like(endpoint: str) -> Iterator[Wire]:
-    """A connection of the endpoint's kind while the block runs: UDP, TCP or serial.
+    """A connection of the same kind as `endpoint` while the block runs: UDP, TCP or serial.
 
     Over TCP the vehicle always listens and the program connects.
 
@@ -77,12 +77,12 @@ def check_mock(config: Path) -> None:
     """Let the mock vehicle check the section `mock` of a configuration.
 
     Raises:
-        ConfigError: the section is wrong; the message is the vehicle's.
+        ConfigError: the section is wrong; the message comes from the mock vehicle.
     """
     command = [sys.executable, "-m", "sitl_mock", "--check", "--config", str(config)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise ConfigError(done.stderr.strip() or "the mock vehicle refused its configuration")
+    check = subprocess.run(command, capture_output=True, text=True, check=False)
+    if check.returncode != 0:
+        raise ConfigError(check.stderr.strip() or "the mock vehicle refused its configuration")
 
 
 @contextmanager
@@ -117,7 +117,7 @@ def _end(process: "subprocess.Popen[bytes]", log: Path) -> None:
     """End the vehicle's process.
 
     Raises:
-        VehicleStoppedError: the process had ended before.
+        VehicleStoppedError: the process had already ended.
     """
     try:
         _check_running(process, log)
@@ -145,6 +145,6 @@ def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
 
 def _check_running(process: "subprocess.Popen[bytes]", log: Path) -> None:
     if process.poll() is not None:
-        last = log.read_text(errors="replace").strip().rpartition("\n")[2]
-        last = last or "it could not write there; is the disk full?"
-        raise VehicleStoppedError(f"the mock vehicle stopped, see {log}: {last}")
+        last_line = log.read_text(errors="replace").strip().rpartition("\n")[2]
+        last_line = last_line or "it could not write there; is the disk full?"
+        raise VehicleStoppedError(f"the mock vehicle stopped, see {log}: {last_line}")

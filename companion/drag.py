@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Number = TypeVar("Number", float, NDArray[np.float64])
-"""Type of a vector component: float, array, or CasADi symbol."""
+"""Type of a vector component: float or array; CasADi symbols work as well."""
 
 _TINY = 1e-12
 """Added to the squared speed, (m/s)², so that the speed is differentiable at rest."""
@@ -31,41 +31,41 @@ class Drag(NamedTuple):
     def deceleration(
         self, velocity: tuple[Number, Number, Number]
     ) -> tuple[Number, Number, Number]:
-        """Deceleration, m/s², at the airspeed vector `velocity`, m/s; drag accelerates by −this."""
+        """Deceleration vector, m/s², parallel to the airspeed vector `velocity`, m/s."""
         north, east, down = velocity
-        share = self.linear + self.quadratic * _smooth_speed(velocity)
-        return share * north, share * east, share * down
+        per_velocity = self.linear + self.quadratic * _smooth_speed(velocity)
+        return per_velocity * north, per_velocity * east, per_velocity * down
 
     def deceleration_rate(
         self, velocity: tuple[Number, Number, Number], acceleration: tuple[Number, Number, Number]
     ) -> tuple[Number, Number, Number]:
-        """The time derivative of `deceleration`, m/s³, at a velocity and an acceleration."""
+        """Time derivative of `deceleration`, m/s³, at an airspeed vector and its derivative."""
         speed = _smooth_speed(velocity)
-        share = self.linear + self.quadratic * speed
+        per_velocity = self.linear + self.quadratic * speed
         north, east, down = velocity
         a_north, a_east, a_down = acceleration
-        along = self.quadratic * (north * a_north + east * a_east + down * a_down) / speed
+        growth = self.quadratic * (north * a_north + east * a_east + down * a_down) / speed
         return (
-            share * a_north + along * north,
-            share * a_east + along * east,
-            share * a_down + along * down,
+            per_velocity * a_north + growth * north,
+            per_velocity * a_east + growth * east,
+            per_velocity * a_down + growth * down,
         )
 
 
 NO_DRAG = Drag()
 
 _MEAN_SHARE = 8.0 / (3.0 * pi)
-"""Mean of |cos φ|³ + |sin φ|³ over all directions φ of flight. That sum is the component along the
-velocity of quadratic drag along two axes, per coefficient·|v|².
+"""Mean of |cos φ|³ + |sin φ|³ over all angles φ between airspeed and forward axis. Quadratic drag
+along two body axes decelerates along the airspeed by coefficient·|v|² times this sum.
 """
 
 
 class AxisDrag(NamedTuple):
     """The part of the quadratic drag that depends on the direction of flight.
 
-    Along each horizontal body axis the drag is coefficient·|v_i|·v_i, as in PX4's model of bluff
-    body drag. Its mean over all directions, 0.85·coefficient·|v|·v_i, belongs to `Drag.quadratic`;
-    the rest decelerates by coefficient·(|v_i| − 0.85·|v|)·v_i.
+    Along each horizontal body axis i the drag is coefficient·|v_i|·v_i, as in PX4's model of bluff
+    body drag. The mean over all directions of flight, 0.85·coefficient·|v|·v_i, belongs to
+    `Drag.quadratic`; the rest decelerates by coefficient·(|v_i| − 0.85·|v|)·v_i.
 
     Attributes:
         coefficient: quadratic drag along an axis per mass, 1/m; 0 for a round body.
@@ -76,7 +76,7 @@ class AxisDrag(NamedTuple):
     heading: float = 0.0
 
     def deceleration(self, north: float, east: float) -> tuple[float, float]:
-        """Deceleration north and east, m/s², at a horizontal velocity in m/s."""
+        """Deceleration north and east, m/s², at the airspeed (`north`, `east`), m/s."""
         if self.coefficient == 0.0:
             return 0.0, 0.0
         return along_axes(self.coefficient, cos(self.heading), sin(self.heading), north, east)
@@ -90,8 +90,8 @@ class AxisDrag(NamedTuple):
         """The time derivative of `deceleration`, m/s³.
 
         Args:
-            velocity: north, east, m/s.
-            acceleration: north, east, m/s².
+            velocity: airspeed, north and east, m/s.
+            acceleration: derivative of `velocity`, m/s².
             heading_rate: rate of change of `heading`, rad/s.
         """
         if self.coefficient == 0.0:
@@ -100,25 +100,27 @@ class AxisDrag(NamedTuple):
         forward, right = _in_axes(cosine, sine, *velocity)
         a_forward, a_right = _in_axes(cosine, sine, *acceleration)
         # Derivatives of the components along the axes, which turn.
-        g_forward, g_right = a_forward + heading_rate * right, a_right - heading_rate * forward
+        forward_rate = a_forward + heading_rate * right
+        right_rate = a_right - heading_rate * forward
         speed = _smooth_speed((forward, right, 0.0))
         mean = _MEAN_SHARE * speed
-        mean_rate = _MEAN_SHARE * (forward * g_forward + right * g_right) / speed
-        f_forward = forward * (abs(forward) - mean)
-        f_right = right * (abs(right) - mean)
-        h_forward = g_forward * (2.0 * abs(forward) - mean) - mean_rate * forward
-        h_right = g_right * (2.0 * abs(right) - mean) - mean_rate * right
-        forward = self.coefficient * (h_forward - heading_rate * f_right)
-        right = self.coefficient * (h_right + heading_rate * f_forward)
+        mean_rate = _MEAN_SHARE * (forward * forward_rate + right * right_rate) / speed
+        # d: deceleration along an axis, per coefficient.
+        d_forward = forward * (abs(forward) - mean)
+        d_right = right * (abs(right) - mean)
+        d_forward_rate = forward_rate * (2.0 * abs(forward) - mean) - mean_rate * forward
+        d_right_rate = right_rate * (2.0 * abs(right) - mean) - mean_rate * right
+        forward = self.coefficient * (d_forward_rate - heading_rate * d_right)
+        right = self.coefficient * (d_right_rate + heading_rate * d_forward)
         return cosine * forward - sine * right, sine * forward + cosine * right
 
 
 def along_axes(
     coefficient: Number, cosine: Number, sine: Number, north: Number, east: Number
 ) -> tuple[Number, Number]:
-    """Deceleration of `AxisDrag` north and east, m/s², by the cosine and sine of its heading.
+    """Deceleration by an `AxisDrag`, north and east, m/s².
 
-    `north` and `east` are the horizontal velocity, m/s.
+    `cosine` and `sine` are those of its heading; `north` and `east` are the airspeed, m/s.
     """
     forward, right = _in_axes(cosine, sine, north, east)
     mean = _MEAN_SHARE * _smooth_speed((forward, right, 0.0 * right))

@@ -17,9 +17,9 @@ def require(module: str, extra: str, purpose: str) -> None:
     """Check that an optional package is installed.
 
     Args:
-        module: the module to import.
-        extra: the extra of this project that installs it.
-        purpose: what needs the package; the message begins with it.
+        module: name of a module in the package.
+        extra: the extra of this project that installs the package.
+        purpose: the feature that needs the package; the message begins with it.
 
     Raises:
         MissingExtraError: the package is not installed.
@@ -31,15 +31,15 @@ def require(module: str, extra: str, purpose: str) -> None:
 def pip_command(extra: str) -> str:
     """The shell command that installs an extra into the environment that runs this program."""
     in_clone = (_CLONE_FOLDER / "pyproject.toml").is_file()
-    what = (
+    requirement = (
         f"-e '{_from_here(_CLONE_FOLDER)}[{extra}]'"
         if in_clone
         else f"'mavlink-companion[{extra}]'"
     )
-    return f"{shlex.quote(_from_here(Path(sys.executable)))} -m pip install {what}"
+    return f"{shlex.quote(_from_here(Path(sys.executable)))} -m pip install {requirement}"
 
 
 def _from_here(path: Path) -> str:
     """A path as a user in the working folder would write it."""
-    here = Path.cwd()
-    return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)
+    folder = Path.cwd()
+    return str(path.relative_to(folder)) if path.is_relative_to(folder) else str(path)

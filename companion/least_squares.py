@@ -17,8 +17,8 @@ Projection = Callable[[Floats], tuple[Floats, Floats]]
 _DIFFERENCE_STEP = 1e-4
 """Step of the central differences."""
 _SMALLEST_REDUCTION = 1e-9
-"""The search ends when a step reduces the sum of squares by less than this share. It also ends
-when a step changes no unknown by 1e-7 or more."""
+"""The search ends when a step reduces the sum of squares by less than this share, or changes every
+nonlinear unknown by less than 1e-7."""
 _MOST_STEPS = 60
 
 
@@ -26,14 +26,14 @@ class Solution(NamedTuple):
     """The unknowns with the smallest sum of squares that was found."""
 
     unknown: Floats
-    """(k,), the nonlinear unknowns."""
+    """Values of the nonlinear unknowns, (k,)."""
     weights: Floats
-    """(c,), the linear unknowns."""
+    """Values of the linear unknowns, (c,)."""
     residual: Floats
-    """(m,), measured − modelled."""
+    """Measured minus modelled values, (m,)."""
     slopes: Floats
-    """(m, k), Jacobian of the residual with respect to `unknown`; the weights are the best ones at
-    each point."""
+    """Jacobian of the residual with respect to `unknown`, (m, k), with the weights fitted again at
+    each value of `unknown`."""
 
     @property
     def squares(self) -> float:
@@ -46,7 +46,7 @@ def project(columns: Floats, measured: Floats) -> tuple[Floats, Floats]:
 
     Args:
         columns: (m, c).
-        measured: (m,), or (m, k) for k series at once; the weights are (c,) or (c, k) then.
+        measured: (m,), or (m, k) for k series at once; then the weights are (c, k), not (c,).
     """
     weights = np.asarray(np.linalg.lstsq(columns, measured, rcond=None)[0], dtype=np.float64)
     residual: Floats = measured - columns @ weights
@@ -69,24 +69,25 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
     slopes = _slopes(projection, unknown)
     for _ in range(_MOST_STEPS):
         curvature, descent = slopes.T @ slopes, -(slopes.T @ residual)
-        stiff = curvature + damping * np.diag(np.diagonal(curvature) + 1e-12)
-        trial = np.clip(unknown + np.linalg.solve(stiff, descent), lowest, highest)
+        damped = curvature + damping * np.diag(np.diagonal(curvature) + 1e-12)
+        trial = np.clip(unknown + np.linalg.solve(damped, descent), lowest, highest)
         trial_weights, trial_residual = projection(trial)
-        gained = float(residual @ residual - trial_residual @ trial_residual)
-        moved = float(np.abs(trial - unknown).max())
-        if gained > 0.0:
+        reduction = float(residual @ residual - trial_residual @ trial_residual)
+        largest_change = float(np.abs(trial - unknown).max())
+        if reduction > 0.0:
             unknown, weights, residual = trial, trial_weights, trial_residual
             slopes = _slopes(projection, unknown)
             damping = max(0.2 * damping, 1e-9)
         else:
             damping *= 5.0
-        if moved < 1e-7 or 0.0 < gained < _SMALLEST_REDUCTION * float(residual @ residual):
+        least_reduction = _SMALLEST_REDUCTION * float(residual @ residual)
+        if largest_change < 1e-7 or 0.0 < reduction < least_reduction:
             break
     return Solution(unknown, weights, residual, slopes)
 
 
 def _slopes(projection: Projection, unknown: Floats) -> Floats:
-    """(m, k), Jacobian of the residual of `projection`, by central differences."""
+    """Jacobian of the residual of `projection` by central differences, (m, k)."""
     steps = _DIFFERENCE_STEP * np.eye(unknown.size)
     return np.stack(
         [

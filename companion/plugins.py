@@ -31,22 +31,22 @@ def load(group: str, name: str) -> Any:
     """The object that an entry point names.
 
     Raises:
-        PluginError: there is no such plug-in, two packages provide it, or its package fails.
+        PluginError: there is no such plug-in, two packages provide it, or its import fails.
     """
-    found = tuple(entry_points(group=group, name=name))
-    if len(found) != 1:
-        raise PluginError(_not_one_message(group, name, found))
+    matches = tuple(entry_points(group=group, name=name))
+    if len(matches) != 1:
+        raise PluginError(_not_one_message(group, name, matches))
     try:
-        return found[0].load()
+        return matches[0].load()
     except Exception as error:
         raise PluginError(
-            f"the plug-in {name!r} ({_origin(found[0])}) cannot be loaded: {error!r}"
+            f"the plug-in {name!r} ({_origin(matches[0])}) cannot be loaded: {error!r}"
         ) from error
 
 
-def _not_one_message(group: str, name: str, found: Sequence[EntryPoint]) -> str:
-    if found:
-        return f"{' and '.join(map(_origin, found))} both give a plug-in {name!r}; uninstall one"
+def _not_one_message(group: str, name: str, matches: Sequence[EntryPoint]) -> str:
+    if matches:
+        return f"{' and '.join(map(_origin, matches))} both give a plug-in {name!r}; uninstall one"
     return f"no plug-in {name!r} in {group}; installed: {', '.join(names(group)) or 'none'}"
 
 

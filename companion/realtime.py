@@ -16,16 +16,17 @@ from typing import NamedTuple
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _HOW_FIFO = (
-    "run it by docs/companion.service, or allow `rtprio` to its user in /etc/security/limits.conf"
+    "run companion by docs/companion.service, or allow `rtprio` to its user in "
+    "/etc/security/limits.conf"
 )
 _HOW_MEMORY = (
-    "run it by docs/companion.service, or allow `memlock unlimited` to its user in "
+    "run companion by docs/companion.service, or allow `memlock unlimited` to its user in "
     "/etc/security/limits.conf"
 )
 
 
 def schedule_as_usual(pid: int) -> None:
-    """Give a child process the normal scheduler, since it inherits this program's."""
+    """Give a child process the normal scheduler instead of that of this program."""
     with suppress(ProcessLookupError):  # it has ended already
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
 
@@ -47,7 +48,7 @@ class _Frozen:
 
     Attributes:
         blocks: number of `frozen_objects` blocks that are running.
-        by_caller: whether the caller has frozen objects of its own. Once true it is not checked
+        by_caller: whether objects were frozen before the first block. Once true it is not checked
             again, because counting frozen objects takes 10 ms for each 100 000.
     """
 
@@ -59,11 +60,11 @@ class _Frozen:
 def frozen_objects() -> Iterator[None]:
     """Keep the garbage collector from walking through the objects that exist now (`gc.freeze`).
 
-    They are mostly modules and live as long as the program. If the caller had frozen objects
-    before, all stay frozen after the block: Python cannot unfreeze only some.
+    These objects are mostly modules and live as long as the program. If some objects were frozen
+    before the block, all stay frozen after it, because Python cannot unfreeze only some.
     """
-    outermost = not _Frozen.blocks
-    if outermost and not _Frozen.by_caller:
+    is_outermost = not _Frozen.blocks
+    if is_outermost and not _Frozen.by_caller:
         _Frozen.by_caller = gc.get_freeze_count() > 0
     gc.collect()
     gc.freeze()
@@ -72,7 +73,7 @@ def frozen_objects() -> Iterator[None]:
         yield
     finally:
         _Frozen.blocks -= 1
-        if outermost and not _Frozen.by_caller:
+        if is_outermost and not _Frozen.by_caller:
             gc.unfreeze()
 
 
@@ -88,11 +89,11 @@ class SettingResult(NamedTuple):
     """A requested setting, and whether it was granted."""
 
     name: str
-    """Its key in the section `realtime`."""
+    """Key of the setting in the section `realtime`."""
     setting: str
     """The setting in words."""
     refusal: str | None = None
-    """Why it was refused and how to get it; None: granted."""
+    """Why the setting was refused and how to get it; None: granted."""
 
     def __str__(self) -> str:
         if self.refusal is None:
@@ -102,18 +103,18 @@ class SettingResult(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RealtimeSettings:
-    """The settings to request."""
+    """The real-time settings to request."""
 
     fifo_priority: int | None = None
-    """Priority of SCHED_FIFO, 1..99; None: keep the scheduler."""
+    """Priority under SCHED_FIFO, 1..99; None: keep the present scheduler."""
     processors: tuple[int, ...] = ()
     """Numbers of the processors to run on; empty: any."""
     lock_memory: bool = False
-    """Keep all memory in RAM."""
+    """Whether to keep all memory in RAM."""
     freeze_gc: bool = False
-    """Switch the garbage collector off."""
+    """Whether to switch the garbage collector off."""
     required: bool = False
-    """Whether a refusal is an error."""
+    """Whether a refused setting is an error."""
 
 
 @contextmanager
@@ -156,7 +157,7 @@ def _requested_settings(settings: RealtimeSettings) -> Iterator[tuple[str, str, 
 
 
 def _take_fifo(priority: int) -> _Undo:
-    before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    scheduler_before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     # Threads that start later (recording, MAVSDK) must inherit the priority: a preempted thread
     # that holds the interpreter lock would block the control loop.
     try:
@@ -165,22 +166,22 @@ def _take_fifo(priority: int) -> _Undo:
         raise Refused(f"this user lacks the permission; {_HOW_FIFO}") from None
     except OSError as error:
         raise Refused(f"{error.strerror}") from None
-    return lambda: os.sched_setscheduler(0, before, parameters)
+    return lambda: os.sched_setscheduler(0, scheduler_before, parameters)
 
 
 def _run_on(processors: tuple[int, ...]) -> _Undo:
-    before = os.sched_getaffinity(0)
-    missing = [number for number in processors if number not in before]
+    processors_before = os.sched_getaffinity(0)
+    missing = [number for number in processors if number not in processors_before]
     if missing:
         raise Refused(
             f"processor {', '.join(map(str, missing))} is not available to this program; "
-            f"available are {', '.join(map(str, sorted(before)))}"
+            f"available are {', '.join(map(str, sorted(processors_before)))}"
         )
     try:
         os.sched_setaffinity(0, processors)
     except OSError as error:
         raise Refused(f"{error.strerror}") from None
-    return lambda: os.sched_setaffinity(0, before)
+    return lambda: os.sched_setaffinity(0, processors_before)
 
 
 def _lock_memory() -> _Undo:

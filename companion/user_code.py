@@ -13,7 +13,7 @@ MESSAGE_START = "an error outside this program: "
 
 _OUR_PACKAGE = __name__.partition(".")[0]
 _LONGEST_TEXT = 300
-"""Most characters of an error's own text that are shown."""
+"""Largest number of characters of the user code's error that are shown."""
 
 
 class UserCodeError(Exception):
@@ -22,7 +22,7 @@ class UserCodeError(Exception):
 
 @contextmanager
 def naming_user_code(role: str, code: object, *passed: type[BaseException]) -> Iterator[None]:
-    """Name the code that raised, because its error is not one of this program.
+    """Convert an error that user code raises in the block to one that names the code.
 
     An error of an object of this program, such as a trajectory made by `slow_down`, is raised
     unchanged, unless the object contains a trajectory of the user.
@@ -43,14 +43,15 @@ def naming_user_code(role: str, code: object, *passed: type[BaseException]) -> I
         raise
     except BaseException as error:
         code = _innermost(code)
-        named = code if hasattr(code, "__qualname__") else type(code)  # a function, or an object
-        package = _package(named.__module__)
+        # A function has a name; of another object, the class is named.
+        source = code if hasattr(code, "__qualname__") else type(code)
+        package = _package(source.__module__)
         if package == _OUR_PACKAGE:
             raise
-        raised = " ".join(f"{type(error).__name__}: {error}".removesuffix(": ").split())
+        text = " ".join(f"{type(error).__name__}: {error}".removesuffix(": ").split())
         raise UserCodeError(
-            f"an error outside this program: the {role} {named.__qualname__} of the module "
-            f"{named.__module__} raised {raised[:_LONGEST_TEXT]}{_place(package, error)}"
+            f"an error outside this program: the {role} {source.__qualname__} of the module "
+            f"{source.__module__} raised {text[:_LONGEST_TEXT]}{_place(package, error)}"
         ) from error
 
 

@@ -1,6 +1,6 @@
-"""Copies what a program commands, and checks its numbers.
+"""Copies the references that a program commands, and checks their numbers.
 
-A program may pass NumPy arrays and go on writing into them; guidance must not see that.
+A program may pass NumPy arrays and go on writing into them, which must not change a command.
 """
 
 from companion.attitude import BodyRates, Coefficients
@@ -16,11 +16,11 @@ from companion.guidance.reference import (
 )
 
 
-def copied(reference: Reference) -> Reference:
-    """A copy of the reference, with plain floats and tuples.
+def checked_copy(reference: Reference) -> Reference:
+    """Copy a program's reference into plain floats and tuples, after checking its numbers.
 
     Raises:
-        TypeError: it is no `Reference`, or `horizontal` or `vertical` is of another type.
+        TypeError: `reference`, its `horizontal` or its `vertical` has a wrong type.
         ValueError: a number is missing or not finite.
     """
     if not isinstance(reference, Reference):

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import FlightLoop, flight_loop
-from companion.api.program import ProgramPlan, ended_by
+from companion.api.program import ProgramPlan, flight_ended
 from companion.api.state import NewestState
 from companion.api.vehicle import Vehicle
 from companion.config import Config
@@ -26,7 +26,7 @@ from companion.safety.actions import FlightEnded
 T = TypeVar("T")
 
 Configuration = Config | Path | str | Mapping[str, Mapping[str, Any]]
-"""A configuration, its file, or the keys by section that differ from the defaults."""
+"""A configuration, the path of its file, or the keys by section that differ from the defaults."""
 
 
 @asynccontextmanager
@@ -73,11 +73,11 @@ async def connect(
 
 
 def as_config(config: Configuration) -> Config:
-    """The configuration, complete.
+    """Load the file, or add the defaults to the given keys; return a `Config` unchanged.
 
     Raises:
         ConfigError: the configuration is wrong.
-        TypeError: it is no configuration.
+        TypeError: `config` is not a `Configuration`.
     """
     if isinstance(config, Config):
         return config
@@ -172,7 +172,7 @@ async def _fly(session: Session, program: ProgramPlan) -> None:
     finally:
         program.finished.set()
     program.summary = summary
-    program.end(ended_by(summary.result))
+    program.end(flight_ended(summary.result))
 
 
 async def _wait_connected(
@@ -190,8 +190,8 @@ async def _end_flight(program: ProgramPlan) -> None:
     """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
     if program.busy:
         program.interrupt("the program ended before its request was completed")
-    elif not program.over:
-        await program.request(_ending_phases, last=True)
+    elif not program.is_over:
+        await program.request(_ending_phases, ends_flight=True)
 
 
 def _ending_phases(context: FlightContext) -> Sequence[Phase]:
@@ -200,6 +200,6 @@ def _ending_phases(context: FlightContext) -> Sequence[Phase]:
 
 
 async def _end_lost_flight(session: Session, program: ProgramPlan) -> None:
-    """End a flight that still runs, because its program has ended; wait until it has ended."""
+    """Hand the vehicle back if the program ended in flight; wait for the end of the flight."""
     if not program.finished.is_set() and session.interrupt("the program ended in flight"):
         await program.finished.wait()

@@ -5,7 +5,7 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import asynccontextmanager
 from math import inf, isnan
 
-from companion.api.commanded import copied
+from companion.api.commanded import checked_copy
 from companion.api.flight_loop import FlightLoop
 from companion.api.program import ProgramPlan
 from companion.api.state import NewestState, State
@@ -33,7 +33,7 @@ class Control:
     autopilot holds the vehicle and control ends. Frames are world NED and body FRD, in SI units.
 
     Args:
-        program: the flight's plan; has the error to raise once the flight has ended.
+        program: the flight's plan; its `end_error` is raised once the flight has ended.
         context: context of the flight.
         newest: publishes the state of the vehicle.
         loop: loop of the flight.
@@ -134,7 +134,7 @@ class Control:
             FlightEnded: control has ended.
         """
         # A program may write into its arrays after this call, so both are copied.
-        reference = copied(reference)
+        reference = checked_copy(reference)
         jerk_ned = None if jerk_ned is None else finite_vector("jerk_ned", jerk_ned)
         self._require_control()
         self._command = reference, self._loop.time(), jerk_ned
@@ -143,7 +143,7 @@ class Control:
             self._loop.post(self._post_command)
 
     def _post_command(self) -> None:
-        """Give the newest command to guidance; this runs in the flight's loop."""
+        """Give the newest command to guidance; called in the flight's loop."""
         self._posted = False
         if self._command is not None:
             self._source.give(*self._command)
@@ -154,7 +154,8 @@ class Control:
 
         Args:
             north: acceleration to the north divided by specific thrust (thrust per mass).
-            east: the same to the east; sin(tilt) is √(north² + east²).
+            east: acceleration to the east divided by specific thrust; sin(tilt) is
+                √(north² + east²).
             heading: rad; None: the heading at which control began.
 
         Raises:

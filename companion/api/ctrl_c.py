@@ -25,27 +25,27 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
         loop: loop of the flight.
         interrupt: hands the vehicle back for a reason; called in the flight's loop.
     """
-    before = signal.getsignal(signal.SIGINT)
+    handler_before = signal.getsignal(signal.SIGINT)
     in_main_thread = threading.current_thread() is threading.main_thread()
-    if not in_main_thread or not isinstance(loop, OwnThreadLoop) or not callable(before):
+    if not in_main_thread or not isinstance(loop, OwnThreadLoop) or not callable(handler_before):
         yield
         return
-    previous: Callable[[int, FrameType | None], object] = before
+    call_handler_before: Callable[[int, FrameType | None], object] = handler_before
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         loop.post(_require_reaction, loop, interrupt)
-        previous(number, frame)
+        call_handler_before(number, frame)
 
     signal.signal(signal.SIGINT, on_signal)
     try:
         yield
     finally:
         if signal.getsignal(signal.SIGINT) is on_signal:
-            signal.signal(signal.SIGINT, before)
+            signal.signal(signal.SIGINT, handler_before)
 
 
 def _require_reaction(loop: FlightLoop, interrupt: Callable[[str], object]) -> None:
-    """Hand back unless the program's loop runs within `REACTION_TIMEOUT`; for the flight's loop."""
+    """In the flight's loop, hand back unless the program's loop reacts in `REACTION_TIMEOUT`."""
     reacted = threading.Event()
     loop.post_to_program(reacted.set)
 

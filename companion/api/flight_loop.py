@@ -17,7 +17,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar, TypeVarTuple
 
-from companion.api.program import ended_by
+from companion.api.program import flight_ended
 from companion.mavlink.lockstep import LockstepEventLoop
 from companion.mavlink.loop import LinkEventLoop
 
@@ -51,11 +51,11 @@ class SharedLoop:
         return asyncio.ensure_future(work)
 
     def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call the function at once."""
+        """Call `callback(*args)` at once."""
         callback(*args)
 
     def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call the function at once."""
+        """Call `callback(*args)` at once."""
         callback(*args)
 
     def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
@@ -96,18 +96,18 @@ class OwnThreadLoop:
             future = asyncio.run_coroutine_threadsafe(work, self._loop)
         except RuntimeError as error:  # the loop is closed
             work.close()
-            raise ended_by("ok") from error
+            raise flight_ended("ok") from error
         self._unfinished.add(future)
         future.add_done_callback(self._unfinished.discard)
         return asyncio.wrap_future(future)
 
     def post(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Schedule the function in the flight's loop; ignored after the flight has ended."""
+        """Schedule `callback(*args)` in the flight's loop; ignored after the flight has ended."""
         with suppress(RuntimeError):
             self._loop.call_soon_threadsafe(callback, *args)
 
     def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Schedule the function in the program's loop; ignored after that loop has ended."""
+        """Schedule `callback(*args)` in the program's loop; ignored after that loop has ended."""
         with suppress(RuntimeError):
             self._program.call_soon_threadsafe(callback, *args)
 
@@ -116,7 +116,7 @@ class OwnThreadLoop:
         self._end_flight = end
 
     def close(self, *, wait: bool) -> None:
-        """End the flight if it still runs, and its thread; with `wait`, return after both."""
+        """End the flight, if it still runs, and its thread; with `wait`, return after their end."""
         self.post(self._closing.set)
         if wait:
             self._thread.join()
@@ -142,14 +142,14 @@ class OwnThreadLoop:
     def _program_is_lost(self) -> bool:
         """Whether the program's loop or thread has ended, or is ending with the interpreter."""
         thread = self._program_thread
-        ending = thread.daemon and not threading.main_thread().is_alive()
-        return ending or not thread.is_alive() or self._program.is_closed()
+        is_ending = thread.daemon and not threading.main_thread().is_alive()
+        return is_ending or not thread.is_alive() or self._program.is_closed()
 
 
 _switch_interval_lock = threading.Lock()
 _intervals_before: list[float] = []
-"""`sys.getswitchinterval()` at the start of each running flight, s. The first value is set again
-after the last flight."""
+"""`sys.getswitchinterval()` at the start of each running flight, s. When no flight runs any more,
+the value from before the first flight is restored."""
 
 
 @contextmanager
@@ -162,10 +162,10 @@ def quick_switches() -> Iterator[None]:
         yield
     finally:
         with _switch_interval_lock:
-            before = _intervals_before[0]
+            interval_before = _intervals_before[0]
             _intervals_before.pop()
             if not _intervals_before:
-                sys.setswitchinterval(before)
+                sys.setswitchinterval(interval_before)
 
 
 FlightLoop = SharedLoop | OwnThreadLoop

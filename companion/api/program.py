@@ -21,12 +21,12 @@ class PhaseRequest:
 
     Attributes:
         phases: function that returns the phases for the flight's context.
-        last: whether the flight ends after these phases.
+        ends_flight: whether the flight ends after these phases.
         done: set when the last of these phases has ended.
     """
 
     phases: Callable[[FlightContext], Sequence[Phase]]
-    last: bool = False
+    ends_flight: bool = False
     done: asyncio.Future[None] = field(
         default_factory=lambda: asyncio.get_running_loop().create_future()
     )
@@ -39,21 +39,22 @@ class ProgramPlan:
     control, and the safety monitors stay active.
 
     Attributes:
-        maneuvers: empty, because they are not known before the flight.
+        maneuvers: empty, because the program's maneuvers are not known before the flight.
         connected: receives the flight's context when the preflight checks have passed.
         summary: summary of the flight, available after it has ended.
-        over: whether the flight has no further phases: the last request is done, or the flight has
-            ended.
+        is_over: whether the flight has no further phases, because the last request is done or the
+            flight has ended.
         end_error: exception that every later call raises; None before the end of the flight.
         finished: set when the flight has ended and its files are written.
-        interrupt: function that ends the flight for a reason in words: see `Session.interrupt`.
+        interrupt: function that ends the flight; its argument is the reason in words
+            (`Session.interrupt`).
     """
 
     def __init__(self) -> None:
         self.maneuvers = ManeuverSequence(())
         self.connected: asyncio.Future[FlightContext] = asyncio.get_running_loop().create_future()
         self.summary: Summary | None = None
-        self.over = False
+        self.is_over = False
         self.interrupt: Callable[[str], object] = lambda _: None
         self._waiting: deque[PhaseRequest] = deque()
         self._running: PhaseRequest | None = None
@@ -75,14 +76,14 @@ class ProgramPlan:
             self._running = request = self._waiting.popleft()
             for phase in request.phases(context):
                 yield phase
-            self._running, self.over = None, request.last
+            self._running, self.is_over = None, request.ends_flight
             if not request.done.done():
                 request.done.set_result(None)
-            if request.last:
+            if request.ends_flight:
                 return
 
     async def request(
-        self, phases: Callable[[FlightContext], Sequence[Phase]], *, last: bool = False
+        self, phases: Callable[[FlightContext], Sequence[Phase]], *, ends_flight: bool = False
     ) -> None:
         """Run phases, and wait until they have ended.
 
@@ -90,7 +91,7 @@ class ProgramPlan:
 
         Args:
             phases: function that returns the phases for the flight's context.
-            last: whether the flight ends after these phases.
+            ends_flight: whether the flight ends after these phases.
 
         Raises:
             FlightEnded: the flight has ended; the program does not control the vehicle any more.
@@ -100,7 +101,7 @@ class ProgramPlan:
             raise self.end_error
         if self.busy:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
-        request = PhaseRequest(phases, last)
+        request = PhaseRequest(phases, ends_flight)
         self._waiting.append(request)
         self._new_request.set()
         try:
@@ -118,7 +119,7 @@ class ProgramPlan:
 
     def end(self, error: Exception) -> None:
         """Note that the flight has ended; calls that wait, and all later ones, raise `error`."""
-        self.end_error, self.over = error, True
+        self.end_error, self.is_over = error, True
         if not self.connected.done():
             self.connected.set_exception(error)
         for request in (self._running, *self._waiting):
@@ -138,6 +139,6 @@ class ProgramPlan:
             await self._new_request.wait()
 
 
-def ended_by(result: str) -> FlightEnded:
-    """The exception for a flight that has ended with `result`."""
+def flight_ended(result: str) -> FlightEnded:
+    """The exception for calls after the end of a flight whose summary has this `result`."""
     return FlightEnded("the flight is over" if result == "ok" else result)

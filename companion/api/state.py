@@ -13,12 +13,11 @@ from companion.guidance.reference import Vector
 class State(NamedTuple):
     """The vehicle at one instant.
 
-    Estimator resets do not make position and heading jump: the jumps are taken out of them. A reset
-    of the tilt stays in the attitude.
+    The jumps by estimator resets are removed from position and heading, but not from the tilt.
 
     Attributes:
         time: event-loop time of the flight, s.
-        position_ned: m.
+        position_ned: position from the origin of the autopilot's local frame, m.
         velocity_ned: m/s.
         q: attitude, body to world, w first.
         body_rates: rad/s, about body x, y, z (FRD).
@@ -97,7 +96,7 @@ class NewestState:
 
 
 class _Wake:
-    """Calls a function in the program's loop; calls before the previous one has run are dropped."""
+    """Calls a function in the program's loop; a call is dropped while an earlier one is pending."""
 
     def __init__(self, loop: FlightLoop, callback: Callable[[], object]) -> None:
         self._loop, self._callback, self._pending = loop, callback, False

@@ -44,7 +44,8 @@ class Vehicle:
     """One vehicle for one flight; `companion.connect` makes it.
 
     Every coroutine raises `FlightEnded` once the flight has ended early, as by a pilot or a safety
-    monitor. The vehicle is then handed back or landed. During a call another raises `RuntimeError`.
+    monitor. The vehicle is then handed back or landed. A call during another one raises
+    `RuntimeError`.
 
     Args:
         program: the flight's plan, which takes the requests.
@@ -81,8 +82,8 @@ class Vehicle:
         The height is `flight.takeoff_height_m`. The preflight checks run before each step.
 
         Raises:
-            FlightEnded: the flight has ended early, or the vehicle already flies; in the second
-                case it flies on.
+            FlightEnded: the flight has ended early, or the vehicle is already in the air; a
+                vehicle in the air flies on.
         """
         if self._context.loop.offboard_active or self._context.link.state.flying:
             raise FlightEnded("the vehicle flies already", Exit.LEAVE)
@@ -122,7 +123,7 @@ class Vehicle:
             jerk: largest jerk, m/s³.
 
         Raises:
-            ConfigError: the configured limits or the fence do not allow it; nothing was flown.
+            ConfigError: the configured limits or the fence forbid the line; nothing was flown.
             FlightEnded: the vehicle is not under the program's control.
             TrajectoryError: a limit given here is not positive.
             ValueError: an argument is not finite, or the heading exceeds two turns.
@@ -130,16 +131,16 @@ class Vehicle:
         to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
         names = "speed", "acceleration", "jerk"
         speed, acceleration, jerk = map(finite_number, names, (speed, acceleration, jerk))
-        facing = None if heading is None else finite_number("heading", heading)
-        if facing is not None and abs(facing) > 2.0 * tau:
-            raise ValueError(f"heading is in rad, and {facing:g} rad are more than two turns")
+        new_heading = None if heading is None else finite_number("heading", heading)
+        if new_heading is not None and abs(new_heading) > 2.0 * tau:
+            raise ValueError(f"heading is in rad, and {new_heading:g} rad are more than two turns")
         if hypot(*to) < SMALLEST_DISTANCE:
-            await self.follow(Hover(0.0, heading=facing))
-        elif facing is None:
+            await self.follow(Hover(0.0, heading=new_heading))
+        elif new_heading is None:
             await self._fly(HeldHeadingManeuver(line(to, speed, acceleration, jerk)))
         else:
             path = line(to, speed, acceleration, jerk)
-            await self.follow(replace(path, heading=FixedHeading(facing)))
+            await self.follow(replace(path, heading=FixedHeading(new_heading)))
 
     async def follow(self, trajectory: Trajectory | Path | str) -> None:
         """Follow a trajectory from the present position.
@@ -152,8 +153,9 @@ class Vehicle:
         Raises:
             ConfigError: the trajectory is unreadable, inconsistent, or breaks a limit or the fence.
             FlightEnded: the vehicle is not under the program's control.
-            TypeError: the object is no trajectory.
-            UserCodeError: the object raised while it was checked; nothing was flown.
+            TypeError: `trajectory` is no trajectory.
+            UserCodeError: code of the trajectory raised an error during the checks; nothing was
+                flown.
         """
         if isinstance(trajectory, Path | str):
             trajectory = await call_in_thread(trajectory_file.load, Path(trajectory))
@@ -187,17 +189,17 @@ class Vehicle:
 
     async def land(self) -> None:
         """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
-        await self._request(lambda context: landing_phases(context.config.flight), last=True)
+        await self._request(lambda context: landing_phases(context.config.flight), ends_flight=True)
 
     async def hand_back(self) -> None:
         """Let the autopilot hold the vehicle; the flight ends."""
-        await self._request(lambda _: (hand_back_phase(),), last=True)
+        await self._request(lambda _: (hand_back_phase(),), ends_flight=True)
 
     def _request(
-        self, phases: Callable[[FlightContext], Sequence[Phase]], *, last: bool = False
+        self, phases: Callable[[FlightContext], Sequence[Phase]], *, ends_flight: bool = False
     ) -> asyncio.Future[None]:
         """Request phases; the future is done when they have ended."""
-        return self._loop.start(self._program.request(phases, last=last))
+        return self._loop.start(self._program.request(phases, ends_flight=ends_flight))
 
     async def _fly(self, maneuver: Maneuver) -> None:
         self._held_pose()  # raises if the vehicle is not under our control
@@ -209,20 +211,20 @@ class Vehicle:
         )
 
     def _require_followable(self, maneuver: Maneuver) -> None:
-        context, here = self._context, self._held_pose().position_ned
-        origin = context.snapshot_builder.fence_centre_ned or (0.0, 0.0, 0.0)
-        north, east, down = (place - begin for place, begin in zip(here, origin, strict=True))
+        context, position = self._context, self._held_pose().position_ned
+        centre = context.snapshot_builder.fence_centre_ned or (0.0, 0.0, 0.0)
+        north, east, down = minus(position, centre)
         require_followable(context.config, maneuver, (north, east, down), context.known_drag)
 
     def _held_pose(self) -> Pose:
-        """The pose at which guidance began to fly its present source.
+        """The pose that guidance holds, or at which its present maneuver began.
 
         Raises:
             FlightEnded: the flight has ended, or the vehicle is not under the program's control.
         """
         if self._program.end_error is not None:
             raise self._program.end_error
-        pose = self._context.guidance_loop.flown.pose
+        pose = self._context.guidance_loop.flown_source.pose
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
         return pose

@@ -138,7 +138,7 @@ def _prepare_trajectories(
                 note(text)
             if context.config.guidance.kind == "nmpc":
                 context.guidance_loop.maker.predictive = predictive(
-                    context.config, part, note, waits=not real_time
+                    context.config, part, note, vehicle_waits=not real_time
                 )
 
 

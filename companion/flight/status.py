@@ -153,7 +153,7 @@ class StatusReporter:
         """The present state."""
         now, context = self._clock(), self._context
         (phase, phase_began), record = self._phase(), context.loop.record
-        maneuver = flown_part(context.guidance_loop.flown, now)
+        maneuver = flown_part(context.guidance_loop.flown_source, now)
         return FlightStatus(
             time=now - self._began,
             airborne_time=None if self.takeoff is None else now - self.takeoff,

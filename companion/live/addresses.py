@@ -24,18 +24,17 @@ class PageSocket(NamedTuple):
     host: str
     port: int
     token: str
-    """Required to change something, and to watch from another computer."""
+    """Secret text that permits changes of values, and watching from another computer."""
     listening: socket.socket
 
     def address_text(self) -> str:
         """A line for the user: address of the page, and the token."""
-        shown = _displayed(self.host)
+        host = _displayed_host(self.host)
         if ip_address(self.host).is_loopback:
             return (
-                f"Live page: http://{shown}:{self.port}/  token to change values there: "
-                f"{self.token}"
+                f"Live page: http://{host}:{self.port}/  token to change values there: {self.token}"
             )
-        return f"Live page: http://{shown}:{self.port}/?token={self.token}"
+        return f"Live page: http://{host}:{self.port}/?token={self.token}"
 
 
 class StreamAddress(NamedTuple):
@@ -48,15 +47,15 @@ class StreamAddress(NamedTuple):
     def address_text(self) -> str:
         """A line for the user: address of the stream, and how to open it."""
         return (
-            f"Live stream: ws://{_displayed(self.host)}:{self.port}/  in Foxglove or Lichtblick: "
-            "open connection, Foxglove WebSocket"
+            f"Live stream: ws://{_displayed_host(self.host)}:{self.port}/  in Foxglove or "
+            "Lichtblick: open connection, Foxglove WebSocket"
         )
 
 
 _ANY_ADDRESS = (ip_address("0.0.0.0"), ip_address("::"))
 
 
-def _displayed(host: str) -> str:
+def _displayed_host(host: str) -> str:
     name = host if ip_address(host) not in _ANY_ADDRESS else socket.gethostname()
     return f"[{name}]" if ":" in name else name
 
@@ -87,7 +86,7 @@ def stream_address(address: str) -> StreamAddress:
 
 
 def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.socket]:
-    """Listen at the address given to an option; return host and socket."""
+    """Listen at `address`, the value of the option `option`; return host and socket."""
     host, port = _host_and_port(address, option, default_port)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listening = socket.socket(family, socket.SOCK_STREAM)
@@ -97,7 +96,7 @@ def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.s
         listening.listen(50)
     except OSError as error:
         listening.close()
-        remedy = f"name another one, as {option} {port + 1}"
+        remedy = f"choose another port, such as {option} {port + 1}"
         if error.errno == errno.EADDRNOTAVAIL:
             remedy = f"no interface of this computer has that address; use {option} 0.0.0.0:{port}"
         raise ConfigError(
@@ -107,7 +106,7 @@ def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.s
 
 
 def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, int]:
-    """Host and port of an address."""
+    """Host and port of `address`, the value of the option `option`."""
     host, colon, port = address.rpartition(":")
     if not colon and not address.isdigit():
         host, port = address, str(default_port)
@@ -118,7 +117,8 @@ def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, i
         ip_address(host)
     except ValueError as error:
         raise ConfigError(
-            f"{option} {address}: write an IP address, a port, or both, as 0.0.0.0:{default_port}"
+            f"{option} {address}: write an IP address, a port, or both, such as "
+            f"0.0.0.0:{default_port}"
         ) from error
     if not 0 <= number <= 65535:
         raise ConfigError(f"{option} {address}: a port is at most 65535")
@@ -127,13 +127,13 @@ def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, i
 
 def _bind(listening: socket.socket, host: str, port: int) -> None:
     """Bind the socket; the page or the stream of an ended flight first releases the port."""
-    deadline, leaving = time.monotonic() + _ANSWER_TIMEOUT, False
+    deadline, release_agreed = time.monotonic() + _ANSWER_TIMEOUT, False
     while True:
         try:
             listening.bind((host, port))
         except OSError as error:
-            if not leaving and ask_to_leave(port):
-                deadline, leaving = time.monotonic() + _RELEASE_TIMEOUT, True
+            if not release_agreed and ask_to_leave(port):
+                deadline, release_agreed = time.monotonic() + _RELEASE_TIMEOUT, True
             if error.errno != errno.EADDRINUSE or time.monotonic() > deadline:
                 raise
             time.sleep(0.05)
@@ -148,10 +148,10 @@ def leave_address(port: int) -> str:
 
 def ask_to_leave(port: int) -> bool:
     """Ask the page or stream of an ended flight to release its port; return whether it agreed."""
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as asking:
-        asking.settimeout(1.0)
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
+        sock.settimeout(1.0)
         try:
-            asking.connect(leave_address(port))
-            return asking.recv(8) == b"leaving"
+            sock.connect(leave_address(port))
+            return sock.recv(8) == b"leaving"
         except OSError:
             return False

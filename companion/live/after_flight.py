@@ -21,10 +21,10 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
     Wait at most an hour.
     """
     async with _leave_request(port) as leave_requested:
-        quiet = 0.0
+        time_without_users = 0.0
         for _ in range(int(_LONGEST_STAY)):
-            quiet = 0.0 if is_open() else quiet + 1.0
-            if leave_requested.is_set() or quiet > _LONGEST_TIME_WITHOUT_USERS:
+            time_without_users = 0.0 if is_open() else time_without_users + 1.0
+            if leave_requested.is_set() or time_without_users > _LONGEST_TIME_WITHOUT_USERS:
                 break
             waiting = asyncio.create_task(leave_requested.wait())
             await asyncio.wait({waiting}, timeout=1.0)

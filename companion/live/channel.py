@@ -16,15 +16,16 @@ class Channel:
     """One end of the channel. Messages that the other end does not read in time are dropped.
 
     Attributes:
-        dropped: number of messages that could not be sent. The buffer was full, the message was too
-            large, or the other end was found to be closed; messages after that are not counted.
+        dropped: number of messages that could not be sent, because the buffer was full, the message
+            too large, or the other end closed. Messages after the first to a closed end are not
+            counted.
         open: whether the other end existed at the last attempt.
     """
 
     def __init__(self, end: socket.socket) -> None:
         self.dropped = 0
         self.open = True
-        self._end = end
+        self._socket = end
 
     @staticmethod
     def pair() -> "tuple[Channel, socket.socket]":
@@ -35,7 +36,7 @@ class Channel:
 
     def fileno(self) -> int:
         """File descriptor, for `add_reader`."""
-        return self._end.fileno()
+        return self._socket.fileno()
 
     def send(self, message: Message) -> bool:
         """Send a message or drop it; return whether it was sent."""
@@ -46,7 +47,7 @@ class Channel:
             self.dropped += 1
             return False
         try:
-            self._end.send(data, socket.MSG_DONTWAIT)
+            self._socket.send(data, socket.MSG_DONTWAIT)
         except BlockingIOError:
             self.dropped += 1
             return False
@@ -56,12 +57,12 @@ class Channel:
             return False
         return True
 
-    def arrived(self, max_count: int = sys.maxsize) -> Iterator[Message | None]:
-        """Yield up to `max_count` arrived messages, and None if the other end is closed.
+    def received_messages(self, max_count: int = sys.maxsize) -> Iterator[Message | None]:
+        """Yield up to `max_count` received messages, and None if the other end is closed.
 
-        A blocking socket waits for them.
+        If the socket blocks, wait for each message.
         """
-        for data in datagrams(self._end, max_count):
+        for data in datagrams(self._socket, max_count):
             if not data:
                 self.open = False
                 yield None
@@ -72,7 +73,7 @@ class Channel:
     def close(self) -> None:
         """Close our end."""
         self.open = False
-        self._end.close()
+        self._socket.close()
 
 
 class Feed:
@@ -84,7 +85,7 @@ class Feed:
 
     def __init__(self, end: socket.socket) -> None:
         self.dropped = 0
-        self._end = end
+        self._socket = end
 
     @staticmethod
     def pair() -> "tuple[Feed, socket.socket]":
@@ -95,13 +96,13 @@ class Feed:
     def send(self, datagram: bytes) -> None:
         """Send a datagram, or drop it."""
         try:
-            self._end.send(datagram, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
+            self._socket.send(datagram, socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
         except OSError:  # the buffer is full, or the process is gone
             self.dropped += 1
 
     def close(self) -> None:
         """Close our end."""
-        self._end.close()
+        self._socket.close()
 
 
 def datagrams(end: socket.socket, max_count: int) -> Iterator[bytes]:

@@ -1,4 +1,7 @@
-"""The slow checks of a change; the helper process makes them before the flight's own checks."""
+"""The slow checks of a change of values; they precede the flight's own checks.
+
+The helper process makes them, so that they do not delay the flight.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -23,15 +26,15 @@ _ROUNDING = 1e-3
 
 
 class ChangeChecks:
-    """Checks requested changes against the configuration of the flight.
+    """Checks requested changes of values against the configuration of the flight.
 
     Attributes:
         start: the configuration with which the flight began.
-        now: the configuration after the newest change.
+        current: the configuration after the newest change.
     """
 
     def __init__(self, start: Config, *, flies_maneuvers: bool) -> None:
-        self.start = self.now = start
+        self.start = self.current = start
         self._drag = before_connecting(start)
         self._maneuvers: ManeuverSequence | None = None
         self._maneuvers_error: ConfigError | None = None
@@ -48,10 +51,10 @@ class ChangeChecks:
 
     def note(self, message: dict[str, Any]) -> None:
         """Note the changed configuration, from a message of the flight."""
-        self.now = Config.model_validate(message["config"])
+        self.current = Config.model_validate(message["config"])
 
     def note_drag(self, message: dict[str, Any]) -> None:
-        """Note the drag of the flown vehicle; until then, that of the last vehicle is assumed."""
+        """Note the drag of this vehicle; before, the drag of the vehicle flown last is assumed."""
         drag, source = message["drag"], message["source"]
         self._drag = KnownDrag(
             None if drag is None else Drag(*drag), None if source is None else Path(source)
@@ -61,15 +64,15 @@ class ChangeChecks:
         """Check new values: valid, not too large a change, stable, and the maneuvers still flyable.
 
         Raises:
-            ConfigError: one of these does not hold; or a key, or anything with this planner or
-                guidance, must not change in flight; or the maneuvers could not be loaded.
+            ConfigError: a check fails, a key must not change in flight, no key may change with
+                the planner or guidance of this flight, or its maneuvers could not be loaded.
         """
-        wanted = changed_in_flight(self.start, self.now, values, name)
-        fixed = fixed_because(self.start)
-        if fixed is not None:
-            raise ConfigError(f"{name}: {fixed}")
+        wanted = changed_in_flight(self.start, self.current, values, name)
+        reason = fixed_because(self.start)
+        if reason is not None:
+            raise ConfigError(f"{name}: {reason}")
         try:
-            require_moderate(self.now, wanted, name)
+            require_moderate(self.current, wanted, name)
             _require_margins(self.start, wanted, name)
         except (ValueError, ArithmeticError) as error:
             raise ConfigError(f"{name}: {error}") from error
@@ -82,7 +85,7 @@ class ChangeChecks:
 
 
 def _require_margins(start: Config, wanted: Config, name: str) -> None:
-    """Check the stability margins of the wanted control loop with the configured vehicle."""
+    """Check the stability margins of the control loop with the `wanted` configuration."""
     before, after = stability(start), stability(wanted)
     if not after.stable:
         raise ConfigError(f"{name}: with these values the control loop is unstable")

@@ -36,7 +36,7 @@ class _Subscriptions(ServerListener):
         """End a subscription; a client that leaves also unsubscribes."""
         self._active.discard((client.id, channel.id))
 
-    def any(self) -> bool:
+    def exist(self) -> bool:
         """Whether a client has subscribed to a channel."""
         return bool(self._active)
 
@@ -55,11 +55,13 @@ class Stream:
         self._channels = [
             foxglove.Channel(
                 topic,
-                schema=foxglove.Schema(name=kind.name, encoding=SCHEMA_ENCODING, data=kind.schema),
+                schema=foxglove.Schema(
+                    name=message_type.name, encoding=SCHEMA_ENCODING, data=message_type.schema
+                ),
                 message_encoding=ENCODING,
                 context=self._context,
             )
-            for topic, kind in TOPICS.items()
+            for topic, message_type in TOPICS.items()
         ]
         self._server = foxglove.start_server(
             name="companion",
@@ -77,18 +79,18 @@ class Stream:
             self._channels[number].log(data, log_time=time_ns)
 
     def note(self, message: Message) -> None:
-        """Tell clients about messages that the flight dropped, and about its end."""
+        """Tell clients about messages that the flight dropped, and about the flight's end."""
         dropped = message.get("stream_dropped", 0)
         if dropped > self._dropped:
             self._dropped = dropped
-            words = "messages are missing: this computer is too busy to stream all of them"
-            self._server.publish_status(words, StatusLevel.Warning, "dropped")
+            text = "messages are missing: this computer is too busy to stream all of them"
+            self._server.publish_status(text, StatusLevel.Warning, "dropped")
         if message["kind"] == "end":
             self._server.publish_status(str(message["text"]), StatusLevel.Info, "end")
 
     def is_open(self) -> bool:
         """Whether somebody has the stream open."""
-        return self._subscriptions.any()
+        return self._subscriptions.exist()
 
     def close(self) -> None:
         """Stop serving."""

@@ -26,18 +26,18 @@ _MOST_PER_TURN = 10
 class HelperTasks(NamedTuple):
     """The tasks of the helper process."""
 
-    watch: Path | None
+    watched_file: Path | None
     """Configuration file whose edits are applied in flight, or None."""
     config_as_read: Config
     """Configuration as read from its file for the flight, before options."""
     page: PageSocket | None
-    """Listening socket of the live page, or None."""
+    """Listening socket of the live page; None: no live page."""
     stream: StreamAddress | None
-    """Address of the live stream, or None."""
+    """Address of the live stream; None: no live stream."""
     flies_maneuvers: bool
     """Whether the flight flies the maneuvers of its configuration."""
     folder: Path | None
-    """Folder of the flight, for `live.log` and saved values; None: there is none."""
+    """Folder of the flight, for `live.log` and saved values; None: nothing is recorded."""
 
 
 class Helper:
@@ -46,8 +46,8 @@ class Helper:
     Attributes:
         changes: makes the changes that the process requests. Replace it by the session's `changes`
             before the flight begins.
-        note: called with sentences of the process for the user.
-        feed: sends the records for the live stream; None: there is none.
+        note: called with each sentence for the user that the process sends.
+        feed: sends the records for the live stream; None: no live stream.
 
     Raises:
         OSError: the process cannot be started.
@@ -85,7 +85,7 @@ class Helper:
             loop.remove_reader(self._channel.fileno())
 
     def close(self, reason: str) -> None:
-        """Tell the process that, and why, the flight has ended; see `until_unused` for the page."""
+        """Tell the process why the flight has ended; it ends when `until_unused` returns."""
         self._send("end", text=reason)
         self._has_ended = True
         self._channel.close()
@@ -93,14 +93,14 @@ class Helper:
             self.feed.close()
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Pass a phase on."""
+        """Send a phase to the process."""
         self._send("phase", name=name, waits_for=waits_for)
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Do nothing: `status` sends the same detail."""
 
     def status(self, status: FlightStatus) -> None:
-        """Pass the state of the flight on."""
+        """Send the state of the flight to the process."""
         battery = status.battery
         self._send(
             "status",
@@ -127,7 +127,7 @@ class Helper:
         )
 
     def event(self, time: float, text: str) -> None:
-        """Pass an event on."""
+        """Send an event to the process."""
         self._send("event", time_s=round(time, 3), text=text)
 
     def _send(self, kind: str, **content: Any) -> None:
@@ -136,7 +136,7 @@ class Helper:
             self._note_ended()
 
     def _note_ended(self) -> None:
-        """Note once that the process has ended."""
+        """Tell the user, once, that the process has ended."""
         if not self._has_ended:
             self._has_ended = True
             self.note(f"{self._name} has ended by itself; the flight goes on without it")
@@ -145,8 +145,8 @@ class Helper:
         change = str(self.changes.made[-1])
         self._send("config", config=_as_json(config), can_undo=self.changes.can_undo, text=change)
 
-    def _tell_drag(self, known: KnownDrag) -> None:
-        drag, source = known.drag, known.source
+    def _tell_drag(self, known_drag: KnownDrag) -> None:
+        drag, source = known_drag.drag, known_drag.source
         self._send(
             "drag",
             drag=None if drag is None else [drag.linear, drag.quadratic],
@@ -155,7 +155,7 @@ class Helper:
 
     def _on_readable(self) -> None:
         """Handle the requests of the process."""
-        for message in self._channel.arrived(_MOST_PER_TURN):
+        for message in self._channel.received_messages(_MOST_PER_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self._note_ended()
@@ -188,7 +188,7 @@ def _helper_name(tasks: HelperTasks) -> str:
 def _start_process(
     sockets: tuple[socket.socket | None, ...], folder: Path | None
 ) -> "subprocess.Popen[bytes]":
-    """Start the process. It survives Ctrl-C, and the flight's end while page or stream is open."""
+    """Start the helper process, which survives Ctrl-C; it outlives the flight (`until_unused`)."""
     descriptors = [-1 if each is None else each.fileno() for each in sockets]
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"
@@ -211,7 +211,7 @@ def _first_message(tasks: HelperTasks, config: Config) -> Message:
         "config": _as_json(config),
         "read": _as_json(tasks.config_as_read),
         "follows": tasks.flies_maneuvers,
-        "watch": None if tasks.watch is None else str(tasks.watch.absolute()),
+        "watch": None if tasks.watched_file is None else str(tasks.watched_file.absolute()),
         "folder": None if tasks.folder is None else str(tasks.folder.absolute()),
         "token": None if page is None else page.token,
         "host": None if page is None else page.host,

@@ -85,8 +85,8 @@ class Relay:
         try:
             if self.over.is_set() or not self._channel.send({**message, "id": number}):
                 ended = self.over.is_set() or not self._channel.open
-                why = "the flight has ended" if ended else "the flight is too busy to take it"
-                raise ChangeRefusedError(f"{why}; nothing has changed")
+                reason = "the flight has ended" if ended else "the flight is too busy to take it"
+                raise ChangeRefusedError(f"{reason}; nothing has changed")
             async with asyncio.timeout(_ANSWER_TIMEOUT):
                 reply = await answer
         except TimeoutError as error:
@@ -105,7 +105,7 @@ class Relay:
         self._channel.send({"kind": "note", "text": text})
 
     def _on_readable(self) -> None:
-        for message in self._channel.arrived():
+        for message in self._channel.received_messages():
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self.over.set()
@@ -117,17 +117,17 @@ class Relay:
             self.checks.note(message)
         elif message["kind"] == "drag":
             self.checks.note_drag(message)
-        answered = self._pending_answers.get(message.get("id", -1))
-        if answered is not None and not answered.done():
-            answered.set_result(message)
+        answer = self._pending_answers.get(message.get("id", -1))
+        if answer is not None and not answer.done():
+            answer.set_result(message)
         for take in self._listeners:
             take(message)
 
 
 async def watch(relay: Relay, path: Path) -> None:
     """Apply the edits of a file until the flight ends."""
-    read = Config.model_validate(relay.first["read"])
-    watched = WatchedFile(path, read, relay.checks.check)
+    config_as_read = Config.model_validate(relay.first["read"])
+    watched = WatchedFile(path, config_as_read, relay.checks.check)
     relay.note(f"edits of {path.name} are applied from now on")
     while not relay.over.is_set():
         edit = await asyncio.to_thread(watched.newest_edit)
@@ -146,7 +146,7 @@ async def watch(relay: Relay, path: Path) -> None:
 
 
 async def _serve(descriptor: int, listening: int, feed: int) -> None:
-    """Do the tasks in the flight's first message.
+    """Do the tasks that the flight's first message names.
 
     Args:
         descriptor: file descriptor of the channel to the flight.
@@ -155,7 +155,7 @@ async def _serve(descriptor: int, listening: int, feed: int) -> None:
             stream; −1: no live stream.
     """
     channel = Channel(socket.socket(fileno=descriptor))
-    first = next(channel.arrived(1))
+    first = next(channel.received_messages(1))
     if first is None:
         return
     os.set_blocking(descriptor, False)

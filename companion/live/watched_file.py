@@ -9,8 +9,8 @@ from companion.config.files import files_of, load
 from companion.config.in_flight import Values, differences
 from companion.files.yaml_file import ConfigError
 
-_LONGEST_EXPLANATION = 400
-"""Largest length of an explanation, characters."""
+_LONGEST_REASON = 400
+"""Largest length of the reason for refusing an edit, characters."""
 _UNCHANGED_CHECKS = 3
 """A file counts as complete after this many checks without a change; editors save in steps."""
 
@@ -37,8 +37,8 @@ class WatchedFile:
 
     Args:
         path: path of the file.
-        config_as_read: configuration as read from this file for the flight. If the file has changed
-            since, that is its first edit.
+        config_as_read: configuration as read from this file for the flight. A change of the file
+            since then is the first edit.
         check: called with changed values and the name of the file; raises ConfigError if they
             cannot be used.
     """
@@ -47,39 +47,39 @@ class WatchedFile:
         self, path: Path, config_as_read: Config, check: Callable[[Values, str], None]
     ) -> None:
         self._path, self._check = path, check
-        self._accepted = self._newest_loaded = config_as_read
+        self._accepted_config = self._newest_config = config_as_read
         self._files = files_of(path)
-        self._seen = self._signature()
-        self._last_judged: Signature | None = None
+        self._newest_signature = self._signature()
+        self._checked_signature: Signature | None = None
         self._unchanged_checks = 0
 
     def newest_edit(self) -> Edit | None:
         """The newest edit; None: no new edit, or the file is still being written."""
         signature = self._signature()
-        if signature != self._seen:
-            self._seen, self._unchanged_checks = signature, 0
+        if signature != self._newest_signature:
+            self._newest_signature, self._unchanged_checks = signature, 0
         self._unchanged_checks += 1
-        if self._unchanged_checks < _UNCHANGED_CHECKS or signature == self._last_judged:
+        if self._unchanged_checks < _UNCHANGED_CHECKS or signature == self._checked_signature:
             return None
         self._files = files_of(self._path)
-        self._seen = self._last_judged = self._signature()
+        self._newest_signature = self._checked_signature = self._signature()
         return self._edit()
 
     def accept(self) -> None:
         """Accept the newest edit: later edits are compared with it."""
-        self._accepted = self._newest_loaded
+        self._accepted_config = self._newest_config
 
     def _edit(self) -> Edit | None:
         name = self._path.name
         try:
-            self._newest_loaded = load(self._path)
-            values = _values(self._accepted, self._newest_loaded)
+            self._newest_config = load(self._path)
+            values = _values(self._accepted_config, self._newest_config)
             if not values:
                 return None
             self._check(values, name)
         except ConfigError as error:
             text = " ".join(str(error).split())
-            text = text if len(text) <= _LONGEST_EXPLANATION else f"{text[:_LONGEST_EXPLANATION]}…"
+            text = text if len(text) <= _LONGEST_REASON else f"{text[:_LONGEST_REASON]}…"
             return Edit({}, f"{name} is not applied, and nothing has changed: {text}")
         return Edit(values)
 
@@ -88,7 +88,7 @@ class WatchedFile:
 
 
 def _values(before: Config, after: Config) -> dict[str, dict[str, Any]]:
-    """The values after the edit that differ, by section and key, without those of `include`."""
+    """The values that an edit changes, by section and key; changes of `include` are left out."""
     values: dict[str, dict[str, Any]] = {}
     for each in differences(before, after):
         if each.section != "include":

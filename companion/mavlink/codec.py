@@ -79,13 +79,13 @@ class SetpointEncoder:
         """Build one frame; with signing, the signature must be appended.
 
         Args:
-            sequence: Sequence number, 0..255.
-            time_boot_ms: Time stamp of the sample to which this setpoint responds, ms.
+            sequence: sequence number, 0..255.
+            time_boot_ms: time stamp of the sample to which this setpoint responds, ms.
             rates: rad/s about body x, y, z (FRD).
-            thrust: Collective thrust, 0..1.
+            thrust: collective thrust, 0..1.
 
         Raises:
-            InvalidSetpoint: A rate or the thrust is not finite as float32, the thrust is outside
+            InvalidSetpoint: a rate or the thrust is not finite as float32, the thrust is outside
                 0..1, or the time stamp outside uint32.
         """
         roll, pitch, yaw = rates

@@ -61,15 +61,16 @@ class _Try:
 
     answers: AnswerQueue[int]
     deadline: float = inf
-    """Event-loop time until which an ACK counts for this try, s; inf while its call waits."""
+    """Event-loop time until which an ACK is accepted, s; inf while `CommandClient.send` waits."""
 
 
 class CommandClient:
     """Sends commands and waits for their ACKs.
 
     An ACK names only the command, so a call waits until an earlier call with the same command ends.
-    ACKs come in the order of the tries, so each ACK counts for the oldest try that expects one. The
-    late ACK of a cancelled call, or of a call before a stall, does not count for the next call.
+    ACKs come in the order of the tries, so each ACK counts for the oldest try that expects one. A
+    late ACK of a cancelled call, or of a call before a stall, is not taken for that of the next
+    call.
     """
 
     def __init__(
@@ -83,7 +84,7 @@ class CommandClient:
         self._settings, self._outbox, self._registry = settings, outbox, registry
         self._texts = texts
         self._locks: dict[int, asyncio.Lock] = {}
-        self._unanswered: dict[int, deque[_Try]] = {}
+        self._unanswered_tries: dict[int, deque[_Try]] = {}
         router.subscribe("COMMAND_ACK", self._on_ack)
 
     async def send(
@@ -93,26 +94,26 @@ class CommandClient:
 
         Args:
             command: MAV_CMD.
-            params: Up to seven parameters; the rest are 0.
-            timeout_s: Time allowed for the ACK of each try, s. A command that is in progress is not
-                repeated; it may take 30 s.
-            retries: Number of repetitions after the first try.
+            params: up to seven parameters; the rest are 0.
+            timeout_s: time allowed for the ACK of each try, s. After an ACK "in progress" the
+                command is not repeated, and may take 30 s.
+            retries: number of repetitions after the first try.
 
         Raises:
-            CommandRefused: The result is not ACCEPTED.
-            CommandTimeout: No ACK came to any of the tries.
-            CommandUnfinished: The autopilot answered "in progress", and gave no final result
+            CommandRefused: the result is not ACCEPTED.
+            CommandTimeout: no ACK came to any of the tries.
+            CommandUnfinished: the autopilot answered "in progress", and gave no final result
                 within 30 s.
-            LinkLost: The connection dropped while waiting.
+            LinkLost: the connection dropped while waiting.
         """
         lock = self._locks.setdefault(command, asyncio.Lock())
         async with lock:
-            began = asyncio.get_running_loop().time()
+            start_time = asyncio.get_running_loop().time()
             with AnswerQueue[int](self._registry) as answers:
                 result = await self._exchange(command, params, timeout_s, retries, answers)
             if result != _ACCEPTED:
                 await asyncio.sleep(_REASON_DELAY_S)
-                texts = self._texts.since(began)
+                texts = self._texts.since(start_time)
                 raise CommandRefused(command_name(command), result, result_name(result), texts)
 
     async def _exchange(
@@ -125,8 +126,8 @@ class CommandClient:
     ) -> int:
         time = asyncio.get_running_loop().time
         for confirmation in range(retries + 1):
-            sent, deadline = _Try(answers), time() + timeout_s
-            self._expected_tries(command).append(sent)
+            this_try, deadline = _Try(answers), time() + timeout_s
+            self._expected_tries(command).append(this_try)
             self._send_try(command, params, confirmation)
             try:
                 result = await answers.next(timeout_s)
@@ -136,7 +137,7 @@ class CommandClient:
             except TimeoutError:  # the ACK is lost, or after a stall it may be in the backlog
                 deadline = time() + _BACKLOG_S if time() - deadline > _STALL_S else -inf
             finally:
-                sent.deadline = deadline
+                this_try.deadline = deadline
         raise CommandTimeout(
             f"{command_name(command)}: no answer after {retries + 1} tries of {timeout_s:g} s; "
             f"is system {self._settings.target_system} still there?"
@@ -176,17 +177,17 @@ class CommandClient:
             return
         if message.target_component not in (0, self._settings.source_component):
             return
-        expected = self._expected_tries(message.command)
-        if not expected:
+        expected_tries = self._expected_tries(message.command)
+        if not expected_tries:
             return
-        expected[0].answers.put(message.result)
+        expected_tries[0].answers.put(message.result)
         if message.result != _IN_PROGRESS:
-            expected.popleft()
+            expected_tries.popleft()
 
     def _expected_tries(self, command: int) -> deque[_Try]:
         """The tries of a command whose ACK may still come, oldest first."""
         now = asyncio.get_running_loop().time()
-        tries = self._unanswered.setdefault(command, deque())
+        tries = self._unanswered_tries.setdefault(command, deque())
         while tries and tries[0].deadline < now:
             tries.popleft()
         return tries

@@ -2,7 +2,7 @@
 
 
 class LinkError(Exception):
-    """The root of all errors of this package."""
+    """The base class of all errors of `companion.mavlink`."""
 
 
 class EndpointError(LinkError):
@@ -22,7 +22,7 @@ class NotConnected(LinkError):  # noqa: N818
 
 
 class UnsupportedAutopilot(LinkError):  # noqa: N818
-    """This program cannot fly the vehicle: another autopilot, or no multirotor."""
+    """The vehicle's autopilot is neither PX4 nor ArduPilot, or the vehicle is no multirotor."""
 
 
 class UnknownMessage(LinkError):  # noqa: N818
@@ -53,10 +53,10 @@ class CommandRefused(LinkError):  # noqa: N818
     """The autopilot's final answer to a command is anything but ACCEPTED.
 
     Attributes:
-        command: The command's name, such as `MAV_CMD_COMPONENT_ARM_DISARM`.
+        command: the command's name, such as `MAV_CMD_COMPONENT_ARM_DISARM`.
         result: MAV_RESULT number of the ACK.
-        result_name: The result without its prefix, such as `TEMPORARILY_REJECTED`.
-        texts: The autopilot's texts (STATUSTEXT, or PX4's events) from the command until 0.3 s
+        result_name: the result without its prefix, such as `TEMPORARILY_REJECTED`.
+        texts: the autopilot's texts (STATUSTEXT, or PX4's events) from the command until 0.3 s
             after the refusal, oldest first; may be empty.
     """
 
@@ -70,7 +70,7 @@ class CommandRefused(LinkError):  # noqa: N818
 
 
 class ParameterError(LinkError):
-    """The root of parameter errors."""
+    """The base class of parameter errors."""
 
 
 class UnknownParameter(ParameterError):  # noqa: N818
@@ -82,4 +82,4 @@ class UnansweredParameter(UnknownParameter):
 
 
 class ParameterRefused(ParameterError):  # noqa: N818
-    """The autopilot refused the request or kept another value, or the type excludes the value."""
+    """The autopilot refused the request or kept another value, or the value has a wrong type."""

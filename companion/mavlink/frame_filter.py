@@ -16,7 +16,7 @@ _REFUSED_NOTICES = {
     SignatureResult.WRONG_KEY: "the vehicle signs its frames with another key, so they are "
     "refused; give both sides the same key (link.signing_key_file)",
 }
-"""Notices about refused signatures. Notices about their time stamps are in `Signing.remarks`."""
+"""Notices about refused signatures. Those about time stamps of signatures: `Signing.remarks`."""
 
 _KEY_MISSING_NOTICE = (
     "the vehicle signs its frames and we do not, so it may obey nothing we send; set "
@@ -28,28 +28,28 @@ class FrameFilter:
     """Passes only the vehicle's frames, and counts those that it refuses.
 
     Args:
-        settings: The vehicle's ids, and the signing key.
-        stats: Counts foreign frames and bad signatures.
-        notice: Called once with each notice about signatures and their time stamps.
+        settings: the vehicle's ids, and the signing key.
+        stats: counts foreign frames and bad signatures.
+        notice: called once with each notice about signatures and their time stamps.
     """
 
     def __init__(self, settings: LinkSettings, stats: LinkStats, notice: Notice) -> None:
-        self._source = (settings.target_system, settings.target_component)
+        self._vehicle_ids = (settings.target_system, settings.target_component)
         self._signing = settings.signing
         self._stats, self._notify = stats, notice
         self._noticed: set[str] = set()
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame is refused only until an answer to TIMESYNC proves its date."""
+        """Whether the last frame was refused only because no answer to TIMESYNC proved its date."""
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:
-        """Whether a frame carries the vehicle's system and component."""
-        return (frame.system, frame.component) == self._source
+        """Whether a frame carries the vehicle's system and component id."""
+        return (frame.system, frame.component) == self._vehicle_ids
 
     def admits_source(self, frame: Frame) -> bool:
-        """Whether a frame carries the vehicle's ids; if not, it is counted as foreign."""
+        """Whether a frame carries the vehicle's ids; any other frame is counted as foreign."""
         if self.is_vehicle(frame):
             return True
         self._stats.ignored_foreign += 1

@@ -50,11 +50,11 @@ class FrameScanner:
     """Finds the intact frames in the bytes that arrive.
 
     Args:
-        crc_extra: The dialect's CRC_EXTRA as one byte for each known message id.
+        crc_extra: the dialect's CRC_EXTRA as one byte for each known message id.
         streaming: True if a frame may continue in the next call (TCP, serial). False for
             datagrams: an incomplete frame is dropped.
-        stats: Counts wrong checksums and unknown messages.
-        keep_unknown: Whether frames of unknown messages are returned too, with their checksum not
+        stats: counts wrong checksums and unknown messages.
+        keep_unknown: whether frames of unknown messages are returned too, with their checksum not
             checked. Their id is not in `crc_extra`.
     """
 
@@ -70,13 +70,13 @@ class FrameScanner:
         self._streaming = streaming
         self._keep_unknown = keep_unknown
         self._stats = stats or LinkStats()
-        self._rest = b""  # the beginning of an incomplete frame
+        self._incomplete_frame = b""
 
     def feed(self, data: bytes) -> list[Frame]:
         """Take the next bytes; return the frames that they complete, in order."""
-        if self._rest:
-            data = self._rest + data
-            self._rest = b""
+        if self._incomplete_frame:
+            data = self._incomplete_frame + data
+            self._incomplete_frame = b""
         frames: list[Frame] = []
         start, end = 0, len(data)
         while start < end:
@@ -89,7 +89,7 @@ class FrameScanner:
                 length = _NOT_A_FRAME
             if length == _INCOMPLETE:
                 if self._streaming:
-                    self._rest = data[start:]
+                    self._incomplete_frame = data[start:]
                     break
                 length = _NOT_A_FRAME
             start += length or 1

@@ -20,8 +20,8 @@ T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
 
 BEACON_TIMEOUT_S = 2.0
-"""Wall time without a new beacon after which the vehicle counts as gone, s; virtual time then
-advances without it.
+"""Wall time without a new beacon after which the vehicle counts as gone, s; then the event loop's
+time advances without beacons.
 """
 
 _SPIN_S = 0.0005
@@ -30,7 +30,9 @@ _SPIN_S = 0.0005
 _TIMERS_IN_ORDER = 1_000_000
 """Number of consecutive timers whose order is kept if they are due at the same time."""
 _TIMER_SPACING_S = 1e-12
-"""Shift between two such timers, s; all shifts together are 1 us, shorter than any step."""
+"""Shift between two timers that are due at the same time, s. `_TIMERS_IN_ORDER` shifts are 1 us,
+shorter than any step.
+"""
 
 _MAX_ITERATIONS = 200
 """The loop counts as settled after this many iterations, so that a busy task cannot block it."""
@@ -164,8 +166,8 @@ class LockstepEventLoop(LinkEventLoop):
     wall time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
 
     Args:
-        clock: Clock to use instead of the one described above; needs `selector` too.
-        selector: The selector that advances `clock`.
+        clock: clock to use instead of the one described above; needs `selector` too.
+        selector: the selector that advances `clock`.
     """
 
     def __init__(
@@ -199,8 +201,8 @@ class LockstepEventLoop(LinkEventLoop):
         self._timer_count += 1
         order = self._timer_count % _TIMERS_IN_ORDER * _TIMER_SPACING_S
         # All timers are set early: a timer late by a picosecond would run a whole step late.
-        lead = _TIMERS_IN_ORDER * _TIMER_SPACING_S
-        return super().call_at(when - lead + order, callback, *args, context=context)
+        advance = _TIMERS_IN_ORDER * _TIMER_SPACING_S
+        return super().call_at(when - advance + order, callback, *args, context=context)
 
     def advance(self, vehicle_time: float) -> bool:
         """Move the clock to a beacon's time, s; return False for a repeated beacon."""

@@ -10,13 +10,13 @@ class LockstepClient:
     """Handles beacons: runs one step of this program for each, and answers.
 
     Args:
-        loop: The event loop to advance.
-        process: Handles the frames of one step, in order, after the clock has advanced.
-        deliver: Passes the attitude samples of the step, if any, to the control loop.
-        answer: Sends the answer that closes the step of `time_boot_ms`.
+        loop: the event loop to advance.
+        process: handles the frames of one step, in order, after the clock has advanced.
+        deliver: passes the attitude samples of the step, if any, to the control loop.
+        answer: sends the answer that closes the step of `time_boot_ms`.
 
     Attributes:
-        first_beacon: A future that is done when the first beacon has come.
+        first_beacon: a future that is done when the first beacon has come.
     """
 
     def __init__(

@@ -63,7 +63,7 @@ class LinkEventLoop(asyncio.SelectorEventLoop):
     futures or use `call_soon`. It must not raise and must not block.
 
     Attributes:
-        hot_selector: Calls the hot readers.
+        hot_selector: calls the hot readers.
     """
 
     def __init__(self, selector: HotSelector | None = None) -> None:

@@ -27,8 +27,8 @@ class CurrentModeMessage:
 
     Attributes:
         standard_mode: MAV_STANDARD_MODE; 0 for a mode that is not a standard mode.
-        custom_mode: Number of the mode, specific to the autopilot.
-        intended_custom_mode: The mode that the user commanded last; it differs in a failsafe.
+        custom_mode: number of the mode, specific to the autopilot.
+        intended_custom_mode: the mode that the user commanded last; it differs in a failsafe.
     """
 
     msgname = "CURRENT_MODE"
@@ -53,18 +53,22 @@ _CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMess
 UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
 """Numbers of messages of MAVLink common that pymavlink lacks; their payloads are not decoded."""
 
-MESSAGE_IDS: dict[str, int] = {kind.msgname: number for number, kind in _CLASSES.items()}
+MESSAGE_IDS: dict[str, int] = {
+    message_class.msgname: number for number, message_class in _CLASSES.items()
+}
 CRC_EXTRA: dict[int, bytes] = {
-    **{number: bytes([kind.crc_extra]) for number, kind in _CLASSES.items()},
+    **{number: bytes([message_class.crc_extra]) for number, message_class in _CLASSES.items()},
     410: bytes([160]),
     411: bytes([106]),
 }
 
 
 _IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
-    number: itemgetter(*kind.orders)
-    for number, kind in _CLASSES.items()
-    if len(kind.orders) > 1 and set(kind.lengths) == {1} and "s" not in kind.unpacker.format
+    number: itemgetter(*message_class.orders)
+    for number, message_class in _CLASSES.items()
+    if len(message_class.orders) > 1
+    and set(message_class.lengths) == {1}
+    and "s" not in message_class.unpacker.format
 }
 """By message number, functions that put a payload's values in the order of the constructor.
 They exist only for messages without arrays and texts, such as most telemetry.
@@ -75,7 +79,7 @@ def message_id(name: str) -> int:
     """Number of a message by its name, such as `ATTITUDE_QUATERNION`.
 
     Raises:
-        UnknownMessage: The dialect has no such message.
+        UnknownMessage: the dialect has no such message.
     """
     try:
         return MESSAGE_IDS[name]
@@ -87,21 +91,21 @@ def message_id(name: str) -> int:
 
 def decode(number: int, payload: bytes) -> Message:
     """Build the message object from a payload whose checksum was already checked."""
-    kind = _CLASSES[number]
-    size = kind.unpacker.size
-    flat = kind.unpacker.unpack(payload[:size].ljust(size, b"\0"))
+    message_class = _CLASSES[number]
+    size = message_class.unpacker.size
+    flat = message_class.unpacker.unpack(payload[:size].ljust(size, b"\0"))
     if number in _IN_FIELD_ORDER:
-        return kind(*_IN_FIELD_ORDER[number](flat))
+        return message_class(*_IN_FIELD_ORDER[number](flat))
     fields: list[Any] = []  # in the order of the payload
     index = 0
-    for length in kind.lengths:
+    for length in message_class.lengths:
         value = flat[index]
         if isinstance(value, bytes):
             fields.append(value.rstrip(b"\0"))
         else:
             fields.append(value if length == 1 else list(flat[index : index + length]))
         index += length
-    return kind(*(fields[order] for order in kind.orders))
+    return message_class(*(fields[order] for order in message_class.orders))
 
 
 def encode(message: Message) -> bytes:

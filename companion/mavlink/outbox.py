@@ -19,8 +19,8 @@ class Outbox:
     """Numbers, signs and sends frames. A frame that cannot be sent now is dropped.
 
     Attributes:
-        transport: The open connection; None while there is none.
-        last_setpoint_at: Event-loop time of the last setpoint, sent or dropped, s; −inf before the
+        transport: the open connection; None while there is none.
+        last_setpoint_at: event-loop time of the last setpoint, sent or dropped, s; −inf before the
             first.
     """
 
@@ -44,30 +44,33 @@ class Outbox:
         """Send SET_ATTITUDE_TARGET now; return False if it could not be sent.
 
         Args:
-            time_boot_ms: Time stamp of the sample to which it responds, ms.
-            rates: Body rates, rad/s (FRD).
-            thrust: Collective thrust, 0..1.
+            time_boot_ms: time stamp of the sample to which the setpoint responds, ms.
+            rates: body rates, rad/s (FRD).
+            thrust: collective thrust, 0..1.
 
         Raises:
-            InvalidSetpoint: A value must not reach the vehicle; nothing was sent.
+            InvalidSetpoint: a value must not reach the vehicle; nothing was sent.
         """
-        sent = self._send_frame(
+        was_sent = self._send_frame(
             self._setpoint_encoder.frame(self._sequence, time_boot_ms, rates, thrust)
         )
         self.last_setpoint_at = self._loop.time()
-        return sent
+        return was_sent
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
         """Keep a setpoint as the answer of this lockstep step; a later one in the step replaces it.
 
         Raises:
-            InvalidSetpoint: A value must not reach the vehicle; nothing was kept.
+            InvalidSetpoint: a value must not reach the vehicle; nothing was kept.
         """
         self._setpoint_encoder.frame(0, time_boot_ms, rates, thrust)
         self._latched = (time_boot_ms, rates, thrust)
 
     def close_step(self, time_boot_ms: int) -> None:
-        """Close a lockstep step: send its setpoint; without one, a SYSTEM_TIME, not recorded."""
+        """Close a lockstep step: send the setpoint kept by `latch`, or else a SYSTEM_TIME.
+
+        The SYSTEM_TIME is not recorded.
+        """
         latched, self._latched = self._latched, None
         if latched is not None:
             self.send_setpoint(*latched)

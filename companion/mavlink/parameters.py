@@ -37,18 +37,18 @@ class _Value(NamedTuple):
     """The four bytes of a value, and its MAV_PARAM_TYPE."""
 
     raw: bytes
-    kind: int
+    param_type: int
 
 
 class ParameterClient:
     """Reads and writes single parameters.
 
     Args:
-        settings: System and component ids of the vehicle and of this program.
-        outbox: Sends the requests.
-        router: Delivers the answers.
-        registry: Ends the waits when the connection drops.
-        bytewise: Returns True if an integer is sent as its bytes (PX4), False if as a float
+        settings: system and component ids of the vehicle and of this program.
+        outbox: sends the requests.
+        router: delivers the answers.
+        registry: ends the waits when the connection drops.
+        bytewise: returns whether an integer is sent as its four bytes (PX4) instead of as a float
             (ArduPilot).
     """
 
@@ -72,11 +72,11 @@ class ParameterClient:
         """Read a parameter.
 
         Raises:
-            UnansweredParameter: The autopilot did not answer.
-            UnknownParameter: The autopilot answered that it has no such parameter, or the name is
+            UnansweredParameter: the autopilot did not answer.
+            UnknownParameter: the autopilot answered that it has no such parameter, or the name is
                 not 1 to 16 ASCII characters.
-            ParameterRefused: The autopilot answered with another error.
-            LinkLost: The connection dropped while waiting.
+            ParameterRefused: the autopilot answered with another error.
+            LinkLost: the connection dropped while waiting.
         """
         self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
@@ -86,16 +86,16 @@ class ParameterClient:
         """Write a parameter in the autopilot's own type; return the value that it then has.
 
         Raises:
-            UnansweredParameter, UnknownParameter: As for `read`.
-            ParameterRefused: The value does not fit the type, or the autopilot keeps another value
+            UnansweredParameter, UnknownParameter: as for `read`.
+            ParameterRefused: the value does not fit the type, or the autopilot keeps another value
                 or answered with an error.
-            LinkLost: The connection dropped while waiting.
+            LinkLost: the connection dropped while waiting.
         """
         self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
-            kind = (await self._request_value(name, timeout_s, retries)).kind
-            value_wanted = _Value(self._encoded(name, value, kind), kind)
-            payload = _SET_LAYOUT.pack(value_wanted.raw, *self._target, name.encode(), kind)
+            param_type = (await self._request_value(name, timeout_s, retries)).param_type
+            value_wanted = _Value(self._encoded(name, value, param_type), param_type)
+            payload = _SET_LAYOUT.pack(value_wanted.raw, *self._target, name.encode(), param_type)
             value_held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
             if value_held != value_wanted:
                 # It may be a late or second answer to an earlier read.
@@ -137,33 +137,34 @@ class ParameterClient:
             raise UnknownParameter(f"{name!r} is no parameter name: 1 to 16 ASCII characters")
 
     def _decoded(self, value: _Value) -> float | int:
-        if self._bytewise() and value.kind in _INTEGER_LAYOUTS:
-            integer: int = struct.unpack(_INTEGER_LAYOUTS[value.kind], value.raw)[0]
+        if self._bytewise() and value.param_type in _INTEGER_LAYOUTS:
+            integer: int = struct.unpack(_INTEGER_LAYOUTS[value.param_type], value.raw)[0]
             return integer
         number: float = struct.unpack("<f", value.raw)[0]
         # NaN and infinity cannot become integers; the caller gets them unchanged.
-        return int(number) if value.kind in _INTEGER_LAYOUTS and isfinite(number) else number
+        return int(number) if value.param_type in _INTEGER_LAYOUTS and isfinite(number) else number
 
-    def _encoded(self, name: str, value: float, kind: int) -> bytes:
+    def _encoded(self, name: str, value: float, param_type: int) -> bytes:
         if not isfinite(value):
             raise ParameterRefused(f"{name} cannot hold {value}")
         try:
-            if kind not in _INTEGER_LAYOUTS:
+            if param_type not in _INTEGER_LAYOUTS:
                 return struct.pack("<f", value)
             if value != int(value):
                 raise ParameterRefused(f"{name} is an integer and cannot hold {value}")
             # Packed also when not bytewise, so that the range of the integer type is checked.
-            packed = struct.pack(_INTEGER_LAYOUTS[kind], int(value))
+            packed = struct.pack(_INTEGER_LAYOUTS[param_type], int(value))
             return packed if self._bytewise() else struct.pack("<f", value)
         except (struct.error, OverflowError, ValueError) as error:
             raise ParameterRefused(f"{name} cannot hold {value}: {error}") from error
 
     def _on_value(self, payload: bytes) -> None:
-        raw, _, _, name, kind = _VALUE_LAYOUT.unpack_from(payload.ljust(_VALUE_LAYOUT.size, b"\0"))
+        padded = payload.ljust(_VALUE_LAYOUT.size, b"\0")
+        raw, _, _, name, param_type = _VALUE_LAYOUT.unpack_from(padded)
         name_text = name.split(b"\0", 1)[0].decode("ascii", errors="replace")
         answers = self._pending.get(name_text)
         if answers is not None:
-            answers.put(_Value(raw, kind))
+            answers.put(_Value(raw, param_type))
 
     def _on_error(self, message: Message) -> None:
         answers = self._pending.get(message.param_id)
@@ -173,5 +174,5 @@ class ParameterClient:
 
 def _refusal(name: str, code: int) -> UnknownParameter | ParameterRefused:
     reason = _ERROR_TEXTS.get(code, f"error {code}")
-    kind = UnknownParameter if code == 1 else ParameterRefused
-    return kind(f"{name}: {reason}")
+    error_class = UnknownParameter if code == 1 else ParameterRefused
+    return error_class(f"{name}: {reason}")

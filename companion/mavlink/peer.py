@@ -1,4 +1,4 @@
-"""The peer: the one sender that a transport talks to. Who may become it, how, and for how long."""
+"""Decides which sender is the peer, the one sender that a transport talks to."""
 
 import asyncio
 import ipaddress
@@ -17,7 +17,7 @@ async def resolve_peers(peers: Sequence[PeerAddress], kind: socket.SocketKind) -
     """Look up the addresses of the peers that the endpoint names.
 
     Raises:
-        EndpointError: A host name is unknown.
+        EndpointError: a host name is unknown.
     """
     loop = asyncio.get_running_loop()
     admitted: set[tuple[str, int | None]] = set()
@@ -37,13 +37,13 @@ class NamedPeers:
     """The senders that may talk to the endpoint; everyone if the endpoint names none.
 
     Args:
-        admitted: IP address and port of each; a port of `None` is any port.
+        admitted: IP address and port of each sender; a port of `None` is any port.
     """
 
     def __init__(self, admitted: frozenset[tuple[str, int | None]] = frozenset()) -> None:
         self._admitted = admitted
 
-    def admit(self, address: Any) -> bool:
+    def admits(self, address: Any) -> bool:
         """Whether a sender at this socket address, (host, port, ...), is admitted."""
         if not self._admitted:
             return True
@@ -74,10 +74,10 @@ PEER_NOTICE = "link.endpoint: "
 """Beginning of each notice about the peer."""
 
 CLAIM_LASTS_S = 5.0
-"""Another sender may become the peer after this time without a heartbeat of the peer, s."""
+"""Time without a heartbeat of the peer after which another sender may become the peer, s."""
 
 _CONTROL_LASTS_S = 2.0
-"""Time after the last setpoint during which the peer changes only if it is silent, s."""
+"""Time after the last setpoint during which only a silent peer is replaced, s."""
 
 HEARTBEAT = 0
 # Offsets in a HEARTBEAT payload, and its length; a received payload may lack trailing zeros.
@@ -94,11 +94,11 @@ class PeerRule:
     except while setpoints are sent and for 2 s after the last one.
 
     Args:
-        stats: Counts the changes of the peer.
-        notice: Called with a sentence for the user at each change, and by `report_ignored`.
-        clock: Returns the event-loop time, s.
-        last_setpoint: Returns the event-loop time of the last setpoint, s; −inf before the first.
-        every_frame_claims: Whether each accepted frame is a claim: with signing or in lockstep.
+        stats: counts the changes of the peer.
+        notice: called with a sentence for the user at each change, and by `report_ignored`.
+        clock: returns the event-loop time, s.
+        last_setpoint: returns the event-loop time of the last setpoint, s; −inf before the first.
+        every_frame_claims: whether each accepted frame is a claim: with signing or in lockstep.
     """
 
     def __init__(
@@ -142,13 +142,14 @@ class PeerRule:
 
     def set_peer(self, sender: str) -> None:
         """Make `sender`, given as HOST:PORT, the peer; count a change and report it to the user."""
-        before, self._peer = self._peer, sender
+        old_peer, self._peer = self._peer, sender
         self.renew()
-        if before is not None and before != sender:
+        if old_peer is not None and old_peer != sender:
             self._stats.peers += 1
             self._notify(
-                f"{PEER_NOTICE}the vehicle's frames now come from {sender}, before from {before}; "
-                f"to prevent this, name the vehicle's address in the endpoint (?peer=ADDRESS)"
+                f"{PEER_NOTICE}the vehicle's frames now come from {sender}, before from "
+                f"{old_peer}; to prevent this, name the vehicle's address in the endpoint "
+                "(?peer=ADDRESS)"
             )
 
     def report_ignored(self, sender: str) -> None:

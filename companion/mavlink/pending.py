@@ -9,9 +9,9 @@ T = TypeVar("T")
 
 
 class AnswerQueue(Generic[T]):
-    """A queue of answers: callbacks of the link fill it, and one task waits for it.
+    """A queue of answers: callbacks of the link fill it, and one task waits for the next answer.
 
-    Use as a context manager.
+    Use it as a context manager.
     """
 
     def __init__(self, registry: "AnswerQueueRegistry") -> None:
@@ -26,8 +26,8 @@ class AnswerQueue(Generic[T]):
         """Wait for the next answer.
 
         Raises:
-            TimeoutError: No answer came in time.
-            LinkLost: The connection dropped.
+            TimeoutError: no answer came in time.
+            LinkLost: the connection dropped.
         """
         async with asyncio.timeout(timeout_s):
             answer = await self._queue.get()
@@ -47,7 +47,7 @@ class AnswerQueueRegistry:
     """All queues of a link on which a task waits.
 
     Attributes:
-        waiting: the queues, as keys: a dict keeps their order, so that flights are repeatable.
+        waiting: the queues, as keys of a dict, because a dict keeps their order and a set does not.
     """
 
     def __init__(self) -> None:

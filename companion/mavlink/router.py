@@ -29,20 +29,20 @@ class Router:
         self.on_error: Callable[[Exception], None] | None = None
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
-        """Call `callback` with each decoded message of that name; return a function that ends this.
+        """Call `callback` with each decoded message of this name; return how to unsubscribe.
 
         Raises:
-            UnknownMessage: The dialect has no such message.
+            UnknownMessage: the dialect has no such message.
         """
         return _add(self._decoded, message_id(name), callback)
 
     def subscribe_raw(self, name: str, callback: Callable[[bytes], None]) -> Unsubscribe:
-        """Call `callback` with each payload of that message; return a function that ends this.
+        """Call `callback` with each payload of this message; return how to unsubscribe.
 
         The payload is passed as it was sent: MAVLink 2 cuts trailing zeros.
 
         Raises:
-            UnknownMessage: Neither the dialect nor `UNDECODED` has such a message.
+            UnknownMessage: neither the dialect nor `UNDECODED` has such a message.
         """
         return _add(self._raw, UNDECODED.get(name) or message_id(name), callback)
 

@@ -14,7 +14,7 @@ class LinkSettings:
     """The endpoint, and the ids of the vehicle and of this program."""
 
     endpoint: str
-    """Such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`; see `parse_endpoint`."""
+    """Endpoint such as `udpin://0.0.0.0:14540` or `serial:///dev/ttyAMA0:921600`."""
     target_system: int = 1
     """System id of the vehicle; frames of other systems are ignored."""
     target_component: int = 1
@@ -29,8 +29,8 @@ class LinkSettings:
     heartbeat_rate_hz: float = 1.0
     """Rate of the heartbeats that are sent, Hz. No setpoint depends on it."""
     signing: Signing | None = None
-    """Signs frames that are sent and checks those received; `None`: no signing."""
+    """Signs frames that are sent and checks received frames; `None`: no signing."""
     lockstep: bool = False
-    """Vehicle time drives the event loop; needs `companion.mavlink.lockstep.run`."""
+    """Whether vehicle time drives the event loop; needs `companion.mavlink.lockstep.run`."""
     first_beacon_timeout_s: float = 10.0
     """Wall time to wait for the first beacon in lockstep, s."""

@@ -30,14 +30,14 @@ _MAX_REQUESTS = 16  # TIMESYNC requests whose answers are recognised
 WRITE_PERIOD_S = 10.0
 """Time between two writes of the stamps, s. The guide demands one write a minute."""
 _STAMP_RESERVE = 15 * TICKS_PER_S
-"""How far the stamps in the file are ahead of the newest stamps while the link is open, ticks.
+"""Time added to the newest stamps in the file while the link is open, ticks.
 
-It is longer than `WRITE_PERIOD_S`. So even after this program is killed, its next run sends newer
-stamps and accepts no older frame again. That run refuses the vehicle's frames until their stamps
-are newer than those in the file, for 15 s at most.
+It is longer than `WRITE_PERIOD_S`. So even if this program is killed, its next run sends newer
+stamps, and accepts no frame of this run again. The next run refuses the vehicle's frames until
+their stamps are newer than those in the file, for 15 s at most.
 """
 _LAST_WRITE_TIMEOUT_S = 2.0
-"""Time allowed for the last write, s."""
+"""Time allowed for the last write of the stamps, s."""
 
 
 def key_from_passphrase_file(path: Path) -> bytes:
@@ -46,7 +46,7 @@ def key_from_passphrase_file(path: Path) -> bytes:
     Blanks at both ends of the line do not count.
 
     Raises:
-        SigningError: The file cannot be read or its first line is empty.
+        SigningError: the file cannot be read or its first line is empty.
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -62,18 +62,18 @@ class Signing:
 
     Args:
         key: 32 bytes shared with the vehicle.
-        link_id: Link id in the signatures that are sent, 0..255.
-        clock: Returns Unix time in s; called once, at the start.
-        elapsed: Returns monotonic time in s; the stamps sent rise with it.
-        file: Keeps the newest stamps from one run to the next; `None` keeps nothing.
+        link_id: link id in the signatures that are sent, 0..255.
+        clock: returns Unix time in s; called once, at the start.
+        monotonic_clock: returns the time in s that the stamps follow after the start.
+        file: keeps the newest stamps from one run to the next; `None`: they are not kept.
 
     Attributes:
-        file: Keeps the newest stamps; `None` keeps nothing.
-        remarks: Sentences about time stamps for the user; whoever shows them removes them.
-        changed: Set when the time stamps should be written to the file soon.
+        file: see the argument.
+        remarks: sentences about time stamps for the user; the code that shows them removes them.
+        changed: set when the time stamps should be written to the file soon.
 
     Raises:
-        SigningError: The key is not 32 bytes.
+        SigningError: the key is not 32 bytes.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class Signing:
         key: bytes,
         link_id: int = 0,
         clock: Callable[[], float] = time.time,
-        elapsed: Callable[[], float] = time.monotonic,
+        monotonic_clock: Callable[[], float] = time.monotonic,
         file: StampFile | None = None,
     ) -> None:
         if len(key) != 32:
@@ -89,12 +89,12 @@ class Signing:
         self._key = key
         self._link = bytes([link_id])
         self.file = file
-        kept, load_error = file.load() if file is not None else (Stamps(), None)
-        self._judge = StampJudge(kept, clock, elapsed)
+        kept_stamps, load_error = file.load() if file is not None else (Stamps(), None)
+        self._judge = StampJudge(kept_stamps, clock, monotonic_clock)
         self.remarks, self.changed = self._judge.remarks, self._judge.changed
         if load_error is not None:
             self.remarks.append(load_error)
-        self._newest_stamp = kept.sent
+        self._newest_stamp = kept_stamps.sent
         self._timesync_requests: deque[bytes] = deque(maxlen=_MAX_REQUESTS)
         self._unproven_stamp = 0
 
@@ -130,11 +130,11 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame is refused only until an answer to TIMESYNC proves its date."""
+        """Whether the last frame was refused only because no answer to TIMESYNC proved its date."""
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:
-        """The stamps of this run, to be kept in the file; called by another thread."""
+        """The stamps of this run, to be written to the file; called by another thread."""
         return Stamps(self._judge.date(), self._newest_stamp, self._judge.streams())
 
     def _answers_timesync(self, frame: Frame) -> bool:
@@ -155,14 +155,13 @@ def _timesync_fields(payload: bytes) -> tuple[bytes, bytes]:
 
 
 class StampWriter:
-    """A thread that writes the stamps every 10 s, when a new stream is heard, and at the end.
+    """Writes the stamps every 10 s, when a new stream is heard, and at the end, in a thread.
 
-    It is a thread, so that the event loop never waits for a disk. A failure is reported once, in
-    `Signing.remarks`.
+    So the event loop never waits for a disk. A failure is reported once, in `Signing.remarks`.
 
     Args:
-        signing: Holds the stamps.
-        file: The file to which they are written.
+        signing: holds the stamps.
+        file: the file to which the stamps are written.
     """
 
     def __init__(self, signing: Signing, file: StampFile) -> None:

@@ -22,13 +22,13 @@ class StampFile:
     """Time stamps in the user's state directory ($XDG_STATE_HOME, or ~/.local/state), mode 0600.
 
     Args:
-        key: The signing key; the file's name is a hash of it, which does not reveal the key.
+        key: the signing key; the file's name is a hash of it, which does not reveal the key.
 
     Attributes:
-        path: The file.
+        path: the file.
 
     Raises:
-        SigningError: There is no state directory.
+        SigningError: there is no state directory.
     """
 
     def __init__(self, key: bytes) -> None:
@@ -59,7 +59,7 @@ class StampFile:
         """Replace the whole file.
 
         Raises:
-            OSError: The file cannot be written; the old one is unchanged.
+            OSError: the file cannot be written; the old one is unchanged.
         """
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         text = json.dumps(

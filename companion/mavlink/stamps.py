@@ -1,9 +1,9 @@
-"""Which signature time stamps are accepted, and which date this program assumes.
+"""Decides which signature time stamps are accepted, and which date this program assumes.
 
 Source: the MAVLink message-signing guide, "Timestamp handling". The stamps of a stream must rise. A
-new stream may be a minute behind. The newest stamp is kept on disk, and the next run starts at the
-later of clock and disk. The guide accepts every stamp with the right key; here, stamps too far in
-the future are refused.
+new stream may be a minute behind. The newest stamp is kept on disk, and the next run starts at this
+stamp or at the computer's clock, whichever is later. The guide accepts every stamp with the right
+key; here, stamps too far in the future are refused.
 """
 
 import time
@@ -20,7 +20,7 @@ _MINUTE = 60 * TICKS_PER_S
 _PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
 """2026-09-01, ticks. A correct clock is never earlier; raise this date with a release."""
 _MAX_AHEAD = 5 * 365 * _DAY
-"""Furthest that an accepted stamp may be ahead of the date, ticks."""
+"""Largest time by which an accepted stamp may be ahead of the date, ticks."""
 
 LATEST_TICKS = 2**48 - 2 * _MAX_AHEAD
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
@@ -71,53 +71,55 @@ class StampJudge:
     - A stamp further ahead is refused.
 
     Args:
-        kept: The stamps kept by the last run.
-        clock: Returns Unix time in s; called once.
-        elapsed: Returns monotonic time in s.
+        kept_stamps: the stamps kept by the last run.
+        clock: returns Unix time in s; called once.
+        monotonic_clock: returns monotonic time in s.
 
     Attributes:
-        remarks: Sentences for the user; whoever shows them removes them.
-        changed: Set at the first frame of a stream in this run.
+        remarks: sentences for the user; the code that shows them removes them.
+        changed: set at the first frame of a stream in this run.
     """
 
     def __init__(
         self,
-        kept: Stamps,
+        kept_stamps: Stamps,
         clock: Callable[[], float] = time.time,
-        elapsed: Callable[[], float] = time.monotonic,
+        monotonic_clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.remarks: list[str] = []
         self.changed = Event()
         self._remarked: set[str] = set()
-        self._monotonic_time = elapsed
-        start = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
-        self._check_clock(start, kept.date)
-        self._start = min(max(start, kept.date, _PROGRAM_DATE), LATEST_TICKS)
-        self._start_monotonic = elapsed()
-        self._ahead_limit = self._start + _DAY
-        self._kept_streams = kept.streams
+        self._monotonic_clock = monotonic_clock
+        clock_date = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
+        self._check_clock(clock_date, kept_stamps.date)
+        self._start_date = min(max(clock_date, kept_stamps.date, _PROGRAM_DATE), LATEST_TICKS)
+        self._start_monotonic = monotonic_clock()
+        self._ahead_limit = self._start_date + _DAY
+        self._kept_streams = kept_stamps.streams
         self._newest_by_stream: dict[tuple[Stream, bool], int] = {}  # the bool as in `_newest`
         self._newest = {False: 0, True: 0}  # of all streams; True: of stamps far ahead of the date
         self._date_proven = False
 
     def date(self) -> int:
         """The date of this program now, ticks."""
-        return self._start + int((self._monotonic_time() - self._start_monotonic) * TICKS_PER_S)
+        return self._start_date + int(
+            (self._monotonic_clock() - self._start_monotonic) * TICKS_PER_S
+        )
 
     def awaits_answer(self, stamp: int) -> bool:
         """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
         date = self.date()
-        in_reach = date + _DAY < stamp <= date + _MAX_AHEAD
+        is_far_ahead = date + _DAY < stamp <= date + _MAX_AHEAD
         # Once a stamp near the date was accepted, no other stamp changes the date.
-        return in_reach and not self._date_proven and not self._newest[False]
+        return is_far_ahead and not self._date_proven and not self._newest[False]
 
     def judge(self, stream: Stream, stamp: int, *, answers_timesync: bool) -> SignatureResult:
         """Judge a stamp; only a good one is remembered.
 
         Args:
-            stream: The signer's stream.
-            stamp: The time stamp, ticks.
-            answers_timesync: Whether the frame answers a TIMESYNC request of this run.
+            stream: the signer's stream.
+            stamp: the time stamp, ticks.
+            answers_timesync: whether the frame answers a TIMESYNC request of this run.
         """
         date = self.date()
         ahead = stamp > date + _DAY
@@ -171,27 +173,28 @@ class StampJudge:
         return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
 
     def _kept_stamp(self, stream: Stream, ahead: bool) -> int:
-        """The newest stamp of a stream on disk, 0 without one.
+        """The newest stamp of a stream on disk, ticks; 0 without one.
 
         Args:
             stream: the signer's stream.
-            ahead: true: among the stamps far ahead of the date; false: among the others.
+            ahead: whether to search only the stamps far ahead of the date, or only the others.
         """
         stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)
 
-    def _check_clock(self, start: int, kept: int) -> None:
-        """Remark that this computer's clock, `start`, is before the date on disk or the release."""
-        if start < kept - _MINUTE and kept > _PROGRAM_DATE:
+    def _check_clock(self, clock_date: int, kept_date: int) -> None:
+        """Remark that the clock's date, ticks, is before the date on disk or of the release."""
+        if clock_date < kept_date - _MINUTE and kept_date > _PROGRAM_DATE:
             self._remark(
-                f"this computer's clock is wrong: it says {_date(start)}, but an earlier run ended "
-                f"at {_date(kept)}, so the later date is used; {SET_CLOCK}; if the clock was "
-                "ahead in the earlier run, delete the file of time stamps (docs/signing.md)"
+                f"this computer's clock is wrong: it says {_date(clock_date)}, but an earlier run "
+                f"ended at {_date(kept_date)}, so the later date is used; {SET_CLOCK}; if the "
+                "clock was ahead in the earlier run, delete the file of time stamps "
+                "(docs/signing.md)"
             )
-        elif start < _PROGRAM_DATE:
+        elif clock_date < _PROGRAM_DATE:
             self._remark(
-                f"this computer's clock is wrong: it says {_date(start)}, before this program was "
-                f"released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
+                f"this computer's clock is wrong: it says {_date(clock_date)}, before this program "
+                f"was released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
             )
 
     def _remark_ahead(self, ticks: int, rest: str) -> None:

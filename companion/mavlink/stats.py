@@ -34,11 +34,11 @@ class LinkStats:
     non_finite: int = 0
     """Messages refused for a NaN or infinity."""
     non_finite_at: dict[str, float] = field(default_factory=dict)
-    """Event-loop time at which the newest of them came, s, by message name."""
+    """Event-loop time of the newest message refused for a NaN or infinity, s, by message name."""
     outdated: int = 0
-    """Positions refused because one with the same or a later time stamp had come."""
+    """Position messages refused because one with the same or a later time stamp had come."""
     stamped_ahead: int = 0
-    """Positions refused because they were stamped ahead of the vehicle's clock."""
+    """Position messages refused because their time stamp was ahead of the vehicle's clock."""
     malformed: int = 0
     """Messages that could not be decoded or whose values are impossible."""
     sent: int = 0
@@ -49,8 +49,7 @@ class LinkStats:
     """Frames of this program dropped because they could not be sent (no peer, buffer full,
     connection down)."""
     reconnects: int = 0
-    """Number of times that the connection was opened again; of a TCP server, number of times that
-    its client was lost."""
+    """Number of times that the connection was opened again, or a TCP server lost its client."""
     peers: int = 0
     """Number of times that the peer changed to another address or port, or another TCP client. A
     peer that returns at the same address and port does not count. A serial port or TCP connection
@@ -58,7 +57,7 @@ class LinkStats:
     by_message: dict[int, int] = field(default_factory=dict)
     """Accepted frames for each message id."""
     foreign_sources: set[tuple[int, int]] = field(default_factory=set)
-    """(system, component) of frames that are ignored."""
+    """(system, component) of the frames in `ignored_foreign`."""
 
     def refuse_non_finite(self, message: str, now: float) -> None:
         """Count a message of that name as refused at `now`, s of event-loop time."""
@@ -70,7 +69,7 @@ class FrameCounter:
     """Counts the vehicle's accepted frames and the gaps in its sequence numbers (0..255, wrapping).
 
     Args:
-        stats: Takes the counts.
+        stats: takes the counts.
     """
 
     def __init__(self, stats: LinkStats) -> None:

@@ -42,8 +42,8 @@ class TextAssembler:
 
         Args:
             severity: MAV_SEVERITY.
-            text: The text.
-            now: Event-loop time, s.
+            text: the text.
+            now: event-loop time, s.
         """
         if not _is_repetition(self.texts, text, now):
             event = StatusText(now, severity, text)
@@ -89,9 +89,9 @@ def status_texts(text: str, severity: int, text_id: int) -> list[Message]:
     """The STATUSTEXTs of an ASCII text: a long one in pieces of 50 characters, the last shorter.
 
     Args:
-        text: The text.
+        text: the text.
         severity: MAV_SEVERITY.
-        text_id: Joins the pieces of one text, 1..65535; not used for a text of one piece.
+        text_id: number that joins the pieces of one text, 1..65535; not used for a single piece.
     """
     if len(text) <= _CHUNK_CHARACTERS:
         return [dialect.MAVLink_statustext_message(severity, text.encode("ascii"))]
@@ -106,11 +106,11 @@ def status_texts(text: str, severity: int, text_id: int) -> list[Message]:
 class TextFrames:
     """Makes STATUSTEXT frames with texts of this program, for a log; they are not sent.
 
-    Their component is MAV_COMP_ID_LOG: among the frames that are sent, their sequence numbers
-    would look as if frames had been lost.
+    The frames come from MAV_COMP_ID_LOG: among this program's own frames, their sequence numbers
+    would look like lost frames.
 
     Args:
-        system: System id of the frames.
+        system: system id of the frames.
     """
 
     def __init__(self, system: int) -> None:
@@ -124,12 +124,12 @@ class TextFrames:
         return [self._frame(message) for message in messages]
 
     def _frame(self, message: Message) -> bytes:
-        kind = message.get_msgId()
+        message_id = message.get_msgId()
         self._sequence = (self._sequence + 1) & 0xFF
         return build_frame(
-            kind,
+            message_id,
             encode(message),
-            CRC_EXTRA[kind],
+            CRC_EXTRA[message_id],
             sequence=self._sequence,
             system=self._system,
             component=dialect.MAV_COMP_ID_LOG,

@@ -28,13 +28,13 @@ class MavsdkLink(Link):
     and count as lost in `stats`.
 
     Args:
-        settings: The endpoint, and the ids of the vehicle and of this program.
-        tap: Called with every frame accepted from and sent to the vehicle.
-        notice: Called once with each notice about the peer; by default it logs a warning.
+        settings: the endpoint, and the ids of the vehicle and of this program.
+        tap: called with every frame accepted from and sent to the vehicle.
+        notice: called once with each notice about the peer; by default it logs a warning.
 
     Raises:
-        EndpointError: The endpoint cannot be parsed.
-        LinkError: The settings demand lockstep or signing, which MAVSDK cannot do.
+        EndpointError: the endpoint cannot be parsed.
+        LinkError: the settings demand lockstep or signing, which MAVSDK cannot do.
     """
 
     def __init__(

@@ -45,7 +45,7 @@ def connection_url(endpoint: str) -> str:
     """Convert an endpoint to the URL that `Mavsdk.add_any_connection` takes.
 
     Raises:
-        EndpointError: The endpoint cannot be parsed, or MAVSDK cannot do what it demands.
+        EndpointError: the endpoint cannot be parsed, or MAVSDK cannot do what it demands.
     """
     where = parse_endpoint(endpoint)
     if isinstance(where, UdpIn | TcpServer) and where.peers:
@@ -60,7 +60,7 @@ def connection_url(endpoint: str) -> str:
 
 
 _MOST_WAITING = 1000
-"""Largest number of frames that wait for the event loop; beyond it the oldest are dropped."""
+"""Largest number of frames that wait for the event loop; if more wait, the oldest are dropped."""
 _SOURCE = slice(5, 7)  # system and component of a MAVLink 2 frame
 _OPEN_FAILURES = {
     "BIND_ERROR": "the port is in use by another program, or the address is not this computer's",
@@ -73,12 +73,12 @@ class MavsdkTransport:
     """A running MAVSDK. It opens a dropped TCP connection or serial port again by itself.
 
     Args:
-        settings: The endpoint and ids. MAVSDK itself uses the component id above
+        settings: the endpoint and ids. MAVSDK itself uses the component id above
             `source_component`, because it does not forward frames that are addressed to itself.
-        receive: Called in the event loop for each frame except MAVSDK's own.
+        receive: called in the event loop for each frame except MAVSDK's own.
 
     Raises:
-        EndpointError: The endpoint cannot be parsed, or MAVSDK cannot open it; the message says
+        EndpointError: the endpoint cannot be parsed, or MAVSDK cannot open it; the message says
             why.
     """
 
@@ -88,12 +88,12 @@ class MavsdkTransport:
         url = connection_url(settings.endpoint)
         log_subscribe(lambda *_: True)  # otherwise MAVSDK logs to standard output
         component = settings.source_component % 255 + 1
-        self._own = bytes((settings.source_system, component))
+        self._mavsdk_source = bytes((settings.source_system, component))
         self._receive = receive
         # A listening UDP port knows no address to send to before it has received a frame.
         self._has_peer = not url.startswith(_SCHEMES[UdpIn])
         self._is_open = True
-        self._waiting: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
+        self._waiting_frames: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
         self._loop = asyncio.get_running_loop()
         self._wakeup = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._mavsdk = Mavsdk(Configuration.create_manual(settings.source_system, component, True))
@@ -133,18 +133,18 @@ class MavsdkTransport:
 
     def _on_frame(self, frame: bytes) -> None:
         """Pass a frame to the event loop; called in MAVSDK's thread."""
-        self._waiting.append((frame, perf_counter_ns()))
+        self._waiting_frames.append((frame, perf_counter_ns()))
         os.eventfd_write(self._wakeup, 1)
 
     def _read(self) -> None:
         os.eventfd_read(self._wakeup)
-        while self._waiting:
-            frame, received_ns = self._waiting.popleft()
-            if frame[0] != V2 or frame[_SOURCE] != self._own:
+        while self._waiting_frames:
+            frame, received_ns = self._waiting_frames.popleft()
+            if frame[0] != V2 or frame[_SOURCE] != self._mavsdk_source:
                 self._has_peer = True
                 self._receive(frame, received_ns)
 
 
 def _open_error(endpoint: str, message: str) -> str:
-    known = (reason for name, reason in _OPEN_FAILURES.items() if name in message)
-    return f"{endpoint} cannot be opened by MAVSDK: {next(known, message)}"
+    reasons = (reason for name, reason in _OPEN_FAILURES.items() if name in message)
+    return f"{endpoint} cannot be opened by MAVSDK: {next(reasons, message)}"

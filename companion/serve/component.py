@@ -24,7 +24,8 @@ _MAX_TEXT_LENGTH = 200
 _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _MAX_ANSWERS = 10
-"""Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`; texts may contain its numbers."""
+"""Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`. Texts that contain the numbers of
+a setpoint may all differ, so that none is a repetition."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 
@@ -32,7 +33,7 @@ WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
 
 
 class Component:
-    """Sends to the clients as the component of the companion computer, and answers commands to it.
+    """The MAVLink component of the companion computer: sends to clients, and answers commands.
 
     Args:
         settings: ids and signing key of this program.
@@ -89,8 +90,8 @@ class Component:
             client: sender of the frame.
             frame: COMMAND_LONG, COMMAND_INT, SET_MODE, MISSION_ITEM or any other frame.
             result: MAV_RESULT of the command; a mission item is always denied.
-            sender: component that answers; clients accept only an answer from the component they
-                commanded.
+            sender: component in whose name the answer is sent: the one to which the client sent
+                its command, because clients accept no other answer.
         """
         message = _acknowledgement(frame, result)
         if message is not None:
@@ -102,7 +103,10 @@ class Component:
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
     def _note_unless_repeated(self, client: Client | None, text: str) -> bool:
-        """Note a text as sent now; return False if it, or too many, were within the last 5 s."""
+        """Note that `text` is sent now; return False if it must not be sent.
+
+        A text must not be sent if it or too many others were sent to `client` in the last 5 s.
+        """
         now = self._loop.time()
         self._sent_at = {
             key: sent for key, sent in self._sent_at.items() if now - sent < _TEXT_REPEAT_PERIOD

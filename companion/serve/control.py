@@ -1,4 +1,4 @@
-"""What becomes of clients' frames: setpoints to fly, requests for control, refused commands."""
+"""Handles the clients' frames that concern control: setpoints, and commands of modes or motions."""
 
 import asyncio
 
@@ -122,7 +122,8 @@ class ServedControl:
     def _give_control(self, program: Program, now: float) -> bool:
         """Give control if setpoints alone begin a flight; return whether `program` has control.
 
-        They begin one only in the air, in ArduPilot's GUIDED. A refused program gets the reason.
+        Setpoints alone begin a flight only in the air, in ArduPilot's GUIDED. A refused program
+        gets the reason.
         """
         autopilot, state = self._link.autopilot, self._link.state
         if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:

@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 class FlightRecords:
     """Makes the record of each flight; between flights nothing is recorded.
 
-    The link stays open between flights and passes all its frames to this object, its tap.
+    An instance is the `Tap` of the link, which stays open between flights.
 
     Args:
         directory: folder for the flights' folders; None: nothing is recorded.
@@ -31,7 +31,7 @@ class FlightRecords:
         note: called with each event, as a sentence for the user.
 
     Attributes:
-        grants: requested real-time settings, and which of them were refused.
+        grants: the requested real-time settings, granted or refused.
         on_recorded: called with the folder of each flight when its record is complete; returns a
             sentence for the clients, or None. It runs in a thread, except on a virtual clock.
     """
@@ -51,9 +51,9 @@ class FlightRecords:
             self._tap(time, frame)
 
     def new_record(self, config: Config) -> FlightFiles:
-        """The open record of a new flight, which begins with this configuration.
+        """Open the record of a new flight, which begins with this configuration.
 
-        It is a record without folder if none can be created.
+        If no folder can be created, the flight is not recorded, and the user is told.
         """
         folder = None
         if self._directory is not None:

@@ -30,10 +30,10 @@ class ServedFlights:
         observer: receives phases and events of each flight.
         environment: environment of the flights.
         records: makes the records of the flights.
-        changes: changes of configuration values in flight.
+        changes: applies changes of configuration values in flight.
 
     Attributes:
-        ownership: determines whose requests are flown.
+        ownership: decides which client's requests are flown.
         current: the flight that runs, or None.
     """
 
@@ -64,11 +64,11 @@ class ServedFlights:
 
     @property
     def may_retry(self) -> bool:
-        """Whether setpoints alone may begin a takeover: none has failed a short time ago."""
+        """Whether setpoints alone may begin a takeover: none failed in the last `_RETRY_PAUSE`."""
         return self._clock() >= self._retry_time
 
     def fence_refusal(self) -> str | None:
-        """Why the fence of the first flight forbids another one, or None."""
+        """Why another flight must not begin, as found by `KeptFence.refusal`; None: it may."""
         return self._fence.refusal()
 
     def begin(
@@ -79,7 +79,8 @@ class ServedFlights:
         Args:
             owner: the program in control.
             request: the first request to fly.
-            command: the command that requested control, to be answered; None: setpoints did.
+            command: the command that requested control, to be answered; None: setpoints alone
+                requested it.
             from_ground: whether the vehicle stands armed, and takes off first.
 
         Raises:
@@ -117,14 +118,14 @@ class ServedFlights:
 
     async def _fly(self, flight: ServedFlight, command: ControlRequest | None) -> None:
         """Fly, then release control; complete the record, while the next flight may begin."""
-        begun = False
+        has_begun = False
         try:
-            begun = await flight.run(command)
+            has_begun = await flight.run(command)
         finally:
             self.ownership.release()
             self._fence.keep(flight.fence_centre)
             self.current = self._task = None
-            if not begun:
+            if not has_begun:
                 self._retry_time = self._clock() + _RETRY_PAUSE
             await flight.save()
             if self.current is None and self._config.realtime.freeze_gc:  # between flights

@@ -33,9 +33,9 @@ class KeptFence:
 
     @property
     def centre(self) -> FenceCentre | None:
-        """Centre of the fence in the first flight since the vehicle was armed; None: none yet.
+        """Centre of the fence in the first flight since the vehicle was armed; None: no flight yet.
 
-        It is given in the autopilot's present local frame.
+        The centre is in the autopilot's present local frame.
         """
         if self._kept_centre is None:
             return None
@@ -56,8 +56,8 @@ class KeptFence:
 
         Possible reasons: the vehicle is outside the fence, or the fence's position is uncertain.
         """
-        position, kept = self._state.position, self.centre
-        if kept is None or position is None:
+        position, kept_centre = self._state.position, self.centre
+        if kept_centre is None or position is None:
             return None
         shift = dist(self._resets.shift, self._shift_when_kept)
         if shift > self._max_shift:
@@ -66,8 +66,8 @@ class KeptFence:
                 "more than safety.max_reset_m, so it is not certain where the fence lies; land and "
                 "disarm"
             )
-        offset = minus(position.position_ned, kept.position_ned)
-        breach = self._fence.breach(offset, self._state.height, kept.place)
+        offset = minus(position.position_ned, kept_centre.position_ned)
+        breach = self._fence.breach(offset, self._state.height, kept_centre.place)
         if breach is None:
             return None
         return f"outside the fence of the first flight: {breach}; fly back, or land and disarm"

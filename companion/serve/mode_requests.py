@@ -21,13 +21,14 @@ _REQUEST_DATA_STREAM = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
 MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
 """Ids of the messages with one mission item."""
 _GUIDED_ITEMS = 2, 3
-"""Values of `current` with which ArduPilot flies to a mission item, or to its height, at once."""
+"""Values of a mission item's field `current` that ArduPilot obeys at once: 2 flies to the item's
+position, 3 to its height."""
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
 _STEERING_COMMANDS = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE
 _LEAVING_COMMANDS = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE_FLAG = 1
 _MAIN_MODE = 0xFF << 16
-"""Mask of PX4's main mode in `custom_mode`. OFFBOARD has no sub mode, and PX4 ignores one."""
+"""Mask of PX4's main mode in `custom_mode`; OFFBOARD has no sub mode, and PX4 ignores any given."""
 _MODE_MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE})
 """Messages that can command a mode."""
 
@@ -62,9 +63,9 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
 def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame makes the autopilot fly elsewhere without leaving the mode of our setpoints.
 
-    In GUIDED, ArduPilot flies to the position of a DO_REPOSITION or of a single mission item, as to
-    that of a setpoint. After DO_PAUSE_CONTINUE, it ignores setpoints until the pause ends. Such a
-    frame would work against the client in control. PX4 leaves OFFBOARD for these commands.
+    In GUIDED, ArduPilot flies to the position of a DO_REPOSITION or of a single mission item, and
+    after DO_PAUSE_CONTINUE it ignores setpoints until the pause ends. Such a frame would work
+    against the client in control. PX4 leaves OFFBOARD for these commands.
     """
     if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
         return False
@@ -77,7 +78,7 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
 
 
 def leaves_control(frame: Frame) -> bool:
-    """Whether a frame commands a mode, a landing or a return: its sender gives up control."""
+    """Whether a frame gives up its sender's control: it commands a mode, a landing or a return."""
     if frame.message_id == _SET_MODE:
         return True
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
@@ -86,7 +87,7 @@ def leaves_control(frame: Frame) -> bool:
 
 
 def reduces_telemetry(frame: Frame, needed: dict[str, float]) -> bool:
-    """Whether a frame could reduce telemetry below the needed rates: Hz, by message name."""
+    """Whether a frame could reduce telemetry below the rates `needed`, Hz by message name."""
     if frame.message_id == _REQUEST_DATA_STREAM:
         return True
     if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):

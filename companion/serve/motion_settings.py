@@ -33,8 +33,8 @@ def change_refusal(before: Config, after: Config) -> str | None:
     """Why a change is refused while a client is in control; None: it is permitted.
 
     Motions are planned with the limits at the takeover, but the guidance loop uses changed limits
-    at once, and with lower ones the vehicle could not follow the motions. So these limits must not
-    change, and the tilt limit must stay large enough.
+    at once. With lower limits the vehicle could not follow the motions. So the limits of motions
+    must not change, and the tilt limit must stay large enough.
     """
     changed_names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
     if changed_names:

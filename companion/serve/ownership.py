@@ -6,11 +6,11 @@ from enum import Enum
 from math import inf
 
 _MAX_CLIENTS = 64
-"""Number of remembered clients above which the silent ones are forgotten."""
+"""Largest number of remembered clients; if more send setpoints, silent clients are forgotten."""
 
 
 class ControlState(Enum):
-    """What the vehicle does for its owner, the client in control."""
+    """State of the control by the owner, the client in control."""
 
     FREE = "no client is in control"
     LIVE = "the owner's setpoints are flown"
@@ -20,27 +20,27 @@ class ControlState(Enum):
 
 @dataclass
 class _Stream:
-    """The setpoints of one client."""
+    """Arrival times of the last two setpoints of one client."""
 
     newest: float = -inf
-    """Arrival of the newest setpoint, s."""
+    """Event-loop time at which the newest setpoint arrived, s; −inf: none yet."""
     previous: float = -inf
-    """Arrival of the setpoint before the newest, s."""
+    """Event-loop time at which the setpoint before the newest arrived, s; −inf: none yet."""
 
 
 class Ownership:
     """Keeps one owner, the client in control, and refuses all others with a reason.
 
     Args:
-        timeout: a client without a setpoint for this long is silent, s.
-        hold: time for which the vehicle is held for a silent owner, s.
+        timeout: time without a setpoint after which a client counts as silent, s.
+        hold_time: time for which the vehicle is held for a silent owner, s.
 
     Attributes:
         owner: the client in control, or None.
     """
 
-    def __init__(self, timeout: float, hold: float) -> None:
-        self._timeout, self._hold = timeout, hold
+    def __init__(self, timeout: float, hold_time: float) -> None:
+        self._timeout, self._hold_time = timeout, hold_time
         self.owner: Hashable | None = None
         self._streams: dict[Hashable, _Stream] = {}
 
@@ -80,12 +80,12 @@ class Ownership:
         return None
 
     def has_stream(self, client: Hashable, now: float) -> bool:
-        """Whether a client sends a stream: its last two setpoints came in time."""
+        """Whether a client sends a stream: its last two setpoints came within the timeout."""
         stream = self._streams.get(client, _Stream())
         return self._is_live(client, now) and stream.newest - stream.previous <= self._timeout
 
     def begin(self, now: float) -> None:
-        """Note the beginning of control; the hold of an owner that is already silent starts now."""
+        """Note that control begins; if the owner is already silent, its hold time starts now."""
         stream = self._streams.setdefault(self.owner, _Stream())
         stream.newest = max(stream.newest, now - self._timeout)
 
@@ -94,13 +94,13 @@ class Ownership:
         self.owner = None
 
     def state(self, now: float) -> ControlState:
-        """What the vehicle does for its owner at `now`, s."""
+        """State of the control at the event-loop time `now`, s."""
         if self.owner is None:
             return ControlState.FREE
         overdue = now - self._streams.get(self.owner, _Stream()).newest - self._timeout
         if overdue <= 0.0:
             return ControlState.LIVE
-        return ControlState.HOLDING if overdue <= self._hold else ControlState.EXPIRED
+        return ControlState.HOLDING if overdue <= self._hold_time else ControlState.EXPIRED
 
     def _is_live(self, client: Hashable, now: float) -> bool:
         return now - self._streams.get(client, _Stream()).newest <= self._timeout

@@ -28,22 +28,22 @@ class Programs:
         self._newest: dict[Program, Request] = {}  # in the order of their newest requests
 
     def keep(self, program: Program, request: Request) -> None:
-        """Keep a program's newest request; if too many are kept, drop the oldest ones."""
+        """Keep a program's newest request; drop the oldest of more than `_MAX_PROGRAMS`."""
         self._newest.pop(program, None)
         self._newest[program] = request
         while len(self._newest) > _MAX_PROGRAMS:
             del self._newest[next(iter(self._newest))]
 
     def newest(self, program: Program) -> Request | None:
-        """The newest request of a program; None if it has sent none, or was forgotten."""
+        """The newest request of a program; None if it has sent none, or its request was dropped."""
         return self._newest.get(program)
 
     def sender_of(self, client: Client, frame: Frame) -> Program:
         """The program that sent a command.
 
         A program may use different component ids for commands and setpoints. If no setpoint came
-        from the sender's address, the sender is taken for the program of the same client with the
-        newest setpoint.
+        from the address of `frame`, this is the program with the newest setpoint at the same
+        client.
         """
         program = Program(client, source_of(frame))
         if program in self._newest:

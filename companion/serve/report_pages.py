@@ -13,9 +13,9 @@ from companion.realtime import schedule_as_usual
 _PAGE_TIMEOUT = 120.0
 """Time allowed for one page, s; a small computer needs about ten seconds."""
 _CHECK_PERIOD = 1.0
-"""Period of the checks whether to stop waiting for the process, s."""
+"""Period of the checks whether the program ends or the page takes too long, s."""
 _NICENESS = 19
-"""Niceness of the process, so that it yields to everything else; the next flight may have begun."""
+"""Niceness of the process, so that it yields to a flight that has begun meanwhile."""
 _INTERRUPTED = "interrupted"
 
 
@@ -63,17 +63,17 @@ class ReportPages:
             start_new_session=True,  # Ctrl-C must reach only this program
         )
         _lower_priority(self._process.pid)
-        out, errors = self._wait_for_output(self._process)
+        output, errors = self._wait_for_output(self._process)
         if self._process.returncode != 0:
             raise RuntimeError(" ".join(errors.split()) or f"exit {self._process.returncode}")
-        return out.strip()
+        return output.strip()
 
     def _wait_for_output(self, process: "subprocess.Popen[str]") -> tuple[str, str]:
         """Return the output of the process when it has ended.
 
         Raises:
-            RuntimeError: the program ends, or the time is over. The process is killed without
-                waiting for its end, because it may be blocked by a disk that hangs.
+            RuntimeError: the program ends, or the page takes too long. The process is killed
+                without waiting for its end, because it may be blocked by a disk that hangs.
         """
         deadline = time.monotonic() + _PAGE_TIMEOUT
         while True:

@@ -37,8 +37,8 @@ _PROGRESS_PERIOD = 0.4
 """Period of progress messages to a client that requested control, s."""
 _CHECK_PERIOD = 0.05
 _RELEASE_TIME = 2.0
-"""Longest time from the owner's command of another mode to the change of mode, s. A later change
-counts as somebody else's."""
+"""Longest time from the owner's command of another mode to the change of mode, s. A change after
+this time is attributed to somebody else."""
 _VALUES_PERIOD = 0.5
 
 
@@ -57,11 +57,11 @@ class ServedFlight:
         config: configuration of the vehicle and of `serve`.
         link: open link to the vehicle.
         component: sends answers to clients and texts to pilots.
-        ownership: determines whose requests are flown, and for how long.
+        ownership: decides which client's requests are flown, and how long.
         observer: receives phases and events.
         environment: environment of the flight.
         records: makes the record of the flight.
-        changes: changes of configuration values in flight.
+        changes: applies changes of configuration values in flight.
         fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
             control begins.
         from_ground: whether the vehicle stands armed, and takes off first.
@@ -88,7 +88,7 @@ class ServedFlight:
         self._link, self._component, self._ownership = link, component, ownership
         self._changes, self._clock = changes, asyncio.get_running_loop().time
         self._autopilot = Address(link.settings.target_system, link.settings.target_component)
-        self._owner, self._release_commanded_at = name, -inf
+        self._owner_name, self._release_commanded_at = name, -inf
         self._source = ServedSource(
             name, commanded_motion(changes.wanted_config), ownership, self._heading
         )
@@ -116,27 +116,27 @@ class ServedFlight:
     @property
     def is_ending(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
-        begun = self._source.start_pose is not None
-        flown = self._assembled.context.guidance_loop.flown
-        given_up = begun and flown.source is not self._source
-        return given_up or self._assembled.flight.failed_in is not None
+        has_begun = self._source.start_pose is not None
+        flown = self._assembled.context.guidance_loop.flown_source
+        is_replaced = has_begun and flown.source is not self._source
+        return is_replaced or self._assembled.flight.failed_in is not None
 
     @property
     def fence_centre(self) -> FenceCentre | None:
         """Centre of the fence; None before control has begun."""
-        begun = self._source.start_pose is not None
-        return self._assembled.context.snapshot_builder.fence_centre if begun else None
+        has_begun = self._source.start_pose is not None
+        return self._assembled.context.snapshot_builder.fence_centre if has_begun else None
 
     @property
     def tracking_error(self) -> float | None:
-        """Distance from the reference, m; None: unknown."""
+        """Distance of the vehicle from the reference, m; None: unknown."""
         return self._assembled.context.guidance_loop.tracking_error
 
     def give(self, request: Request) -> None:
         """Fly a request, at once if control has begun.
 
         Raises:
-            UnplannableError: no motion leads to it; the previous request stays in force.
+            UnplannableError: no motion leads to the request; the previous one stays in force.
         """
         self._source.give(request, self._clock())
         self._assembled.context.guidance_loop.step_soon()
@@ -151,8 +151,8 @@ class ServedFlight:
 
     async def run(self, command: ControlRequest | None) -> bool:
         """Fly; answer `command`, if there is one; return whether control had begun."""
-        limited = self._changes.limited_by(change_refusal)
-        with self._records.recording(self._record), limited:
+        refusing_changes = self._changes.limited_by(change_refusal)
+        with self._records.recording(self._record), refusing_changes:
             result = "stopped at once"
             self._record.begin_counting(self._link.stats)
             try:
@@ -166,7 +166,7 @@ class ServedFlight:
         return self._source.start_pose is not None
 
     async def save(self) -> None:
-        """Complete the record; remove it after a failed takeover."""
+        """Complete the record, or remove it if control did not begin."""
         if self._summary is None or self._source.start_pose is None:
             await self._records.discard(self._record)
         else:
@@ -196,8 +196,8 @@ class ServedFlight:
 
     def _released_by(self) -> str:
         """Name of the owner if it has just commanded another mode, else an empty text."""
-        lately = self._clock() - self._release_commanded_at <= _RELEASE_TIME
-        return self._owner if lately else ""
+        is_recent = self._clock() - self._release_commanded_at <= _RELEASE_TIME
+        return self._owner_name if is_recent else ""
 
     def _tell_alarm(self, text: str) -> None:
         self._note_alarm(text)
@@ -205,30 +205,30 @@ class ServedFlight:
 
     def _tell_end(self, command: ControlRequest | None, result: str) -> None:
         if self._source.start_pose is None:
-            self._component.tell(f"control was not given to {self._owner}: {result}")
+            self._component.tell(f"control was not given to {self._owner_name}: {result}")
             self._answer(command, REJECTED)
             return
         if result == "ok":
             released = self._assembled.flight.failed_in is not None
             result = "released by the client" if released else "handed back"
-        self._component.tell(f"control by {self._owner} has ended: {result}")
+        self._component.tell(f"control by {self._owner_name} has ended: {result}")
 
     async def _answer_and_tell(self, command: ControlRequest | None) -> None:
-        """Answer the client until control begins; then tell all clients when it falls silent."""
+        """Answer `command` until control begins; then tell clients of each change of control."""
         while self._source.start_pose is None:
             self._answer(command, IN_PROGRESS)
             await asyncio.sleep(_PROGRESS_PERIOD)
         self._answer(command, ACCEPTED)
-        told, reported = "", ControlState.LIVE
+        told_owner, told_state = "", ControlState.LIVE
         while True:
-            now = self._ownership.state(self._clock())
-            self._owner = str(self._ownership.owner or self._owner)
-            if self._owner != told:  # also when another client goes on for a silent one
-                told, reported = self._owner, ControlState.LIVE
-                self._component.tell(f"{told} is in control")
-            elif now is not reported and now in (ControlState.LIVE, ControlState.HOLDING):
-                self._component.tell(f"{self._owner}: {now.value}")
-                reported = now
+            state = self._ownership.state(self._clock())
+            self._owner_name = str(self._ownership.owner or self._owner_name)
+            if self._owner_name != told_owner:  # also when another client goes on for a silent one
+                told_owner, told_state = self._owner_name, ControlState.LIVE
+                self._component.tell(f"{told_owner} is in control")
+            elif state is not told_state and state in (ControlState.LIVE, ControlState.HOLDING):
+                self._component.tell(f"{self._owner_name}: {state.value}")
+                told_state = state
             await asyncio.sleep(_CHECK_PERIOD)
 
     async def _send_values(self) -> None:

@@ -51,7 +51,7 @@ class ServeSession:
             recorded.
 
     Attributes:
-        changes: changes of configuration values in flight, in force for the next flight too.
+        changes: applies changes of configuration values in flight, for the next flights too.
         network: network of the clients, once it is open.
         flights: flights under a client's control, once the link is open, if `serve.control` is
             true.
@@ -112,7 +112,7 @@ class ServeSession:
                 return await self._serve(link, network)
 
     def _log_state(self, link: Link) -> None:
-        """Note changes of the vehicle's state; a flight, while connected, notes them itself."""
+        """Note changes of the vehicle's state, except in a flight, which notes them itself."""
 
         def note(text: str) -> None:
             if link.on_attitude is None:
@@ -130,13 +130,13 @@ class ServeSession:
         if self._config.serve.control:
             keeper = SituationKeeper(link, network)
             control = self._control(link, component, keeper)
-            network.flown = SETPOINTS
+            network.setpoint_ids = SETPOINTS
             background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
-        gate = _FrameInterceptor(
+        interceptor = _FrameInterceptor(
             permission, component, control, network.routing, link.settings.target_system
         )
-        network.routing.on_own_frame = gate.on_own_frame
-        network.routing.intercept = gate.intercept
+        network.routing.on_own_frame = interceptor.on_own_frame
+        network.routing.intercept = interceptor.intercept
         for endpoint in self._config.serve.clients:
             self._note(f"clients at {endpoint}")
         self.network = network
@@ -153,7 +153,7 @@ class ServeSession:
     def _control(
         self, link: Link, component: Component, keeper: SituationKeeper
     ) -> "ServedControl":
-        """Let clients command the vehicle."""
+        """Make the objects through which clients command the vehicle."""
         from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
         from companion.serve.flights import ServedFlights  # noqa: PLC0415  the same
 
@@ -177,7 +177,7 @@ class ServeSession:
 
 
 class _FrameInterceptor:
-    """Refuses frames that a client may not send, and passes its setpoints to control."""
+    """Refuses frames that a client may not send, and passes setpoints to `ServedControl`."""
 
     def __init__(
         self,

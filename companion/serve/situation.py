@@ -21,7 +21,8 @@ from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
 _COUNTING_TIME = 0.1
-"""Time over which messages are counted after a request, s; short, as the count is not used."""
+"""Time for which `Link.set_rates` counts messages after its request, s. It is short, because the
+counts are not used here."""
 _MAX_TELEMETRY_AGE = 0.5
 """Largest age of a position or attitude that is used, s."""
 _MAX_PAIR_INTERVAL = 0.3
@@ -30,7 +31,7 @@ _NEW_ORIGIN_WEIGHT = 0.05
 """Weight of a new pair of positions; each pair is off by some centimetres. The altitude of home is
 exact in each message, and is not averaged."""
 _NEW_ORIGIN_DISTANCE = 2.0
-"""An origin this far from the estimate counts as newly set, m."""
+"""Distance from the estimate at which a measured origin counts as newly set, m."""
 
 
 class SituationKeeper:
@@ -70,15 +71,15 @@ class SituationKeeper:
         return "command a height of 1 m or more above the ground, or take off first"
 
     async def keep_telemetry(self, wanted: Callable[[], Mapping[str, float]]) -> None:
-        """Until cancelled, request telemetry whenever no attitude comes; ArduPilot needs a request.
+        """Until cancelled, request telemetry whenever no attitude comes, as ArduPilot requires.
 
         `wanted` returns rates by message name, Hz; it is called once the autopilot is known.
         """
-        newest = self._network.attitude_payload
+        newest_payload = self._network.attitude_payload
         while True:
             await asyncio.sleep(_CHECK_PERIOD)
-            before, newest = newest, self._network.attitude_payload
-            if newest != before or self._link.state.autopilot is None:
+            payload_before, newest_payload = newest_payload, self._network.attitude_payload
+            if newest_payload != payload_before or self._link.state.autopilot is None:
                 continue
             with suppress(LinkError):  # the autopilot may be booting; the request is repeated
                 await self._link.set_rates(wanted(), window_s=_COUNTING_TIME)

@@ -35,7 +35,7 @@ class ServedSource:
     Attributes:
         name: shown to the user.
         start_pose: pose of the vehicle when control began; None before.
-        resets: jumps of the autopilot's estimate, which are taken out of requests.
+        resets: jumps of the autopilot's estimate, which are removed from requests.
         failure: always None; a silent client does not count as a failure.
     """
 
@@ -52,19 +52,19 @@ class ServedSource:
         self.start_pose: Pose | None = None
         self.resets = EstimatorResets()
         self._motion, self._ownership, self._heading_now = motion, ownership, heading_now
-        self._vehicle = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-        self._direct: Reference | None = None  # of commanded attitudes or body rates
+        self._vehicle_motion = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        self._open_loop_reference: Reference | None = None  # a commanded attitude or body rates
         self._waiting_request: Request | None = None
-        self._stopped = False
+        self._is_stopped = False
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Start from the pose that was held so far, with the newest request if it is fresh."""
+        """Start from the held pose, with the newest request unless the client is silent."""
         self.start_pose = pose
-        live = self._ownership.state(now) is ControlState.LIVE
+        is_live = self._ownership.state(now) is ControlState.LIVE
         self._ownership.begin(now)
-        self._vehicle = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
+        self._vehicle_motion = VehicleMotion(pose.position_ned, (0.0, 0.0, 0.0))
         self._motion.begin(pose.position_ned, (0.0, 0.0, 0.0), pose.heading, now)
-        if self._waiting_request is not None and live:
+        if self._waiting_request is not None and is_live:
             with suppress(UnplannableError):  # hold; the client's next setpoint gets a refusal
                 self.give(self._waiting_request, now)
 
@@ -72,46 +72,46 @@ class ServedSource:
         """Fly a request from now on; before `begin`, keep it.
 
         Raises:
-            UnplannableError: no motion leads to it; the previous request stays in force.
+            UnplannableError: no motion leads to the request; the previous one stays in force.
         """
         if self.start_pose is None:
             self._waiting_request = request
             return
         if isinstance(request, MotionRequest):
-            direct = self._direct
-            self._leave_direct(now)
+            before = self._open_loop_reference
+            self._end_open_loop(now)
             try:
-                self._motion.command(self._without_jumps(request), now, self._vehicle)
+                self._motion.command(self._without_jumps(request), now, self._vehicle_motion)
             except UnplannableError:
-                self._direct = direct
+                self._open_loop_reference = before
                 raise
         else:
-            self._direct = self._direct_reference(request)
-        self._stopped = False
+            self._open_loop_reference = self._make_open_loop_reference(request)
+        self._is_stopped = False
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The reference over time; if the client is silent, the reference comes to rest."""
-        self._vehicle = motion
-        if self._ownership.state(now) is not ControlState.LIVE and not self._stopped:
-            self._leave_direct(now)
+        self._vehicle_motion = motion
+        if self._ownership.state(now) is not ControlState.LIVE and not self._is_stopped:
+            self._end_open_loop(now)
             self._motion.stop(now, motion)
-            self._stopped = True
-        direct = self._direct
-        return self._motion.reference if direct is None else lambda _: direct
+            self._is_stopped = True
+        reference = self._open_loop_reference
+        return self._motion.reference if reference is None else lambda _: reference
 
     def finished(self, now: float) -> bool:
         """Whether no client is in control any more: it released control, or was silent too long."""
         return self._ownership.state(now) not in _FLOWN_STATES
 
-    def _leave_direct(self, now: float) -> None:
-        """If attitudes or rates were flown, let the commanded motion begin where the vehicle is."""
-        if self._direct is not None:
-            self._direct = None
-            position, velocity = self._vehicle
+    def _end_open_loop(self, now: float) -> None:
+        """If an attitude or rates were flown, begin the commanded motion where the vehicle is."""
+        if self._open_loop_reference is not None:
+            self._open_loop_reference = None
+            position, velocity = self._vehicle_motion
             self._motion.begin(position, velocity, self._heading_now(), now)
 
-    def _direct_reference(self, request: AttitudeRequest | RatesRequest) -> Reference:
-        position, heading_now = self._vehicle.position_ned, self._heading_now()
+    def _make_open_loop_reference(self, request: AttitudeRequest | RatesRequest) -> Reference:
+        position, heading_now = self._vehicle_motion.position_ned, self._heading_now()
         thrust = ThrustCommand(request.thrust)
         if isinstance(request, RatesRequest):
             return Reference(
@@ -129,13 +129,13 @@ class ServedSource:
         """The request in the frame without estimator resets."""
         north, east, down = self.resets.shift
         return request._replace(
-            horizontal=_shifted(request.horizontal, (north, east)),
-            vertical=_shifted(request.vertical, (down,)),
+            horizontal=_without_shift(request.horizontal, (north, east)),
+            vertical=_without_shift(request.vertical, (down,)),
             yaw=None if request.yaw is None else self.resets.frame.heading(request.yaw),
         )
 
 
-def _shifted(demand: AxisDemand, shift: tuple[float, ...]) -> AxisDemand:
+def _without_shift(demand: AxisDemand, shift: tuple[float, ...]) -> AxisDemand:
     if demand.position is None:
         return demand
     position = tuple(a - b for a, b in zip(demand.position, shift, strict=True))

@@ -22,19 +22,19 @@ Flights
     run                 runs a coroutine on the vehicle's clock
     session             a flight that can be interrupted, to be flown inside `run`
     serving             `companion serve` in memory, inside `run`
-    Program             a program that speaks MAVLink to it
+    Program             a client program that speaks MAVLink to `companion serve`
     ReceivedSetpoint    a setpoint that reached the autopilot: `MockVehicle.setpoints`
     Truth               the true state: `MockVehicle.state()`
 
-Judges of your own planner and guidance
+Checks of your own planner and guidance
     check_planner       whether a planner may fly
     check_guidance      whether guidance may fly
 
-Below them
+Parts of the above
     VirtualEventLoop    the event loop whose time is the vehicle's
     open_wire           opens a link inside `run`: `Link(settings, opener=open_wire)`
     environment         what a flight inside `run` gets from the computer
-    UnseenError         a part of the program failed, and nothing took its error
+    UnseenError         a task or callback failed, and the error was not handled
 
 In pytest the fixture `mock_vehicle` makes vehicles.
 """

@@ -70,7 +70,7 @@ class Program(Client):
 
     Attributes:
         heard: received messages, decoded by pymavlink, oldest first.
-        packer: encoder of pymavlink with the program's ids and sequence number.
+        packer: pymavlink's encoder, with the program's ids and sequence number.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class Program(Client):
         return self.of(name)[count_before]
 
     def _flush(self) -> None:
-        """Decode everything that waits for this client."""
+        """Decode all frames that are queued for this program."""
         while self._waiting:
             data, _ = self._dequeue(100_000)
             self.heard += self._parser.parse_buffer(data) or ()

@@ -28,7 +28,7 @@ _GAIN = 5.0  # 1/s
 _DT = 0.004  # s
 _CASE_COUNT = 200
 _SETTLING_TIME = 3.0
-"""Time allowed for a step, s: 15 time constants of `_GAIN`."""
+"""Time allowed for a step, s: 15 times the time constant 1/`_GAIN`."""
 _MAX_REMAINING_ERROR = 0.02
 """Largest distance of the coefficients from their target after `_SETTLING_TIME`."""
 _MAX_DISTANCE = 1.5
@@ -43,18 +43,18 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         seed: seed of the attitudes and targets.
 
     Raises:
-        AssertionError: the planner may not fly; the message gives the attitude or target at which
-            it began, and the target that it was to reach.
+        AssertionError: the planner may not fly; the message gives the start (attitude or target)
+            and the target to be reached.
         PluginError: the plug-in cannot be loaded, or two packages give it.
         TypeError: `planner` is no planner: the law does not return three numbers, or the class has
-            not the methods of a planner.
+            not the methods of a `Planner`.
         ValueError: there is no planner of that name.
     """
     if isinstance(planner, str) and planner in plugins.names(plugins.PLANNERS):
         planner = plugins.load(plugins.PLANNERS, planner)
     rng = random.Random(seed)
     for _ in range(_CASE_COUNT):
-        q, target = _any_attitude(rng), _any_target(rng)
+        q, target = _random_attitude(rng), _random_target(rng)
         rates = _first_rates(planner, q, target)
         case = f"at q = {q} towards {target}"
         assert all(map(isfinite, rates)), f"rates {rates} are not finite, {case}"
@@ -70,7 +70,7 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         difference = max(abs(a - b) for a, b in zip(rates, rates_at_negative_q, strict=True))
         assert difference < 1e-6, f"q and −q give rates that differ by {difference} rad/s, {case}"
     for _ in range(_CASE_COUNT // 20):
-        _check_convergence(planner, _any_target(rng), _any_target(rng))
+        _check_convergence(planner, _random_target(rng), _random_target(rng))
 
 
 def check_guidance(name: str) -> None:
@@ -98,16 +98,15 @@ def check_guidance(name: str) -> None:
 
 
 _BOOT_S = 0.5
-"""Boot time of the mock autopilots here, s; real ones need 4 to 42 s, which does not matter here.
-"""
+"""Boot time of the mock autopilots in this check, s, shorter than the 4 to 42 s of real ones."""
 _SAFE_PARAMETERS = {"ardupilot": {"GUID_OPTIONS": 8, "ATC_ANGLE_BOOST": 0, "GUID_TIMEOUT": 1.0}}
-"""Autopilot -> parameters with which the vehicle passes the preflight checks."""
+"""Parameters with which the vehicle passes the preflight checks, by autopilot."""
 
 
-def _make(planner: str | Law | type[Planner]) -> Planner:
-    # The attitudes here follow the rates at once, so that is what the planner is told.
-    times = {"lag": 0.0, "dead_time": 0.0} if planner == MODEL_FOLLOWING else {}
-    return make_planner(planner, gain=_GAIN, limits=_LIMITS, **times)
+def _make_planner(planner: str | Law | type[Planner]) -> Planner:
+    # The attitudes in these checks follow the commanded rates at once.
+    rate_loop = {"lag": 0.0, "dead_time": 0.0} if planner == MODEL_FOLLOWING else {}
+    return make_planner(planner, gain=_GAIN, limits=_LIMITS, **rate_loop)
 
 
 def _rates(planner: Planner, q: Quaternion, target: Target, body_rates: BodyRates) -> BodyRates:
@@ -119,37 +118,39 @@ def _rates(planner: Planner, q: Quaternion, target: Target, body_rates: BodyRate
     try:
         return BodyRates(*map(float, planner.rates(q, target, _DT, body_rates)))
     except Exception as error:
-        raise AssertionError(f"it raised {error!r}, at q = {q} towards {target}") from error
+        raise AssertionError(
+            f"the planner raised {error!r}, at q = {q} towards {target}"
+        ) from error
 
 
 def _first_rates(planner: str | Law | type[Planner], q: Quaternion, target: Target) -> BodyRates:
-    instance, still = _make(planner), BodyRates(0.0, 0.0, 0.0)
-    instance.reset(q, still)
-    return _rates(instance, q, target, still)
+    instance, zero_rates = _make_planner(planner), BodyRates(0.0, 0.0, 0.0)
+    instance.reset(q, zero_rates)
+    return _rates(instance, q, target, zero_rates)
 
 
-def _check_convergence(planner: str | Law | type[Planner], begin: Target, end: Target) -> None:
-    instance, rates = _make(planner), BodyRates(0.0, 0.0, 0.0)
-    q = attitude(Coefficients(begin.north, begin.east), begin.heading)
+def _check_convergence(planner: str | Law | type[Planner], start: Target, target: Target) -> None:
+    instance, rates = _make_planner(planner), BodyRates(0.0, 0.0, 0.0)
+    q = attitude(Coefficients(start.north, start.east), start.heading)
     instance.reset(q, rates)
     for _ in range(round(_SETTLING_TIME / _DT)):
-        rates = _rates(instance, q, end, rates)
+        rates = _rates(instance, q, target, rates)
         q = after_constant_rates(q, rates, _DT)
     reached = coefficients(q)
-    remaining = hypot(reached.north - end.north, reached.east - end.east)
+    remaining = hypot(reached.north - target.north, reached.east - target.east)
     assert remaining < _MAX_REMAINING_ERROR, (
-        f"after {_SETTLING_TIME:g} s its coefficients are {remaining:.3f} away from {end}; "
-        f"it began at {begin}"
+        f"after {_SETTLING_TIME:g} s the coefficients are {remaining:.3f} away from {target}; "
+        f"the planner began at {start}"
     )
 
 
-def _any_attitude(rng: random.Random) -> Quaternion:
+def _random_attitude(rng: random.Random) -> Quaternion:
     values: Sequence[float] = [rng.gauss(0.0, 1.0) for _ in range(4)]
     length = sqrt(sum(value * value for value in values))
     w, x, y, z = (value / length for value in values)
     return w, x, y, z
 
 
-def _any_target(rng: random.Random) -> Target:
+def _random_target(rng: random.Random) -> Target:
     length, direction = sin(_LIMITS.max_tilt or 0.0) * rng.random(), tau * rng.random()
     return Target(length * cos(direction), length * sin(direction), tau * rng.random())

@@ -151,7 +151,7 @@ async def connect(
     Raises:
         ConfigError: the configuration is wrong.
         FlightEnded, LinkError, OSError: see `companion.connect`.
-        RuntimeError: it was called outside `run`.
+        RuntimeError: this function was called outside `run`.
     """
     if not isinstance(asyncio.get_running_loop(), VirtualEventLoop):
         raise RuntimeError(

@@ -7,10 +7,10 @@ class ReceivedSetpoint(NamedTuple):
     """A SET_ATTITUDE_TARGET that reached the autopilot.
 
     Attributes:
-        time: vehicle time when it was handled, s.
-        answers: its `time_boot_ms`, the time stamp of the answered sample, ms.
+        time: vehicle time when the setpoint was handled, s.
+        answers: `time_boot_ms` of the setpoint: the time stamp of the answered sample, ms.
         rates: body rates about x, y, z (FRD), rad/s.
-        thrust: 0..1.
+        thrust: normalised thrust, 0..1.
     """
 
     time: float
@@ -20,7 +20,7 @@ class ReceivedSetpoint(NamedTuple):
 
 
 def received_setpoint(message: Any, time: float) -> ReceivedSetpoint | None:
-    """The setpoint in a pymavlink message that is handled at this vehicle time, s; else None."""
+    """The setpoint in a message that is handled at vehicle time `time`, s; None: no setpoint."""
     if message.get_type() != "SET_ATTITUDE_TARGET":
         return None
     rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common
 from companion.extras import require
 from companion.testing.setpoints import ReceivedSetpoint, received_setpoint
 from sitl_mock.control_channel import Truth, add_fault, truth
-from sitl_mock.exchange import Arrived, Exchange
+from sitl_mock.exchange import Exchange, ReceivedDatagram
 from sitl_mock.link.framing import decode
 from sitl_mock.physics.vehicle_step import Plant, PythonPlant
 from sitl_mock.settings import load_settings
@@ -82,19 +82,19 @@ class MockVehicle:
         lockstep_key = {"lockstep": {"enabled": True, **lockstep}}
         # Without a socket, telemetry for a ground station would be built for nobody.
         overrides = {**autopilot_key, **settings, **lockstep_key, "gcs_port": 0}
-        whole = load_settings(config, overrides, "MockVehicle")
-        self.autopilot: str = whole.autopilot
-        self.in_lockstep, self.delay_s = whole.lockstep.enabled, delay_s
+        all_settings = load_settings(config, overrides, "MockVehicle")
+        self.autopilot: str = all_settings.autopilot
+        self.in_lockstep, self.delay_s = all_settings.lockstep.enabled, delay_s
         self.setpoints: list[ReceivedSetpoint] = []
         self.after_step: list[Callable[[], None]] = []
         self.to_companion: Relay | None = None
         self.from_companion: Relay | None = None
-        self.settings = whole
-        self._simulation = Simulation(whole, plant=_plant(compiled))
-        self._exchange = Exchange(whole, self._simulation)
+        self.settings = all_settings
+        self._simulation = Simulation(all_settings, plant=_plant(compiled))
+        self._exchange = Exchange(all_settings, self._simulation)
         self._exchange.on_message = self._record_setpoint
-        self._arrived: list[Arrived] = []
-        self._begun = False
+        self._arrived_datagrams: list[ReceivedDatagram] = []
+        self._has_begun = False
 
     # --- true state
 
@@ -160,7 +160,7 @@ class MockVehicle:
             self.step()
 
     def until(self, condition: Callable[[Truth], bool], seconds: float = 60.0) -> Truth:
-        """Let time pass without the program until `condition` holds; return that state.
+        """Run the vehicle without the program until `condition` holds; return its state then.
 
         Raises:
             AssertionError: the condition does not hold within `seconds` of vehicle time.
@@ -180,26 +180,29 @@ class MockVehicle:
         return self._simulation.next_us / 1e6
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the clock (vehicle time, ns) for TIMESYNC; it also advances between two steps."""
+        """Set the clock (vehicle time, ns) that answers TIMESYNC.
+
+        This clock also advances between two steps, unlike `time`.
+        """
         simulation = self._simulation
 
         def vehicle_time_ns() -> int:
             if simulation.effects.clock_frozen:
-                return simulation.state.shown_us * 1000
+                return simulation.state.stamp_us * 1000
             return min(max(clock_ns(), simulation.time_us * 1000), simulation.next_us * 1000)
 
         simulation.set_clock(vehicle_time_ns)
 
     def receive(self, datagram: bytes) -> None:
-        """Take a datagram of the companion link; in lockstep it waits for the next step."""
+        """Take a datagram of the program; in lockstep the vehicle handles it in the next step."""
         relay = self.from_companion
         for each in (datagram,) if relay is None else relay(datagram):
-            self._arrived.append((each, decode(each)))
+            self._arrived_datagrams.append((each, decode(each)))
         if not self.in_lockstep:
-            arrived, self._arrived = self._arrived, []
+            arrived, self._arrived_datagrams = self._arrived_datagrams, []
             self._exchange.deliver(arrived, self._simulation.companion)
 
-    def sent(self) -> list[bytes]:
+    def take_sent(self) -> list[bytes]:
         """Take the datagrams that the vehicle has sent since the last call."""
         return self._relayed(self._exchange.outgoing(self._simulation.companion))
 
@@ -208,19 +211,19 @@ class MockVehicle:
 
         In lockstep that is the first beacon.
         """
-        if self._begun:
+        if self._has_begun:
             return []
-        self._begun = True
+        self._has_begun = True
         if self.in_lockstep:
             beacon = self._simulation.beacon()
             return self._relayed([self._simulation.companion.sign(beacon)])
         self._simulation.boot()
-        return self.sent()
+        return self.take_sent()
 
     def step(self) -> list[bytes]:
         """Simulate one step; return the datagrams that the vehicle sends in it."""
-        self._begun = True
-        arrived, self._arrived = self._arrived, []
+        self._has_begun = True
+        arrived, self._arrived_datagrams = self._arrived_datagrams, []
         beacon = self._exchange.step(arrived)
         datagrams = self._exchange.outgoing(self._simulation.companion, beacon)
         for callback in tuple(self.after_step):
@@ -233,7 +236,9 @@ class MockVehicle:
 
     def _relayed(self, datagrams: list[bytes]) -> list[bytes]:
         relay = self.to_companion
-        return datagrams if relay is None else [out for one in datagrams for out in relay(one)]
+        if relay is None:
+            return datagrams
+        return [arriving for sent in datagrams for arriving in relay(sent)]
 
     def _record_setpoint(self, message: Any) -> None:
         setpoint = received_setpoint(message, self.time)

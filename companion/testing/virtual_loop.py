@@ -12,7 +12,7 @@ Arguments = TypeVarTuple("Arguments")
 
 
 class VirtualClock:
-    """The time of one loop, s.
+    """The clock of one `VirtualEventLoop`.
 
     Args:
         now: initial time, s.
@@ -35,7 +35,7 @@ class VirtualClock:
 
 
 class World(Protocol):
-    """What is outside the program: delivers datagrams, and moves the clock while it is idle."""
+    """What is outside the program: delivers datagrams, and moves the clock if the program waits."""
 
     def deliver_due(self) -> object:
         """Deliver the datagrams that arrive at the present time."""

@@ -20,7 +20,7 @@ _NAME = "the mock vehicle"
 
 
 class MemoryTransport:
-    """The program's end of the wire.
+    """The program's end of a `Wire`.
 
     Args:
         receiver: takes arriving datagrams.
@@ -33,16 +33,16 @@ class MemoryTransport:
         self.is_open = True
         self._receiver, self._take = receiver, take
         self._loop = asyncio.get_running_loop()
-        self._connected = self._heard = False
+        self._connected = self._heard_in_period = False
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
     def deliver(self, datagram: bytes, received_ns: int) -> None:
-        """Let a datagram of the vehicle arrive at a time of the loop, ns."""
+        """Let a datagram of the vehicle arrive at the event-loop time `received_ns`, ns."""
         receiver = self._receiver
         if self._connected:
-            self._heard = receiver.receive(datagram, received_ns) or self._heard
+            self._heard_in_period = receiver.receive(datagram, received_ns) or self._heard_in_period
         elif receiver.claim(datagram, received_ns, _NAME) or receiver.may_prove_date(_NAME):
-            self._connected = self._heard = True
+            self._connected = self._heard_in_period = True
 
     def send(self, frame: bytes) -> bool:
         """Send one datagram now; return false without a peer."""
@@ -58,7 +58,7 @@ class MemoryTransport:
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
-        silent, self._heard = not self._heard, False
+        silent, self._heard_in_period = not self._heard_in_period, False
         if silent or self._receiver.claim_lapsed():
             self._connected = False
 
@@ -79,7 +79,7 @@ class Wire:
         """Open the program's end.
 
         Raises:
-            EndpointError: it is already open.
+            EndpointError: the program's end is already open.
         """
         if self._transport is not None and self._transport.is_open:
             raise EndpointError("the mock vehicle has one companion link, which is open already")
@@ -87,7 +87,7 @@ class Wire:
         return self._transport
 
     def _take(self, frame: bytes) -> None:
-        """Take a frame of the program."""
+        """Pass a frame of the program to the vehicle."""
         self._vehicle.receive(frame)
 
     def _deliver(self, datagram: bytes, time: float) -> None:
@@ -96,7 +96,10 @@ class Wire:
 
 
 class LockstepWire(Wire):
-    """In lockstep: the vehicle steps when the program has settled; a beacon moves the clock."""
+    """A wire in lockstep: the vehicle steps once nothing is due in the program.
+
+    A beacon moves the clock.
+    """
 
     def deliver_due(self) -> None:
         """Do nothing: no datagram arrives between two steps."""
@@ -111,7 +114,7 @@ class LockstepWire(Wire):
 
 
 class FreeWire(Wire):
-    """Without lockstep: both sides run freely on the clock; `MockVehicle.delay_s` applies."""
+    """A wire without lockstep: both sides run on the clock; `MockVehicle.delay_s` applies."""
 
     def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
         super().__init__(vehicle, clock)
@@ -125,7 +128,7 @@ class FreeWire(Wire):
         vehicle.set_clock(lambda: round((clock.now - self._behind_clock) * 1e9))
 
     def advance(self, until: float) -> None:
-        """Advance until something reaches the program, but at most to `until`."""
+        """Advance until a datagram reaches the program, but at most to the time `until`, s."""
         clock, in_transit = self._clock, self._in_transit
         step_at = self._next_step_at()
         while True:
@@ -145,7 +148,7 @@ class FreeWire(Wire):
         return burst_time(self._vehicle.next_step_at, self._burst) + self._behind_clock
 
     def deliver_due(self) -> bool:
-        """Deliver what is due, in order; return whether the program received something."""
+        """Deliver due datagrams, in order; return whether the program received one."""
         in_transit, now, received = self._in_transit, self._clock.now, False
         while in_transit and in_transit[0][0] <= now:
             _, to_program, datagram = in_transit.popleft()
@@ -154,7 +157,7 @@ class FreeWire(Wire):
                 self._deliver(datagram, now)
             else:
                 self._vehicle.receive(datagram)
-                self._send(self._vehicle.sent())
+                self._send(self._vehicle.take_sent())
         return received
 
     def _take(self, frame: bytes) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from companion import Reference
-from companion.api.commanded import copied
+from companion.api.commanded import checked_copy
 from companion.attitude import BodyRates, Coefficients
 from companion.files.yaml_file import ConfigError
 from companion.guidance.reference import ThrustCommand, TiltCommand
@@ -66,11 +66,11 @@ def test_references_are_copied_so_that_a_program_may_reuse_its_arrays():
 def test_a_copied_reference_holds_plain_numbers():
     arrays = Reference(np.ones(3), [1, 2, 3], np.zeros(3, np.float32), np.float64(1.0))
     for reference in (arrays, arrays._replace(horizontal=TiltCommand(np.zeros(2)))):
-        made = copied(reference)
+        made = checked_copy(reference)
         assert made.position_ned == (1.0, 1.0, 1.0)
         assert made.velocity_ned == (1.0, 2.0, 3.0)
         assert type(made.heading) is type(made.acceleration_ned[0]) is float
-    tilted = copied(arrays._replace(horizontal=TiltCommand((0, 0), trimmed=True))).horizontal
+    tilted = checked_copy(arrays._replace(horizontal=TiltCommand((0, 0), trimmed=True))).horizontal
     assert isinstance(tilted.coefficients, Coefficients)
     assert tilted.trimmed
 
@@ -80,7 +80,7 @@ def test_a_copied_reference_holds_plain_numbers():
 )
 def test_a_command_of_another_type_is_refused_with_the_types_that_are_meant(changes):
     with pytest.raises(TypeError, match=rf"^{next(iter(changes))} is a \w+Mode"):
-        copied(Reference(REST)._replace(**changes))
+        checked_copy(Reference(REST)._replace(**changes))
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_command_of_another_type_is_refused_with_the_types_that_are_meant(chan
 )
 def test_what_is_wrong_in_a_reference_is_named(field, value):
     with pytest.raises(ValueError, match=f"{field} must be"):
-        copied(Reference(REST)._replace(**{field: value}))
+        checked_copy(Reference(REST)._replace(**{field: value}))
 
 
 @pytest.mark.parametrize(
@@ -108,13 +108,13 @@ def test_what_is_wrong_in_a_reference_is_named(field, value):
 )
 def test_what_is_wrong_in_a_command_is_named(wrong, field, value):
     with pytest.raises(ValueError, match=f"{wrong} must be"):
-        copied(Reference(REST)._replace(**{field: value}))
+        checked_copy(Reference(REST)._replace(**{field: value}))
 
 
 @pytest.mark.parametrize("what", [None, REST, "hover"])
 def test_a_reference_is_a_reference(what):
     with pytest.raises(TypeError, match=r"a reference is a companion\.Reference"):
-        copied(what)
+        checked_copy(what)
 
 
 def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on():

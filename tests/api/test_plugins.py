@@ -348,7 +348,7 @@ def test_a_planner_that_raises_does_not_conform():
             raise RuntimeError("not at this attitude")
         return 0.0, 0.0, 0.0
 
-    with pytest.raises(AssertionError, match=r"it raised RuntimeError.* at q = "):
+    with pytest.raises(AssertionError, match=r"the planner raised RuntimeError.* at q = "):
         check_planner(fails)
 
 

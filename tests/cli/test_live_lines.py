@@ -124,7 +124,7 @@ def test_events_scroll_above_the_lines_and_nothing_else_remains():
     live = LiveLines(out)
     for k in range(3):
         live.show([f"phase {k}", "longer than the next" if k < 2 else "short", "third"])
-        live.above(f"event {k}\n")
+        live.write_above(f"event {k}\n")
     assert Screen().feed(out.getvalue()).lines == [
         "event 0",
         "event 1",
@@ -321,7 +321,7 @@ def test_lines_for_a_terminal_that_stalls_are_dropped_and_the_end_does_not_wait(
     monkeypatch.setattr(terminal, "_QUEUE_LENGTH", 3)
     monkeypatch.setattr(terminal, "_CLOSE_TIMEOUT", 0.05)
     printer, line = terminal._PrintThread(), Stalled()
-    said = [printer.say(line(number)) for number in range(9)]
+    said = [printer.queue_line(line(number)) for number in range(9)]
     assert said[:3] == [True] * 3
     assert not said[-1]
     began = time.monotonic()
@@ -341,7 +341,7 @@ def test_a_terminal_that_is_gone_is_not_written_to_again():
         raise OSError("gone")
 
     for _ in range(5):
-        printer.say(fail)
+        printer.queue_line(fail)
     printer.close()
     printer.close()
     assert tried == ["once"]

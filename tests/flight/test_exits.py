@@ -273,8 +273,8 @@ def test_frozen_guidance_is_noticed_and_the_vehicle_handed_back(tmp_path, monkey
 
     def freezing(guidance_loop):
         if not (
-            guidance_loop.flown.begun_at is not None
-            and guidance_loop._clock() > guidance_loop.flown.begun_at + 1.0
+            guidance_loop.flown_source.begun_at is not None
+            and guidance_loop._clock() > guidance_loop.flown_source.begun_at + 1.0
         ):
             flown(guidance_loop)
 

@@ -59,7 +59,7 @@ def _scan(chunks: list[bytes], pieces: list[bytes], case: Case) -> None:
     found: list[Frame] = []
     for chunk in chunks:
         found += scanner.feed(chunk)
-        assert len(scanner._rest) <= _LONGEST_FRAME * case["streaming"]
+        assert len(scanner._incomplete_frame) <= _LONGEST_FRAME * case["streaming"]
     for frame in found:
         _intact(frame)
     if case["whole"]:

@@ -27,7 +27,7 @@ class Flight:
         self.end, self.answer, self.told = end, {"text": "done"}, []
 
     def serve(self):
-        for message in self.end.arrived():
+        for message in self.end.received_messages():
             if message is None:
                 return
             self.told.append(message)
@@ -80,7 +80,7 @@ def test_messages_of_the_flight_reach_the_checks_and_the_listeners():
         flight.end.send({"kind": "config", "config": now, "can_undo": True})
         flight.end.send({"kind": "drag", "drag": [0.3, 0.0], "source": "learned-aa.json"})
         assert [(await heard.get())["kind"] for _ in range(2)] == ["config", "drag"]
-        assert relay.checks.now.planner.gain_per_s == 4.0
+        assert relay.checks.current.planner.gain_per_s == 4.0
         assert relay.checks._drag.drag.linear == 0.3
 
     used(use)
@@ -154,7 +154,7 @@ def test_an_end_that_broke_counts_as_closed():
             raise ConnectionResetError
 
     channel = Channel(Broken())
-    assert list(channel.arrived()) == [None]
+    assert list(channel.received_messages()) == [None]
     assert not channel.open
     assert list(datagrams(Broken(), 1)) == [b""]
 
@@ -165,7 +165,7 @@ def test_a_turn_takes_no_more_than_it_may():
     for number in range(3):
         channel.send({"number": number})
     told = Channel(theirs)
-    assert [message["number"] for message in told.arrived(2)] == [0, 1]
+    assert [message["number"] for message in told.received_messages(2)] == [0, 1]
     assert len(list(datagrams(theirs, 0))) == 0
     assert len(list(datagrams(theirs, 5))) == 1
     channel.close()

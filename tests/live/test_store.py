@@ -50,15 +50,15 @@ def test_a_phase_is_an_event_at_the_newest_state(store):
 
 def test_a_message_of_another_kind_changes_nothing(store):
     store.take({"kind": "answer", "id": 1, "refusal": None})
-    assert (store.state_count, store.event_count, store.over) == (0, 0, None)
+    assert (store.state_count, store.event_count, store.end_text) == (0, 0, None)
 
 
 def test_the_words_of_the_flight_about_its_end_are_kept(store):
     store.end()
-    assert store.over == "the program that flew has ended"
+    assert store.end_text == "the program that flew has ended"
     store.take({"kind": "end", "text": "the flight is over"})
     store.end()
-    assert store.over == "the flight is over"
+    assert store.end_text == "the flight is over"
 
 
 def test_changed_values_are_yaml_by_section_with_their_former_values(store):

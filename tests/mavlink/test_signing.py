@@ -34,7 +34,7 @@ def frame_of(packed):
 
 
 def signing(now=NOW):
-    return Signing(KEY, clock=lambda: now, elapsed=lambda: 0.0)
+    return Signing(KEY, clock=lambda: now, monotonic_clock=lambda: 0.0)
 
 
 def test_pymavlinks_signature_is_accepted_once():
@@ -81,7 +81,7 @@ def test_streams_are_kept_apart():
 
 
 def test_our_stamps_rise_even_when_no_time_passes():
-    ours = Signing(KEY, clock=lambda: NOW, elapsed=lambda: 0.0)
+    ours = Signing(KEY, clock=lambda: NOW, monotonic_clock=lambda: 0.0)
     stamps = [int.from_bytes(ours.sign(b"x")[2:8], "little") for _ in range(3)]
     assert stamps == [TICKS, TICKS + 1, TICKS + 2]
 

@@ -45,8 +45,8 @@ def frame(when, message=None, link_id=3):
     return found
 
 
-def signing(clock=NOW, file=None, elapsed=lambda: 0.0):
-    return Signing(KEY, clock=lambda: clock, elapsed=elapsed, file=file)
+def signing(clock=NOW, file=None, monotonic_clock=lambda: 0.0):
+    return Signing(KEY, clock=lambda: clock, monotonic_clock=monotonic_clock, file=file)
 
 
 def stamp_of(ours):
@@ -173,7 +173,7 @@ def test_a_clock_beyond_the_48_bits_of_a_stamp_breaks_nothing():
 def test_a_step_of_the_clock_in_flight_changes_nothing():
     clock = iter([NOW])  # read once
     now = [0.0]
-    ours = Signing(KEY, clock=lambda: next(clock), elapsed=lambda: now[0])
+    ours = Signing(KEY, clock=lambda: next(clock), monotonic_clock=lambda: now[0])
     for second in range(1, 4):
         now[0] = float(second)
         assert ours.check(frame(NOW + second)) is SignatureResult.GOOD

@@ -110,7 +110,7 @@ def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():
     network = object.__new__(Network)
     network.routing = SimpleNamespace(from_client=from_client)
     network._faults, network._note_event = set(), notes.append
-    network._flush_later, network.flown = lambda: None, frozenset()
+    network._flush_later, network.setpoint_ids = lambda: None, frozenset()
     frames = [SimpleNamespace(message_id=0, text=text) for text in ("bad", "good", "bad", "good")]
     network.received(SimpleNamespace(name="script"), frames)
     assert routed == ["good", "good"]

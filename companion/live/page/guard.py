@@ -24,8 +24,8 @@ class Guard:
         # The cookie allows watching only; changing needs the token itself.
         self._cookie = hmac.digest(token.encode(), b"watch", "sha256").hex()
 
-    def knows(self, token: str) -> bool:
-        """Whether this is the token."""
+    def is_token(self, token: str) -> bool:
+        """Whether `token` is the live page's token."""
         return hmac.compare_digest(token.encode(), self._token.encode())
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -37,7 +37,7 @@ class Guard:
             key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]
         }
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
-        has_token = self.knows(query.get("token", [""])[0])
+        has_token = self.is_token(query.get("token", [""])[0])
         refusal = self._refusal(scope, headers, has_token=has_token)
         if refusal is not None:
             await _refuse(scope, send, refusal)
@@ -53,8 +53,8 @@ class Guard:
         if origin is not None and _host_in(origin) != host:
             return f"another site, {origin!r}, must not use the live page"
         client = scope.get("client")
-        local = client is not None and ip_address(client[0]).is_loopback
-        if local or has_token or self._has_cookie(headers):
+        is_local = client is not None and ip_address(client[0]).is_loopback
+        if is_local or has_token or self._has_cookie(headers):
             return None
         return (
             "to open the live page from another computer, add ?token= and the token shown at the "
@@ -103,8 +103,8 @@ def _is_address_or_own_name(host: str) -> bool:
     try:
         ip_address(name)
     except ValueError:
-        own = socket.gethostname().lower()
-        return name in ("localhost", own, f"{own}.local")
+        own_name = socket.gethostname().lower()
+        return name in ("localhost", own_name, f"{own_name}.local")
     return True
 
 

@@ -41,31 +41,31 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
     """Add the page, and send new states to all browsers that show it."""
     shared = f"<style>{_file_text('live.css')}</style><script>{_file_text('live.js')}</script>"
     ui.add_head_html(shared, shared=True)
-    sent: dict[str, tuple[int, int]] = {}
+    sent_counts: dict[str, tuple[int, int]] = {}
 
     @ui.page("/")
     def page(client: Client, token: str = "") -> None:
         _add_drawings()
-        Panel(relay, store, guard, unlocked=guard.knows(token))
+        Panel(relay, store, guard, unlocked=guard.is_token(token))
         state = {"fence": store.fence(), "frames": store.since(0), "events": store.events_since(0)}
-        sent[client.id] = store.state_count, store.event_count
+        sent_counts[client.id] = store.state_count, store.event_count
         client.run_javascript(f"live.begin({json.dumps(state)})")
 
     async def push() -> None:
         for client in list(Client.instances.values()):
-            known = sent.get(client.id)
-            if known is None or not client.has_socket_connection:
+            counts = sent_counts.get(client.id)
+            if counts is None or not client.has_socket_connection:
                 continue
             new = {
-                "frames": store.since(known[0]),
-                "events": store.events_since(known[1]),
+                "frames": store.since(counts[0]),
+                "events": store.events_since(counts[1]),
                 "fence": store.fence(),
-                "over": store.over,
+                "over": store.end_text,
             }
-            sent[client.id] = store.state_count, store.event_count
+            sent_counts[client.id] = store.state_count, store.event_count
             client.run_javascript(f"live.push({json.dumps(new)})")
-        for gone in sent.keys() - Client.instances.keys():
-            del sent[gone]
+        for gone in sent_counts.keys() - Client.instances.keys():
+            del sent_counts[gone]
 
     app.timer(_PUSH_PERIOD, push)
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
-from companion.config.in_flight import shown
+from companion.config.in_flight import value_text
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
@@ -24,7 +24,7 @@ _WRONG_TOKEN_DELAY = 1.0
 class Panel:
     """Inputs and buttons of one browser tab; each tab must be unlocked separately.
 
-    `unlocked`: the tab was opened with the token.
+    A tab that was opened with the token begins `unlocked`.
     """
 
     def __init__(self, relay: Relay, store: Store, guard: Guard, *, unlocked: bool) -> None:
@@ -37,7 +37,7 @@ class Panel:
             with ui.element("div").classes("live-values"):
                 for key in store.values():
                     name = key.section, key.name
-                    self._shown[name] = shown(key.value)
+                    self._shown[name] = value_text(key.value)
                     self._inputs[name] = ui.input(
                         f"{key.section}.{key.name}", value=self._shown[name]
                     ).props(f'dense suffix="{key.unit}" hint="{_range(key.allowed)}"')
@@ -53,7 +53,7 @@ class Panel:
             token = ui.input("token, as shown at the start").props("dense")
 
             async def unlock() -> None:
-                if self._guard.knows(str(token.value or "").strip()):
+                if self._guard.is_token(str(token.value or "").strip()):
                     self._unlocked = True
                     self._show_message("values can be changed in this tab now")
                 else:
@@ -110,20 +110,20 @@ class Panel:
     def _refresh(self) -> None:
         """Show values changed elsewhere, except in edited fields; enable or disable Undo."""
         for key in self._store.values():
-            name, value = (key.section, key.name), shown(key.value)
+            name, value = (key.section, key.name), value_text(key.value)
             field = self._inputs[name]
             if value != self._shown[name]:
                 if str(field.value or "").strip() == self._shown[name] or field.value is None:
                     field.value = value
                 self._shown[name] = value
-        self._undo.set_enabled(self._store.can_undo and self._store.over is None)
+        self._undo.set_enabled(self._store.can_undo and self._store.end_text is None)
 
     def _show_message(self, text: str) -> None:
         self._message.set_text(text)
 
 
 def _range(allowed: str) -> str:
-    """The range of a key as a hint; the words "changeable in flight" are removed."""
+    """The range of a key, for a hint: `allowed` without the words "changeable in flight"."""
     return (
         allowed.replace("changeable in flight within its range", "")
         .strip(", ")
@@ -132,7 +132,7 @@ def _range(allowed: str) -> str:
 
 
 def _parsed(text: str) -> Any:
-    """The number in a field, or None if it is empty. Another text is returned, to be refused."""
+    """The number in a field, None for an empty field, or a text that the checks refuse."""
     if text in ("", "null"):
         return None
     try:

@@ -4,7 +4,7 @@ from collections import deque
 from typing import Any
 
 from companion.config import Config
-from companion.config.in_flight import changeable, differences
+from companion.config.in_flight import changeable_keys, differences
 from companion.config.reference import ConfigKey, keys
 from companion.files.bounded_yaml import dump_value
 from companion.live.channel import Message
@@ -25,7 +25,7 @@ class Store:
         config: the configuration after the newest change.
         start: the configuration with which the flight began.
         can_undo: whether a change can be undone.
-        over: how the flight ended; None: it has not ended.
+        end_text: how the flight ended; None: it has not ended.
     """
 
     def __init__(self, config: Config) -> None:
@@ -35,7 +35,7 @@ class Store:
         self.event_count = 0
         self.config = self.start = config
         self.can_undo = False
-        self.over: str | None = None
+        self.end_text: str | None = None
 
     def take(self, message: Message) -> None:
         """Take one message."""
@@ -51,25 +51,25 @@ class Store:
                 self.config = Config.model_validate(message["config"])
                 self.can_undo = bool(message["can_undo"])
             case "end":
-                self.over = str(message["text"])
+                self.end_text = str(message["text"])
 
     def end(self) -> None:
         """Note the end of the flight, if its message `end` was not received."""
-        self.over = self.over or "the program that flew has ended"
+        self.end_text = self.end_text or "the program that flew has ended"
 
     def since(self, count: int) -> list[Message]:
         """The kept states after the first `count` states."""
-        new = min(self.state_count - count, len(self.states))
-        return list(self.states)[len(self.states) - new :]
+        new_count = min(self.state_count - count, len(self.states))
+        return list(self.states)[len(self.states) - new_count :]
 
     def events_since(self, count: int) -> list[dict[str, Any]]:
         """The kept events after the first `count` events."""
-        new = min(self.event_count - count, len(self.events))
-        return list(self.events)[len(self.events) - new :]
+        new_count = min(self.event_count - count, len(self.events))
+        return list(self.events)[len(self.events) - new_count :]
 
     def values(self) -> list[ConfigKey]:
         """The keys that may change in flight, with their present values."""
-        return [key for key in keys(self.config) if (key.section, key.name) in changeable()]
+        return [key for key in keys(self.config) if (key.section, key.name) in changeable_keys()]
 
     def fence(self) -> dict[str, Any]:
         """The fence and the tilt limit in force, for the drawings."""

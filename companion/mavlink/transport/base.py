@@ -19,7 +19,7 @@ class Receiver(Protocol):
         """Prepare for a new connection: forget an incomplete frame and the last sequence number.
 
         Args:
-            streaming: Whether a frame may continue in the bytes received next.
+            streaming: whether a frame may continue in the bytes received next.
         """
 
     def receive(self, data: bytes, received_ns: int) -> bool:

@@ -13,9 +13,9 @@ _PEER_PATTERN = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]+)(?::(\d{1,5}))?")
 _NETWORK_PATTERN = re.compile(r"(\[[0-9a-fA-F:.]+\]|[^:/\[\]]*):(\d{1,5})")
 _SERIAL_PATTERN = re.compile(r"(/[^:]+|COM\d+):(\d{1,8})")
 _DEVICE_PATTERN = re.compile(r"(?:serial:/*)?(/?dev/[^:,]+|tty[^:,/]+|COM\d+)(?:[:,](\d{1,8}))?")
-"""A serial device as other programs write it, and its baud rate."""
+"""A serial device and its baud rate, in the notations of other programs."""
 _ADDRESS_PATTERN = re.compile(r"(?:(\w+):/*)?([^:/\[\]]*|\[[0-9a-fA-F:.]+\]):(\d{1,5})/?")
-"""An address as other programs write it: in pymavlink's notation, or without a scheme."""
+"""An address in the notations of other programs: pymavlink's, or without a scheme."""
 _LISTENING_HOSTS = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
 """Hosts for which `udp://` can only mean listening."""
 
@@ -72,7 +72,7 @@ class SerialPort:
 
 Endpoint = UdpIn | UdpOut | TcpClient | TcpServer | SerialPort
 
-_NETWORK_KINDS: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
+_NETWORK_CLASSES: dict[str, type[UdpIn | UdpOut | TcpClient | TcpServer]] = {
     "udpin": UdpIn,
     "udp": UdpIn,
     "udpout": UdpOut,
@@ -91,21 +91,21 @@ def parse_endpoint(text: str) -> Endpoint:
     several separated by commas.
 
     Raises:
-        EndpointError: The text is in none of the notations in `_HELP`, a host name is not valid, or
+        EndpointError: the text is in none of the notations in `_HELP`, a host name is not valid, or
             a port is not 1..65535 (a listening endpoint also takes 0: any free port). For the
             notation of another program, the message says what to write instead.
     """
     scheme, separator, rest = text.strip().partition("://")
     if separator and scheme == "serial":
         return _serial(text, rest)
-    kind = _NETWORK_KINDS.get(scheme)
-    if not separator or kind is None:
+    endpoint_class = _NETWORK_CLASSES.get(scheme)
+    if not separator or endpoint_class is None:
         raise EndpointError(f"endpoint {text!r} is not understood: {_remedy(text)}")
     rest, question, query = rest.partition("?")
     match = _NETWORK_PATTERN.fullmatch(rest.rstrip("/"))
     if match is None:
         raise EndpointError(f"endpoint {text!r} needs HOST:PORT after {scheme}://: {_HELP}")
-    listens = kind in (UdpIn, TcpServer)
+    listens = endpoint_class in (UdpIn, TcpServer)
     host, port = match[1].strip("[]") or ("0.0.0.0" if listens else ""), int(match[2])
     if not host:
         raise EndpointError(f"endpoint {text!r} names no host to connect to: {_HELP}")
@@ -119,9 +119,9 @@ def parse_endpoint(text: str) -> Endpoint:
     if not (0 if listens else 1) <= port <= 65535:
         raise EndpointError(f"endpoint {text!r}: port {port} is outside 1..65535")
     if not question:
-        return kind(host, port)
-    if kind is UdpIn or kind is TcpServer:
-        return kind(host, port, _peers(text, query))
+        return endpoint_class(host, port)
+    if endpoint_class is UdpIn or endpoint_class is TcpServer:
+        return endpoint_class(host, port, _peers(text, query))
     raise EndpointError(
         f"endpoint {text!r}: {scheme}:// names its peer already; leave ?{query} out"
     )
@@ -148,7 +148,7 @@ def _peers(text: str, query: str) -> tuple[PeerAddress, ...]:
 
 
 def is_host(text: str) -> bool:
-    """Whether this is a valid host name: labels of 1 to 63 characters, 253 in all, no blanks."""
+    """Whether `text` is a valid host name: labels of 1 to 63 characters, 253 in all, no blanks."""
     try:
         text.encode("idna")  # the resolver does this too, and would raise UnicodeError
     except UnicodeError:
@@ -160,8 +160,8 @@ def _serial(text: str, rest: str) -> SerialPort:
     match = _SERIAL_PATTERN.fullmatch(rest)
     if match is None or int(match[2]) == 0:
         device, colon, _ = rest.partition(":")
-        known = device.startswith("/") and (colon or not _DEVICE_PATTERN.fullmatch(text))
-        remedy = _baud_remedy(device) if known else _remedy(text)
+        is_path = device.startswith("/") and (colon or not _DEVICE_PATTERN.fullmatch(text))
+        remedy = _baud_remedy(device) if is_path else _remedy(text)
         raise EndpointError(f"endpoint {text!r} needs DEVICE:BAUD: {remedy}")
     return SerialPort(match[1], int(match[2]))
 
@@ -174,7 +174,7 @@ def _baud_remedy(path: str) -> str:
 
 
 def _remedy(text: str) -> str:
-    """How to write another program's endpoint here; if it is unknown, all notations."""
+    """What to write instead of another program's notation; for an unknown text, all notations."""
     text = text.strip()
     if device := _DEVICE_PATTERN.fullmatch(text):
         name, baud = device[1], device[2]
@@ -185,12 +185,12 @@ def _remedy(text: str) -> str:
         return _baud_remedy(path)
     if address := _ADDRESS_PATTERN.fullmatch(text):
         scheme, host, port = address[1], address[2], address[3]
-        kind = _NETWORK_KINDS.get(scheme or "")
-        if kind is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
+        endpoint_class = _NETWORK_CLASSES.get(scheme or "")
+        if endpoint_class is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
             our_scheme = "udpin" if scheme == "udp" else scheme
             return f"write {our_scheme}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
-            is_host_named = host and host not in _NETWORK_KINDS
+            is_host_named = host and host not in _NETWORK_CLASSES
             udpout_hint = (
                 f", or udpout://{host}:{port} to send to {host} first" if is_host_named else ""
             )

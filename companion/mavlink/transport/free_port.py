@@ -19,11 +19,10 @@ _counter = itertools.count()
 def free_port(*offsets: int) -> int:
     """Find a port for UDP and TCP that is free on 127.0.0.1.
 
-    The ports that lie above it by one of the `offsets` are free, too.
+    The ports above it by each of the `offsets` are free, too.
 
     Another program could open the port before the caller does. So a process gets the same port
-    again only after it has tried all others, and processes with neighboring process ids begin 50
-    ports apart.
+    again only after all others, and processes with neighboring process ids begin 50 ports apart.
 
     Raises:
         LinkError: all ports are in use.

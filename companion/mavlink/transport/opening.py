@@ -23,13 +23,13 @@ async def open_transport(endpoint: Endpoint, receiver: Receiver, lost: Lost) -> 
     """Open the transport that the endpoint describes.
 
     Args:
-        endpoint: The parsed endpoint.
-        receiver: Takes all bytes that arrive.
-        lost: Called with the reason when an open connection drops: once; for a TCP server, each
-            time that its peer drops. Never called for UDP, nor after `close`.
+        endpoint: the parsed endpoint.
+        receiver: takes all bytes that arrive.
+        lost: called with the reason when an open connection drops, by a TCP server each time that
+            its peer drops. Never called for UDP, nor after `close`.
 
     Raises:
-        EndpointError: The transport cannot be opened; the message says why and what to do.
+        EndpointError: the transport cannot be opened; the message says why and what to do.
     """
     match endpoint:
         case UdpIn() | UdpOut():

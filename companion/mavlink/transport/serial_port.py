@@ -40,7 +40,7 @@ class SerialTransport:
     there is room, and frames sent meanwhile are dropped.
 
     Raises:
-        EndpointError: The device is missing, in use or not permitted, or refuses the baud rate.
+        EndpointError: the device is missing, in use or not permitted, or refuses the baud rate.
     """
 
     reconnects = True
@@ -75,7 +75,8 @@ class SerialTransport:
     def send(self, frame: bytes) -> bool:
         """Write one frame, or drop it and return False.
 
-        It is dropped if the device is gone, its buffer is full, or the last frame is unfinished.
+        A frame is dropped if the device is gone, its buffer is full, or the last frame is
+        unfinished.
         """
         if self._fd < 0 or self._unsent:
             return False
@@ -135,7 +136,7 @@ def _open_error(endpoint: SerialPort, error: Exception) -> str:
 
 
 def _error_number(error: BaseException | None) -> int | None:
-    """The system's error number: pyserial hides some in the text of an error that it raises."""
+    """The system's error number; some errors of pyserial have it only in their context."""
     while error is not None:
         number = error.args[0] if isinstance(error, termios.error) else getattr(error, "errno", 0)
         if number:

@@ -17,7 +17,7 @@ async def open_tcp_client(endpoint: TcpClient, receiver: Receiver, lost: Lost) -
     """Connect to a listening vehicle.
 
     Raises:
-        EndpointError: Nobody listens there, the host is unknown, or no answer came within 5 s.
+        EndpointError: nobody listens there, the host is unknown, or no answer came within 5 s.
     """
     transport = TcpTransport(receiver, lost)
     where = f"TCP {endpoint.host}:{endpoint.port}"
@@ -46,7 +46,7 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
     """Listen for one vehicle.
 
     Raises:
-        EndpointError: The port is in use or not permitted, the address is not that of an interface
+        EndpointError: the port is in use or not permitted, the address is not that of an interface
             of this computer, or a peer's host name is unknown.
     """
     named_peers = await resolve_peers(endpoint.peers, socket.SOCK_STREAM)
@@ -101,7 +101,7 @@ class TcpTransport:
         if self._closed:
             return False
         address = connection.get_extra_info("peername")
-        if self._server is not None and not self._named_peers.admit(address):
+        if self._server is not None and not self._named_peers.admits(address):
             self._receiver.note_stranger(host_and_port(address))
             return False
         if self._connection is not None:
@@ -166,21 +166,21 @@ class TcpTransport:
 
 
 class _Connection(asyncio.Protocol):
-    def __init__(self, owner: TcpTransport) -> None:
-        self._owner = owner
-        self._transport: asyncio.Transport | None = None
+    def __init__(self, tcp_transport: TcpTransport) -> None:
+        self._tcp_transport = tcp_transport
+        self._connection: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
-        if self._owner.accept(transport):
-            self._transport = transport
+        if self._tcp_transport.accept(transport):
+            self._connection = transport
         else:
             transport.abort()
 
     def data_received(self, data: bytes) -> None:
-        if self._transport is not None:
-            self._owner.take_data(self._transport, data)
+        if self._connection is not None:
+            self._tcp_transport.take_data(self._connection, data)
 
     def connection_lost(self, exc: Exception | None) -> None:
         reason = f"connection broken: {exc}" if exc else "closed by the other side"
-        self._owner.connection_dropped(self._transport, reason)
+        self._tcp_transport.connection_dropped(self._connection, reason)

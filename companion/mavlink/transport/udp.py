@@ -24,22 +24,22 @@ _MAX_STAMP_AGE_NS = 1_000_000_000  # an older stamp means that the computer's cl
 _MAX_READS_AT_ONCE = 32  # datagrams read before the loop does other work
 
 PEER_SILENCE_S = 2.0
-"""Period in which the peer is checked for silence, s. After a silent period, a sender at another
-address may become the peer."""
+"""Period of the checks whether the peer is silent, s. If nothing was received since the last check,
+a sender at another address may become the peer."""
 
 
 async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
     """Open a UDP endpoint.
 
     Raises:
-        EndpointError: The port is in use, the host is unknown, the address is not that of an
+        EndpointError: the port is in use, the host is unknown, the address is not that of an
             interface of this computer, or there is no permission.
     """
     return UdpTransport(endpoint, await udp_address(endpoint), receiver)
 
 
 class UdpAddress(NamedTuple):
-    """The addresses of an endpoint."""
+    """The socket address of an endpoint, and the peers that it names."""
 
     family: socket.AddressFamily
     """Address family of the socket."""
@@ -53,7 +53,7 @@ async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
     """Look up the host of an endpoint, and the peers that it names.
 
     Raises:
-        EndpointError: A host name is unknown.
+        EndpointError: a host name is unknown.
     """
     loop, kind = asyncio.get_running_loop(), socket.SOCK_DGRAM
     try:
@@ -154,11 +154,11 @@ class UdpTransport:
     def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
         """Take a datagram of an unconnected socket; return whether its sender becomes the peer.
 
-        It becomes the peer if its claim is valid, or if it needs a TIMESYNC request to prove its
-        date (`Receiver.may_prove_date`).
+        The sender becomes the peer if its claim is valid, or if it needs a TIMESYNC request to
+        prove its date (`Receiver.may_prove_date`).
         """
         sender = host_and_port(address)
-        if not self._named_peers.admit(address):
+        if not self._named_peers.admits(address):
             self._receiver.note_stranger(sender)
             return False
         if address == self._peer and not self._receiver.claim_lapsed():
@@ -202,7 +202,7 @@ class UdpTransport:
 
 
 def _arrival_ns(stamps: list[tuple[int, int, bytes]]) -> int:
-    """Arrival of the datagram in the kernel, as a `perf_counter_ns`; now if it is unknown."""
+    """Arrival of a datagram in the kernel, as a `perf_counter_ns`; the present time if unknown."""
     now = time.perf_counter_ns()
     if not stamps:
         return now

@@ -26,7 +26,7 @@ def source_of(frame: Frame) -> Address:
 
 
 def target_of(frame: Frame) -> Address:
-    """The target of a frame; everybody for a message without target, or of an unknown kind.
+    """The target of a frame; `EVERYBODY` for a message without target or of unknown id.
 
     MAVLink 2 cuts trailing zeros off a payload, so a missing field is 0.
     """
@@ -43,12 +43,12 @@ def target_of(frame: Frame) -> Address:
 def _target_fields() -> dict[int, tuple[int, int | None]]:
     """Offsets of target system and component in the payload, by message id."""
     fields_by_id: dict[int, tuple[int, int | None]] = {}
-    for number, kind in dialect.mavlink_map.items():
+    for number, message_class in dialect.mavlink_map.items():
         offsets, offset = {}, 0
         for name, code, count in zip(
-            kind.ordered_fieldnames,
-            kind.native_format.decode()[1:],
-            kind.array_lengths,
+            message_class.ordered_fieldnames,
+            message_class.native_format.decode()[1:],
+            message_class.array_lengths,
             strict=True,
         ):
             offsets[name] = offset

@@ -17,7 +17,7 @@ _MAX_QUEUED_BYTES = 32_768
 
 @dataclass
 class ClientStats:
-    """Counters of one client, in frames."""
+    """Counters of one client."""
 
     received: int = 0
     """Intact frames from the client."""
@@ -30,16 +30,16 @@ class ClientStats:
 
 
 class ClientListener(Protocol):
-    """Is told by the endpoints when clients connect, send frames and go."""
+    """The network, as the endpoints call it when clients connect, send frames and go."""
 
     def attach(self, client: "Client") -> None:
-        """A client has connected."""
+        """Add a client that has connected."""
 
     def detach(self, client: "Client") -> None:
-        """A client has gone."""
+        """Remove a client that has gone."""
 
     def received(self, client: "Client", frames: Iterable[Frame]) -> None:
-        """A client has sent frames."""
+        """Take the frames that a client has sent."""
 
 
 class Client(ABC):
@@ -48,7 +48,7 @@ class Client(ABC):
     Args:
         name: name for messages, such as `udp 127.0.0.1:14550`.
         host: IP address of the client, or None.
-        device: its serial device, or None.
+        device: serial device of the client, or None.
         streaming: whether a frame may continue in the bytes of the next `scan`.
 
     Attributes:
@@ -96,10 +96,10 @@ class Client(ABC):
         """Send queued frames without blocking; called only if some are queued."""
 
     def _dequeue(self, max_bytes: int) -> tuple[bytes, int]:
-        """Remove whole frames: at least one, or several with at most `max_bytes` together.
+        """Remove whole frames from the queue: the first, and more up to `max_bytes` bytes together.
 
         Returns:
-            The bytes, and the number of frames in them.
+            The bytes of the frames, and the number of frames.
         """
         frames = [self._waiting.popleft()]
         size = len(frames[0])
@@ -123,14 +123,14 @@ class FloodDetector:
     _MAX_COUNT = 64
     """Largest number of frames or datagrams in one window."""
     _BYTES_PER_COUNT = 64
-    """So many bytes count as a frame: to search noise for frames costs time, too."""
+    """Number of received bytes that count as a frame, because searching noise costs time, too."""
 
     def __init__(self) -> None:
         self._window_start = 0.0
         self._count = 0
 
     def count(self, number: int, size: int, now: float) -> bool:
-        """Count what was received; return whether it is too much.
+        """Count received frames or datagrams; return whether this window contains too many.
 
         Args:
             number: number of frames or datagrams.
@@ -143,5 +143,5 @@ class FloodDetector:
         return self._count > self._MAX_COUNT
 
     def is_flood(self, now: float) -> bool:
-        """Whether too much was received already in the window of `now`, s."""
+        """Whether the window at `now`, s, already contains too many frames or datagrams."""
         return now - self._window_start <= self.WINDOW and self._count > self._MAX_COUNT

@@ -56,10 +56,12 @@ class Network:
         routing: the routing rules and their counters; set its `intercept` and `on_own_frame`.
         uplink: the clients' frames on their way to the vehicle.
         ports: the open endpoints, in the order of `endpoints`.
-        attitude_payload: of the autopilot's newest ATTITUDE_QUATERNION; empty before the first.
-        attitude_at: event-loop time at which that payload arrived, s.
-        overflowed: frames of the vehicle that were dropped because the queue was full.
-        flown: ids of the messages that are flown here; `SetpointLimit` bounds them.
+        attitude_payload: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the
+            first.
+        attitude_at: event-loop time at which `attitude_payload` arrived, s.
+        overflowed: number of the vehicle's frames that were dropped because the queue was full.
+        setpoint_ids: ids of the messages whose rate `SetpointLimit` limits, because this program
+            flies them.
 
     Raises:
         EndpointError: an endpoint cannot be parsed, or (entering the block) cannot be opened.
@@ -83,8 +85,8 @@ class Network:
         self.attitude_payload = b""
         self.attitude_at = -inf
         self.overflowed = 0
-        self.flown: frozenset[int] = frozenset()
-        self._limit = SetpointLimit(self._route)
+        self.setpoint_ids: frozenset[int] = frozenset()
+        self._setpoint_limit = SetpointLimit(self._route)
         self._link, self._note_event = link, note
         self._faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
@@ -134,27 +136,28 @@ class Network:
         self._flush_later()
 
     def attach(self, client: Client) -> None:
-        """A client has connected."""
+        """Add a client that has connected."""
         self._clients.append(client)
         self.routing.attach(client)
 
     def detach(self, client: Client) -> None:
-        """A client has gone."""
+        """Remove a client that has gone."""
         if client in self._clients:
             self._clients.remove(client)
             self.routing.detach(client)
             self.uplink.forget(client)
-            self._limit.forget(client)
+            self._setpoint_limit.forget(client)
 
     def received(self, client: Client, frames: Iterable[Frame]) -> None:
-        """A client has sent frames. A frame that causes a fault is dropped; the session goes on."""
+        """Take the frames that a client has sent; a frame that causes a fault is dropped."""
         for frame in frames:
-            if frame.message_id not in self.flown or self._limit.admits(client, frame):
+            is_setpoint = frame.message_id in self.setpoint_ids
+            if not is_setpoint or self._setpoint_limit.admits(client, frame):
                 self._route(client, frame)
         self._flush_later()
 
     def flush(self) -> None:
-        """Forward the queued frames; those to the vehicle first, as far as `uplink` permits."""
+        """Forward the queued frames: first those to the vehicle, as far as `uplink` permits."""
         self._flush_handle = None
         if self._timer is not None:
             self._timer.cancel()

@@ -38,13 +38,13 @@ _READING_COMMANDS = frozenset(
 )
 _COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 _COMMAND_OFFSET = 28
-"""Offset of the command's number in these two payloads, after seven fields of four bytes each."""
+"""Offset of the command's number in COMMAND_LONG and COMMAND_INT, after seven 4-byte fields."""
 _FTP_ID = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
 _OPCODE_OFFSET = 6
-"""Offset of the FTP opcode, after three address bytes, a sequence number and a session."""
+"""Offset of the opcode in FILE_TRANSFER_PROTOCOL, after addresses, sequence number and session."""
 _READING_OPCODES = frozenset({0, 1, 2, 3, 4, 5, 14, 15})
-"""None, TerminateSession, ResetSessions, ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32 and
-BurstReadFile. Source: "File Transfer Protocol" of the MAVLink guide."""
+"""FTP opcodes that change nothing on the vehicle: None, TerminateSession, ResetSessions,
+ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32, BurstReadFile. Source: the MAVLink guide."""
 
 
 def reads_only(frame: Frame) -> bool:
@@ -63,8 +63,9 @@ def reads_only(frame: Frame) -> bool:
 class Permission:
     """Decides which frames of a client are forwarded.
 
-    `trusted` are the hosts and serial devices that the configuration trusts. Without `signing`,
-    signatures are not checked and permit nothing.
+    Args:
+        trusted: hosts and serial devices whose clients may command without a signature.
+        signing: checks the signatures of clients; None: a signature permits nothing.
     """
 
     def __init__(self, trusted: Iterable[str], signing: Signing | None) -> None:
@@ -76,7 +77,7 @@ class Permission:
         return client.is_local or (client.host or client.device) in self._trusted
 
     def refusal(self, client: Client, frame: Frame) -> str | None:
-        """Why a frame is not forwarded, in words for its sender; None if it is forwarded."""
+        """Why a frame is not forwarded, as a text for the client; None: it is forwarded."""
         if reads_only(frame) or self.trusts(client):
             return None
         if self._signing is None:

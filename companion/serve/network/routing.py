@@ -1,4 +1,4 @@
-"""Where a frame goes: learned addresses, targets, no loops (MAVLink guide, "Routing").
+"""Decides where a frame goes, by targets and learned addresses (MAVLink guide, "Routing").
 
 Nothing here sends: frames are only queued at the channels. Time comes only from the given clock.
 """
@@ -13,13 +13,13 @@ from companion.serve.network.client import Client
 from companion.serve.network.uplink import UplinkQueue
 
 _REPETITION_TIME = 0.2
-"""A frame identical to one that was forwarded within this time is a repetition, s."""
+"""Time within which a frame identical to a forwarded one is a repetition, s."""
 _MAX_REMEMBERED_FRAMES = 4096
 """Largest number of remembered frames; in a flood, only the newest are remembered."""
 
 
 _MAX_ADDRESSES = 1024
-"""Largest number of addresses that are learned of one channel: each targeted frame looks at all."""
+"""Largest number of addresses that are learned on one channel; all are searched for each frame."""
 
 Intercept = Callable[[Client, Frame], bool]
 """Called with a client's frame before forwarding; returns True if it must not be forwarded."""
@@ -49,10 +49,10 @@ class Routing:
     - A targeted frame goes to the channels on which its target was heard. A client's frame for a
       never-heard component of the vehicle's system goes to the vehicle.
     - A frame for our own component is not forwarded.
-    - A message of an unknown kind goes to all channels except the one it came from, as its
-      target is not known.
+    - A message of unknown id, whose target is unknown, goes to all channels except the one it came
+      from.
 
-    Several nodes may be behind a channel, also behind that to the vehicle.
+    Several nodes may be behind one channel, also behind the channel to the vehicle.
 
     Attributes:
         stats: counters of frames.
@@ -61,12 +61,16 @@ class Routing:
     """
 
     def __init__(
-        self, vehicle: UplinkQueue, autopilot: Address, own: Address, clock: Callable[[], float]
+        self,
+        vehicle: UplinkQueue,
+        autopilot: Address,
+        our_address: Address,
+        clock: Callable[[], float],
     ) -> None:
         self.stats = RoutingStats()
         self.intercept: Intercept = lambda *_: True
         self.on_own_frame: Callable[[Client, Frame], None] | None = None
-        self._vehicle, self._autopilot, self._own = vehicle, autopilot, own
+        self._vehicle, self._autopilot, self._our_address = vehicle, autopilot, our_address
         self._heard: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
         self._clients: tuple[Client, ...] = ()
         self._repeats = _Repeats(clock)
@@ -89,14 +93,14 @@ class Routing:
         """Forward a frame that came over the link to the vehicle."""
         source = source_of(frame)
         if source != self._autopilot:  # another component, or a station behind the autopilot
-            if source == self._own or self._repeats.is_repeat(frame.raw):
+            if source == self._our_address or self._repeats.is_repeat(frame.raw):
                 self.stats.looped += 1
                 return
             self._learn(self._vehicle, source)
         target = target_of(frame)
         if target == EVERYBODY:
             receivers = self._clients
-        elif target == self._own:
+        elif target == self._our_address:
             return
         else:
             receivers = tuple(each for each in self._clients if self._reaches(each, target))
@@ -113,7 +117,7 @@ class Routing:
         """
         source = source_of(frame)
         if (
-            source in (self._autopilot, self._own)
+            source in (self._autopilot, self._our_address)
             or client not in self._heard
             or self._repeats.is_repeat(frame.raw)
         ):
@@ -122,7 +126,7 @@ class Routing:
         if source.system != 0:
             self._learn(client, source)
         target = target_of(frame)
-        if target == self._own:
+        if target == self._our_address:
             if self.on_own_frame is not None:
                 self.on_own_frame(client, frame)
             return
@@ -180,7 +184,7 @@ class _Repeats:
         self._forwarded_at: OrderedDict[bytes, float] = OrderedDict()
 
     def is_repeat(self, raw: bytes) -> bool:
-        """Whether these bytes were forwarded just before; if not, remember them."""
+        """Whether the frame `raw` was forwarded within `_REPETITION_TIME`; if not, remember it."""
         now, forwarded_at = self._clock(), self._forwarded_at
         previous = forwarded_at.pop(raw, None)
         if previous is not None and now - previous <= _REPETITION_TIME:

@@ -57,7 +57,7 @@ class SerialLine:
 
 
 class SerialClient(Client):
-    """The client at the other end of the line.
+    """The client at the other end of a serial line.
 
     Attributes:
         transport: the open device, or None.

@@ -1,4 +1,4 @@
-"""Bounds what the setpoints of one client cost the control loop."""
+"""Limits the rate of each client's setpoints, so that they do not delay the control loop."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,35 +18,36 @@ _MAX_COUNT = 10
 class _Window:
     """The setpoints of one client in its present window."""
 
-    begins: float
-    """When the window begins, s of event-loop time."""
+    begin_time: float
+    """Event-loop time at the beginning of the window, s."""
     count: int = 0
-    """Number of setpoints that were handled in it."""
+    """Number of setpoints that were handled in the window."""
     newest: Frame | None = None
-    """The newest setpoint that was not, or None."""
+    """The newest setpoint that waits for the end of the window, or None."""
     timer: asyncio.TimerHandle | None = None
-    """Hands on `newest` at the end of the window."""
+    """Timer that passes `newest` on at the end of the window; None: no setpoint waits."""
 
 
 class SetpointLimit:
-    """Admits some setpoints of each client at once; of the others, only the newest, a little later.
+    """Admits the first `_MAX_COUNT` setpoints of a client in each window.
 
-    So neither a flood nor the backlog of a connection that stood still delays the control loop, and
-    the newest setpoint is always flown.
+    If more come, the newest is passed on at the end of the window, and the others are dropped. So
+    neither a flood nor the backlog of a stalled connection delays the control loop, and the newest
+    setpoint is always flown.
 
     Args:
-        hand_on: called with a client and its setpoint that was kept until its window ended.
+        pass_on: called at the end of a window with a client and its newest setpoint.
     """
 
-    def __init__(self, hand_on: Callable[[Client, Frame], None]) -> None:
-        self._hand_on = hand_on
+    def __init__(self, pass_on: Callable[[Client, Frame], None]) -> None:
+        self._pass_on = pass_on
         self._loop = asyncio.get_running_loop()
         self._windows: WeakKeyDictionary[Client, _Window] = WeakKeyDictionary()
 
     def admits(self, client: Client, frame: Frame) -> bool:
         """Whether a setpoint may be handled now; otherwise it is kept or dropped."""
         now, window = self._loop.time(), self._windows.get(client)
-        if window is None or now - window.begins >= _WINDOW:
+        if window is None or now - window.begin_time >= _WINDOW:
             self.forget(client)
             window = self._windows[client] = _Window(now)
         if window.count < _MAX_COUNT:
@@ -54,12 +55,12 @@ class SetpointLimit:
             return True
         window.newest = frame
         if window.timer is None:
-            end = window.begins + _WINDOW
+            end = window.begin_time + _WINDOW
             window.timer = self._loop.call_at(end, self._end_window, client, window)
         return False
 
     def forget(self, client: Client) -> None:
-        """Drop what is kept of a client."""
+        """Drop the window of a client and the setpoint that waits in it."""
         window = self._windows.pop(client, None)
         if window is not None and window.timer is not None:
             window.timer.cancel()
@@ -68,4 +69,4 @@ class SetpointLimit:
         newest = window.newest
         self._windows[client] = _Window(self._loop.time(), count=1)
         if newest is not None:
-            self._hand_on(client, newest)
+            self._pass_on(client, newest)

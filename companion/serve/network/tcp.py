@@ -1,4 +1,4 @@
-"""Clients over TCP: those that connect to our port, or a program that listens."""
+"""Clients over TCP: those that connect to our port, or a program to whose port we connect."""
 
 import asyncio
 import socket
@@ -12,16 +12,17 @@ from companion.serve.network.client import Client, ClientListener, FloodDetector
 
 _MAX_CLIENTS = 16
 _MAX_UNSENT_BYTES = 65_536
-"""Unsent bytes above which frames are dropped."""
+"""Number of unsent bytes to one client above which further frames are dropped."""
 _KERNEL_BUFFER = 65_536
-"""Size of the kernel's buffer for a client, bytes. It is small, because a client that paused must
-read all old bytes in it before it reads anything new."""
+"""Size of the kernel's send buffer for a client, bytes. It is small, because a client that paused
+must read all old bytes in the buffer before it reads anything new."""
 _READ_BYTES = 4096
-"""Largest number of bytes that are read at once; asyncio would read 256 KiB, which costs so long
-that the control loop would stop."""
+"""Largest number of bytes that are read at once; asyncio would read 256 KiB, whose handling would
+stop the control loop for too long."""
 _DEAD_TIMEOUT = 60.0
-"""A client that acknowledges nothing, or reads nothing, for this long is gone, s. Linux gives it up
-after 15 minutes. Meanwhile one that connects again and again from a bad network takes all places.
+"""Time without an acknowledgement or a read after which a client counts as gone, s. Linux would
+wait for 15 minutes. Until then a client that reconnects often over a bad network would take all
+`_MAX_CLIENTS` places.
 """
 _RETRY_PAUSE = 2.0
 """Pause before connecting again, s."""
@@ -59,19 +60,19 @@ class TcpPort:
     """The TCP connections of one endpoint.
 
     Attributes:
-        local: (host, port) listened on, or None.
+        local: (host, port) on which clients are accepted; None: this program connects.
     """
 
     def __init__(self, clients: ClientListener, named_peers: NamedPeers) -> None:
         self._clients, self._named_peers = clients, named_peers
         self._server: asyncio.Server | None = None
         self._connecting: asyncio.Task[None] | None = None
-        self._open: set[TcpClient] = set()
+        self._connected_clients: set[TcpClient] = set()
         self._closed = False
         self.local: tuple[str, int] | None = None
 
     def protocol(self) -> "_Connection":
-        """The protocol of a new connection."""
+        """Make the asyncio protocol of a new connection."""
         return _Connection(self)
 
     def listen(self, server: asyncio.Server) -> None:
@@ -99,8 +100,8 @@ class TcpPort:
     def accept(self, transport: asyncio.Transport) -> "TcpClient | None":
         """Make a client for a new connection; None if it is refused."""
         address = transport.get_extra_info("peername")
-        full = len(self._open) >= _MAX_CLIENTS
-        if self._closed or full or address is None or not self._named_peers.admit(address):
+        is_full = len(self._connected_clients) >= _MAX_CLIENTS
+        if self._closed or is_full or address is None or not self._named_peers.admits(address):
             return None
         sock = transport.get_extra_info("socket")
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -108,20 +109,20 @@ class TcpPort:
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * _DEAD_TIMEOUT))
         name, host = f"tcp {host_and_port(address)}", plain_host(str(address[0]))
         client = TcpClient(name, host, transport)
-        self._open.add(client)
+        self._connected_clients.add(client)
         self._clients.attach(client)
         return client
 
     def received(self, client: "TcpClient", data: bytes) -> int:
-        """Pass on what a client sent; return the number of frames."""
+        """Pass on the frames in the bytes that a client sent; return the number of frames."""
         frames = client.scan(data)
         self._clients.received(client, frames)
         return len(frames)
 
-    def lost(self, client: "TcpClient") -> None:
-        """A connection is gone."""
-        if client in self._open:
-            self._open.discard(client)
+    def remove(self, client: "TcpClient") -> None:
+        """Remove a client whose connection is gone."""
+        if client in self._connected_clients:
+            self._connected_clients.discard(client)
             self._clients.detach(client)
 
     def close(self) -> None:
@@ -131,9 +132,9 @@ class TcpPort:
             self._connecting.cancel()
         if self._server is not None:
             self._server.close()
-        for client in tuple(self._open):
+        for client in tuple(self._connected_clients):
             client.abort()
-            self.lost(client)
+            self.remove(client)
 
 
 class TcpClient(Client):
@@ -181,8 +182,8 @@ class _Connection(asyncio.BufferedProtocol):
         if self._client is None or self._transport is None:
             return
         number = self._port.received(self._client, bytes(self._buffer[:nbytes]))
-        too_much = self._flood.count(number, nbytes, self._loop.time())
-        if too_much and not self._transport.is_closing():
+        is_flood = self._flood.count(number, nbytes, self._loop.time())
+        if is_flood and not self._transport.is_closing():
             self._transport.pause_reading()
             self._loop.call_later(FloodDetector.WINDOW, self._resume)
 
@@ -193,4 +194,4 @@ class _Connection(asyncio.BufferedProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         self.lost.set()
         if self._client is not None:
-            self._port.lost(self._client)
+            self._port.remove(self._client)

@@ -15,9 +15,9 @@ _READ_BYTES = 4_096
 _MAX_DATAGRAM = 1_400
 """Largest datagram that joins several frames, bytes, so that no network must split it."""
 _MAX_READS_AT_ONCE = 8
-"""Number of datagrams read before the loop does other work."""
+"""Largest number of datagrams read before the event loop does other work."""
 _SILENCE_TIMEOUT = 15.0
-"""A client counts as gone after this silence, s; ground stations send once a second."""
+"""Time of silence after which a client counts as gone, s; ground stations send once a second."""
 _MAX_CLIENTS = 16
 
 
@@ -47,10 +47,10 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: ClientListener) -> "UdpPor
 
 
 class UdpPort:
-    """A socket with its clients, distinguished by their addresses.
+    """A UDP socket with its clients, distinguished by their addresses.
 
     Attributes:
-        local: the (host, port) it is bound to.
+        local: (host, port) to which the socket is bound.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class UdpPort:
         self._loop.add_reader(sock.fileno(), self._read)
 
     def send_only_to(self, address: Any) -> None:
-        """Send to this client even before it has sent anything; ignore all others."""
+        """Send to the client at `address` even before it has sent anything; ignore all others."""
         self._only_address = address
         self._attach(address)
 
@@ -85,7 +85,7 @@ class UdpPort:
     def send(self, data: bytes, address: Any) -> bool:
         """Send a datagram; return False if the kernel's buffer is full.
 
-        After any other error the datagram is lost, and True is returned: the next may arrive.
+        After any other error the datagram is lost and True is returned: the next one may arrive.
         """
         try:
             self._socket.sendto(data, address)
@@ -114,7 +114,7 @@ class UdpPort:
     def _receive(self, data: bytes, address: Any) -> None:
         client = self._by_address.get(address)
         if client is None:
-            if self._only_address is not None or not self._named_peers.admit(address):
+            if self._only_address is not None or not self._named_peers.admits(address):
                 return
             client = UdpClient(self, address)
             frames = client.scan(data)
@@ -147,7 +147,7 @@ class UdpClient(Client):
     """A client with one UDP address.
 
     Attributes:
-        heard_at: arrival of its last datagram, s.
+        heard_at: event-loop time at which the client's last datagram arrived, s.
         flood: detects a flood from this client. All clients share the socket, so a flood cannot be
             left unread: its datagrams are read and discarded.
     """

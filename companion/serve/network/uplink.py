@@ -1,4 +1,4 @@
-"""Queues clients' frames to the vehicle: at a limited rate, in turn, without delay of setpoints."""
+"""Queues clients' frames to the vehicle; limits their rate, so that they do not delay setpoints."""
 
 from collections import deque
 from collections.abc import Callable
@@ -8,7 +8,8 @@ from companion.mavlink.transport.endpoint import Endpoint, SerialPort
 _MAX_QUEUED_FRAMES = 64
 """Largest number of frames of one client that wait to be sent to the vehicle."""
 _MAX_FRAME_AGE = 1.0
-"""Largest age of a frame that is sent, s: a command to arm must not arrive after an outage."""
+"""Largest age of a queued frame that is still sent, s: no old command to arm may arrive after an
+outage."""
 _LARGEST_FRAME = 280
 _SERIAL_SHARE = 0.5
 """Share of a serial line that clients may use; our setpoints and requests need the rest."""
@@ -19,7 +20,7 @@ _NETWORK_BURST = 50_000.0
 
 
 def uplink_rate(endpoint: Endpoint) -> tuple[float, float]:
-    """Limits of clients' frames to the vehicle: (bytes per second, bytes that may go at once)."""
+    """Limits of clients' frames to the vehicle: (bytes per second, bytes sent at once)."""
     if isinstance(endpoint, SerialPort):
         rate = _SERIAL_SHARE * endpoint.baud / _BITS_PER_BYTE
         return rate, max(float(_LARGEST_FRAME), 0.01 * rate)
@@ -31,13 +32,14 @@ class UplinkQueue:
 
     Args:
         send: sends a whole frame now; returns false if it could not be sent.
-        rate: bytes per second.
-        burst: bytes that may be sent at once.
+        rate: largest mean rate, bytes/s.
+        burst: largest number of bytes sent at once.
         clock: returns the event-loop time, s.
 
     Attributes:
         sent: number of frames sent.
-        dropped: frames dropped because their client's queue was full, or they waited too long.
+        dropped: number of frames that were dropped, because their client's queue was full or they
+            waited too long.
     """
 
     def __init__(
@@ -61,7 +63,7 @@ class UplinkQueue:
         queue.append((self._clock(), frame))
 
     def drain(self) -> bool:
-        """Send what may be sent now, a frame of each client in turn; return whether more remain."""
+        """Send as many frames as allowed, one of each client in turn; return whether any remain."""
         now = self._clock()
         self._allowed_bytes = min(
             self._burst, self._allowed_bytes + self._rate * (now - self._refilled_at)

@@ -1,4 +1,4 @@
-"""Jerk-limited motions from one state of some axes to another, by Ruckig (extra `serve`)."""
+"""Jerk-limited motions of an error to zero, along one or more axes, by Ruckig (extra `serve`)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ AxisValues = tuple[float, ...]
 
 
 class AxisState(NamedTuple):
-    """Position, velocity and acceleration along some axes; SI units or radians."""
+    """Position, velocity and acceleration along one or more axes; SI units or radians."""
 
     position: AxisValues
     velocity: AxisValues
@@ -21,9 +21,9 @@ class AxisLimits(NamedTuple):
     """Limits of a motion along one axis, in SI units or radians."""
 
     velocity: float
-    """Largest velocity along the axis."""
-    backward: float
-    """Largest speed against the axis."""
+    """Largest speed in the positive direction."""
+    backward_velocity: float
+    """Largest speed in the negative direction, as a positive number."""
     acceleration: float
     """Largest acceleration in both directions."""
     jerk: float
@@ -39,9 +39,13 @@ class UnplannableError(ValueError):
 
 
 class Approach:
-    """A time-optimal motion of an error to zero from the time `begin_time`, s.
+    """A time-optimal motion that reduces an error to zero.
 
-    `by_velocity`: only the velocity error must become zero, and the position error need not.
+    Args:
+        error: error at the beginning of the motion.
+        limits: limits of the motion, one for each axis.
+        begin_time: event-loop time at the beginning, s.
+        by_velocity: whether only the velocity error must become zero, not the position error.
 
     Raises:
         UnplannableError: Ruckig finds no such motion.
@@ -62,7 +66,7 @@ class Approach:
         problem.current_acceleration = list(error.acceleration)
         problem.target_position = [0.0] * axes
         problem.max_velocity = [each.velocity for each in limits]
-        problem.min_velocity = [-each.backward for each in limits]
+        problem.min_velocity = [-each.backward_velocity for each in limits]
         problem.max_acceleration = [each.acceleration for each in limits]
         problem.max_jerk = [each.jerk for each in limits]
         if by_velocity:
@@ -78,7 +82,7 @@ class Approach:
             raise _unplannable(result)
 
     def at(self, time: float) -> AxisState:
-        """The error at a time, s; constant after the end."""
+        """The error at a time, s; after the end of the motion it stays constant."""
         elapsed = max(0.0, time - self._begin_time)
         position, velocity, acceleration = self._trajectory.at_time(elapsed)[:3]
         return AxisState(tuple(position), tuple(velocity), tuple(acceleration))

@@ -19,7 +19,7 @@ _ALL_RATES = _NO_ROLL_RATE | _NO_PITCH_RATE | _NO_YAW_RATE
 _THRUST_BODY, _NO_THRUST, _NO_ATTITUDE = 32, 64, 128
 _RESERVED = 8 | 16
 _LARGEST_RATE = 100.0
-"""Rates above this are invalid, rad/s."""
+"""Largest body rate that is accepted, rad/s."""
 
 
 def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:

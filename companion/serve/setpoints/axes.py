@@ -21,9 +21,9 @@ from companion.serve.setpoints.commanded_state import (
 from companion.serve.setpoints.request import AxisDemand
 
 _MAX_STREAM_PERIOD = 0.25
-"""Longest period of setpoints that count as a stream, whose derivatives are estimated, s."""
+"""Longest time between setpoints of a stream, s; the derivatives of a stream are estimated."""
 _DERIVATIVE_WEIGHT = 0.5
-"""Weight of a new derivative in its running estimate."""
+"""Weight of a new derivative in the exponential average."""
 _LARGEST_ACCELERATION = 15.0
 """Largest estimated acceleration, m/s²; faster changes of the velocity are jumps."""
 _MAX_BRAKING_FACTOR = 2.0
@@ -39,12 +39,12 @@ _MIN_LIMIT_SHARE = 0.25
 
 
 class Continuity(NamedTuple):
-    """Largest jump of a stream that is still followed directly."""
+    """Largest jumps of a stream that are still followed directly."""
 
     position: float
-    """m or rad."""
+    """Largest jump of the position, m or rad."""
     velocity: float
-    """m/s or rad/s."""
+    """Largest jump of the velocity, m/s or rad/s."""
 
 
 class CommandFollower:
@@ -54,7 +54,7 @@ class CommandFollower:
         limits: limits of motions after a jump, one for each axis. A motion along several axes is
             limited along its direction.
         continuity: largest jumps that are followed directly.
-        timeout: time for which a command repeated unchanged is extrapolated, s. After it, a
+        timeout: time for which a command repeated unchanged is extrapolated, s. After this time a
             commanded position stands still, and a commanded velocity stays constant.
     """
 
@@ -63,20 +63,20 @@ class CommandFollower:
     ) -> None:
         self._limits, self._continuity, self._timeout = limits, continuity, timeout
         self._zero: AxisValues = (0.0,) * len(limits)
-        self._demand: AxisDemand | None = None
+        self._newest_demand: AxisDemand | None = None
         self._commanded_at = 0.0
         self._approach: Approach | None = None
-        self._commanded = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
+        self._commanded_state = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
 
     def begin(self, state: AxisState, now: float) -> None:
         """Start from a state, and come to rest until a command comes."""
-        self._demand, self._approach = None, None
-        self._commanded = CommandedState(*state, self._zero, now)
+        self._newest_demand, self._approach = None, None
+        self._commanded_state = CommandedState(*state, self._zero, now)
         self.stop(now)
 
     def at(self, time: float) -> AxisState:
-        """The state at a time, s."""
-        commanded = self._commanded.at(time)
+        """State at a time, s: the commanded state plus the rest of the error."""
+        commanded = self._commanded_state.at(time)
         if self._approach is None:
             return commanded
         error = self._approach.at(time)
@@ -89,15 +89,16 @@ class CommandFollower:
     def stop(self, now: float, actual: AxisMotion | None = None) -> None:
         """Come to rest within limits, and stay there.
 
-        If the state is too far from `actual`, the motion of the vehicle, the stop begins there.
+        If the state is too far from `actual`, the motion of the vehicle, the stop begins at
+        `actual`.
         """
         if actual is not None:
             current = self.at(now)
             if are_far_apart(
                 current.position, actual.position, _MAX_LEAD_DISTANCE
             ) or are_far_apart(current.velocity, actual.velocity, _MAX_LEAD_SPEED):
-                self._demand, self._approach = None, None
-                self._commanded = CommandedState(*actual, self._zero, self._zero, now)
+                self._newest_demand, self._approach = None, None
+                self._commanded_state = CommandedState(*actual, self._zero, self._zero, now)
         self.command(AxisDemand(None, self._zero, None), now)
 
     def command(self, demand: AxisDemand, now: float, actual: AxisMotion | None = None) -> None:
@@ -106,9 +107,9 @@ class CommandFollower:
         Without a commanded position, the state stays close to `actual`, the motion of the vehicle.
 
         Raises:
-            UnplannableError: no motion leads to it; the previous command stays in force.
+            UnplannableError: no motion leads to the command; the previous one stays in force.
         """
-        if demand == self._demand:
+        if demand == self._newest_demand:
             self._repeat(demand, now, actual)
             return
         current = self.at(now)
@@ -116,15 +117,15 @@ class CommandFollower:
             self._follow_position(demand, current, now)
         else:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
-        self._demand, self._commanded_at = demand, now
+        self._newest_demand, self._commanded_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
-        """Follow an unchanged command; extrapolate it only for a time, as its sender may hang."""
+        """Follow an unchanged command; extrapolate it only for `timeout`: its sender may hang."""
         if demand.position is None:
             self._repeat_motion(demand, now, actual)
             return
-        moving = any(demand.velocity or ()) or any(demand.acceleration or ())
-        if moving and now - self._commanded_at > self._timeout:
+        is_moving = any(demand.velocity or ()) or any(demand.acceleration or ())
+        if is_moving and now - self._commanded_at > self._timeout:
             self._follow_position(AxisDemand(demand.position, None, None), self.at(now), now)
             self._commanded_at = inf
 
@@ -136,11 +137,11 @@ class CommandFollower:
         current = self.at(now)
         if demand.velocity is not None and now - self._commanded_at > self._timeout:
             demand = AxisDemand(None, demand.velocity, None)
-        strayed = actual is not None and are_far_apart(
+        is_far_away = actual is not None and are_far_apart(
             current.position, actual.position, _MAX_LEAD_DISTANCE
         )
-        still_accelerates = demand.acceleration is None and any(self._commanded.acceleration)
-        if demand.velocity is None or strayed or still_accelerates:
+        still_accelerates = demand.acceleration is None and any(self._commanded_state.acceleration)
+        if demand.velocity is None or is_far_away or still_accelerates:
             self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
 
     def _follow_position(self, demand: AxisDemand, current: AxisState, now: float) -> None:
@@ -153,7 +154,7 @@ class CommandFollower:
             approach = None
         else:
             approach = self._plan(error, error.position, now, by_velocity=False)
-        self._commanded, self._approach = target, approach
+        self._commanded_state, self._approach = target, approach
 
     def _follow_motion(self, demand: AxisDemand, current: AxisState, now: float) -> None:
         velocity = current.velocity if demand.velocity is None else demand.velocity
@@ -163,7 +164,7 @@ class CommandFollower:
         if demand.velocity is not None:
             error = target.error_of(current)
             approach = self._plan(error, error.velocity, now, by_velocity=True)
-        self._commanded, self._approach = target, approach
+        self._commanded_state, self._approach = target, approach
 
     def _plan(
         self, error: AxisState, direction: AxisValues, now: float, *, by_velocity: bool
@@ -171,8 +172,8 @@ class CommandFollower:
         """A motion of the error to zero; the limits hold along `direction`, not for each axis."""
         length = hypot(*direction)
         limits = [
-            each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(along) / length))
-            for each, along in zip(self._limits, direction, strict=True)
+            each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(part) / length))
+            for each, part in zip(self._limits, direction, strict=True)
         ]
         acceleration = tuple(
             clamp(value, _MAX_BRAKING_FACTOR * each.acceleration)
@@ -183,7 +184,7 @@ class CommandFollower:
 
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[AxisValues, AxisValues]:
         """Acceleration and jerk of a stream; estimated if they are not commanded."""
-        before, interval = self._demand, now - self._commanded_at
+        before, interval = self._newest_demand, now - self._commanded_at
         commanded = demand.acceleration
         is_stream = (
             before is not None
@@ -196,11 +197,11 @@ class CommandFollower:
             rate = change_rate(before.velocity, demand.velocity, interval, _LARGEST_ACCELERATION)
             if rate is None:
                 return self._zero, self._zero
-            return _blend(self._commanded.acceleration, rate), self._zero
+            return _blend(self._commanded_state.acceleration, rate), self._zero
         if before.acceleration is None:
             return commanded, self._zero
         jerk = change_rate(before.acceleration, commanded, interval, LARGEST_JERK)
-        return commanded, self._zero if jerk is None else _blend(self._commanded.jerk, jerk)
+        return commanded, self._zero if jerk is None else _blend(self._commanded_state.jerk, jerk)
 
     def _is_continuous(self, error: AxisState) -> bool:
         return (
@@ -218,9 +219,9 @@ def _blend(old: AxisValues, new: AxisValues) -> AxisValues:
 
 
 def _near_vehicle(current: AxisState, actual: AxisMotion | None, demand: AxisDemand) -> AxisState:
-    """The state, but the vehicle's own position or velocity where the state is too far from it.
+    """The state `current`, with position or velocity of `actual` where they are too far apart.
 
-    A commanded velocity is never replaced.
+    `actual` is the motion of the vehicle. A commanded velocity is never replaced.
     """
     if actual is None:
         return current

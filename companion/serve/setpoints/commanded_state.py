@@ -1,4 +1,4 @@
-"""The commanded state along some axes, extrapolated between two setpoints."""
+"""The commanded state along one or more axes, extrapolated between two setpoints."""
 
 from math import hypot
 from typing import NamedTuple
@@ -7,16 +7,14 @@ from companion.serve.setpoints.approach import AxisState, AxisValues
 
 
 class AxisMotion(NamedTuple):
-    """Motion of the vehicle along some axes; SI units."""
+    """Position (m) and velocity (m/s) of the vehicle along one or more axes."""
 
     position: AxisValues
-    """m."""
     velocity: AxisValues
-    """m/s."""
 
 
 class CommandedState(NamedTuple):
-    """The commanded state at the time `begins`, s; from then on the jerk is constant.
+    """The commanded state at the time `begin_time`, s; from then on the jerk is constant.
 
     Position, velocity, acceleration and jerk are in SI units or radians.
     """
@@ -25,11 +23,11 @@ class CommandedState(NamedTuple):
     velocity: AxisValues
     acceleration: AxisValues
     jerk: AxisValues
-    begins: float
+    begin_time: float
 
     def at(self, time: float) -> AxisState:
-        """The state at a time, s."""
-        t = max(0.0, time - self.begins)
+        """The commanded state extrapolated to a time, s."""
+        t = max(0.0, time - self.begin_time)
         position, velocity, acceleration = [], [], []
         rows = zip(self.position, self.velocity, self.acceleration, self.jerk, strict=True)
         for p, v, a, j in rows:  # one fast loop: each step of guidance asks for a dozen states
@@ -39,7 +37,7 @@ class CommandedState(NamedTuple):
         return AxisState(tuple(position), tuple(velocity), tuple(acceleration))
 
     def error_of(self, state: AxisState) -> AxisState:
-        """A state minus the commanded state at `begins`."""
+        """A state minus the commanded state at `begin_time`."""
         return AxisState(
             _minus(state.position, self.position),
             _minus(state.velocity, self.velocity),

@@ -18,7 +18,8 @@ _VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
 """Largest vertical acceleration, m/s², and jerk, m/s³: thrust used for climbing is not available
 for tilt."""
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
-"""Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the yaw; yaw responds slowly.
+"""Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the commanded yaw. Vehicles
+respond slowly in yaw.
 """
 _MAX_STREAM_PERIOD = 0.25
 """Longest time between yaw setpoints of a stream, s; the yaw rate of a stream is estimated."""
@@ -28,17 +29,17 @@ class MotionLimits(NamedTuple):
     """Limits of motions after a jump of the setpoints; SI units and radians."""
 
     speed: float
-    """Largest horizontal speed."""
+    """Largest horizontal speed, m/s."""
     acceleration: float
-    """Largest acceleration; vertically at most `_VERTICAL_ACCELERATION`."""
+    """Largest acceleration, m/s²; vertically at most `_VERTICAL_ACCELERATION`."""
     jerk: float
-    """Largest jerk; vertically at most `_VERTICAL_JERK`."""
+    """Largest jerk, m/s³; vertically at most `_VERTICAL_JERK`."""
     climb: float
     descent: float
     yaw_rate: float
     timeout: float
-    """Time for which a request repeated unchanged is extrapolated. After it, a commanded position
-    stands still, and a commanded velocity stays constant."""
+    """Time for which a request repeated unchanged is extrapolated, s. After this time a commanded
+    position stands still, and a commanded velocity stays constant."""
 
 
 class CommandedMotion:
@@ -48,23 +49,25 @@ class CommandedMotion:
     """
 
     def __init__(self, limits: MotionLimits) -> None:
-        level = AxisLimits(limits.speed, limits.speed, limits.acceleration, limits.jerk)
-        down = AxisLimits(
+        horizontal = AxisLimits(limits.speed, limits.speed, limits.acceleration, limits.jerk)
+        vertical = AxisLimits(  # positive down
             limits.descent,
             limits.climb,
             min(limits.acceleration, _VERTICAL_ACCELERATION),
             min(limits.jerk, _VERTICAL_JERK),
         )
         yaw = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
-        self._horizontal = CommandFollower((level, level), _HORIZONTAL_CONTINUITY, limits.timeout)
-        self._vertical = CommandFollower((down,), _VERTICAL_CONTINUITY, limits.timeout)
+        self._horizontal = CommandFollower(
+            (horizontal, horizontal), _HORIZONTAL_CONTINUITY, limits.timeout
+        )
+        self._vertical = CommandFollower((vertical,), _VERTICAL_CONTINUITY, limits.timeout)
         self._heading = CommandFollower((yaw,), _HEADING_CONTINUITY, limits.timeout)
         self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
         self._newest_yaw: tuple[float, float, float] | None = None  # request, heading demand, time
 
     def begin(self, position_ned: Vector, velocity_ned: Vector, heading: float, now: float) -> None:
-        """Start from a position, velocity and heading, and come to rest until a request comes."""
+        """Begin at a position (m), velocity (m/s) and heading (rad), and come to rest."""
         (x, y, z), (u, v, w) = position_ned, velocity_ned
         self._horizontal.begin(AxisState((x, y), (u, v), (0.0, 0.0)), now)
         self._vertical.begin(AxisState((z,), (w,), (0.0,)), now)
@@ -75,9 +78,14 @@ class CommandedMotion:
         """Follow a request; `actual` is the motion of the vehicle.
 
         Raises:
-            UnplannableError: no motion leads to it; the previous request stays in force.
+            UnplannableError: no motion leads to the request; the previous one stays in force.
         """
-        before = copy(self._horizontal), copy(self._vertical), copy(self._heading), self._newest_yaw
+        state_before = (
+            copy(self._horizontal),
+            copy(self._vertical),
+            copy(self._heading),
+            self._newest_yaw,
+        )
         horizontal, vertical = _by_axes(actual)
         try:
             self._horizontal.command(request.horizontal, now, horizontal)
@@ -86,7 +94,7 @@ class CommandedMotion:
             self._vertical.command(demand, now, vertical)
             self._heading.command(self._heading_demand(request, now), now)
         except UnplannableError:
-            self._horizontal, self._vertical, self._heading, self._newest_yaw = before
+            self._horizontal, self._vertical, self._heading, self._newest_yaw = state_before
             raise
 
     def stop(self, now: float, actual: VehicleMotion) -> None:
@@ -104,9 +112,9 @@ class CommandedMotion:
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
     def _clamped(self, vertical: AxisDemand, *speeds: float) -> AxisDemand:
-        """The demand within the vertical limits, unless a position is demanded too.
+        """Limit a vertical demand without position to the vertical speeds and acceleration.
 
-        An acceleration does not lead beyond the limits of the speed either.
+        Also an acceleration does not lead beyond the limits of the speed.
 
         Args:
             vertical: the demand.
@@ -115,14 +123,15 @@ class CommandedMotion:
         if vertical.position is not None:
             return vertical
         if vertical.velocity is not None:
-            (down,) = vertical.velocity
-            vertical = vertical._replace(velocity=(min(max(down, -self._climb), self._descent),))
+            (speed,) = vertical.velocity
+            vertical = vertical._replace(velocity=(min(max(speed, -self._climb), self._descent),))
         if vertical.acceleration is None:
             return vertical
         acceleration = clamp(vertical.acceleration[0], _VERTICAL_ACCELERATION)
         limit = self._descent if acceleration > 0.0 else -self._climb
-        gained = 0.5 * acceleration * abs(acceleration) / _VERTICAL_JERK  # while it ends
-        if acceleration and any((v + gained - limit) * acceleration >= 0.0 for v in speeds):
+        # The speed changes further while the acceleration is reduced to zero.
+        change = 0.5 * acceleration * abs(acceleration) / _VERTICAL_JERK
+        if acceleration and any((v + change - limit) * acceleration >= 0.0 for v in speeds):
             return AxisDemand(None, vertical.velocity or (limit,), None)
         return vertical._replace(acceleration=(acceleration,))
 
@@ -154,6 +163,6 @@ class CommandedMotion:
 
 
 def _by_axes(motion: VehicleMotion) -> tuple[AxisMotion, AxisMotion]:
-    """The motion, split into horizontal and vertical."""
+    """The horizontal and the vertical part of a motion."""
     (x, y, z), (u, v, w) = motion
     return AxisMotion((x, y), (u, v)), AxisMotion((z,), (w,))

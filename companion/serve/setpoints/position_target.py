@@ -27,26 +27,26 @@ _KNOWN_BITS = 4095
 _HORIZONTAL_AXES, _VERTICAL_AXES = (0, 1), (2,)
 
 _MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 100.0, 20.0
-"""Larger numbers count as errors; m, m/s, m/s², rad/s."""
+"""Largest numbers that are accepted, m, m/s, m/s² and rad/s."""
 
 
 class _Frame(NamedTuple):
     """A coordinate frame of SET_POSITION_TARGET_LOCAL_NED."""
 
-    offset: bool
+    is_offset: bool
     """Whether positions are relative to the vehicle."""
-    body: bool
+    is_body: bool
     """Whether directions are relative to the vehicle's heading."""
-    same_position: bool = True
+    has_same_position: bool = True
     """Whether a position in this frame means the same to PX4 and ArduPilot."""
 
 
 _LOCAL_FRAMES = {
-    dialect.MAV_FRAME_LOCAL_NED: _Frame(offset=False, body=False),
-    dialect.MAV_FRAME_LOCAL_OFFSET_NED: _Frame(offset=True, body=False),
-    dialect.MAV_FRAME_BODY_NED: _Frame(offset=False, body=True, same_position=False),
-    dialect.MAV_FRAME_BODY_OFFSET_NED: _Frame(offset=True, body=True),
-    dialect.MAV_FRAME_BODY_FRD: _Frame(offset=True, body=True),
+    dialect.MAV_FRAME_LOCAL_NED: _Frame(is_offset=False, is_body=False),
+    dialect.MAV_FRAME_LOCAL_OFFSET_NED: _Frame(is_offset=True, is_body=False),
+    dialect.MAV_FRAME_BODY_NED: _Frame(is_offset=False, is_body=True, has_same_position=False),
+    dialect.MAV_FRAME_BODY_OFFSET_NED: _Frame(is_offset=True, is_body=True),
+    dialect.MAV_FRAME_BODY_FRD: _Frame(is_offset=True, is_body=True),
 }
 _AMSL_FRAMES = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_INT
 _ABOVE_HOME_FRAMES = (
@@ -61,8 +61,11 @@ def local_target(
 ) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_LOCAL_NED.
 
-    `body_yaw_is_relative`: a yaw in a body frame is relative to the present yaw (ArduPilot), not to
-    north (PX4).
+    Args:
+        message: the setpoint.
+        situation: position and yaw of the vehicle.
+        body_yaw_is_relative: whether a yaw in a body frame is relative to the present yaw
+            (ArduPilot), not to north (PX4).
 
     Raises:
         RefusedSetpoint: the setpoint is contradictory, incomplete, not finite, too large, or of a
@@ -73,15 +76,16 @@ def local_target(
         raise RefusedSetpoint(f"coordinate_frame {message.coordinate_frame} is not supported")
     groups = _groups(message, (message.x, message.y, message.z))
     position, velocity, acceleration = groups
-    if not frame.same_position and any(value is not None for value in position):
+    if not frame.has_same_position and any(value is not None for value in position):
         raise RefusedSetpoint("position in BODY_NED is ambiguous: use LOCAL_NED or BODY_OFFSET_NED")
-    turn = situation.yaw if frame.body else 0.0
-    start = situation.position_ned if frame.offset else (0.0, 0.0, 0.0)
-    position = _shifted(_turned(position, turn), start)
+    frame_yaw = situation.yaw if frame.is_body else 0.0
+    frame_origin = situation.position_ned if frame.is_offset else (0.0, 0.0, 0.0)
+    position = _shift(_rotate(position, frame_yaw), frame_origin)
+    velocity, acceleration = _rotate(velocity, frame_yaw), _rotate(acceleration, frame_yaw)
     yaw, yaw_rate = _heading(message)
-    if frame.body and body_yaw_is_relative and yaw is not None:
+    if frame.is_body and body_yaw_is_relative and yaw is not None:
         yaw += situation.yaw
-    return _request((position, _turned(velocity, turn), _turned(acceleration, turn)), yaw, yaw_rate)
+    return _request((position, velocity, acceleration), yaw, yaw_rate)
 
 
 def global_target(message: Message, situation: Situation) -> MotionRequest:
@@ -100,9 +104,9 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
     if any(value is not None for value in position):
         if situation.origin is None:
             raise RefusedSetpoint("the vehicle's global position is not known yet")
-        place = _to_local(message, situation.origin, above_home=frame in _ABOVE_HOME_FRAMES)
+        local = _to_local(message, situation.origin, above_home=frame in _ABOVE_HOME_FRAMES)
         position = tuple(
-            None if value is None else local for value, local in zip(position, place, strict=True)
+            None if used is None else value for used, value in zip(position, local, strict=True)
         )
     yaw, yaw_rate = _heading(message)
     return _request((position, velocity, acceleration), yaw, yaw_rate)
@@ -112,7 +116,7 @@ _Values = tuple[float | None, ...]
 
 
 def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Values]:
-    """Position, velocity and acceleration; None for what the mask excludes."""
+    """Position, velocity and acceleration; None for each number that the mask excludes."""
     mask = message.type_mask
     if mask & _FORCE and mask & _NO_ACCELERATION != _NO_ACCELERATION:
         raise RefusedSetpoint("forces are not supported: clear FORCE_SET")
@@ -157,16 +161,16 @@ def _heading(message: Message) -> tuple[float | None, float | None]:
     return yaw, rate
 
 
-def _turned(values: _Values, angle: float) -> _Values:
+def _rotate(values: _Values, angle: float) -> _Values:
     north, east, down = values
     if north is None or east is None or angle == 0.0:
         return values
     return (*rotated(north, east, angle), down)
 
 
-def _shifted(values: _Values, start: Vector) -> _Values:
+def _shift(values: _Values, offset: Vector) -> _Values:
     return tuple(
-        None if value is None else value + first for value, first in zip(values, start, strict=True)
+        None if value is None else value + part for value, part in zip(values, offset, strict=True)
     )
 
 
@@ -198,8 +202,8 @@ def _demand(
 
 def _complete_vector(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...] | None:
     """The values of these axes; None if one of them is not commanded."""
-    given = tuple(value for value in (values[axis] for axis in axes) if value is not None)
-    return given if len(given) == len(axes) else None
+    commanded = tuple(value for value in (values[axis] for axis in axes) if value is not None)
+    return commanded if len(commanded) == len(axes) else None
 
 
 def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:

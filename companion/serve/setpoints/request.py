@@ -11,31 +11,31 @@ class RefusedSetpoint(ValueError):  # noqa: N818 - it is refused, and nothing fa
 
 
 class AxisDemand(NamedTuple):
-    """A command along some axes: position, velocity, acceleration, or several of them.
+    """A command along one or more axes: position, velocity, acceleration, or several of them.
 
     A position may come with a velocity, and both with an acceleration; a velocity may come with an
     acceleration. None: not commanded.
     """
 
     position: tuple[float, ...] | None
-    """m, in the autopilot's local frame; rad for the heading."""
+    """Commanded position in the autopilot's local frame, m, or heading, rad."""
     velocity: tuple[float, ...] | None
-    """m/s or rad/s."""
+    """Commanded velocity, m/s, or yaw rate, rad/s."""
     acceleration: tuple[float, ...] | None
-    """m/s² or rad/s²."""
+    """Commanded acceleration, m/s² or rad/s²."""
 
 
 class MotionRequest(NamedTuple):
     """A commanded motion, NED, SI units and radians."""
 
     horizontal: AxisDemand
-    """(north, east)."""
+    """Demand on (north, east)."""
     vertical: AxisDemand
-    """(down,)."""
+    """Demand on (down,)."""
     yaw: float | None
-    """rad from north; None: the present yaw, which `yaw_rate` changes."""
+    """Commanded yaw, rad from north; None: not commanded."""
     yaw_rate: float | None
-    """rad/s; None: not commanded."""
+    """Commanded yaw rate, rad/s; None: not commanded."""
 
 
 class AttitudeRequest(NamedTuple):
@@ -46,16 +46,16 @@ class AttitudeRequest(NamedTuple):
     yaw_rate: float
     """Feedforward of the yaw rate, rad/s."""
     thrust: float
-    """Normalised, 0..1."""
+    """Normalised thrust, 0..1."""
 
 
 class RatesRequest(NamedTuple):
     """Commanded body rates."""
 
     rates: BodyRates
-    """rad/s about body x, y, z (FRD)."""
+    """Body rates about x, y, z (FRD), rad/s."""
     thrust: float
-    """Normalised, 0..1."""
+    """Normalised thrust, 0..1."""
 
 
 Request = MotionRequest | AttitudeRequest | RatesRequest
@@ -73,7 +73,7 @@ class Situation(NamedTuple):
 
 
 _MIN_TAKEOFF_HEIGHT, _MIN_TAKEOFF_SPEED = 1.0, 0.1
-"""Height above the vehicle (m) or upward speed (m/s) from which a setpoint requests a take-off."""
+"""Least commanded height above the vehicle (m) or upward speed (m/s) that requests a take-off."""
 
 
 def climbs(request: Request, situation: Situation) -> bool:
@@ -93,4 +93,4 @@ class Origin(NamedTuple):
     longitude: float
     altitude: float
     home_altitude: float
-    """Altitude of home."""
+    """Altitude of home above mean sea level, m."""

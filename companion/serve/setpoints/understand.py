@@ -21,10 +21,13 @@ def decode_setpoint(
     *,
     body_yaw_is_relative: bool,
 ) -> Request:
-    """The request that a setpoint makes.
+    """Decode a client's setpoint to a request.
 
-    `targets` are the autopilot and our component; a setpoint may be addressed to either.
-    `body_yaw_is_relative`: see `local_target`.
+    Args:
+        frame: frame of the setpoint.
+        situation: position and yaw of the vehicle.
+        targets: the autopilot and our component; a setpoint may be addressed to either.
+        body_yaw_is_relative: see `local_target`.
 
     Raises:
         RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not finite,
@@ -39,12 +42,12 @@ def decode_setpoint(
     return local_target(message, situation, body_yaw_is_relative=body_yaw_is_relative)
 
 
-def _check_target(target: Address, autopilot: Address, own: Address) -> None:
+def _check_target(target: Address, autopilot: Address, our_address: Address) -> None:
     if target.system not in (0, autopilot.system):
         raise RefusedSetpoint(
             f"target_system is {target.system}; this vehicle is {autopilot.system}"
         )
-    if target.component not in (0, autopilot.component, own.component):
+    if target.component not in (0, autopilot.component, our_address.component):
         raise RefusedSetpoint(
             f"target_component is {target.component}; the autopilot is {autopilot.component}"
         )
