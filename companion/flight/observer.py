@@ -15,7 +15,7 @@ class Observer(Protocol):
         ...
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Once a second: the phase, the condition it waits for, elapsed time and timeout (s)."""
+        """Once a second: name of the phase, what it waits for, elapsed time and timeout (s)."""
         ...
 
     def status(self, status: FlightStatus) -> None:

@@ -73,7 +73,7 @@ def round_trip(config: Config, seconds: float) -> Finding:
 
 
 def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the vehicle's clock runs steadily, as the control law needs it."""
+    """Whether the vehicle's clock runs steadily, at the rate of ours."""
     samples, source = evidence.samples, "ATTITUDE_QUATERNION time_boot_ms"
     if samples.clock_change:
         yield Finding(

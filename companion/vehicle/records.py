@@ -56,7 +56,7 @@ class Heartbeat(NamedTuple):
     received: float
     """Event-loop time of arrival, s."""
     autopilot: int
-    """MAV_AUTOPILOT."""
+    """MAV_AUTOPILOT number."""
     mode: str
     """The autopilot's name for the mode."""
     custom_mode: int

@@ -1,9 +1,9 @@
 """TIMESYNC: compares the clocks, and measures delay and loss on the link to the vehicle.
 
 Source: the MAVLink time synchronisation protocol. An exchange is a request whose answer enters the
-estimate of the vehicle's clock. A probe is a request that does not: it only measures the link to
-the vehicle, by which setpoints go. Setpoints are not acknowledged, so only the answers to probes
-show that setpoints come late or are lost.
+estimate of the vehicle's clock. A probe is a request whose answer only measures the link to the
+vehicle, over which setpoints are sent. Setpoints are not acknowledged, so only the answers to
+probes show that setpoints come late or are lost.
 """
 
 import asyncio
