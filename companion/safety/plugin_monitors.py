@@ -62,17 +62,23 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
         raise ConfigError(
             f"{setting} cannot be used where a value is not known: {guarded_judge.fault}"
         )
+    watching = replace(monitor, name=name, judge=guarded_judge.judge, stream=Stream.CONTINUES)
     return (
-        replace(monitor, name=name, judge=guarded_judge.judge, stream=Stream.CONTINUES),
+        watching,
         replace(
-            monitor,
+            watching,
             name=f"{name} (its fault)",
             judge=guarded_judge.judge_fault,
             action=Action.HAND_BACK,
             lasts=0.0,
-            stream=Stream.CONTINUES,
         ),
-        Monitor(f"{name} (its time)", guarded_judge.judge_time, Action.WARN, lasts=_SLOW_DURATION),
+        replace(
+            watching,
+            name=f"{name} (its time)",
+            judge=guarded_judge.judge_time,
+            action=Action.WARN,
+            lasts=_SLOW_DURATION,
+        ),
     )
 
 
