@@ -1,7 +1,7 @@
 """Clients for `companion bench serve`: they read all forwarded frames, and count the lost ones.
 
-`python -m companion.bench.client_program PORT COUNT` runs until its standard input is closed, and
-then prints the counts as a line of JSON.
+`python -m companion.bench.client_program PORT COUNT` runs COUNT clients until its standard input is
+closed, and then prints how many frames each received and lost, as a line of JSON.
 """
 
 import json
@@ -27,7 +27,7 @@ class Counter:
 
     Attributes:
         received: number of frames received.
-        lost: number of frames lost, by the gaps.
+        lost: number of frames missing in the gaps.
     """
 
     def __init__(self) -> None:
@@ -53,7 +53,7 @@ class Counter:
 
 
 def main(port: int, count: int) -> None:
-    """Read on `count` sockets until standard input is closed; print the counts."""
+    """Run `count` clients on UDP port `port` until standard input is closed; print their counts."""
     heartbeat = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
     selector = selectors.DefaultSelector()
     selector.register(sys.stdin, selectors.EVENT_READ, None)

@@ -12,7 +12,7 @@ _TIME_BOOT_MS = slice(10, 14)  # bytes of time_boot_ms, in a sample and in a set
 
 
 def main(port: int) -> None:
-    """Answer each datagram on a UDP port until killed."""
+    """Answer each datagram until killed; `port`: UDP port to listen on."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         opened.bind(("127.0.0.1", port))
         while True:

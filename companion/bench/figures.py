@@ -1,4 +1,4 @@
-"""What the latency benchmarks share: rounds, figures of a program, and their table."""
+"""Measures programs in interleaved rounds, and prints their latency and processor time."""
 
 from collections.abc import Mapping
 from math import ceil
@@ -32,7 +32,7 @@ def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> di
 
 
 def print_table(title: str, names: Mapping[str, str], figures: Mapping[str, Any]) -> None:
-    """Print the figures of the programs with these names, both by key."""
+    """Print a row for each program: its title in `names`, its figures in `figures`, by its key."""
     table = Table(title=title)
     for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
         table.add_column(heading, justify="right" if heading else "left")

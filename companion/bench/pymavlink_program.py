@@ -17,7 +17,7 @@ _HOVER_THRUST = 0.5
 
 
 def main(port: int) -> None:
-    """Answer each attitude sample on a UDP port with a setpoint until killed."""
+    """Answer each attitude sample with a setpoint until killed; `port`: UDP port to listen on."""
     law, target, mavlink = planner(Config()), Target(0.1, 0.0, 0.0), dialect.MAVLink(None, 1, 191)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
         opened.bind(("127.0.0.1", port))

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.bench.process import BenchmarkedProgram, BenchmarkError
 
 Stamp = Callable[[bytes], int]
-"""Function from the bytes of a setpoint to the time stamp of its sample, ms, modulo `modulus`."""
+"""Function from the bytes of a setpoint to the time stamp of its sample, ms, which may wrap."""
 TIME_MODULUS = 2**32
 """Value at which `time_boot_ms` wraps, ms."""
 _SETPOINT_BYTES = 51
@@ -27,7 +27,7 @@ _ATTITUDE = (0.99, 0.05, 0.05, 0.1197)
 
 
 def stamp_by_time(setpoint: bytes) -> int:
-    """`time_boot_ms` of a SET_ATTITUDE_TARGET frame."""
+    """The time stamp (ms) of the sample, in `time_boot_ms` of a SET_ATTITUDE_TARGET frame."""
     stamp: int = struct.unpack_from("<I", setpoint, _TIME_OFFSET)[0]
     return stamp
 
@@ -138,7 +138,7 @@ class Sender:
         self._recording = False
 
     def reset_measurements(self) -> None:
-        """Reset all measurements."""
+        """Forget the round trips, and set counts and times to 0."""
         self.round_trips_ns.clear()
         self.sent = self.cpu_ns = self.wall_ns = 0
 
