@@ -102,9 +102,9 @@ def _print(figures: dict[str, Any]) -> None:
             table.add_row(
                 autopilot,
                 clock,
-                f"{flown['vehicle_s']:.1f}",
-                f"{flown['cpu_s']:.2f}",
-                f"{flown['times_real_time']:.1f}",
+                f"{flight['vehicle_s']:.1f}",
+                f"{flight['cpu_s']:.2f}",
+                f"{flight['times_real_time']:.1f}",
             )
     console = Console()
     console.print(table)

@@ -28,10 +28,10 @@ class Campaign:
     """A campaign: what to fly, and the files that the flights read."""
 
     file: CampaignFile
-    """Content of the campaign file. The trajectories in its `sweep` are keys of `files`."""
+    """Content of the campaign file. Trajectories in its `sweep` are paths of texts in `files`."""
     base: Config
     """Configuration that the swept keys change; the keys of `set` are already applied. Its
-    `flight.trajectory`, if any, is a key of `files`."""
+    `flight.trajectory`, if any, is the path of a text in `files`."""
     files: Mapping[str, str] = field(default_factory=dict)
     """The text of each file that a flight reads, by its path in the campaign's folder."""
     name: str = "the campaign"
@@ -73,7 +73,7 @@ class Campaign:
             fault = self._fault(planned.values)
         except ConfigError as error:
             case = Case(planned.index, planned.seed, factors, self.base, None, {}, 0.0)
-            raise ConfigError(f"{self.name}: {case.described()}: {error}") from error
+            raise ConfigError(f"{self.name}: {case.description()}: {error}") from error
         return Case(
             planned.index,
             planned.seed,
@@ -113,7 +113,7 @@ class Campaign:
             name,
             scenario.inject,
             phase,
-            float(values.get(FAULT_AFTER, scenario.after(phase))),
+            float(values.get(FAULT_AFTER, scenario.delay(phase))),
             scenario.endings(phase),
         )
 

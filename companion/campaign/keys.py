@@ -91,7 +91,7 @@ def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
     return config.model_copy(update={"mock": mock_with(base.mock or {}, mock)})
 
 
-def replaced(config: Config, **sections: dict[str, Any]) -> Config:
+def replace_unchecked(config: Config, **sections: dict[str, Any]) -> Config:
     """The configuration with new values by section and key, which are not checked."""
     changed = {
         name: getattr(config, name).model_copy(update=values) for name, values in sections.items()

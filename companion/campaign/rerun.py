@@ -23,7 +23,7 @@ class Rerun(NamedTuple):
     row: dict[str, Value]
     """Results of the repeated flight, as one row."""
     folder: Path
-    """Folder of its recording."""
+    """Folder of the recorded flight."""
     identical: bool
     """Whether the row equals the stored row to the bit. A case that has no stored row yet counts as
     identical."""
@@ -50,7 +50,7 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
     recording = flight_folder(campaign_folder / _CASES_FOLDER / f"case-{index:05d}")
     row = fly_case(case, recording)
     verdict = "good" if row["ok"] else f"not good: {row['failed_checks'] or row['result']}"
-    lines = [f"{case.described()}: {verdict}"]
+    lines = [f"{case.description()}: {verdict}"]
     if other := difference(description.versions, versions()):
         lines.append(f"The campaign was flown by another version: this one has {other}.")
     stored = _stored_row(campaign_folder, campaign, description, index)

@@ -76,11 +76,11 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
     Raises:
         VersionError: says what differs.
     """
-    differs = difference(ours, others)
-    if differs:
+    differences = difference(ours, others)
+    if differences:
         raise VersionError(
-            f"{who} has {differs}: results of two versions must not be mixed, so install the same "
-            "version there"
+            f"{who} has {differences}: results of two versions must not be mixed, so install the "
+            "same version there"
         )
 
 

@@ -22,7 +22,7 @@ class CaseLimits(Section):
     max_tilt_deg: Annotated[float, Field(ge=1.0, le=75.0)] | None = None
     """Largest tilt of the target."""
     max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
-    """W_M, largest roll-pitch rate."""
+    """Largest roll-pitch rate, W_M in the paper."""
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
@@ -63,7 +63,7 @@ class Case(Section):
     inner_loop: bool = False
     """True: fly with the mock vehicle's rate loop, rotors and rigid body. False: ideal rates."""
     quickness: Annotated[int, Field(ge=1, le=10)] = 1
-    """All times of the inner loop are divided by this; at 1 it responds as measured on a PX4."""
+    """Factor that divides all times of the inner loop; 1: it responds as measured on a PX4."""
     transport_delay_ms: Annotated[int, Field(ge=0, le=500)] = 0
     """Transport delay of the setpoints; needs inner_loop."""
 

@@ -24,12 +24,12 @@ LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ROLL_STEP = BodyRates(0.5, 0.0, 0.0)
 """Step of the rate setpoint with which the rate loop is measured, rad/s."""
 ROLL_STEP_S = 0.25
-"""Duration of that flight, s."""
+"""Duration of the simulated response to `ROLL_STEP`, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class InnerLoopFlight:
-    """A flight of n planner samples. Rates are body rates (FRD), rad/s."""
+    """Result of a flight of n planner samples. Rates are body rates (FRD), rad/s."""
 
     time: NDArray[np.float64]
     """(n+1,), s from the start."""
@@ -43,7 +43,8 @@ class InnerLoopFlight:
     """(n,), whether the rotors could not produce the commanded roll and pitch torque in at least
     one physics step of the sample."""
     yaw_saturated: NDArray[np.bool_]
-    """(n,), the same for the yaw torque."""
+    """(n,), whether the rotors could not produce the commanded yaw torque in at least one physics
+    step of the sample."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ class InnerLoop:
         return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * length, maxlen=length)
 
 
-def quickened(factor: int) -> InnerLoop:
+def faster_inner_loop(factor: int) -> InnerLoop:
     """The default inner loop with all of its times divided by `factor`.
 
     Inertia and rotor lag are divided by `factor`, and the torques are the same. So the body rates

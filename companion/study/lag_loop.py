@@ -31,8 +31,8 @@ class LagBody:
 
     Args:
         q: attitude at the start, at rest.
-        lag_ms: τ, ms.
-        dead_time_ms: θ, ms.
+        lag_ms: lag τ, ms.
+        dead_time_ms: dead time θ, ms.
 
     Attributes:
         q: attitude, body → world.
@@ -74,9 +74,9 @@ class LagLoop:
     """The inner loop of a planner that commands a `LagBody`."""
 
     lag_ms: int
-    """τ, ms."""
+    """Lag τ of the body rates, ms."""
     dead_time_ms: int
-    """θ, ms."""
+    """Dead time θ of the body rates, ms."""
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float

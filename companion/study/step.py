@@ -26,10 +26,11 @@ class Step:
     """A step from one steady tilt to another, flown at several headings."""
 
     start: Coefficients
+    """Acceleration coefficients (north, east) before the step."""
     target: Coefficients
-    """`start` and `target`: acceleration coefficients (north, east)."""
+    """Acceleration coefficients (north, east) of the target."""
     gain: float = 5.0
-    """P of the planners and of the first-order reference, 1/s."""
+    """Gain p of the planners and of the first-order reference, 1/s."""
     rate_hz: float = 1000.0
     """Sample rate of the planner."""
     seconds: float = 2.0

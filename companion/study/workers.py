@@ -21,7 +21,7 @@ _POLL_S = 0.05
 
 
 class _Channels(NamedTuple):
-    """What a worker shares with the main process."""
+    """Queue and event that a worker shares with the main process."""
 
     ticks: Any
     """Queue of (study, part), put by the workers."""
@@ -30,7 +30,7 @@ class _Channels(NamedTuple):
 
 
 _shared: list[_Channels] = []
-"""In a worker, its `_Channels`: queues can only be passed to a process when it starts."""
+"""The `_Channels` of this worker process; queues can only be passed to a process when it starts."""
 
 
 class _StoppedError(Exception):
@@ -85,7 +85,7 @@ def run_in_workers(
 def interrupts_blocked() -> Iterator[None]:
     """Block SIGINT in the context, and unblock it afterwards.
 
-    Processes that are started in the context inherit this, so that Ctrl-C does not end them.
+    Processes started in the context inherit the blocked signal, so Ctrl-C does not end them.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

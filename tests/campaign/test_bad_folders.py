@@ -23,7 +23,7 @@ TILT = {"limits.max_tilt_deg": [20, 25, 30]}
 
 def row_of(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.of_error("ok") | {"ok": True, "digest": f"d{case.index}"}
+    return row | outcomes.error_outcomes("ok") | {"ok": True, "digest": f"d{case.index}"}
 
 
 @pytest.fixture
@@ -126,7 +126,7 @@ def test_a_folder_that_holds_other_files_or_is_none_is_refused(begun, tmp_path):
         folder.make(below, campaign, description)
     with (
         pytest.raises(ConfigError, match="cannot be written: Not a directory"),
-        folder.locked(below),
+        folder.lock(below),
     ):
         pass
 

@@ -113,10 +113,10 @@ def test_a_case_is_described_with_its_values(tmp_path):
     first, second = load(
         tmp_path, set={"vehicle.lag_ms": 50, "vehicle.dead_time_ms": 9}, **told
     ).cases()
-    assert first.described() == "case 0 (vehicle.damping = null, planner.gain_per_s = 1.23457)"
-    assert second.described() == "case 1 (vehicle.damping = 0.7, planner.gain_per_s = 1.23457)"
+    assert first.description() == "case 0 (vehicle.damping = null, planner.gain_per_s = 1.23457)"
+    assert second.description() == "case 1 (vehicle.damping = 0.7, planner.gain_per_s = 1.23457)"
     assert (
-        load(tmp_path, sweep={}).case(next(load(tmp_path, sweep={}).planned_cases())).described()
+        load(tmp_path, sweep={}).case(next(load(tmp_path, sweep={}).planned_cases())).description()
         == "case 0"
     )
 

@@ -31,9 +31,10 @@ if TYPE_CHECKING:
 
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0  # exit code
-_GRID_LIKE, _FEW_SAMPLES = 12, 60
-"""Number of different values of a factor: up to the first number it counts as a grid; a sampled
-factor needs the second number for its influence to be separated from that of other factors."""
+_GRID_LIKE = 12
+"""Largest number of different values with which a sampled factor counts as a grid."""
+_FEW_SAMPLES = 60
+"""Number of different values from which the influences of sampled factors can be told apart."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -94,7 +95,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         *plots.pareto(results),
         *plots.distributions(results),
     ]
-    first_tables = [tables.worst_cases(results), tables.crossed(results)]
+    first_tables = [tables.worst_cases(results), tables.two_factors(results)]
     if order:
         first_tables.append(tables.success_by_factor(results, order))
     if by_outcome:
@@ -119,21 +120,21 @@ def headline(results: Results) -> str:
     """
     share = share_of(_success(results))
     success = "with a fault ended as documented" if results.all_faulty else "good"
-    return f"{results.name}: {share.chosen} of {share.total} {results.noun} {success}: {share}"
+    return f"{results.name}: {share.case_count} of {share.total} {results.noun} {success}: {share}"
 
 
 def _success(results: Results) -> NDArray[np.bool_]:
     """(cases,): whether each case was a success in the sense of `headline`."""
-    return results.documented if results.all_faulty else results.good
+    return results.as_documented if results.all_faulty else results.good
 
 
 def missing_cases_note(results: Results) -> list[str]:
     """One sentence: how many cases are missing and how to continue; empty if all are flown."""
-    unflown = results.planned - results.count
+    unflown = results.planned_count - results.count
     if not unflown:
         return []
     return [
-        f"{unflown} of {results.planned} {results.noun} are missing. `companion campaign "
+        f"{unflown} of {results.planned_count} {results.noun} are missing. `companion campaign "
         f"{shlex.quote(str(results.folder))}` goes on with them."
     ]
 
@@ -148,13 +149,13 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
         yield f"{crashed} {results.noun} crashed; they stand first in the table of worst cases."
     if results.all_faulty:
         yield f"{results.good.sum()} of them were good in spite of the fault."
-    elif results.documented.size:
-        kept, faulty = results.documented.sum(), results.documented.size
-        yield f"{kept} of {faulty} flights with a fault ended as documented."
+    elif results.as_documented.size:
+        documented_count, faulty = results.as_documented.sum(), results.as_documented.size
+        yield f"{documented_count} of {faulty} flights with a fault ended as documented."
     reasons = Counter(results.reason(row) for row in range(results.count) if not results.good[row])
     if reasons:
-        (reason, times) = reasons.most_common(1)[0]
-        yield f"Most frequent reason why a case was not good, {times} times: {reason}."
+        (reason, count) = reasons.most_common(1)[0]
+        yield f"Most frequent reason why a case was not good, {count} times: {reason}."
     yield from _most_influential(results, by_outcome)
     if results.error_outcome == TRUE_ERROR:
         yield (
@@ -204,8 +205,8 @@ def _few_samples(results: Results) -> Iterator[str]:
 
 
 def _factors_by_influence(results: Results, by_outcome: dict[str, list[Influence]]) -> list[str]:
-    """The factors by their influence on success, then on the error; the others last."""
-    listed = [
+    """The factors sorted by influence on success, then on the error; those without one last."""
+    influential = [
         each.factor for name in ("ok", results.error_outcome) for each in by_outcome.get(name, ())
     ]
-    return list(dict.fromkeys([*listed, *results.factors]))
+    return list(dict.fromkeys([*influential, *results.factors]))

@@ -22,7 +22,7 @@ _DISTRIBUTIONS = (
     "saturated_share",
 )
 _SHOWN_SHARE = 0.995
-"""Share of the values that a distribution shows; the last bin holds the larger ones."""
+"""Quantile at which the axis of a histogram ends; its last bin also holds all larger values."""
 _BINS = 40
 """Number of bins of a histogram."""
 
@@ -44,7 +44,7 @@ def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
                 "arrayminus": [_percent(each.share - each.low) for each in shares],
             },
             "marker": {"color": MEASURED, "size": 8},
-            "text": [f"{each.chosen} of {each.total}" for each in shares],
+            "text": [f"{each.case_count} of {each.total}" for each in shares],
             "hovertemplate": "%{x}: %{y:.1f} % (%{text})<extra></extra>",
         }
         layout = axes(x=label(name), y=f"good {results.noun}, %")
@@ -141,7 +141,10 @@ def _points(name: str, goals: Floats, titles: list[str], marker: dict[str, Any])
 
 
 def _colour_scale(values: Floats, all_values: Floats, *, shown: bool) -> dict[str, Any]:
-    """Colours of some points by their thrust deviation, on one scale for all points."""
+    """Colours of points by their thrust deviations `values`, on a scale over `all_values`.
+
+    `shown`: whether the colour bar is shown.
+    """
     return {
         "color": numbers(values),
         "cmin": float(all_values.min()),
@@ -158,15 +161,15 @@ def distributions(results: Results) -> Iterator[Plot]:
         if not results.measured(name):
             continue
         values = results.columns[name]
-        known = np.isfinite(values)
-        low = float(values[known].min())
-        high = float(np.quantile(values[known], _SHOWN_SHARE))
+        is_finite = np.isfinite(values)
+        low = float(values[is_finite].min())
+        high = float(np.quantile(values[is_finite], _SHOWN_SHARE))
         if high <= low:
             continue
         edges = np.linspace(low, high, _BINS + 1)
         traces = []
         for good, title, colour in ((True, "good", MEASURED), (False, "not good", REFERENCE)):
-            selected = values[known & (results.good == good)]
+            selected = values[is_finite & (results.good == good)]
             counts, _ = np.histogram(np.clip(selected, low, high), edges)
             traces.append(
                 {
@@ -179,7 +182,7 @@ def distributions(results: Results) -> Iterator[Plot]:
                 }
             )
         layout = {**axes(x=label(name), y=results.noun), "barmode": "stack", "bargap": 0.0}
-        p05, median, p95 = np.quantile(values[known], (0.05, 0.5, 0.95))
+        p05, median, p95 = np.quantile(values[is_finite], (0.05, 0.5, 0.95))
         note = (
             f"Median {median:.3g}; nine of ten lie from {p05:.3g} to {p95:.3g}. The last bar "
             "holds all larger values."

@@ -11,11 +11,11 @@ from companion.campaign.report.results import Column, Floats, Results
 
 CONFIDENCE = 0.95
 _MOST_LEVELS = 12
-"""A factor with more different values is shown in ranges."""
+"""Largest number of different values of a factor that are each shown as a level."""
 _RANGE_COUNT = 5
-"""Number of these ranges."""
+"""Number of ranges that divide a factor with more than `_MOST_LEVELS` different values."""
 _MOST_CHOICES = 300
-"""With more groups of equal values, `choices` shows single cases."""
+"""Largest number of groups of equal values; if there were more, `choices` returns single cases."""
 _NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
 """Prefixes of the factors that a user does not choose."""
 
@@ -26,15 +26,16 @@ class Share(NamedTuple):
     The interval covers the true share in 95 % of campaigns.
     """
 
-    chosen: int
+    case_count: int
     """Number of cases that have the property."""
     total: int
     """Number of all cases."""
     share: float
-    """`chosen` / `total`; NaN for no case."""
+    """`case_count` / `total`; NaN for no case."""
     low: float
-    """The interval, from here to `high`."""
+    """Lower bound of the interval."""
     high: float
+    """Upper bound of the interval."""
 
     def __str__(self) -> str:
         return f"{_percent(self.share)} % ({_percent(self.low)} to {_percent(self.high)} %)"
@@ -47,11 +48,11 @@ def _percent(share: float) -> str:
     return f"{percent:.1f}" if 0.0 < percent < 100.0 else f"{percent:.0f}"
 
 
-def share_of(chosen: NDArray[np.bool_]) -> Share:
+def share_of(has_property: NDArray[np.bool_]) -> Share:
     """The share of cases for which the (cases,) array is True."""
     from scipy.stats import binomtest  # noqa: PLC0415  takes a second to import
 
-    count, total = int(np.sum(chosen)), len(chosen)
+    count, total = int(np.sum(has_property)), len(has_property)
     if not total:
         return Share(0, 0, np.nan, 0.0, 1.0)
     interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
@@ -62,7 +63,7 @@ class Group(NamedTuple):
     """Cases in which some factors have the same or similar values."""
 
     name: str
-    """These values, as text."""
+    """The common values of the factors, as text."""
     cases: NDArray[np.bool_]
     """(cases,), whether each case belongs to the group."""
 

@@ -108,32 +108,32 @@ def _median_text(values: Floats) -> str:
 def sensitivity(influences: dict[str, list[Influence]]) -> Table:
     """The first-order Sobol indices of each outcome, with their intervals."""
     factors = dict.fromkeys(each.factor for found in influences.values() for each in found)
-    known = {
+    index_texts = {
         outcome: {each.factor: f"{each.share:.0%} ± {each.confidence:.0%}" for each in found}
         for outcome, found in influences.items()
     }
     rows = [
-        (factor, *(known[outcome].get(factor, EMPTY) for outcome in influences))
+        (factor, *(index_texts[outcome].get(factor, EMPTY) for outcome in influences))
         for factor in factors
     ]
     header = ("factor", *("good" if name == "ok" else OUTCOME_LABELS[name] for name in influences))
     return Table("Share of the variance that a factor explains by itself", header, rows)
 
 
-def crossed(results: Results) -> Table | None:
+def two_factors(results: Results) -> Table | None:
     """Median error and success rate for each pair of values of two factors.
 
     They are the first two factors with 2 to `_MOST_LEVELS` values; None if there are no two.
     """
     columns = results.columns
-    few = [
+    few_valued = [
         name
         for name in results.factors
         if 1 < len({str(value) for value in columns[name]}) <= _MOST_LEVELS
     ]
-    if len(few) < 2:
+    if len(few_valued) < 2:
         return None
-    first, second = few[0], few[1]
+    first, second = few_valued[0], few_valued[1]
     second_levels = levels(columns[second])
     rows = []
     for level in levels(columns[first]):

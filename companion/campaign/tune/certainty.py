@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from companion.campaign.tune.scores import Floats, Score, pooled
+from companion.campaign.tune.scores import Floats, Score, pooled_rms
 
 CONFIDENCE = 0.95
 _RESAMPLES = 4000
@@ -30,19 +30,20 @@ class Comparison(NamedTuple):
     """RMS horizontal distance of the true position from the reference, m, with the configuration
     before the search."""
     after: Interval
-    """The same distance with the result of the search, m."""
+    """RMS horizontal distance of the true position from the reference, m, with the result of the
+    search."""
     ratio: Interval
     """`after` / `before`."""
-    estimated: tuple[float, float]
+    estimated_errors: tuple[float, float]
     """RMS horizontal distance of the estimated position from the reference, m, before and after."""
-    estimate: tuple[float, float]
+    estimator_errors: tuple[float, float]
     """RMS horizontal distance of the estimated from the true position, m, before and after."""
-    better: int
+    better_samples: int
     """Number of samples in which the result has the smaller RMS error."""
     samples: int
 
 
-def compared(before: Score, after: Score, samples: int) -> Comparison | None:
+def compare(before: Score, after: Score, samples: int) -> Comparison | None:
     """Compare two scores on the same cases, by a paired bootstrap over the samples.
 
     All cases of a sample are drawn together, because they have the same vehicle. A sample in which
@@ -57,7 +58,7 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
         None if fewer than two samples were flown to their end with both configurations.
     """
     scores = before, after
-    errors = [np.array(score.true).reshape(samples, -1) for score in scores]
+    errors = [np.array(score.true_errors).reshape(samples, -1) for score in scores]
     complete = np.isfinite(np.hstack(errors)).all(axis=1)
     count = int(complete.sum())
     if count < 2:
@@ -65,15 +66,15 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
     old, new = (each[complete] for each in errors)
 
     def pooled_compared(values: tuple[float, ...]) -> float:
-        return pooled(np.array(values).reshape(samples, -1)[complete])
+        return pooled_rms(np.array(values).reshape(samples, -1)[complete])
 
     squares = [np.mean(np.square(each), axis=1) for each in (old, new)]
     return Comparison(
         _interval(_rms, squares[0]),
         _interval(_rms, squares[1]),
         _interval(_ratio, *squares),
-        (pooled_compared(before.estimated), pooled_compared(after.estimated)),
-        (pooled_compared(before.estimate), pooled_compared(after.estimate)),
+        (pooled_compared(before.estimated_errors), pooled_compared(after.estimated_errors)),
+        (pooled_compared(before.estimator_errors), pooled_compared(after.estimator_errors)),
         int(np.sum(squares[1] < squares[0])),
         count,
     )

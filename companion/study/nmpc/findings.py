@@ -23,30 +23,30 @@ from companion.study.outcome import Claimant, Finding
 _SETTLED_M = 0.1
 """A flight has settled if its errors in the last 2 s are at most this, m."""
 _LAST_PERIODS = round(2.0 * RATE_HZ)
-"""Number of solver periods in the last 2 s."""
+"""Number of solver periods in the last 2 s of a flight."""
 _MAX_ANSWER_MS = 10.0
 """Required 99th percentile of the solver process's answer time, ms; half a period."""
 
 
-def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
+def find(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
     """All findings."""
     return (
-        _solved_faster("paper", ("euler", "quaternion"), flown),
-        _solved_faster("ours", ("euler-reduced",), flown),
+        _solved_faster("paper", ("euler", "quaternion"), flights),
+        _solved_faster("ours", ("euler-reduced",), flights),
         _cold_starts(counts),
-        _settles("limited", flown),
-        _settles("proposed", flown),
-        _dead_time(flown),
-        _smallest_error(flown),
+        _settles("limited", flights),
+        _settles("proposed", flights),
+        _dead_time(flights),
+        _smallest_error(flights),
         _in_time(times),
     )
 
 
-def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flown: Flights) -> Finding:
+def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flights: Flights) -> Finding:
     """Whether the proposed model is solved faster than `others`, with one or all iterations."""
     ratios = {
-        (model, iterations): _median_ms(model, iterations, flown)
-        / _median_ms("proposed", iterations, flown)
+        (model, iterations): _median_ms(model, iterations, flights)
+        / _median_ms("proposed", iterations, flights)
         for model in others
         for iterations in (1, MAX_ITERATIONS)
     }
@@ -64,8 +64,8 @@ def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flown: Fligh
     )
 
 
-def _median_ms(model: ModelName, iterations: int, flown: Flights) -> float:
-    return flown[EIGHT.name, Variant(model, iterations)].solve_ms(50)
+def _median_ms(model: ModelName, iterations: int, flights: Flights) -> float:
+    return flights[EIGHT.name, Variant(model, iterations)].solve_ms(50)
 
 
 def _cold_starts(counts: ColdStarts) -> Finding:
@@ -80,8 +80,8 @@ def _cold_starts(counts: ColdStarts) -> Finding:
     )
 
 
-def _settles(model: ModelName, flown: Flights) -> Finding:
-    flight = flown[CIRCLE.name, Variant(model)]
+def _settles(model: ModelName, flights: Flights) -> Finding:
+    flight = flights[CIRCLE.name, Variant(model)]
     last = max(flight.errors[-_LAST_PERIODS:])
     return Finding(
         "ours",
@@ -92,10 +92,10 @@ def _settles(model: ModelName, flown: Flights) -> Finding:
     )
 
 
-def _smallest_error(flown: Flights) -> Finding:
+def _smallest_error(flights: Flights) -> Finding:
     compared = []
     for task in (CIRCLE, EIGHT):
-        errors = {model: flown[task.name, Variant(model)].rms for model in MODELS}
+        errors = {model: flights[task.name, Variant(model)].rms for model in MODELS}
         other = min((errors[model], STYLES[model].label) for model in UNLIMITED)
         compared.append((task.name, errors["limited"], *other))
     return Finding(
@@ -110,11 +110,11 @@ def _smallest_error(flown: Flights) -> Finding:
     )
 
 
-def _dead_time(flown: Flights) -> Finding:
+def _dead_time(flights: Flights) -> Finding:
     """Whether models that know the dead time have the smaller error on the figure-eight."""
     gains = {
-        model: flown[EIGHT.name, Variant(model, knows_dead_time=False)].rms
-        / flown[EIGHT.name, Variant(model)].rms
+        model: flights[EIGHT.name, Variant(model, knows_dead_time=False)].rms
+        / flights[EIGHT.name, Variant(model)].rms
         for model in UNLIMITED
     }
     ratios = ", ".join(f"{STYLES[model].label} {gain:.2g} ×" for model, gain in gains.items())

@@ -23,18 +23,18 @@ PARTS = 2
 
 
 class _Row(NamedTuple):
-    """K at one tilt, over all directions."""
+    """Scaling factor K (see `scaling_factor`) at one tilt, over all directions."""
 
     tilt_deg: int
     """Tilt, °."""
     largest: float
-    """Largest K."""
+    """Largest K over all directions."""
     bound: float
     """Bound of K by the formula of the paper."""
     smallest: float
-    """Smallest K."""
+    """Smallest K over all directions."""
     rate_share: float
-    """Mean body rate / largest body rate."""
+    """Mean of the body rate over all directions, divided by its largest value."""
 
 
 def scaling_factor(c: Coefficients, direction: float) -> float:

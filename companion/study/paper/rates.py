@@ -19,22 +19,22 @@ PARTS = 2 * len(RATES_HZ)
 def run(tick: Tick) -> Outcome:
     """Fly the step of figure 2 at several sample rates with `first-order` and with `exact`."""
     steps = {hz: replace(FIGURE_2, rate_hz=hz, headings=(0.0, 1.0, 2.5)) for hz in RATES_HZ}
-    flown: dict[tuple[Method, float], Response] = {}
+    responses: dict[tuple[Method, float], Response] = {}
     for hz, step in steps.items():
         for method in (PROPOSED, EXACT):
             tick(f"{method.label} at {hz:.0f} Hz")
-            flown[method, hz] = fly(planner_of(method, step.gain), step)
+            responses[method, hz] = fly(planner_of(method, step.gain), step)
     worst = {
         key: float(largest_deviation(response, steps[key[1]].reference()).max())
-        for key, response in flown.items()
+        for key, response in responses.items()
     }
     rows = tuple(
         (
             round(hz),
             worst[PROPOSED, hz],
-            float(cross_track(flown[PROPOSED, hz]).max()),
+            float(cross_track(responses[PROPOSED, hz]).max()),
             worst[EXACT, hz],
-            float(cross_track(flown[EXACT, hz]).max()),
+            float(cross_track(responses[EXACT, hz]).max()),
         )
         for hz in RATES_HZ
     )
@@ -42,7 +42,7 @@ def run(tick: Tick) -> Outcome:
         name="rates",
         title="Sample rates: the discretisation error, and the planner without it",
         conditions="The step of figure 2 at 1000, 500, 250, 100 and 50 Hz, three headings.",
-        figure=_figure(flown, worst, steps),
+        figure=_figure(responses, worst, steps),
         caption=(
             "Largest deviation by sample rate; the deviation over time at 50 Hz; the path of the"
             " proposed method at each rate, a_E enlarged."
@@ -79,7 +79,7 @@ def _finding(worst: dict[tuple[Method, float], float]) -> Finding:
 
 
 def _figure(
-    flown: dict[tuple[Method, float], Response],
+    responses: dict[tuple[Method, float], Response],
     worst: dict[tuple[Method, float], float],
     steps: dict[float, Step],
 ) -> Figure:
@@ -100,7 +100,7 @@ def _figure(
     over_rate.legend(loc="center right")
     slowest = min(RATES_HZ)
     for method in (PROPOSED, EXACT):
-        error = deviation(flown[method, slowest], steps[slowest].reference())[:, 0]
+        error = deviation(responses[method, slowest], steps[slowest].reference())[:, 0]
         draw_line(over_time, steps[slowest].time[1:], error[1:], method.line, method.label)
     over_time.set(
         title=f"Deviation at {slowest:.0f} Hz",
@@ -110,17 +110,19 @@ def _figure(
     )
     shades = np.linspace(1.0, 0.35, len(RATES_HZ))
     for hz, alpha in zip(reversed(RATES_HZ), shades, strict=True):
-        c = flown[PROPOSED, hz].at_heading(0)
+        c = responses[PROPOSED, hz].at_heading(0)
         line = {**PROPOSED.line, "alpha": alpha}
-        draw_line(plane, _from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
-    exact = flown[EXACT, slowest].at_heading(0)
-    draw_line(plane, _from_line(exact), exact[:, 0], EXACT.line, f"exact, {slowest:.0f} Hz")
+        draw_line(plane, _distance_from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
+    exact = responses[EXACT, slowest].at_heading(0)
+    draw_line(
+        plane, _distance_from_line(exact), exact[:, 0], EXACT.line, f"exact, {slowest:.0f} Hz"
+    )
     plane.set(title="Paths, enlarged across", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
     plane.set_xlim(right=5.2)
     plane.legend(loc="center right")
     return figure
 
 
-def _from_line(c: Floats) -> Floats:
+def _distance_from_line(c: Floats) -> Floats:
     """(n,) distance of (n, 2) coefficients from the straight line of the step, in thousandths."""
     return np.asarray(1e3 * (c[:, 1] - FIGURE_2.target.east))

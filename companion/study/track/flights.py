@@ -73,10 +73,10 @@ class TrackedFlight(NamedTuple):
         return self.result == "ok"
 
 
-Flown = dict[Task, TrackedFlight]
+TrackedFlights = dict[Task, TrackedFlight]
 
 
-def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
+def fly_all(tasks: Sequence[Task], tick: Tick) -> TrackedFlights:
     """Fly every task, with as many flights at a time as cores; call `tick` as each begins.
 
     The result of a flight does not depend on other flights. On Ctrl-C this function waits for the
@@ -86,24 +86,24 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
         ConfigError: raised by a flight, see `fly`; no further flights are begun.
     """
     count = cores()
-    flown: dict[Task, Future[TrackedFlight]] = {}
+    futures: dict[Task, Future[TrackedFlight]] = {}
     workers = min(count, len(tasks))
     with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
         for task in tasks:
-            _await_a_free_core(list(flown.values()), count)
+            _await_free_core(list(futures.values()), count)
             tick(str(task))
             with interrupts_blocked():
-                flown[task] = pool.submit(fly, task)
-        return {task: future.result() for task, future in flown.items()}
+                futures[task] = pool.submit(fly, task)
+        return {task: future.result() for task, future in futures.items()}
 
 
-def _await_a_free_core(flights: Sequence[Future[TrackedFlight]], count: int) -> None:
-    unfinished = [flight for flight in flights if not flight.done()]
+def _await_free_core(futures: Sequence[Future[TrackedFlight]], count: int) -> None:
+    unfinished = [future for future in futures if not future.done()]
     if len(unfinished) >= count:
         wait(unfinished, return_when=FIRST_COMPLETED)
-    for flight in flights:
-        if flight.done():
-            flight.result()  # raises the flight's exception before more flights are started
+    for future in futures:
+        if future.done():
+            future.result()  # raises the flight's exception before more flights are started
 
 
 def fly(task: Task) -> TrackedFlight:
@@ -187,11 +187,15 @@ def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:
         truth: rows of `TruthRecorder.rows`.
     """
     time = truth[:, 0]
-    flown = tracking[(tracking[:, 0] >= time[0] + HOLD_S) & (tracking[:, 0] <= time[-1])]
-    reference, telemetry = flown[:, 1:4], flown[:, 4:7]
-    true = np.column_stack([np.interp(flown[:, 0], time, axis) for axis in truth[:, 1:].T])
-    path = np.hstack([reference[:, :2], true[:, :2]])
-    return TrackedFlight("ok", _error(telemetry - reference), _error(true - reference), path)
+    course_rows = tracking[(tracking[:, 0] >= time[0] + HOLD_S) & (tracking[:, 0] <= time[-1])]
+    reference, telemetry = course_rows[:, 1:4], course_rows[:, 4:7]
+    true_position = np.column_stack(
+        [np.interp(course_rows[:, 0], time, axis) for axis in truth[:, 1:].T]
+    )
+    path = np.hstack([reference[:, :2], true_position[:, :2]])
+    return TrackedFlight(
+        "ok", _error(telemetry - reference), _error(true_position - reference), path
+    )
 
 
 def _error(offsets: Floats) -> PositionError:
