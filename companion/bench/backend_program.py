@@ -1,4 +1,4 @@
-"""A program that answers samples with `link.backend: mavsdk`, where MAVSDK forwards all frames."""
+"""Answers attitude samples with `link.backend: mavsdk`, where MAVSDK forwards all frames."""
 
 import sys
 

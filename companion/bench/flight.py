@@ -21,7 +21,7 @@ from companion.testing import MockVehicle, fly
 CONFIG_FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
 """File name of the shipped configuration for each autopilot of the mock vehicle."""
 CLOCKS = {"lockstep": True, "free": False}
-"""Whether the vehicle runs in lockstep, by clock; with `free` it never waits for the program."""
+"""Whether the vehicle runs in lockstep, by clock; with `free` it does not wait for setpoints."""
 
 _FLIGHTS = 3  # of which the quickest counts
 _WARM_UP_S = 0.2  # hover of the flight that is not measured
@@ -78,13 +78,13 @@ def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
     )
     began = process_time()
     summary = fly(config, vehicle)
-    cpu = process_time() - began
+    cpu_s = process_time() - began
     if summary.result != "ok":
         raise RuntimeError(f"the flight of {autopilot} failed: {summary.result}")
     return {
         "vehicle_s": vehicle.time,
-        "cpu_s": cpu,
-        "times_real_time": vehicle.time / cpu,
+        "cpu_s": cpu_s,
+        "times_real_time": vehicle.time / cpu_s,
         "setpoints": summary.counts.setpoints,
         "compiled": compiled,
     }

@@ -129,11 +129,11 @@ class Sender:
         due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
         self._sent_ns.clear()
         self._recording = True
-        cpu, began = self._program.cpu_ns(), time.perf_counter_ns()
+        cpu_begin_ns, began = self._program.cpu_ns(), time.perf_counter_ns()
         count = round(rate_hz * seconds)
         self._send_samples(count, rate_hz, due)
         self.sent += count
-        self.cpu_ns += self._program.cpu_ns() - cpu
+        self.cpu_ns += self._program.cpu_ns() - cpu_begin_ns
         self.wall_ns += time.perf_counter_ns() - began
         self._recording = False
 

@@ -71,7 +71,7 @@ class FaultScenario(Section):
         return _DEFAULT_AFTER_S[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
-        """The permitted endings for a phase; empty if the file names none for it."""
+        """The permitted endings in a phase; empty if the campaign file names none."""
         if isinstance(self.ends, dict):
             return {str(name): endings for name, endings in self.ends.items()}.get(phase, ())
         return self.ends

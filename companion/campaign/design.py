@@ -101,6 +101,6 @@ def _probabilities(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
         return np.array(list(product(midpoints, repeat=dimensions)))
     from scipy.stats import qmc  # noqa: PLC0415  takes half a second to import
 
-    kind = qmc.LatinHypercube if file.sampling == "latin-hypercube" else qmc.Sobol
-    probabilities: NDArray[np.float64] = kind(dimensions, rng=file.seed).random(count)
+    sampler = qmc.LatinHypercube if file.sampling == "latin-hypercube" else qmc.Sobol
+    probabilities: NDArray[np.float64] = sampler(dimensions, rng=file.seed).random(count)
     return probabilities

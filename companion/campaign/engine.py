@@ -50,14 +50,16 @@ def run(
         VersionError: a worker that joined later has other versions.
     """
     units = unit_ranges(description.cases, description.unit)
-    finished = store.finished_units(folder)
-    missing = {number: unit for number, unit in enumerate(units) if number not in finished}
-    progress = Progress(flown_cases=sum(len(units[number]) for number in finished))
+    finished_units = store.finished_units(folder)
+    missing_units = {
+        number: unit for number, unit in enumerate(units) if number not in finished_units
+    }
+    progress = Progress(flown_cases=sum(len(units[number]) for number in finished_units))
     on_unit(progress)
-    planned = list(campaign.planned_cases()) if missing else []
+    planned_cases = list(campaign.planned_cases()) if missing_units else []
     tasks = {
-        number: (fly_planned_cases, campaign, [planned[index] for index in unit], versions())
-        for number, unit in missing.items()
+        number: (fly_planned_cases, campaign, [planned_cases[index] for index in unit], versions())
+        for number, unit in missing_units.items()
     }
     for ended_unit in run_tasks(client, tasks):
         _store_unit(ended_unit, units[ended_unit.number], campaign, folder, progress)

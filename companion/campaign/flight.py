@@ -116,7 +116,7 @@ class CaseFlight:
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = truth_afterwards["crashed"], self._case.fault
-        measured = {
+        measured_outcomes = {
             **outcomes.tracking(summary, np.array(self._truth).reshape(-1, 5)),
             **outcomes.response(summary),
             **outcomes.control_effort(setpoints, summary, self._config),
@@ -128,16 +128,16 @@ class CaseFlight:
         result = summary.result
         if self._time_limit_reached:
             result = f"ended by limits.flight_s after {self._case.flight_s:g} s of vehicle time"
-        failed = outcomes.failed_checks(figures)
-        good = result == "ok" and not failed and not crashed
+        failed_checks = outcomes.failed_checks(figures)
+        good = result == "ok" and not failed_checks and not crashed
         return {
             "ok": good,
             "result": result.replace(f"{self._files_folder}/", ""),
-            "failed_checks": failed,
+            "failed_checks": failed_checks,
             "phase": summary.phase,
             "crashed": crashed,
             "as_documented": as_documented,
-            **outcomes.without_nan(measured),
+            **outcomes.without_nan(measured_outcomes),
             "setpoints": len(setpoints),
             "digest": outcomes.digest(setpoints, truth_afterwards),
         }

@@ -70,8 +70,8 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
     try:
         if folder.exists() and any(path.name != _LOCK for path in folder.iterdir()):
             raise ConfigError(
-                f"{folder}: holds files, but no campaign that was begun; name another folder with "
-                "--out, or empty this one"
+                f"{folder}: holds files, but no campaign; name another folder with --out, or empty "
+                "this one"
             )
         (folder / store.RESULTS).mkdir(parents=True, exist_ok=True)
         for name, text in campaign.files.items():
@@ -130,21 +130,25 @@ def _require_same(folder: Path, campaign: Campaign) -> None:
     """Refuse a folder with another campaign; only the limits on the campaign's size may differ."""
     path = folder / CAMPAIGN_FILE_NAME
     try:
-        before = bounded_yaml.parse(read_text(path, _LARGEST_FILE_BYTES))
+        stored_keys = bounded_yaml.parse(read_text(path, _LARGEST_FILE_BYTES))
         # Written and parsed like the file, so that tuples are lists here, too.
-        now = bounded_yaml.parse(bounded_yaml.dump(resolved_keys(campaign)))
+        new_keys = bounded_yaml.parse(bounded_yaml.dump(resolved_keys(campaign)))
     except (FileRefusedError, YamlError) as error:
         raise ConfigError(f"{path}: {error}") from error
-    if not isinstance(before, Mapping):
+    if not isinstance(stored_keys, Mapping):
         raise ConfigError(f"{path}: is damaged")
-    changed = [
-        key for key in now if _without_size_limits(before, key) != _without_size_limits(now, key)
+    changed_keys = [
+        key
+        for key in new_keys
+        if _without_size_limits(stored_keys, key) != _without_size_limits(new_keys, key)
     ]
-    files = [name for name, text in campaign.files.items() if _text_or_none(folder / name) != text]
-    if changed or files:
+    changed_files = [
+        name for name, text in campaign.files.items() if _text_or_none(folder / name) != text
+    ]
+    if changed_keys or changed_files:
         raise ConfigError(
-            f"{folder} holds another campaign: {', '.join((*changed, *files))} differ; name "
-            "another folder with --out"
+            f"{folder} holds another campaign: {', '.join((*changed_keys, *changed_files))} differ;"
+            " name another folder with --out"
         )
 
 

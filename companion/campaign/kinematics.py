@@ -98,8 +98,8 @@ def _run_case(case: Case) -> dict[str, Value]:
 
 
 def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -> dict[str, Value]:
-    """The outcomes of a case, whose longest target has the horizontal length `longest_target`."""
-    time_constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
+    """The outcomes of a case; `longest_target`: largest √(north² + east²) of its coefficients."""
+    time_constants = [constant for constant in figures[-2:] if isfinite(constant)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
         "model_deviation_max": figures.model_deviation_max,
@@ -148,7 +148,7 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
     Returns:
         (samples, 4): acceleration coefficients north and east, heading (rad), heading rate (rad/s).
     """
-    name = next(each for each in config.flight.maneuvers if each in ACCELERATION_STEPS)
+    name = next(maneuver for maneuver in config.flight.maneuvers if maneuver in ACCELERATION_STEPS)
     amplitude: tuple[float, float]
     if name == "corners":
         corners = config.corners
@@ -184,7 +184,9 @@ def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
     commanded_coefficients = [maneuver.at(float(time), pose).coefficients for time in times]
     steps = [k for k, coefficients in enumerate(commanded_coefficients) if coefficients is not None]
     level = Coefficients(0.0, 0.0)
-    targets = [each or level for each in commanded_coefficients[steps[0] : steps[-1] + 1]]
+    targets = [
+        coefficients or level for coefficients in commanded_coefficients[steps[0] : steps[-1] + 1]
+    ]
     ends = [k for k in range(1, len(targets)) if targets[k] != targets[k - 1]]
     parts = zip((0, *ends), (*ends, len(targets)), strict=True)
     return _Pattern(len(targets), tuple((begin, end, targets[begin]) for begin, end in parts))

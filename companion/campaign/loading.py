@@ -96,7 +96,7 @@ class _CampaignReader:
         return load_config(self._folder / given_config)
 
     def _flyable_config(self, base: Config) -> Config:
-        """The base with `flight.arm: true`, and with the path of its trajectory's copy."""
+        """The base configuration with `flight.arm: true` and the path of the copied trajectory."""
         if base.link.backend != "direct":
             raise ConfigError(f"{self._path}: link.backend must be direct in a campaign")
         if base.link.signing_key_file is not None or (base.mock or {}).get("signing"):
@@ -114,7 +114,7 @@ class _CampaignReader:
             return swept
         listed_values = swept.values or swept.choice or ()
         if not (listed_values and all(isinstance(value, str) for value in listed_values)):
-            raise ConfigError(f"{self._path}: sweep.{name}: each value must be a file")
+            raise ConfigError(f"{self._path}: sweep.{name}: each value must be a path")
         copies = tuple(str(self._copy_trajectory(self._folder / value)) for value in listed_values)
         return swept.model_copy(update={swept.kind: copies})
 

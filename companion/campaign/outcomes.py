@@ -61,7 +61,7 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
         settled_rows = np.concatenate(parts)
         figures["estimated_rms_m"] = tracking_errors(settled_rows)["position_rms_m"]
         true_position = [
-            np.interp(settled_rows[:, 0], truth[:, 0], each) for each in truth[:, 1:4].T
+            np.interp(settled_rows[:, 0], truth[:, 0], axis) for axis in truth[:, 1:4].T
         ]
         true_rows = np.column_stack([settled_rows[:, :4], *true_position])
         figures.update(tracking_errors(true_rows))
@@ -118,7 +118,11 @@ def control_effort(
     begin = marks[0].vehicle_time
     end = next((mark.vehicle_time for mark in marks if mark.name is None), np.inf)
     rows = np.array(
-        [(*each.rates, each.thrust) for each in setpoints if begin <= each.time < end]
+        [
+            (*setpoint.rates, setpoint.thrust)
+            for setpoint in setpoints
+            if begin <= setpoint.time < end
+        ]
     ).reshape(-1, 4)
     if not len(rows):
         return {}
@@ -139,8 +143,10 @@ def control_effort(
 def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
     """SHA-256 of all setpoints that the autopilot received, and of the final true state."""
     sha256 = hashlib.sha256()
-    for each in setpoints:
-        sha256.update(struct.pack("<dq4d", each.time, each.answers, *each.rates, each.thrust))
+    for setpoint in setpoints:
+        sha256.update(
+            struct.pack("<dq4d", setpoint.time, setpoint.answers, *setpoint.rates, setpoint.thrust)
+        )
     motion = (*state["position"], *state["velocity"], *state["q"], *state["rates"])
     sha256.update(struct.pack(f"<{len(motion)}d", *motion))
     return sha256.hexdigest()

@@ -219,15 +219,16 @@ def interruptible() -> Iterator[None]:
     """In the context, SIGTERM raises KeyboardInterrupt like Ctrl-C; further signals are ignored."""
 
     def interrupt(number: int, frame: FrameType | None) -> NoReturn:
-        for each in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(each, signal.SIG_IGN)
+        for signal_number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(signal_number, signal.SIG_IGN)
         raise KeyboardInterrupt
 
     previous_handlers = {
-        each: signal.signal(each, interrupt) for each in (signal.SIGINT, signal.SIGTERM)
+        signal_number: signal.signal(signal_number, interrupt)
+        for signal_number in (signal.SIGINT, signal.SIGTERM)
     }
     try:
         yield
     finally:
-        for each, handler in previous_handlers.items():
-            signal.signal(each, handler)
+        for signal_number, handler in previous_handlers.items():
+            signal.signal(signal_number, handler)

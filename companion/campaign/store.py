@@ -53,7 +53,7 @@ def schema(file: CampaignFile) -> "pa.Schema":
     factors = [(name, _column_type(file, name)) for name in file.sweep]
     columns = [("case", "int64"), ("seed", "int64"), *factors, *_OUTCOMES[file.kind]]
     factor_metadata = {
-        name: {**each.description(), "unit": unit_of(name)} for name, each in file.sweep.items()
+        name: {**swept.description(), "unit": unit_of(name)} for name, swept in file.sweep.items()
     }
     contents = {"name": file.name, "kind": file.kind, "factors": factor_metadata}
     return pa.schema(

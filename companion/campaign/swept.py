@@ -122,7 +122,7 @@ class Swept(Section):
         return self.keys or (name,)
 
     def grid(self) -> tuple[Any, ...]:
-        """The values of a grid."""
+        """The values of `values` or `range`."""
         if self.range is None:
             return self.values or ()
         (low, high), count = self.range, self.count or 2

@@ -71,7 +71,7 @@ class Case(Section):
     def _step_makes_sense(self) -> "Case":
         for name, end in (("start", self.start), ("target", self.target)):
             if hypot(*end) >= sin(radians(75.0)):
-                raise ValueError(f"{name} must be a tilt below 75°: shorter than 0.966")
+                raise ValueError(f"{name} must be a tilt below 75°: √(north² + east²) below 0.966")
         if self.start == self.target:
             raise ValueError("start and target are the same: nothing to fly")
         tilt = self.limits.max_tilt_deg

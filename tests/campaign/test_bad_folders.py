@@ -118,7 +118,7 @@ def test_a_folder_that_holds_other_files_or_is_none_is_refused(begun, tmp_path):
     description = folder.describe(campaign, 1, None)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine")
-    with pytest.raises(ConfigError, match="holds files, but no campaign that was begun"):
+    with pytest.raises(ConfigError, match="holds files, but no campaign;"):
         folder.make(tmp_path / "other", campaign, description)
     assert [path.name for path in (tmp_path / "other").iterdir()] == ["notes.txt"]
     below = tmp_path / "table.csv" / "below"

@@ -95,10 +95,10 @@ def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
         ),
         ({"set": {"mock.airframe.no.such": 1}}, "unknown key mock.airframe.no"),
         ({"set": {"limits.max_tilt_deg": 120}}, "max_tilt_deg"),
-        ({"sweep": {"flight.trajectory": [5, 6]}}, "flight.trajectory: each value must be a file"),
+        ({"sweep": {"flight.trajectory": [5, 6]}}, "flight.trajectory: each value must be a path"),
         (
             {"sweep": {"flight.trajectory": {"uniform": [0, 1]}}},
-            "flight.trajectory: each value must be a file",
+            "flight.trajectory: each value must be a path",
         ),
     ],
 )

@@ -83,10 +83,10 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
 def page_text(results: Results, campaign: Campaign) -> str:
     """The HTML of the page about a campaign as stored in its folder."""
     by_outcome = {
-        name: each
+        name: found_influences
         for name in (results.error_outcome, RATES, "ok")
         if name == "ok" or results.measured(name)
-        if (each := influences(results, name))
+        if (found_influences := influences(results, name))
     }
     order = _factors_by_influence(results, by_outcome)
     shown_plots = [
@@ -108,7 +108,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         headline=headline(results),
         good=not results.true_cases("crashed") and bool(_success(results).all()),
         lines=[*missing_cases_note(results), *what_to_look_at(results, by_outcome)],
-        tables=[each for each in first_tables if each is not None],
+        tables=[table for table in first_tables if table is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
     )
 
@@ -182,7 +182,7 @@ def _most_influential(results: Results, by_outcome: dict[str, list[Influence]]) 
             if level.cases.any()
         ),
         default=None,
-        key=lambda each: each[0].high,
+        key=lambda item: item[0].high,
     )
     if worst is not None and worst[0].share < np.mean(results.good):
         lowest, name, value = worst
@@ -199,14 +199,16 @@ def _few_samples(results: Results) -> Iterator[str]:
     largest = max(distinct, default=0)
     if _GRID_LIKE < largest < _FEW_SAMPLES:
         yield (
-            f"Only {largest} different samples of the distributions were flown, so sampled factors "
-            "share influence that only one of them has; raise `samples`."
+            f"Only {largest} different samples of the distributions were flown, so the influence "
+            "of one sampled factor may show for the others, too; raise `samples`."
         )
 
 
 def _factors_by_influence(results: Results, by_outcome: dict[str, list[Influence]]) -> list[str]:
     """The factors sorted by influence on success, then on the error; those without one last."""
     influential = [
-        each.factor for name in ("ok", results.error_outcome) for each in by_outcome.get(name, ())
+        influence.factor
+        for name in ("ok", results.error_outcome)
+        for influence in by_outcome.get(name, ())
     ]
     return list(dict.fromkeys([*influential, *results.factors]))

@@ -36,15 +36,15 @@ def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
             "type": "scatter",
             "mode": "markers",
             "x": [level.name for level in groups],
-            "y": [_percent(each.share) for each in shares],
+            "y": [_percent(share.share) for share in shares],
             "error_y": {
                 "type": "data",
                 "symmetric": False,
-                "array": [_percent(each.high - each.share) for each in shares],
-                "arrayminus": [_percent(each.share - each.low) for each in shares],
+                "array": [_percent(share.high - share.share) for share in shares],
+                "arrayminus": [_percent(share.share - share.low) for share in shares],
             },
             "marker": {"color": MEASURED, "size": 8},
-            "text": [f"{each.case_count} of {each.total}" for each in shares],
+            "text": [f"{share.case_count} of {share.total}" for share in shares],
             "hovertemplate": "%{x}: %{y:.1f} % (%{text})<extra></extra>",
         }
         layout = axes(x=label(name), y=f"good {results.noun}, %")
@@ -68,11 +68,13 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
             {
                 "type": "bar",
                 "name": "good" if outcome == "ok" else label(outcome),
-                "x": [each.factor for each in found],
-                "y": numbers(np.array([100.0 * each.share for each in found])),
+                "x": [influence.factor for influence in found],
+                "y": numbers(np.array([100.0 * influence.share for influence in found])),
                 "error_y": {
                     "type": "data",
-                    "array": numbers(np.array([100.0 * each.confidence for each in found])),
+                    "array": numbers(
+                        np.array([100.0 * influence.confidence for influence in found])
+                    ),
                 },
                 "marker": {"color": colour},
             }

@@ -103,8 +103,8 @@ class Results:
     @cached_property
     def as_documented(self) -> NDArray[np.bool_]:
         """(k,): for each of the k cases with a fault, whether it ended as documented for it."""
-        judged = self.columns.get("as_documented", ())
-        return np.array([value for value in judged if value is not None], dtype=bool)
+        endings = self.columns.get("as_documented", ())
+        return np.array([value for value in endings if value is not None], dtype=bool)
 
     @property
     def all_faulty(self) -> bool:

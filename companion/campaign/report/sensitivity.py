@@ -60,7 +60,7 @@ def influences(results: Results, outcome: str) -> list[Influence]:
             Influence(name, float(index), float(half_width))
             for name, index, half_width in named_indices
         ),
-        key=lambda each: -each.share,
+        key=lambda influence: -influence.share,
     )
 
 

@@ -79,7 +79,9 @@ def levels(column: Column) -> list[Group]:
     if column.dtype != float or len(distinct) <= _MOST_LEVELS:
         shown = distinct if len(distinct) <= _MOST_LEVELS else distinct[: _MOST_LEVELS - 1]
         keys = [_sort_key(value) for value in column]
-        groups = [Group(key[1], np.array([key == each for each in keys])) for key in shown]
+        groups = [
+            Group(key[1], np.array([key == value_key for value_key in keys])) for key in shown
+        ]
         others = len(distinct) - len(shown)
         if others:
             groups.append(Group(f"{others} others", np.array([key not in shown for key in keys])))
@@ -161,7 +163,7 @@ def choices(results: Results) -> list[Group]:
         Group(
             ", ".join(f"{name} = {text}" for name, (_, text) in zip(chosen, key, strict=True))
             or "all cases",
-            np.array([key == each for each in keys]),
+            np.array([key == row_key for row_key in keys]),
         )
         for key in distinct
     ]

@@ -41,7 +41,7 @@ def worst_cases(results: Results) -> Table:
         for row in worst_rows(results, _WORST_SHOWN)
     ]
     header = ("case", "fly it again, recorded", label(results.error_outcome), *shown, "factors")
-    return Table("Worst cases", tuple(each.replace("_", " ") for each in header), rows)
+    return Table("Worst cases", tuple(title.replace("_", " ") for title in header), rows)
 
 
 def _rerun_command(results: Results, case: int) -> str:
@@ -94,9 +94,18 @@ def _level_rows(results: Results, name: str) -> Iterator[tuple[str, ...]]:
         row = [name, level.name, str(int(level.cases.sum()))]
         row.append(str(share_of(results.good[level.cases])))
         if "as_documented" in columns and "fault" in results.factors:
-            judged = [value for value in columns["as_documented"][level.cases] if value is not None]
-            row.append(str(share_of(np.array(judged, dtype=bool))) if judged else EMPTY)
-        row += [_median_text(columns[each][level.cases]) for each in (results.error_outcome, RATES)]
+            endings_documented = [
+                value for value in columns["as_documented"][level.cases] if value is not None
+            ]
+            row.append(
+                str(share_of(np.array(endings_documented, dtype=bool)))
+                if endings_documented
+                else EMPTY
+            )
+        row += [
+            _median_text(columns[outcome][level.cases])
+            for outcome in (results.error_outcome, RATES)
+        ]
         yield tuple(row)
 
 
@@ -107,9 +116,14 @@ def _median_text(values: Floats) -> str:
 
 def sensitivity(influences: dict[str, list[Influence]]) -> Table:
     """The first-order Sobol indices of each outcome, with their intervals."""
-    factors = dict.fromkeys(each.factor for found in influences.values() for each in found)
+    factors = dict.fromkeys(
+        influence.factor for found in influences.values() for influence in found
+    )
     index_texts = {
-        outcome: {each.factor: f"{each.share:.0%} ± {each.confidence:.0%}" for each in found}
+        outcome: {
+            influence.factor: f"{influence.share:.0%} ± {influence.confidence:.0%}"
+            for influence in found
+        }
         for outcome, found in influences.items()
     }
     rows = [
@@ -145,7 +159,7 @@ def two_factors(results: Results) -> Table | None:
         rows.append((level.name, *cells))
     error = label(results.error_outcome)
     title = f"Median {error} and share of good {results.noun}: {first} × {second}"
-    return Table(title, (first, *(each.name for each in second_levels)), rows)
+    return Table(title, (first, *(level.name for level in second_levels)), rows)
 
 
 def all_cases(results: Results) -> Table:

@@ -63,12 +63,12 @@ def compare(before: Score, after: Score, samples: int) -> Comparison | None:
     count = int(complete.sum())
     if count < 2:
         return None
-    old, new = (each[complete] for each in errors)
+    old, new = (sample_errors[complete] for sample_errors in errors)
 
     def pooled_compared(values: tuple[float, ...]) -> float:
         return pooled_rms(np.array(values).reshape(samples, -1)[complete])
 
-    squares = [np.mean(np.square(each), axis=1) for each in (old, new)]
+    squares = [np.mean(np.square(sample_errors), axis=1) for sample_errors in (old, new)]
     return Comparison(
         _interval(_rms, squares[0]),
         _interval(_rms, squares[1]),

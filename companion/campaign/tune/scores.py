@@ -42,25 +42,25 @@ class Score(NamedTuple):
 
     def first(self, count: int) -> "Score":
         """The score on the first `count` cases alone."""
-        return Score._make(each[:count] for each in self)
+        return Score._make(values[:count] for values in self)
 
     def combined_with(self, rest: "Score") -> "Score":
         """The score on these cases and those of `rest` together."""
         return Score._make(ours + theirs for ours, theirs in zip(self, rest, strict=True))
 
     def as_attributes(self) -> dict[str, Any]:
-        """The score as JSON; an infinite number is null."""
+        """The score as JSON values; an infinite number becomes None."""
         attributes: dict[str, Any] = {
-            name: [each if isfinite(each) else None for each in getattr(self, name)]
+            name: [error if isfinite(error) else None for error in getattr(self, name)]
             for name in _ERROR_NAMES
         }
         return {**attributes, "inside": list(self.inside)}
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> "Score":
-        """The score that `as_attributes` wrote."""
+        """The score from the values that `as_attributes` returned."""
         true_errors, estimated_errors, estimator_errors = (
-            tuple(inf if each is None else float(each) for each in attributes[name])
+            tuple(inf if error is None else float(error) for error in attributes[name])
             for name in _ERROR_NAMES
         )
         return cls(true_errors, estimated_errors, estimator_errors, tuple(attributes["inside"]))

@@ -141,16 +141,16 @@ class Search:
     def results(self) -> SearchResults:
         """The results of all trials so far, including those of earlier runs."""
         complete_trials = [
-            each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE_KEY)
+            trial for trial in self._ended_trials() if trial.user_attrs.get(_COMPLETE_KEY)
         ]
         candidates = [
             Candidate(
-                each.number,
-                each.user_attrs[_VALUES_KEY],
-                Score.from_attributes(each.user_attrs[_SCORE_KEY]),
+                trial.number,
+                trial.user_attrs[_VALUES_KEY],
+                Score.from_attributes(trial.user_attrs[_SCORE_KEY]),
             )
-            for each in complete_trials
-            if each.user_attrs[_VIOLATION_KEY] <= 0.0
+            for trial in complete_trials
+            if trial.user_attrs[_VIOLATION_KEY] <= 0.0
         ]
         good = sorted(candidates, key=lambda candidate: candidate.score.rms)
         tried_count = len(self._ended_trials())
@@ -230,7 +230,7 @@ class Search:
         0 or less: `inside_share` can still be reached. `score` covers the cases flown so far, and
         `cases_count` is the number of all cases.
         """
-        outside = sum(not each for each in score.inside)
+        outside = sum(not is_inside for is_inside in score.inside)
         return self._tune.inside_share - (cases_count - outside) / cases_count
 
     def _hopeless(self, score: Score) -> bool:

@@ -51,7 +51,7 @@ def summary_lines(result: CheckedResult) -> list[str]:
 def _certainty_lines(result: CheckedResult) -> Iterator[str]:
     unseen_flights = len(result.after.true_errors)
     early = [
-        sum(not isfinite(each) for each in score.true_errors)
+        sum(not isfinite(error) for error in score.true_errors)
         for score in (result.before, result.after)
     ]
     if any(early):
@@ -86,7 +86,7 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
         "if the estimate is late, guidance.position_lateness_ms reduces it."
     )
     if comparison.ratio.high >= 1.0:
-        yield "The interval holds 1: fly more samples before you believe that it is better."
+        yield "The interval contains 1, so the result may not be better: fly more samples."
 
 
 def result_text(result: CheckedResult, present: Mapping[str, Any]) -> str:
@@ -130,10 +130,12 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
 def _reason(key: str, swept: Swept, result: CheckedResult, before: Any) -> str:
     """Text about a key: its value `before` (None: not set), and those of the best candidates."""
     before_text = "not set before" if before is None else f"before {_value_text(before)}"
-    near_values = [each.values[key] for each in result.found.near_best if key in each.values]
+    near_values = [
+        candidate.values[key] for candidate in result.found.near_best if key in candidate.values
+    ]
     pair = swept.uniform or swept.loguniform
     if pair is None:
-        same = sum(each == result.best.values[key] for each in near_values)
+        same = sum(value == result.best.values[key] for value in near_values)
         return f"{before_text}; {same} of the best {len(near_values)} candidates have it"
     low, high = pair
     text = f"{before_text}; the best {len(near_values)} candidates have {min(near_values):.3g}"

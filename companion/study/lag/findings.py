@@ -151,9 +151,9 @@ def _with_the_complete_loop(
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
             all(
-                each.model_following[NO_ERROR].cross_track
-                < each.other_methods[each.best_other].cross_track
-                for each in by_rate.values()
+                rate_comparison.model_following[NO_ERROR].cross_track
+                < rate_comparison.other_methods[rate_comparison.best_other].cross_track
+                for rate_comparison in by_rate.values()
             ),
             f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[FOLLOWING]:.2g}; first-order"
             f" {cross_tracks[PROPOSED]:.2g}, quaternion {cross_tracks[QUATERNION]:.2g}.",

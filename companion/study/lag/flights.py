@@ -173,7 +173,7 @@ def fly_grid(tick: Tick) -> Grid:
         tick(f"dead time {dead_time} ms, lag {lag} ms")
         loop = LagLoop(lag, dead_time)
         delays = _delays_of(loop)
-        errors = [each for each in _error_pairs(GRID_ERRORS) if dead_time or not each.dead_time]
+        errors = [error for error in _error_pairs(GRID_ERRORS) if dead_time or not error.dead_time]
         for rate in RATES_HZ:
             grid[GridCell(rate, dead_time, lag)] = Comparison(
                 {m: score(_fly(m, delays, loop, rate)) for m in OTHER_METHODS},

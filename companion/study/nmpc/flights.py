@@ -156,19 +156,19 @@ class Flight:
         self.path.append(self._vehicle.position)
 
     @property
-    def settled(self) -> Floats:
+    def settled_errors(self) -> Floats:
         """The errors from `SETTLED_AFTER_S` on, m."""
         return np.array(self.errors[round(SETTLED_AFTER_S * RATE_HZ) :])
 
     @property
     def rms(self) -> float:
         """Root mean square of the settled errors, m."""
-        return float(np.sqrt(np.mean(self.settled**2)))
+        return float(np.sqrt(np.mean(self.settled_errors**2)))
 
     @property
-    def worst(self) -> float:
+    def largest_error(self) -> float:
         """Largest settled error, m."""
-        return float(self.settled.max())
+        return float(self.settled_errors.max())
 
     def solve_ms(self, percentile: float) -> float:
         """Percentile of the solve times, ms."""

@@ -124,7 +124,9 @@ def _error_table(flights: Flights) -> Table:
             continue
         circle = flights[CIRCLE.name, variant]
         known = "known" if variant.knows_dead_time else "not known"
-        rows.append((variant.label, known, circle.rms, circle.worst, eight.rms, eight.worst))
+        rows.append(
+            (variant.label, known, circle.rms, circle.largest_error, eight.rms, eight.largest_error)
+        )
     return Table(
         "nmpc-error",
         "Distance from the trajectory from 4 s on, one iteration per solve at 50 Hz: after"

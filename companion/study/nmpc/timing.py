@@ -28,11 +28,11 @@ class State(NamedTuple):
     position_error: Vector
     """Position minus the reference position on the circle, m, NED."""
     velocity: Vector
-    """m/s, NED."""
+    """Velocity, m/s, NED."""
     coefficients: Coefficients
     """Acceleration coefficients (north, east) of the attitude."""
     body_rates: BodyRates
-    """rad/s."""
+    """Body rates, rad/s."""
 
 
 _LEVEL, _STILL = Coefficients(0.0, 0.0), BodyRates(0.0, 0.0, 0.0)

@@ -24,7 +24,7 @@ _SWEEP = (10, 5, 3, 2, 1)
 PARTS = 2 * len(METHODS) + len(_SWEEP)
 
 Sweep = dict[float, dict[Method, float]]
-"""By `LoopFlights.time_63` of the inner loop (s) and by method: cross-track at heading 0."""
+"""Cross-track at heading 0, by `LoopFlights.time_63` of the inner loop (s) and by method."""
 
 
 class LoopFlights(NamedTuple):

@@ -61,9 +61,9 @@ class TrackedFlight(NamedTuple):
     result: str
     """`ok`, or why the flight ended."""
     telemetry: PositionError
-    """Distance of the position that guidance received from the reference."""
+    """Distance from the reference of the position that guidance received, m."""
     truth: PositionError
-    """Distance of the vehicle's true position from the reference."""
+    """Distance of the vehicle's true position from the reference, m."""
     path: Floats
     """(n, 4), reference north and east, true north and east, m."""
 
