@@ -84,8 +84,8 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(program: _Program) -> Sender:
-    benchmarked = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
-    return Sender(benchmarked, program.stamp, program.modulus)
+    benchmarked_program = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
+    return Sender(benchmarked_program, program.stamp, program.modulus)
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:

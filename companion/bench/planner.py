@@ -160,12 +160,12 @@ def _shortest_ns(cases: list[_Case], seconds: float) -> dict[str, dict[str, floa
         case.timer.timeit(1)  # compiles
         runs.append(max(1, int(_REPEAT_S / case.timer.timeit(1))))
     shortest: dict[str, dict[str, float]] = {case.group: {} for case in cases}
-    end = perf_counter() + seconds
+    deadline = perf_counter() + seconds
     while True:
         for case, number in zip(cases, runs, strict=True):
             ns = 1e9 * case.timer.timeit(number) / (number * case.steps)
             shortest[case.group][case.key] = min(ns, shortest[case.group].get(case.key, ns))
-        if perf_counter() >= end:
+        if perf_counter() >= deadline:
             return shortest
 
 

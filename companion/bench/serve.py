@@ -58,13 +58,13 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         senders = {key: stack.enter_context(closing(_start(key, ports[key]))) for key in _TITLES}
         for sender in senders.values():
             sender.wait_ready()
-        reading = _start_clients(stack, ports["with_clients"], _CLIENTS)
-        stopped = _start_clients(stack, ports["with_clients"], 1)
+        reading_clients = _start_clients(stack, ports["with_clients"], _CLIENTS)
+        stopped_client = _start_clients(stack, ports["with_clients"], 1)
         senders["with_clients"].send_for(rate_hz, ROUND_S)  # all four connect, and receive
-        stopped.send_signal(signal.SIGSTOP)
+        stopped_client.send_signal(signal.SIGSTOP)
         senders["with_clients"].reset_measurements()
         figures = measure(senders, rate_hz, seconds)
-        figures["clients"] = _read_counts(reading)
+        figures["clients"] = _read_counts(reading_clients)
     alone, with_clients = figures["alone"], figures["with_clients"]
     figures["ratio"] = {
         name: round(with_clients[f"{name}_us"] / alone[f"{name}_us"], 3) for name in ("p50", "p99")

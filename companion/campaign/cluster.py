@@ -138,13 +138,13 @@ def _termination_deferred() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():  # signals are not handled here
         yield
         return
-    received: list[int] = []
-    handler = signal.signal(signal.SIGTERM, lambda number, _: received.append(number))
+    received_signals: list[int] = []
+    handler = signal.signal(signal.SIGTERM, lambda number, _: received_signals.append(number))
     try:
         yield
     finally:
         signal.signal(signal.SIGTERM, handler)
-        if received:
+        if received_signals:
             signal.raise_signal(signal.SIGTERM)
 
 

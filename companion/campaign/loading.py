@@ -141,15 +141,15 @@ class _CampaignReader:
 
     def _check_faults(self) -> None:
         file, name = self._file, self._path
-        for scenario, fault_case in file.faults.items():
-            for fault in fault_case.inject:
+        for scenario, scenario_section in file.faults.items():
+            for fault in scenario_section.inject:
                 if fault.keys() & {"at_s", "after_offboard_s"}:
                     raise ConfigError(
                         f"{name}: faults.{scenario}: phase and after_s say when it begins; "
                         "take out at_s and after_offboard_s"
                     )
             try:
-                complete_mock({"faults": fault_case.inject})
+                complete_mock({"faults": scenario_section.inject})
             except ConfigError as error:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
         self._check_names(FAULT, (NO_FAULT, *file.faults))
@@ -157,8 +157,8 @@ class _CampaignReader:
         for key in (FAULT_PHASE, FAULT_AFTER):
             if key in file.sweep and FAULT not in file.sweep:
                 raise ConfigError(f"{name}: sweep.{key} needs sweep.{FAULT}")
-        after = file.sweep.get(FAULT_AFTER)
-        if after is not None and not after.is_number:
+        after_factor = file.sweep.get(FAULT_AFTER)
+        if after_factor is not None and not after_factor.is_number:
             raise ConfigError(f"{name}: sweep.{FAULT_AFTER}: each value must be a number")
 
     def _check_names(self, key: str, known_names: tuple[str, ...]) -> None:

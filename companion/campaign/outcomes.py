@@ -74,8 +74,8 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
 def _horizontal_errors(estimated_rows: Floats, true_rows: Floats) -> dict[str, float]:
     """RMS horizontal distances, m: truth to reference, estimate to reference, estimate to truth.
 
-    `estimated` are (N, 7) rows of `FlightTrace.tracking`; `true` are the same rows with the true
-    position instead of the estimated one.
+    `estimated_rows` are (N, 7) rows of `FlightTrace.tracking`; `true_rows` are the same rows with
+    the true position instead of the estimated one.
     """
     has_reference = np.isfinite(true_rows[:, 1])
     true_position, reference = true_rows[has_reference, 4:6], true_rows[has_reference, 1:3]
@@ -97,11 +97,13 @@ def response(summary: Summary) -> dict[str, float]:
     if response_figures is None:
         return {}
     constants = [response_figures.time_constant_north_s, response_figures.time_constant_east_s]
-    finite = [value for value in constants if isfinite(value)]
+    finite_constants = [value for value in constants if isfinite(value)]
     return {
         "cross_axis_max": response_figures.cross_axis_max,
         "model_deviation_max": response_figures.model_deviation_max,
-        "time_constant_s": sum(finite) / len(finite) if finite else nan,
+        "time_constant_s": sum(finite_constants) / len(finite_constants)
+        if finite_constants
+        else nan,
     }
 
 
@@ -127,7 +129,7 @@ def control_effort(
     if not len(rows):
         return {}
     rates, thrust, limits = np.hypot(rows[:, 0], rows[:, 1]), rows[:, 3], config.limits
-    saturated = (
+    is_saturated = (
         (rates >= _SATURATED_FROM * limits.max_tilt_rate)
         | (thrust >= _SATURATED_FROM * limits.max_thrust)
         | (thrust * _SATURATED_FROM <= limits.min_thrust)
@@ -136,7 +138,7 @@ def control_effort(
         "rate_rms_rad_s": float(np.sqrt(np.mean(rates**2))),
         "rate_max_rad_s": float(rates.max()),
         "thrust_rms": float(np.std(thrust)),
-        "saturated_share": float(np.mean(saturated)),
+        "saturated_share": float(np.mean(is_saturated)),
     }
 
 

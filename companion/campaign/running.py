@@ -109,9 +109,9 @@ class _Run:
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")
                     return self._run_with_progress(client, description)
         except KeyboardInterrupt:
-            return self._stopped("interrupted")
+            return self._report_stop("interrupted")
         except ClusterError as error:
-            return self._stopped(str(error))
+            return self._report_stop(str(error))
 
     def _check_all_cases(self) -> float | None:
         """Check every case; return the wall time that a case takes, s; None: not measured."""
@@ -119,8 +119,8 @@ class _Run:
         workers = self._options.workers or local_workers()
         if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
             # The time of one case is enough to refuse; checking all cases would take long.
-            first = [campaign.case(next(campaign.planned_cases()))]
-            estimate.check_size(campaign, estimate.case_time(kind, first), workers)
+            first_case = [campaign.case(next(campaign.planned_cases()))]
+            estimate.check_size(campaign, estimate.case_time(kind, first_case), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
         if len(cases) <= _UNMEASURED_CASES * workers:
@@ -167,7 +167,7 @@ class _Run:
             say(f"not flown: {sentence}")
         if progress.flown_cases < description.cases:
             count = len(progress.given_up_units)
-            return self._stopped(f"{count} unit{'s were' if count > 1 else ' was'} given up")
+            return self._report_stop(f"{count} unit{'s were' if count > 1 else ' was'} given up")
         errors = engine.internal_errors(self._folder, self._campaign.file)
         for error, count in errors.most_common(_MOST_SHOWN):
             say(f"{count} of the {self._noun} ended by an {error}")
@@ -176,13 +176,13 @@ class _Run:
         for reason, count in results.failures().most_common(_MOST_SHOWN):
             say(f"  {count} not good: {reason}")
         if results.as_documented.size:
-            documented_count, faulty = results.as_documented.sum(), results.as_documented.size
-            say(f"{documented_count} of {faulty} flights with a fault ended as documented.")
+            documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
+            say(f"{documented_count} of {faulty_count} flights with a fault ended as documented.")
         say(f"The results are in {self._folder}. Write their report with")
         say(f"  companion campaign report {shlex.quote(str(self._folder))}")
         return FAILED if errors else DONE
 
-    def _stopped(self, why: str) -> int:
+    def _report_stop(self, why: str) -> int:
         """Print why the campaign stopped and how to continue; return the exit code."""
         if not folder.holds_campaign(self._folder):
             self._console.print(f"{why}; no campaign was started")

@@ -26,12 +26,12 @@ class VersionError(Exception):
 @cache
 def versions() -> Versions:
     """The versions of this process."""
-    own = {
+    program_versions = {
         "companion": _version(_PACKAGE),
         "source": source_digest(),
         "python": platform.python_version(),
     }
-    return own | {name: _version(name) for name in _PACKAGES}
+    return program_versions | {name: _version(name) for name in _PACKAGES}
 
 
 def source_digest() -> str:

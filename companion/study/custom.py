@@ -73,7 +73,7 @@ def _results(case: Case, responses: Responses) -> Table:
     return Table(
         "custom",
         "The custom case; largest values over"
-        f" {_counted(case.headings_deg, 'heading')}, rates as commanded.",
+        f" {_count_text(case.headings_deg, 'heading')}, rates as commanded.",
         (
             "method",
             "rate, Hz",
@@ -124,7 +124,7 @@ def _samples(
             )
 
 
-def _counted(things: tuple[float, ...], word: str) -> str:
+def _count_text(things: tuple[float, ...], word: str) -> str:
     return f"{len(things)} {word}" + ("s" if len(things) > 1 else "")
 
 

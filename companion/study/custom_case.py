@@ -83,10 +83,12 @@ class Case(Section):
 
     @model_validator(mode="after")
     def _lists_make_sense(self) -> "Case":
-        unknown = [name for name in self.methods if name not in LAW_NAMES]
-        if unknown:
-            known = ", ".join(LAW_NAMES)
-            raise ValueError(f"unknown method {unknown[0]!r} in methods; known: {known}")
+        unknown_names = [name for name in self.methods if name not in LAW_NAMES]
+        if unknown_names:
+            known_names = ", ".join(LAW_NAMES)
+            raise ValueError(
+                f"unknown method {unknown_names[0]!r} in methods; known: {known_names}"
+            )
         for key in ("methods", "rates_hz"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
                 raise ValueError(f"{key} has the same value twice")
@@ -110,10 +112,10 @@ class Case(Section):
     @property
     def steps_to_fly(self) -> float:
         """Number of simulation steps of the whole case; with inner_loop, of physics steps."""
-        flown_s = len(self.headings_deg) * len(self.methods) * self.seconds
+        total_s = len(self.headings_deg) * len(self.methods) * self.seconds
         if self.inner_loop:
-            return flown_s * len(self.rates_hz) * 1000.0 * self.quickness
-        return flown_s * sum(self.rates_hz)
+            return total_s * len(self.rates_hz) * 1000.0 * self.quickness
+        return total_s * sum(self.rates_hz)
 
     def step(self, rate_hz: float) -> Step:
         """The step of this case at one of its sample rates."""

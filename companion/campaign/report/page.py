@@ -85,7 +85,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
     by_outcome = {
         name: found_influences
         for name in (results.error_outcome, RATES, "ok")
-        if name == "ok" or results.measured(name)
+        if name == "ok" or results.is_measured(name)
         if (found_influences := influences(results, name))
     }
     order = _factors_by_influence(results, by_outcome)
@@ -145,13 +145,15 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     `by_outcome` holds the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
-    if crashed := results.true_cases("crashed"):
-        yield f"{crashed} {results.noun} crashed; they stand first in the table of worst cases."
+    if crashed_count := results.true_cases("crashed"):
+        yield (
+            f"{crashed_count} {results.noun} crashed; they stand first in the table of worst cases."
+        )
     if results.all_faulty:
         yield f"{results.good.sum()} of them were good in spite of the fault."
     elif results.as_documented.size:
-        documented_count, faulty = results.as_documented.sum(), results.as_documented.size
-        yield f"{documented_count} of {faulty} flights with a fault ended as documented."
+        documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
+        yield f"{documented_count} of {faulty_count} flights with a fault ended as documented."
     reasons = Counter(results.reason(row) for row in range(results.count) if not results.good[row])
     if reasons:
         (reason, count) = reasons.most_common(1)[0]
@@ -205,7 +207,7 @@ def _few_samples(results: Results) -> Iterator[str]:
 
 
 def _factors_by_influence(results: Results, by_outcome: dict[str, list[Influence]]) -> list[str]:
-    """The factors sorted by influence on success, then on the error; those without one last."""
+    """The factors by influence on success, then on the error; those without influence last."""
     influential = [
         influence.factor
         for name in ("ok", results.error_outcome)

@@ -92,7 +92,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
 def pareto(results: Results) -> Iterator[Plot]:
     """Error against commanded rate, coloured by thrust deviation; the Pareto front is marked."""
     columns = results.columns
-    names = [results.error_outcome, RATES, *([THRUST] if results.measured(THRUST) else [])]
+    names = [results.error_outcome, RATES, *([THRUST] if results.is_measured(THRUST) else [])]
     points, titles = [], []
     for choice in choices(results):
         part = choice.cases
@@ -160,7 +160,7 @@ def _colour_scale(values: Floats, all_values: Floats, *, shown: bool) -> dict[st
 def distributions(results: Results) -> Iterator[Plot]:
     """Histograms of the outcomes: good cases, and others."""
     for name in _DISTRIBUTIONS:
-        if not results.measured(name):
+        if not results.is_measured(name):
             continue
         values = results.columns[name]
         is_finite = np.isfinite(values)

@@ -119,9 +119,9 @@ class Results:
     @property
     def error_outcome(self) -> str:
         """Name of the outcome that serves as the campaign's error; see `ERRORS`."""
-        return next((name for name in ERRORS if self.measured(name)), ERRORS[-1])
+        return next((name for name in ERRORS if self.is_measured(name)), ERRORS[-1])
 
-    def measured(self, name: str) -> bool:
+    def is_measured(self, name: str) -> bool:
         """Whether there is a column of numbers with this name, with at least one finite value."""
         column = self.columns.get(name)
         return column is not None and column.dtype == float and bool(np.isfinite(column).any())

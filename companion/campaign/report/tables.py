@@ -60,7 +60,7 @@ def configuration(campaign: Campaign) -> Table:
 
     Swept keys are left out.
     """
-    swept = campaign.file.swept_keys
+    swept_keys = campaign.file.swept_keys
     rows = [
         (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)
         for key in keys(campaign.base)
@@ -75,15 +75,15 @@ def configuration(campaign: Campaign) -> Table:
     ]
     title = "Configuration of every case: the limits, and what is not the default"
     header = ("key", "value", "default", "unit")
-    return Table(title, header, [row for row in rows if row[0] not in swept])
+    return Table(title, header, [row for row in rows if row[0] not in swept_keys])
 
 
 def success_by_factor(results: Results, order: Sequence[str]) -> Table:
     """Success rate, median error and median body rate by level of the most influential factors."""
     rows = [row for name in order[:_MOST_FACTORS] for row in _level_rows(results, name)]
-    documented = "as_documented" in results.columns and "fault" in results.factors
+    has_faults = "as_documented" in results.columns and "fault" in results.factors
     header = ["factor", "value", results.noun, "good (95 % interval)"]
-    header += ["ended as documented (95 % interval)"] if documented else []
+    header += ["ended as documented (95 % interval)"] if has_faults else []
     header += [f"median {label(results.error_outcome)}", f"median {label(RATES)}"]
     return Table("Success by factor", tuple(header), rows)
 
@@ -166,9 +166,9 @@ def all_cases(results: Results) -> Table:
     """All cases or, if they are more, `_MOST_ROWS` of them at even distances."""
     shown = [name for name in results.columns if name not in ("seed", "digest")]
     count = results.count
-    chosen = even_indices(count, _MOST_ROWS)
-    rows = [tuple(_cell(results.columns[name][row]) for name in shown) for row in chosen]
-    part = "" if len(chosen) == count else f", {len(chosen)} of {count}"
+    shown_rows = even_indices(count, _MOST_ROWS)
+    rows = [tuple(_cell(results.columns[name][row]) for name in shown) for row in shown_rows]
+    part = "" if len(shown_rows) == count else f", {len(shown_rows)} of {count}"
     return Table(
         f"Cases{part} (all of them are in results.csv and results.parquet)", tuple(shown), rows
     )

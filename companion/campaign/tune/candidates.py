@@ -98,11 +98,11 @@ def suggested_values(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, A
 
 
 def starts(campaign: Campaign, tune: Tune, learned_config: Config | None = None) -> Iterator[Start]:
-    """The starts: the present configuration, `learned`, and the proposal of `companion tune`.
+    """The starts: the campaign's configuration, `learned_config`, and a proposal.
 
-    `learned` is the configuration with the values that first flights measured; None: no such
-    flights. The proposal is computed from `learned` or, without it, from the present configuration.
-    There is no proposal if the rate loop is not known.
+    `learned_config` is the configuration with the values that first flights measured; None: no such
+    flights. The proposal is that of `companion tune` for `learned_config` or, without it, for the
+    campaign's configuration. There is no proposal if the rate loop is not known.
     """
     yield Start(
         "the configuration",
@@ -155,7 +155,7 @@ def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
     A null key without a derived value is left out.
     """
     weights, drag = hold_weights(config), drag_prior(config).drag
-    derived = {
+    derived_values = {
         "guidance.position_weight_per_s4": weights.position,
         "guidance.velocity_weight_per_s2": weights.velocity,
         "guidance.disturbance_bandwidth_rad_s": disturbance_bandwidth(config),
@@ -165,7 +165,9 @@ def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
     }
     configured = configured_values(config, keys)
     return {
-        key: value for key in keys if (value := configured.get(key, derived.get(key))) is not None
+        key: value
+        for key in keys
+        if (value := configured.get(key, derived_values.get(key))) is not None
     }
 
 

@@ -59,30 +59,32 @@ def compare(before: Score, after: Score, samples: int) -> Comparison | None:
     """
     scores = before, after
     errors = [np.array(score.true_errors).reshape(samples, -1) for score in scores]
-    complete = np.isfinite(np.hstack(errors)).all(axis=1)
-    count = int(complete.sum())
+    is_complete = np.isfinite(np.hstack(errors)).all(axis=1)
+    count = int(is_complete.sum())
     if count < 2:
         return None
-    old, new = (sample_errors[complete] for sample_errors in errors)
+    before_errors, after_errors = (sample_errors[is_complete] for sample_errors in errors)
 
-    def pooled_compared(values: tuple[float, ...]) -> float:
-        return pooled_rms(np.array(values).reshape(samples, -1)[complete])
+    def pooled_complete(values: tuple[float, ...]) -> float:
+        return pooled_rms(np.array(values).reshape(samples, -1)[is_complete])
 
-    squares = [np.mean(np.square(sample_errors), axis=1) for sample_errors in (old, new)]
+    mean_squares = [
+        np.mean(np.square(sample_errors), axis=1) for sample_errors in (before_errors, after_errors)
+    ]
     return Comparison(
-        _interval(_rms, squares[0]),
-        _interval(_rms, squares[1]),
-        _interval(_ratio, *squares),
-        (pooled_compared(before.estimated_errors), pooled_compared(after.estimated_errors)),
-        (pooled_compared(before.estimator_errors), pooled_compared(after.estimator_errors)),
-        int(np.sum(squares[1] < squares[0])),
+        _interval(_rms, mean_squares[0]),
+        _interval(_rms, mean_squares[1]),
+        _interval(_ratio, *mean_squares),
+        (pooled_complete(before.estimated_errors), pooled_complete(after.estimated_errors)),
+        (pooled_complete(before.estimator_errors), pooled_complete(after.estimator_errors)),
+        int(np.sum(mean_squares[1] < mean_squares[0])),
         count,
     )
 
 
-def _rms(squares: Floats, axis: int = -1) -> Any:
+def _rms(mean_squares: Floats, axis: int = -1) -> Any:
     """RMS error, m, from the mean squared error of each sample, m²."""
-    return np.sqrt(np.mean(squares, axis=axis))
+    return np.sqrt(np.mean(mean_squares, axis=axis))
 
 
 def _ratio(before: Floats, after: Floats, axis: int = -1) -> Any:
@@ -93,7 +95,7 @@ def _interval(statistic: Callable[..., Any], *samples: Floats) -> Interval:
     """A statistic of paired samples, each (samples,), with its interval by bootstrap."""
     from scipy.stats import bootstrap  # noqa: PLC0415  takes a second to import
 
-    found = bootstrap(
+    interval = bootstrap(
         samples,
         statistic,
         paired=True,
@@ -102,4 +104,4 @@ def _interval(statistic: Callable[..., Any], *samples: Floats) -> Interval:
         method="percentile",
         rng=np.random.default_rng(_SEED),
     ).confidence_interval
-    return Interval(float(statistic(*samples)), float(found.low), float(found.high))
+    return Interval(float(statistic(*samples)), float(interval.low), float(interval.high))

@@ -23,16 +23,16 @@ class Score(NamedTuple):
     not flown to its end, or had no closed-loop maneuver."""
     estimated_errors: tuple[float, ...]
     """RMS horizontal distance of the estimated position from the reference, m; infinite where
-    `true` is."""
+    `true_errors` is."""
     estimator_errors: tuple[float, ...]
-    """RMS horizontal distance of the estimated from the true position, m; infinite where `true`
-    is."""
+    """RMS horizontal distance of the estimated from the true position, m; infinite where
+    `true_errors` is."""
     inside: tuple[bool, ...]
     """Whether each case was flown to its end and stayed inside the envelope."""
 
     @property
     def rms(self) -> float:
-        """RMS of `true` over all cases, m; infinite if a case was not flown to its end."""
+        """RMS of `true_errors` over all cases, m; infinite if a case was not flown to its end."""
         return pooled_rms(np.array(self.true_errors))
 
     @property
@@ -76,7 +76,7 @@ def score_of(rows: Sequence[Row], envelope: float | None) -> Score:
         tuple(_number(row, "level_rms_m") for row in rows),
         tuple(_number(row, "estimated_level_rms_m") for row in rows),
         tuple(_number(row, "estimate_level_rms_m") for row in rows),
-        tuple(_inside(row, envelope) for row in rows),
+        tuple(_is_inside(row, envelope) for row in rows),
     )
 
 
@@ -91,7 +91,7 @@ def _number(row: Row, name: str) -> float:
     return float(value) if flown_to_end and isinstance(value, float) else inf
 
 
-def _inside(row: Row, envelope: float | None) -> bool:
+def _is_inside(row: Row, envelope: float | None) -> bool:
     if not isfinite(_number(row, "level_rms_m")):
         return False
     return envelope is None or _number(row, "position_max_m") <= envelope

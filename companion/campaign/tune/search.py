@@ -35,7 +35,7 @@ STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _STUDY_NAME = "tune"
 _MOST_STARTS = 3
-"""Largest number of starts."""
+"""Largest number of starts of a search."""
 _FEWEST_NEIGHBOURS = 4
 """Smallest number of candidates that are tried near the last start."""
 _FIRST_CASES_DIVISOR = 4
@@ -49,8 +49,9 @@ the best candidate on the same cases."""
 _LARGEST_ERROR = 10.0
 """Largest error that is reported to Optuna, m; also the error of a flight that ended early."""
 _VALUES_KEY, _SCORE_KEY = "values", "score"
+"""Attributes of a trial in Optuna's storage: values of the searched keys, and score."""
 _VIOLATION_KEY, _COMPLETE_KEY = "violation", "complete"
-"""Names of the attributes of a trial in Optuna's storage."""
+"""Attributes of a trial: violation of the constraint, and whether all cases were flown."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class SearchResults:
     """The results of a search so far."""
 
     tried_count: int = 0
-    """Number of all candidates, including those of `stopped_early`."""
+    """Number of all candidates, including those of `stopped_early_count`."""
     stopped_early_count: int = 0
     """Number of candidates that were abandoned, or whose keys were refused."""
     best: Candidate | None = None
@@ -202,7 +203,7 @@ class Search:
         first_count = min(len(all_cases), first_count)
         score = score_of(self._fly(all_cases[:first_count]), self._tune.envelope_m)
         violation = self._shortfall(score, len(all_cases))
-        if first_count < len(all_cases) and (violation > 0.0 or self._hopeless(score)):
+        if first_count < len(all_cases) and (violation > 0.0 or self._is_hopeless(score)):
             self._stop(trial, _capped_rms(score), max(violation, 0.0))
             return
         score = score.combined_with(
@@ -230,10 +231,10 @@ class Search:
         0 or less: `inside_share` can still be reached. `score` covers the cases flown so far, and
         `cases_count` is the number of all cases.
         """
-        outside = sum(not is_inside for is_inside in score.inside)
-        return self._tune.inside_share - (cases_count - outside) / cases_count
+        outside_count = sum(not is_inside for is_inside in score.inside)
+        return self._tune.inside_share - (cases_count - outside_count) / cases_count
 
-    def _hopeless(self, score: Score) -> bool:
+    def _is_hopeless(self, score: Score) -> bool:
         best = self.results().best
         return (
             best is not None

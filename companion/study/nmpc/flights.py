@@ -37,7 +37,7 @@ FLIGHT_S = 6
 SETTLED_AFTER_S = 4.0
 """Time after the beginning of a flight from which its errors count, s."""
 _INPUTS_GIVEN = 8
-"""Number of latest control inputs in a request to the solver, enough for its dead time and lead."""
+"""Number of control inputs in a request to the solver, enough for its dead time and lead."""
 _PLANNER_HZ = 250
 _STEPS_PER_SAMPLE = STEP_HZ // _PLANNER_HZ
 
