@@ -29,7 +29,7 @@ from companion.study.measures import (
     settling_time,
     signed_distance_from_line,
 )
-from companion.study.methods import BY_PLANNER, LIMIT, Method, planner_of
+from companion.study.methods import LIMIT, METHOD_BY_PLANNER, Method, planner_of
 from companion.study.outcome import Cell, Job, Outcome, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
 
@@ -51,7 +51,7 @@ def _run(case: Case, tick: Tick) -> Outcome:
     """Fly the case with each of its methods at each of its rates."""
     responses: Responses = {}
     for hz in case.rates_hz:
-        for method in (m for name, m in BY_PLANNER.items() if name in case.methods):
+        for method in (m for name, m in METHOD_BY_PLANNER.items() if name in case.methods):
             tick(f"{method.label} at {hz:g} Hz")
             responses[method, hz] = _fly(case, method, hz)
     return Outcome(
@@ -149,8 +149,8 @@ def _reference(case: Case, rate_hz: float) -> Floats:
 
 
 def _reference_text(case: Case) -> str:
-    limited = case.limits.rate_limit == "paper"
-    return "first order " + ("with the limit of equation 33" if limited else "without limits")
+    is_limited = case.limits.rate_limit == "paper"
+    return "first order " + ("with the limit of equation 33" if is_limited else "without limits")
 
 
 def _conditions(case: Case) -> str:

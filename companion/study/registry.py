@@ -90,9 +90,9 @@ def study_names() -> tuple[str, ...]:
 
 def help_table() -> str:
     """Help text with one line for each name that the command line accepts."""
-    everything = ", ".join(study.name for study in selected_studies(ALL))
+    all_names = ", ".join(study.name for study in selected_studies(ALL))
     lines = [(study.name, study.summary) for study in STUDIES.values()]
-    return "\n".join(f"  {name:<8}{text}" for name, text in [*lines, (ALL, everything)])
+    return "\n".join(f"  {name:<8}{text}" for name, text in [*lines, (ALL, all_names)])
 
 
 def names_with_json() -> str:

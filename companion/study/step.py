@@ -90,7 +90,7 @@ class LoopFlight(Protocol):
         ...
 
     @property
-    def commanded(self) -> Floats:
+    def commanded_rates(self) -> Floats:
         """(samples, 3) commanded body rates, rad/s."""
         ...
 
@@ -126,5 +126,5 @@ def fly_loop(planner: Planner, step: Step, loop: Loop) -> Response:
     return Response(
         step,
         batch.coefficients(np.stack([flight.q for flight in flights], axis=-1)),
-        np.stack([flight.commanded for flight in flights], axis=-1),
+        np.stack([flight.commanded_rates for flight in flights], axis=-1),
     )

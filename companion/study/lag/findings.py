@@ -42,7 +42,7 @@ def find(
 def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
     cross_tracks = {m: score(r).cross_track for m, r in example.unlimited[100.0].items()}
     best = min(OTHER_METHODS, key=lambda method: cross_tracks[method])
-    worst = max(wrong.cross_track for wrong in example.model_following.values())
+    worst = max(wrong_score.cross_track for wrong_score in example.model_following.values())
     rate = max(largest_tilt_rate(response) for response in example.rate_limited.values())
     limited_cross_track = max(
         score(response).cross_track for response in example.rate_limited.values()
@@ -95,7 +95,7 @@ def _over_the_grid(grid: Grid) -> Finding:
 def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
     worst_cell = max(grid, key=lambda cell: grid[cell].ratio)
     comparison, other = grid[worst_cell], grid[worst_cell].best_other
-    worse_cells = [cell for cell, compared in grid.items() if compared.ratio >= 1.0]
+    worse_cells = [cell for cell, cell_comparison in grid.items() if cell_comparison.ratio >= 1.0]
     where = (
         f", from {min(cell.dead_time_ms for cell in worse_cells)} ms of dead time on"
         if worse_cells
@@ -121,17 +121,20 @@ def _too_long_or_too_short(grid: Grid, complete: CompleteLoopFlights) -> Finding
         for cell, comparison in grid.items()
         if cell.dead_time_ms > 0
     ]
-    too_long = max(at_long.cross_track for at_long, _ in pairs)
-    too_short = max(at_short.cross_track for _, at_short in pairs)
-    straighter = sum(at_long.cross_track < at_short.cross_track for at_long, at_short in pairs)
-    loop = complete.by_rate[SHOWN_RATE_HZ].model_following
+    worst_long = max(long_score.cross_track for long_score, _ in pairs)
+    worst_short = max(short_score.cross_track for _, short_score in pairs)
+    straighter_count = sum(
+        long_score.cross_track < short_score.cross_track for long_score, short_score in pairs
+    )
+    loop_scores = complete.by_rate[SHOWN_RATE_HZ].model_following
     return Finding(
         "ours",
         "A lag and dead time 50 % too long are better than both 50 % too short.",
-        too_long < too_short and loop[long].cross_track < loop[short].cross_track,
-        f"Largest cross-track {too_long:.2g} against {too_short:.2g}, with the complete inner loop"
-        f" {loop[long].cross_track:.2g} against {loop[short].cross_track:.2g}. Too long is the"
-        f" straighter in {straighter} of the {len(pairs)} cells with a dead time.",
+        worst_long < worst_short and loop_scores[long].cross_track < loop_scores[short].cross_track,
+        f"Largest cross-track {worst_long:.2g} against {worst_short:.2g}, with the complete inner"
+        f" loop {loop_scores[long].cross_track:.2g} against {loop_scores[short].cross_track:.2g}."
+        f" Too long is the straighter in {straighter_count} of the {len(pairs)} cells with a dead"
+        " time.",
     )
 
 

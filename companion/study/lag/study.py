@@ -147,10 +147,7 @@ def _worst_table(grid: Grid) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
         comparisons = [grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times]
-        best_others = [
-            cell_scores.other_methods[cell_scores.best_other].cross_track
-            for cell_scores in comparisons
-        ]
+        best_others = [item.other_methods[item.best_other].cross_track for item in comparisons]
         rows.append(
             (
                 f"{rate:.0f} Hz, {lag} ms",

@@ -72,7 +72,7 @@ class Vehicle:
         for _ in range(round(seconds * _PLANNER_HZ)):
             before = _thrust_and_gravity(self.body.q, thrust)
             rates = self._planner.rates(self.body.q, target, dt, self.body.rates)
-            self.body.turn(rates, _STEPS_PER_SAMPLE)
+            self.body.simulate(rates, _STEPS_PER_SAMPLE)
             after = _thrust_and_gravity(self.body.q, thrust)
             self._move(tuple(0.5 * (a + b) for a, b in zip(before, after, strict=True)), dt)
 
@@ -151,8 +151,8 @@ class Flight:
 
     def _record(self) -> None:
         reference = self._task.trajectory.at(self._task.begin + self._periods / RATE_HZ).position
-        shifted = [a + b for a, b in zip(self._start.position, reference, strict=True)]
-        self.errors.append(dist(shifted, self._vehicle.position))
+        shifted_reference = [a + b for a, b in zip(self._start.position, reference, strict=True)]
+        self.errors.append(dist(shifted_reference, self._vehicle.position))
         self.path.append(self._vehicle.position)
 
     @property
@@ -185,13 +185,13 @@ def fly_all(tick: Tick) -> Flights:
     Other load on the computer therefore slows all equally. The order rotates with every period.
     """
     flights = _new_flights()
-    turns = list(flights.values())
+    flight_order = list(flights.values())
     for second in range(FLIGHT_S):
         tick(f"flights, second {second + 1}")
         for _ in range(round(RATE_HZ)):
-            for flight in turns:
+            for flight in flight_order:
                 flight.step()
-            turns.append(turns.pop(0))
+            flight_order.append(flight_order.pop(0))
     return flights
 
 

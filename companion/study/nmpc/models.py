@@ -204,11 +204,11 @@ def _first_order_target(
 
 def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
     """Rates of the Euler angles, M(φ, θ)⁻¹·ω, for body rates ω = (x, y, z); symbols or numbers."""
-    turning = ca.sin(roll) * y + ca.cos(roll) * z
+    yaw_term = ca.sin(roll) * y + ca.cos(roll) * z
     return (
-        x + ca.tan(pitch) * turning,
+        x + ca.tan(pitch) * yaw_term,
         ca.cos(roll) * y - ca.sin(roll) * z,
-        turning / ca.cos(pitch),
+        yaw_term / ca.cos(pitch),
     )
 
 
@@ -224,10 +224,10 @@ def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
 
 def _heading(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
     """Heading of the tilt-yaw decomposition, 2·atan2(z, w), from Euler angles, rad."""
-    level, tilted = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))
+    coses, sines = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))  # products
     half = 0.5 * yaw
     return 2.0 * ca.atan2(
-        level * ca.sin(half) - tilted * ca.cos(half), level * ca.cos(half) + tilted * ca.sin(half)
+        coses * ca.sin(half) - sines * ca.cos(half), coses * ca.cos(half) + sines * ca.sin(half)
     )
 
 

@@ -75,17 +75,17 @@ def _time_table(flights: Flights) -> Table:
     """Solve times of every model, with one iteration and with iterations to the tolerance."""
     rows: list[tuple[Cell, ...]] = []
     for model in MODELS:
-        single = flights[EIGHT.name, Variant(model)]
-        to_the_end = flights[EIGHT.name, Variant(model, MAX_ITERATIONS)]
+        one_iteration = flights[EIGHT.name, Variant(model)]
+        to_tolerance = flights[EIGHT.name, Variant(model, MAX_ITERATIONS)]
         rows.append(
             (
                 STYLES[model].label,
-                single.solve_ms(50),
-                single.solve_ms(99),
-                to_the_end.solve_ms(50),
-                to_the_end.solve_ms(99),
-                float(np.mean(to_the_end.iterations)),
-                int(max(to_the_end.iterations)),
+                one_iteration.solve_ms(50),
+                one_iteration.solve_ms(99),
+                to_tolerance.solve_ms(50),
+                to_tolerance.solve_ms(99),
+                float(np.mean(to_tolerance.iterations)),
+                int(max(to_tolerance.iterations)),
             )
         )
     return Table(
@@ -124,9 +124,10 @@ def _error_table(flights: Flights) -> Table:
             continue
         circle = flights[CIRCLE.name, variant]
         known = "known" if variant.knows_dead_time else "not known"
-        rows.append(
-            (variant.label, known, circle.rms, circle.largest_error, eight.rms, eight.largest_error)
+        circle_errors, eight_errors = (
+            (flight.rms, flight.largest_error) for flight in (circle, eight)
         )
+        rows.append((variant.label, known, *circle_errors, *eight_errors))
     return Table(
         "nmpc-error",
         "Distance from the trajectory from 4 s on, one iteration per solve at 50 Hz: after"

@@ -69,14 +69,14 @@ def run(tick: Tick) -> Outcome:
         tick(method.label)
         responses[method] = fly(planner_of(method, FIGURE_2.gain), FIGURE_2)
     tick("the error as the paper prints it")
-    printed = fly(
+    printed_response = fly(
         LawPlanner(_printed_quaternion_law, planner_of(QUATERNION, FIGURE_2.gain).constants),
         FIGURE_2,
     )
     rows: list[tuple[Cell, ...]] = []
     for method, response in responses.items():
         rows += _rows(method.label, response, reference)
-    rows += _rows("quaternion, error q_d ⊗ q⁻¹ as printed", printed, reference)
+    rows += _rows("quaternion, error q_d ⊗ q⁻¹ as printed", printed_response, reference)
     return Outcome(
         name="fig2",
         title="Figure 2: step response without limits",
@@ -106,7 +106,7 @@ def run(tick: Tick) -> Outcome:
                 tuple(rows),
             ),
         ),
-        findings=_findings(responses, printed, reference),
+        findings=_findings(responses, printed_response, reference),
     )
 
 
@@ -124,8 +124,8 @@ def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell,
             )
         ]
     rows: list[tuple[Cell, ...]] = []
-    for words, index in zip(("best", "worst"), best_and_worst(deviations), strict=True):
-        row_label = f"{label}, {words} at {degrees(response.step.headings[index]):.0f}°"
+    for rank, index in zip(("best", "worst"), best_and_worst(deviations), strict=True):
+        row_label = f"{label}, {rank} at {degrees(response.step.headings[index]):.0f}°"
         rows.append(
             (
                 row_label,
@@ -177,19 +177,20 @@ def _span(limits: tuple[float, float]) -> float:
 
 
 def _findings(
-    responses: dict[Method, Response], printed: Response, reference: Floats
+    responses: dict[Method, Response], printed_response: Response, reference: Floats
 ) -> tuple[Finding, ...]:
     deviations = {method: largest_deviation(responses[method], reference) for method in responses}
     effect = {method: heading_effect(responses[method]) for method in responses}
     best_other = min(float(deviations[method].min()) for method in (QUATERNION, SO3, EULER))
-    proposed = float(deviations[PROPOSED].max())
+    proposed_deviation = float(deviations[PROPOSED].max())
     return (
         Finding(
             "paper",
             "The proposed method follows the first-order reference; the others do not.",
-            proposed < 0.2 * best_other,
-            f"Largest deviation {proposed:.2g}. The best other method at its best heading has"
-            f" {best_other:.2g}, {best_other / proposed:.0f} times as much (required: 5 times).",
+            proposed_deviation < 0.2 * best_other,
+            f"Largest deviation {proposed_deviation:.2g}. The best other method at its best heading"
+            f" has {best_other:.2g}, {best_other / proposed_deviation:.0f} times as much (required:"
+            " 5 times).",
         ),
         Finding(
             "paper",
@@ -206,10 +207,10 @@ def _findings(
             "ours",
             "Heading does not change the response of the quaternion method with the error"
             " q_d ⊗ q⁻¹, as the paper prints it.",
-            heading_effect(printed) < _SAME_WITHIN,
+            heading_effect(printed_response) < _SAME_WITHIN,
             f"With that error as body rates the paths at two headings differ by up to"
-            f" {heading_effect(printed):.2g}, and the largest deviation is"
-            f" {largest_deviation(printed, reference).max():.2g}.",
+            f" {heading_effect(printed_response):.2g}, and the largest deviation is"
+            f" {largest_deviation(printed_response, reference).max():.2g}.",
         ),
         Finding(
             "paper",

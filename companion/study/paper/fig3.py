@@ -27,7 +27,9 @@ def run(tick: Tick) -> Outcome:
     deviations, cross_tracks = largest_deviation(response, reference), cross_track(response)
     best, worst = best_and_worst(deviations)
     tick(PROPOSED.label)
-    proposed = largest_deviation(fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference)
+    proposed_deviations = largest_deviation(
+        fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference
+    )
     heading_deg = [round(degrees(heading)) for heading in FIGURE_2.headings]
     return Outcome(
         name="fig3",
@@ -56,8 +58,8 @@ def run(tick: Tick) -> Outcome:
                 bool(deviations[best] < 0.5 * deviations[worst]),
                 f"Largest deviation {deviations[best]:.2g} at the best heading,"
                 f" {heading_deg[best]}°, and {deviations[worst]:.2g} at the worst,"
-                f" {heading_deg[worst]}°. The proposed method has {proposed.max():.2g} at every"
-                " heading.",
+                f" {heading_deg[worst]}°. The proposed method has"
+                f" {proposed_deviations.max():.2g} at every heading.",
             ),
         ),
     )

@@ -125,7 +125,7 @@ def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
         error = deviation(quick.responses[method], step.reference())[:, quick.worst_heading(method)]
         draw_line(deviation_panel, step.time, error, method.line)
         times = 1e3 * np.array(list(sweep))
-        values = [tracks[method] for tracks in sweep.values()]
+        values = [cross_tracks[method] for cross_tracks in sweep.values()]
         cross_track_panel.plot(times, values, marker="o", markersize=4, **method.line)
     deviation_panel.set(
         title=f"Distance from first order, {quick}",
@@ -168,19 +168,19 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
 def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[Finding, ...]:
     """Findings on straightness, on the order of the response, and on the effect of heading."""
     others = [method for method in PAPER_METHODS if method is not PROPOSED]
-    straightest_at = [
+    straightest_times = [
         t
         for t, cross_tracks in sweep.items()
         if cross_tracks[PROPOSED] < min(cross_tracks[m] for m in others)
     ]
-    times = ", ".join(f"{1e3 * t:.0f}" for t in straightest_at)
+    times = ", ".join(f"{1e3 * t:.0f}" for t in straightest_times)
     return (
         _straightest("paper", "quick", quick),
         _straightest("ours", "as slow as measured", measured),
         Finding(
             "ours",
             "The proposed method is the straightest with every inner loop.",
-            len(straightest_at) == len(sweep),
+            len(straightest_times) == len(sweep),
             "At heading 0 it is the straightest with "
             + (f"loops of {times} ms (63 % of a rate step)" if times else "none of the loops")
             + ". Its cross-track is "

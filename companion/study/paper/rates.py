@@ -24,16 +24,16 @@ def run(tick: Tick) -> Outcome:
         for method in (PROPOSED, EXACT):
             tick(f"{method.label} at {hz:.0f} Hz")
             responses[method, hz] = fly(planner_of(method, step.gain), step)
-    worst = {
+    largest_deviations = {
         key: float(largest_deviation(response, steps[key[1]].reference()).max())
         for key, response in responses.items()
     }
     rows = tuple(
         (
             round(hz),
-            worst[PROPOSED, hz],
+            largest_deviations[PROPOSED, hz],
             float(cross_track(responses[PROPOSED, hz]).max()),
-            worst[EXACT, hz],
+            largest_deviations[EXACT, hz],
             float(cross_track(responses[EXACT, hz]).max()),
         )
         for hz in RATES_HZ
@@ -42,7 +42,7 @@ def run(tick: Tick) -> Outcome:
         name="rates",
         title="Sample rates: the discretisation error, and the planner without it",
         conditions="The step of figure 2 at 1000, 500, 250, 100 and 50 Hz, three headings.",
-        figure=_figure(responses, worst, steps),
+        figure=_figure(responses, largest_deviations, steps),
         caption=(
             "Largest deviation by sample rate; the deviation over time at 50 Hz; the path of the"
             " proposed method at each rate, a_E enlarged."
@@ -61,31 +61,32 @@ def run(tick: Tick) -> Outcome:
                 rows,
             ),
         ),
-        findings=(_finding(worst),),
+        findings=(_finding(largest_deviations),),
     )
 
 
-def _finding(worst: dict[tuple[Method, float], float]) -> Finding:
+def _finding(largest_deviations: dict[tuple[Method, float], float]) -> Finding:
     slowest, quickest = min(RATES_HZ), max(RATES_HZ)
-    largest = max(worst[EXACT, hz] for hz in RATES_HZ)
+    largest = max(largest_deviations[EXACT, hz] for hz in RATES_HZ)
     return Finding(
         "paper",
         "The deviation of the proposed method comes from discretisation.",
-        worst[PROPOSED, slowest] > 10.0 * worst[PROPOSED, quickest] and largest <= _ROUNDING,
-        f"It grows from {worst[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
-        f" {worst[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With exact, which solves"
-        f" each sample in closed form, it is at most {largest:.1g} at every rate.",
+        largest_deviations[PROPOSED, slowest] > 10.0 * largest_deviations[PROPOSED, quickest]
+        and largest <= _ROUNDING,
+        f"It grows from {largest_deviations[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
+        f" {largest_deviations[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With exact, which"
+        f" solves each sample in closed form, it is at most {largest:.1g} at every rate.",
     )
 
 
 def _figure(
     responses: dict[tuple[Method, float], Response],
-    worst: dict[tuple[Method, float], float],
+    largest_deviations: dict[tuple[Method, float], float],
     steps: dict[float, Step],
 ) -> Figure:
     figure, ((over_rate, over_time, plane),) = new_figure(1, 3, width=4.0)
     for method, marker in ((PROPOSED, "o"), (EXACT, "s")):
-        values = [worst[method, hz] for hz in RATES_HZ]
+        values = [largest_deviations[method, hz] for hz in RATES_HZ]
         over_rate.plot(RATES_HZ, values, marker=marker, label=method.label, **method.line)
     over_rate.set(
         title="Largest deviation",

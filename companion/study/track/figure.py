@@ -40,8 +40,8 @@ _MARKERS = ("o", "s")
 
 def draw_figure(flights: TrackedFlights) -> Figure:
     """Draw the figure that `CAPTION` describes."""
-    telemetry = {task: 1e3 * tracked.telemetry.rms for task, tracked in flights.items()}
-    truth = {task: 1e3 * tracked.truth.rms for task, tracked in flights.items()}
+    telemetry = {task: 1e3 * flight.telemetry_error.rms for task, flight in flights.items()}
+    truth = {task: 1e3 * flight.true_error.rms for task, flight in flights.items()}
     figure, panels = new_figure(4, 2)
     for column, courses in zip(panels.T, (CIRCLES, EIGHTS), strict=True):
         _draw_paths(column[0], flights, courses[-1])

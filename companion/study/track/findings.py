@@ -46,17 +46,17 @@ def find(flights: TrackedFlights) -> tuple[Finding, ...]:
         _smallest(
             flights,
             "In still air no planner has a smaller true position error than model-following.",
-            lambda tracked: tracked.truth.rms,
+            lambda flight: flight.true_error.rms,
         ),
         _in_wind(flights),
-        *(_lead(flights, wind) for wind in (CALM, WINDY)),
+        *(_lead_finding(flights, wind) for wind in (CALM, WINDY)),
         _small_enough(flights),
     )
 
 
-def _telemetry_rms(tracked: TrackedFlight) -> float:
+def _telemetry_rms(flight: TrackedFlight) -> float:
     """RMS error of the position that guidance received, m."""
-    return tracked.telemetry.rms
+    return flight.telemetry_error.rms
 
 
 def _smallest(flights: TrackedFlights, statement: str, error: Error) -> Finding:
@@ -93,16 +93,19 @@ def _in_wind(flights: TrackedFlights) -> Finding:
     return Finding(
         "ours",
         f"In {WINDY:g} m/s of wind model-following has a smaller error than first-order.",
-        all(following < first for following, first in pairs.values()),
+        all(
+            model_following_error < first_order_error
+            for model_following_error, first_order_error in pairs.values()
+        ),
         "; ".join(
-            f"{course}: {_in_mm(following)} against {_in_mm(first)}"
-            for course, (following, first) in pairs.items()
+            f"{course}: {_in_mm(model_following_error)} against {_in_mm(first_order_error)}"
+            for course, (model_following_error, first_order_error) in pairs.items()
         )
         + ".",
     )
 
 
-def _lead(flights: TrackedFlights, wind: float) -> Finding:
+def _lead_finding(flights: TrackedFlights, wind: float) -> Finding:
     ratios = {}
     for course in (CIRCLE_AT_5, EIGHT_AT_5):
         task = Task(course, MODEL_FOLLOWING, LINEAR, wind)
@@ -119,14 +122,14 @@ def _lead(flights: TrackedFlights, wind: float) -> Finding:
 
 
 def _small_enough(flights: TrackedFlights) -> Finding:
-    measured = {task: _telemetry_rms(flights[task]) for task in _REQUIRED}
+    errors_m = {task: _telemetry_rms(flights[task]) for task in _REQUIRED}
     errors = (
-        f"{task}: {_in_mm(measured[task])} of {_in_mm(limit)}" for task, limit in _REQUIRED.items()
+        f"{task}: {_in_mm(errors_m[task])} of {_in_mm(limit)}" for task, limit in _REQUIRED.items()
     )
     return Finding(
         "ours",
         "model-following with linear guidance has an error as small as required.",
-        all(measured[task] <= limit for task, limit in _REQUIRED.items()),
+        all(errors_m[task] <= limit for task, limit in _REQUIRED.items()),
         "; ".join(errors) + ".",
     )
 

@@ -76,7 +76,7 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
     without lead, if there was one.
     """
     rows = []
-    for task, tracked in flights.items():
+    for task, flight in flights.items():
         if not task.lead:
             continue
         without_lead = flights.get(task._replace(lead=False))
@@ -87,17 +87,17 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
                 "planner": task.planner,
                 "guidance": task.guidance,
                 "wind_mps": task.wind,
-                "position_rms_m": _or_null(tracked.telemetry.rms),
-                "position_max_m": _or_null(tracked.telemetry.largest),
-                "true_rms_m": _or_null(tracked.truth.rms),
-                "true_max_m": _or_null(tracked.truth.largest),
+                "position_rms_m": _or_null(flight.telemetry_error.rms),
+                "position_max_m": _or_null(flight.telemetry_error.largest),
+                "true_rms_m": _or_null(flight.true_error.rms),
+                "true_max_m": _or_null(flight.true_error.largest),
                 "not_led_rms_m": None
                 if without_lead is None
-                else _or_null(without_lead.telemetry.rms),
+                else _or_null(without_lead.telemetry_error.rms),
                 "not_led_max_m": None
                 if without_lead is None
-                else _or_null(without_lead.telemetry.largest),
-                "result": tracked.result,
+                else _or_null(without_lead.telemetry_error.largest),
+                "result": flight.result,
             }
         )
     return tuple(rows)
@@ -109,17 +109,17 @@ def _tables(flights: TrackedFlights) -> tuple[Table, ...]:
         _planners_table(
             "track",
             "Position error in still air by telemetry, rms, mm.",
-            {task: tracked.telemetry.rms for task, tracked in flights.items()},
+            {task: flight.telemetry_error.rms for task, flight in flights.items()},
         ),
         _planners_table(
             "track-largest",
             "The largest position error of the same flights, mm.",
-            {task: tracked.telemetry.largest for task, tracked in flights.items()},
+            {task: flight.telemetry_error.largest for task, flight in flights.items()},
         ),
         _planners_table(
             "track-true",
             "Error of the true position in the same flights, rms, mm.",
-            {task: tracked.truth.rms for task, tracked in flights.items()},
+            {task: flight.true_error.rms for task, flight in flights.items()},
         ),
         _lead_and_wind_table(flights),
     )
@@ -151,11 +151,11 @@ def _flights_table(flights: TrackedFlights) -> Table:
                 task.guidance,
                 task.wind,
                 "yes" if task.lead else "no",
-                *_cells(tracked.telemetry),
-                *_cells(tracked.truth),
-                tracked.result,
+                *_cells(flight.telemetry_error),
+                *_cells(flight.true_error),
+                flight.result,
             )
-            for task, tracked in flights.items()
+            for task, flight in flights.items()
         ),
     )
 
@@ -183,7 +183,7 @@ def _planners_table(name: str, caption: str, errors: dict[Task, float]) -> Table
 
 def _lead_and_wind_table(flights: TrackedFlights) -> Table:
     def rms(course: Course, planner: str, wind: float, *, lead: bool = True) -> Cell:
-        return _in_mm(flights[Task(course, planner, LINEAR, wind, lead)].telemetry.rms)
+        return _in_mm(flights[Task(course, planner, LINEAR, wind, lead)].telemetry_error.rms)
 
     return Table(
         "track-lead-and-wind",
