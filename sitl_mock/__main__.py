@@ -36,6 +36,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         settings = load_settings(options.config, _overrides(options))
         if options.check:
+            Simulation(settings)  # it also reads the passphrase of the signing
             sys.stdout.write("configuration is valid\n")
             return EXIT_OK
         servers = _servers(settings, options)
@@ -47,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
     if options.end_with_stdin:
         threading.Thread(target=_end_with_stdin, name="stdin", daemon=True).start()
     for server in servers:
-        sys.stdout.write(f"ready on {server.where}\n")
+        sys.stdout.write(f"ready on {server.address}\n")
     sys.stdout.flush()
     try:
         if len(servers) == 1:
@@ -100,9 +101,9 @@ def _overrides(options: argparse.Namespace) -> dict[str, Any]:
 def _servers(settings: MockSettings, options: argparse.Namespace) -> list[Server]:
     if not 1 <= options.count <= 100:
         raise ConfigError(f"--count must be 1 to 100, not {options.count}")
-    shown = not options.headless and options.count == 1 and sys.stderr.isatty()
+    shows_status = not options.headless and options.count == 1 and sys.stderr.isatty()
     return [
-        Server(settings.for_vehicle(index), 1 + index, StatusLine().show if shown else None)
+        Server(settings.for_vehicle(index), 1 + index, StatusLine().show if shows_status else None)
         for index in range(options.count)
     ]
 
@@ -168,7 +169,7 @@ class StatusLine:
             f"{' FAILSAFE' if state.failsafe else ''}"
             f"  N {north:7.2f}  E {east:7.2f}  up {0.0 - down:6.2f} m"
             f"  roll {roll:4.0f}  pitch {pitch:4.0f}  heading {heading % 360:4.0f} deg"
-            f"  setpoints {simulation.stream.received}"
+            f"  setpoints {simulation.stream.setpoint_count}"
         )
         sys.stderr.write(f"\r{text}\x1b[K")
         sys.stderr.flush()

@@ -7,7 +7,7 @@ import socket
 from sitl_mock.config.endpoint import SerialLine, TcpIn, parse_endpoint
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.control_channel import reply
-from sitl_mock.exchange import Arrived, Exchange
+from sitl_mock.exchange import Exchange, ReceivedDatagram
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.link import Link
 from sitl_mock.link.serial_endpoint import SerialEndpoint
@@ -56,14 +56,14 @@ class Connections:
 
         Requests on the control channel are answered here.
         """
-        by_descriptor = {fd: endpoint for endpoint in self._links for fd in endpoint.readable}
+        by_descriptor = {fd: endpoint for endpoint in self._links for fd in endpoint.descriptors}
         control = [] if self._control is None else [self._control.fileno()]
         readable, _, _ = select.select([*by_descriptor, *control], (), (), timeout_s)
         if self._control is not None and self._control.fileno() in readable:
             self._answer_requests(self._control)
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 
-    def deliver(self, arrived: list[Arrived], endpoint: Endpoint) -> None:
+    def deliver(self, arrived: list[ReceivedDatagram], endpoint: Endpoint) -> None:
         """Pass the datagrams that arrived on an endpoint to the autopilot."""
         self._exchange.deliver(arrived, self._links[endpoint])
 

@@ -18,7 +18,7 @@ from typing import Any, TypedDict
 from pydantic import ValidationError
 
 from sitl_mock.config.faults import Fault, fault_adapter
-from sitl_mock.config.section import ConfigError, wrong_member, wrong_value
+from sitl_mock.config.section import ConfigError, describe_wrong_member, describe_wrong_value
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.simulation import Simulation
 
@@ -35,7 +35,7 @@ class Truth(TypedDict):
     """Vehicle time since boot, s."""
     armed: bool
     mode: str
-    """PX4's mode names or ArduCopter's."""
+    """Flight mode, by PX4's or ArduCopter's name."""
     intended_mode: str
     """The mode that the user chose last. A failsafe of PX4 does not change it; on ArduPilot it is
     always ``mode``."""
@@ -53,7 +53,7 @@ class Truth(TypedDict):
     touchdown_speed: float | None
     """Sink speed of the last touchdown, m/s; None before the first."""
     battery: float
-    """Charge, 0..1."""
+    """Battery charge, 0..1."""
     setpoints: int
     """Number of setpoints that the autopilot accepted."""
     last_setpoint: float | None
@@ -69,7 +69,7 @@ def reply(simulation: Simulation, request: bytes) -> bytes:
 
 
 def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
-    """Inject a fault of the configuration; without a start it begins in the next slot.
+    """Inject a fault, given as in the configuration; without a start it begins in the next slot.
 
     Raises:
         ConfigError: the fault has an unknown kind, an unknown key or an invalid value; the message
@@ -78,13 +78,15 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     if not isinstance(fault, Mapping):
         raise ConfigError(f"a fault is written as {{'kind': 'gps_loss'}}, not as {fault!r}")
     try:
-        valid = fault_adapter.validate_python(dict(fault))
+        valid_fault = fault_adapter.validate_python(dict(fault))
     except ValidationError as error:
         detail = error.errors()[0]
-        where = ".".join(str(part) for part in detail["loc"])
-        refused = wrong_member(detail, Fault) or f" {where}{wrong_value(error)}"
-        raise ConfigError(f"fault{refused}") from error
-    simulation.faults.add(valid, simulation.time_us)
+        key_path = ".".join(str(part) for part in detail["loc"])
+        problem = (
+            describe_wrong_member(detail, Fault) or f" {key_path}{describe_wrong_value(error)}"
+        )
+        raise ConfigError(f"fault{problem}") from error
+    simulation.faults.add(valid_fault, simulation.time_us)
 
 
 def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:
@@ -110,7 +112,8 @@ def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:
 def truth(simulation: Simulation) -> Truth:
     """Return the true state of the vehicle, and what its autopilot reports."""
     state, stream = simulation.state, simulation.stream
-    true = simulation.vehicle.truth
+    true_state = simulation.vehicle.truth
+    touchdown_speed = true_state.touchdown_speed
     signing = simulation.companion.signing
     return {
         "time": state.time_s,
@@ -120,15 +123,15 @@ def truth(simulation: Simulation) -> Truth:
         "failsafe": state.failsafe,
         "landed": state.landed,
         "aborted": state.aborted,
-        "position": true.position_ned,
-        "velocity": true.velocity_ned,
-        "q": true.q,
-        "rates": true.body_rates,
-        "on_ground": true.on_ground,
-        "crashed": true.crashed,
-        "touchdown_speed": None if isnan(true.touchdown_speed) else true.touchdown_speed,
+        "position": true_state.position_ned,
+        "velocity": true_state.velocity_ned,
+        "q": true_state.q,
+        "rates": true_state.body_rates,
+        "on_ground": true_state.on_ground,
+        "crashed": true_state.crashed,
+        "touchdown_speed": None if isnan(touchdown_speed) else touchdown_speed,
         "battery": simulation.vehicle.battery.remaining,
-        "setpoints": stream.received,
+        "setpoints": stream.setpoint_count,
         "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
         "signing": None if signing is None else signing.counts(),
     }

@@ -16,10 +16,10 @@ from sitl_mock.link.pipe import DatagramPipe
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
-Arrived = tuple[bytes, list[Message]]
+ReceivedDatagram = tuple[bytes, list[Message]]
 """A datagram and the messages in it."""
 
-_ANSWERS = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
+_ANSWER_MESSAGES = frozenset({"SET_ATTITUDE_TARGET", "SYSTEM_TIME"})
 """Messages that answer a lockstep beacon."""
 
 
@@ -54,7 +54,7 @@ class Exchange:
         self._lockstep = settings.lockstep.enabled
         self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
 
-    def step(self, arrived: list[Arrived]) -> bytes | None:
+    def step(self, arrived: list[ReceivedDatagram]) -> bytes | None:
         """Handle the datagrams that arrived on the companion link, and simulate one slot.
 
         Returns:
@@ -64,10 +64,10 @@ class Exchange:
         self._simulation.tick()
         return self._simulation.beacon() if self._lockstep else None
 
-    def deliver(self, arrived: list[Arrived], link: Link) -> None:
+    def deliver(self, arrived: list[ReceivedDatagram], link: Link) -> None:
         """Pass datagrams of a link to the autopilot; the companion's go through the link faults."""
         simulation = self._simulation
-        faults = simulation.faults.link
+        faults = simulation.faults.link_faults
         if link is self._companion and not self._pipe_in.is_clear(faults):
             datagrams = [datagram for datagram, _ in arrived]
             passed = self._pipe_in.push(datagrams, faults, simulation.time_us)
@@ -85,7 +85,7 @@ class Exchange:
         The faults of the companion link apply to all but the beacon.
         """
         frames = link.take()
-        faults = self._simulation.faults.link
+        faults = self._simulation.faults.link_faults
         if link is self._companion and not self._pipe_out.is_clear(faults):
             frames = self._pipe_out.push(frames, faults, self._simulation.time_us)
         if beacon is not None:
@@ -96,12 +96,12 @@ class Exchange:
         """Whether one of these messages answers the latest lockstep beacon."""
         now_ms = self._simulation.time_us // 1000
         return any(
-            message.get_type() in _ANSWERS and message.time_boot_ms == now_ms
+            message.get_type() in _ANSWER_MESSAGES and message.time_boot_ms == now_ms
             for message in messages
         )
 
     def is_repeated_answer(self, messages: list[Message]) -> bool:
-        """Whether this datagram only answers an earlier beacon, which was sent twice.
+        """Whether a datagram is only a second answer to an earlier beacon, which was sent twice.
 
         The number of beacons depends on the wall clock. The link faults draw a random number for
         each datagram, so a second answer would make the flight depend on the wall clock, too.

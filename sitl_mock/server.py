@@ -5,16 +5,16 @@ import time
 from collections.abc import Callable
 
 from sitl_mock.connections import Connections
-from sitl_mock.exchange import Arrived, Exchange, burst_time
+from sitl_mock.exchange import Exchange, ReceivedDatagram, burst_time
 from sitl_mock.link.endpoint import Endpoint
 from sitl_mock.link.framing import decode
 from sitl_mock.settings import MockSettings
 from sitl_mock.simulation import Simulation
 
 FIRST_BEACON_PERIOD_S = 0.05
-"""Without an answer, the first beacon is sent again after this wall time, s."""
+"""Wall time after which an unanswered first beacon is sent again, s."""
 BEACON_PERIOD_S = 0.2
-"""Without an answer, a beacon after the first is sent again after this wall time, s."""
+"""Wall time after which an unanswered later beacon is sent again, s."""
 MAX_LAG_S = 1.0
 """Largest lag behind real time that the server makes up, s. A busy computer causes lags of tenths
 of a second. If they were dropped, the link would seem slower to the companion.
@@ -30,7 +30,7 @@ class Server:
     Args:
         settings: settings of this vehicle (see `MockSettings.for_vehicle`).
         system_id: MAVLink system id.
-        status: shows the running vehicle after each slot, None = headless.
+        show_status: shows the running vehicle after each slot, None = headless.
 
     Raises:
         ConfigError: an endpoint cannot be opened (see `Connections`), or the signing passphrase
@@ -41,26 +41,26 @@ class Server:
         self,
         settings: MockSettings,
         system_id: int = 1,
-        status: Callable[[Simulation], None] | None = None,
+        show_status: Callable[[Simulation], None] | None = None,
     ) -> None:
         self._settings = settings
-        self._status = status
+        self._show_status = show_status
         self._simulation = Simulation(settings, system_id)
         self._exchange = Exchange(settings, self._simulation)
         self._connections = Connections(settings, self._simulation, self._exchange)
         self._companion = self._connections.companion
-        self._lockstep = settings.lockstep.enabled
+        self._in_lockstep = settings.lockstep.enabled
         self._beacon = b""
-        self._answered = False
-        self._collected: list[Arrived] = []
+        self._beacon_answered = False
+        self._collected_datagrams: list[ReceivedDatagram] = []
         self._origin_wall_s = 0.0
         self._origin_us = 0
         self._simulation.set_clock(self._clock_ns)
 
     @property
-    def where(self) -> str:
-        """Address of the companion endpoint, for the user."""
-        return self._companion.where
+    def address(self) -> str:
+        """Address of the companion endpoint, as text for the user."""
+        return self._companion.address
 
     def run(self) -> None:
         """Run until an exception, such as `KeyboardInterrupt`, ends the run."""
@@ -83,17 +83,17 @@ class Server:
 
     def _step(self) -> None:
         """Simulate one slot: in lockstep after the latest answer, else when it is due."""
-        if not self._lockstep:
+        if not self._in_lockstep:
             self._wait_for_time()
-        collected, self._collected = self._collected, []
-        beacon = self._exchange.step(collected)
+        datagrams, self._collected_datagrams = self._collected_datagrams, []
+        beacon = self._exchange.step(datagrams)
         if beacon is not None:
-            self._beacon, self._answered = beacon, False
+            self._beacon, self._beacon_answered = beacon, False
         self._connections.flush(beacon)
-        if self._lockstep:
+        if self._in_lockstep:
             self._await_answer()
-        if self._status is not None:
-            self._status(self._simulation)
+        if self._show_status is not None:
+            self._show_status(self._simulation)
 
     # Lockstep
 
@@ -104,28 +104,31 @@ class Server:
         """
         self._beacon = self._simulation.beacon()
         self._connections.send_beacon(self._beacon)
-        heard_at: float | None = None
-        while not self._answered:
+        first_bytes_at: float | None = None
+        while not self._beacon_answered:
             self._collect(FIRST_BEACON_PERIOD_S)
             self._connections.send_beacon(self._beacon)
             now = time.monotonic()
-            if heard_at is None and self._companion.heard:
-                heard_at = now
-            if heard_at is not None and now - heard_at > self._settings.lockstep.patience_s:
-                self._lockstep = False
+            if first_bytes_at is None and self._companion.has_received:
+                first_bytes_at = now
+            if (
+                first_bytes_at is not None
+                and now - first_bytes_at > self._settings.lockstep.patience_s
+            ):
+                self._in_lockstep = False
                 return
 
     def _await_answer(self) -> None:
-        """Wait for the answer; after ``patience_s`` continue in real time."""
+        """Wait for the answer to the latest beacon; after ``patience_s`` continue in real time."""
         self._collect(BEACON_PERIOD_S)
-        if self._answered:
+        if self._beacon_answered:
             return
         deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_PERIOD_S
-        while not self._answered and time.monotonic() < deadline:
+        while not self._beacon_answered and time.monotonic() < deadline:
             self._connections.send_beacon(self._beacon)
             self._collect(BEACON_PERIOD_S)
-        if not self._answered:
-            self._lockstep = False
+        if not self._beacon_answered:
+            self._in_lockstep = False
             self._reset_origin()
 
     def _collect(self, timeout_s: float) -> None:
@@ -137,10 +140,10 @@ class Server:
         began = time.monotonic()
         self._collect_companion()  # frames already buffered from a byte stream do not wake select
         self._poll(0.0)
-        while not self._answered and time.monotonic() - began < SPIN_S:
+        while not self._beacon_answered and time.monotonic() - began < SPIN_S:
             self._collect_companion()
             os.sched_yield()  # let another process use this core
-        while not self._answered:
+        while not self._beacon_answered:
             remaining_s = began + timeout_s - time.monotonic()
             if remaining_s <= 0.0:
                 return
@@ -155,8 +158,8 @@ class Server:
                 self._serve(endpoint)
 
     def _collect_companion(self) -> None:
-        """Read the companion's datagrams up to and including the answer."""
-        while not self._answered:
+        """Read the companion's datagrams up to and including the answer to the latest beacon."""
+        while not self._beacon_answered:
             received = self._companion.receive()
             if received is None:
                 return
@@ -164,9 +167,9 @@ class Server:
             messages = decode(datagram)
             if from_partner and self._exchange.is_repeated_answer(messages):
                 continue
-            self._collected.append((datagram, messages))
+            self._collected_datagrams.append((datagram, messages))
             if from_partner and self._exchange.is_answer(messages):
-                self._answered = True
+                self._beacon_answered = True
 
     # Real time
 
@@ -176,7 +179,7 @@ class Server:
             self._connections.ready(BEACON_PERIOD_S)
 
     def _reset_origin(self) -> None:
-        """Make the present the origin of real time."""
+        """Let the present wall-clock time correspond to the present vehicle time."""
         self._origin_wall_s = time.monotonic()
         self._origin_us = self._simulation.time_us
 
@@ -188,15 +191,15 @@ class Server:
         self._origin_wall_s += self._simulation.effects.take_slip()
         speed = self._settings.speed
         elapsed_s = (self._simulation.next_us - self._origin_us) / speed / 1e6
-        due = self._origin_wall_s + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
-        remaining_s = due - time.monotonic()
+        due_s = self._origin_wall_s + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
+        remaining_s = due_s - time.monotonic()
         if remaining_s < -MAX_LAG_S:
             self._reset_origin()
         while True:
             for endpoint in self._connections.ready(max(0.0, remaining_s)):
                 self._serve(endpoint)
-            remaining_s = due - time.monotonic()
-            if remaining_s <= 0.0 or self._lockstep:
+            remaining_s = due_s - time.monotonic()
+            if remaining_s <= 0.0 or self._in_lockstep:
                 return
 
     def _serve(self, endpoint: Endpoint) -> None:
@@ -208,18 +211,18 @@ class Server:
             in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
             if in_lockstep and from_partner and self._exchange.is_answer(messages):
                 # The latest beacon is answered: lockstep resumes.
-                self._answered = self._lockstep = True
+                self._beacon_answered = self._in_lockstep = True
         self._connections.flush()
 
     def _clock_ns(self) -> int:
         """Return vehicle time for TIMESYNC, ns.
 
         In real time it advances between slots with the wall clock, up to the next slot. While a
-        fault freezes the clock, it stands still.
+        fault freezes the clock, it does not advance.
         """
         simulation = self._simulation
-        if self._lockstep or simulation.effects.clock_frozen:
-            return simulation.state.shown_us * 1000
+        if self._in_lockstep or simulation.effects.clock_frozen:
+            return simulation.state.stamp_us * 1000
         wall_us = (time.monotonic() - self._origin_wall_s) * 1e6 * self._settings.speed
         now_us = min(self._origin_us + wall_us, simulation.next_us)
         return round(max(now_us, simulation.time_us) * 1000)

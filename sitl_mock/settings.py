@@ -13,7 +13,7 @@ from sitl_mock.config.yaml_file import Document, FileRefusedError, explain_yaml,
 from sitl_mock.personalities import PERSONALITIES
 
 SENSORS_WITH_FILTER = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
-"""Defaults of ``sensors`` with a navigation filter: its output is smooth, and as recent as the
+"""Defaults of ``sensors`` with a navigation filter, whose output is smooth and as recent as the
 attitude."""
 
 
@@ -51,8 +51,8 @@ def _with_ekf(section: dict[str, Any]) -> object:
     sensors = section.get("sensors", {})
     if not isinstance(sensors, dict):
         return sensors
-    filled = {"ekf": section.get("autopilot", "px4"), **sensors}
-    return filled if filled["ekf"] in (None, "none") else {**SENSORS_WITH_FILTER, **filled}
+    completed = {"ekf": section.get("autopilot", "px4"), **sensors}
+    return completed if completed["ekf"] in (None, "none") else {**SENSORS_WITH_FILTER, **completed}
 
 
 def load_settings(

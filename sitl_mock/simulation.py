@@ -36,10 +36,10 @@ class Simulation:
         plant: computes the physics, see `Vehicle`.
 
     Attributes:
-        vehicle: the true vehicle.
+        vehicle: the simulated vehicle: true motion, battery and sensors.
         state: the estimate, modes and targets of its autopilot.
         parameters: parameters of the autopilot.
-        stream: the latest offboard setpoint that the autopilot accepted, and their number.
+        stream: the latest accepted offboard setpoint, and the number of accepted ones.
         commander: arming and modes of the autopilot.
         companion: link to the companion.
         gcs: link to the ground station; nothing is sent on it if ``gcs_port`` is 0.
@@ -71,15 +71,15 @@ class Simulation:
         self._slot_us = (
             lockstep.period_ms * 1000 if lockstep.enabled else personality.slot_us(settings)
         )
-        self._slots = 0
-        self._rate_hz = settings.airframe.physics_rate_hz
+        self._slot_count = 0
+        self._physics_rate_hz = settings.airframe.physics_rate_hz
         self._next_commander_us = 0
         self.stream = OffboardStream()
         self.companion, self.gcs = _make_links(settings, personality, system_id)
         self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
         signed = settings.signing is not None
         self._beacon_framer = Framer(system_id, 1, signed=signed)
-        self._rules = personality.rules(
+        self._behaviour = personality.behaviour(
             VehicleParts(
                 self.state,
                 self.parameters,
@@ -91,12 +91,12 @@ class Simulation:
                 StampSlips(settings.sensors.stamp_slips_hz, settings.seed),
             )
         )
-        self.commander = self._rules.commander
+        self.commander = self._behaviour.commander
         self.faults = FaultSchedule(settings.faults)
         self.effects = FaultEffects(
-            self.state, self.vehicle, self.commander, self._rules.control, self.links
+            self.state, self.vehicle, self.commander, self._behaviour.control, self.links
         )
-        self._receiver = Receiver(self.state, self._rules, personality, system_id)
+        self._receiver = Receiver(self.state, self._behaviour, personality, system_id)
 
     @property
     def time_us(self) -> int:
@@ -106,7 +106,7 @@ class Simulation:
     @property
     def next_us(self) -> int:
         """Vehicle time of the next slot, us, rounded down to a whole ms."""
-        next_us = (self._slots + 1) * self._slot_us
+        next_us = (self._slot_count + 1) * self._slot_us
         return next_us - next_us % 1000
 
     def clear_faults(self) -> None:
@@ -129,20 +129,20 @@ class Simulation:
         """Simulate to the next slot, then queue the telemetry that is due."""
         state = self.state
         next_us = self.next_us
-        self._slots += 1
+        self._slot_count += 1
         if state.aborted:
             state.time_us = next_us
             return
-        command = self._rules.control.command((next_us - state.time_us) / 1e6)
+        command = self._behaviour.control.command((next_us - state.time_us) / 1e6)
         vehicle = self.vehicle
-        vehicle.step(command, next_us * self._rate_hz // 1_000_000 - vehicle.steps)
+        vehicle.step(command, next_us * self._physics_rate_hz // 1_000_000 - vehicle.steps)
         state.time_us = next_us
         if not self.effects.clock_frozen:
-            state.shown_us = next_us
+            state.stamp_us = next_us
         state.estimate = vehicle.estimate()
         self._update_state()
-        self._rules.parameter_protocol.step()
-        self._send_due(self._slots * self._slot_us)
+        self._behaviour.parameter_protocol.step()
+        self._send_due(self._slot_count * self._slot_us)
 
     def boot(self) -> None:
         """Queue the telemetry of time 0."""
@@ -155,25 +155,27 @@ class Simulation:
         return self._beacon_framer.frame_raw(_SYSTEM_TIME.id, _SYSTEM_TIME.crc_extra, payload)
 
     def _update_state(self) -> None:
-        state, vehicle, rules = self.state, self.vehicle, self._rules
-        rules.land_detector.step(contact=vehicle.on_ground)
-        if rules.commander.under_setpoints and self.effects.offboard_us is None:
+        state, vehicle, behaviour = self.state, self.vehicle, self._behaviour
+        behaviour.land_detector.step(contact=vehicle.on_ground)
+        if behaviour.commander.under_setpoints and self.effects.offboard_us is None:
             self.effects.offboard_us = state.time_us
-        began, ended = self.faults.update(state.time_us, self.effects.offboard_us)
-        if began or ended:
-            self.effects.apply(began, ended)
+        begun_faults, ended_faults = self.faults.update(state.time_us, self.effects.offboard_us)
+        if begun_faults or ended_faults:
+            self.effects.apply(begun_faults, ended_faults)
         if state.time_us >= self._next_commander_us:
             self._next_commander_us += COMMANDER_PERIOD_US
             state.battery_remaining = vehicle.battery.remaining
-            self.effects.watch_position(rules.converged_us, rules.position_timeout_us())
-            rules.commander.step(crashed=vehicle.crashed)
+            self.effects.update_position_valid(
+                behaviour.position_valid_from_us, behaviour.position_timeout_us()
+            )
+            behaviour.commander.step(crashed=vehicle.crashed)
 
     def _send_due(self, slot_us: int) -> None:
-        builders, silenced = self._rules.builders, self.effects.silenced
+        builders, is_stopped = self._behaviour.builders, self.effects.is_stopped
         for link in self.links:
             for message_id in link.streams.due(slot_us, self.state.status_us):
                 builder = builders.get(message_id)
-                if builder is None or silenced(message_id):
+                if builder is None or is_stopped(message_id):
                     continue
                 message = builder()
                 if message is not None:

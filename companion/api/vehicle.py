@@ -222,7 +222,7 @@ class Vehicle:
         """
         if self._program.end_error is not None:
             raise self._program.end_error
-        pose = self._context.guidance_loop.flown.pose
+        pose = self._context.guidance_loop.flown_source.pose
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
         return pose

@@ -21,6 +21,7 @@ from companion.campaign.keys import with_keys
 from companion.campaign.swept import Value, column_value
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
+from companion.flight.start_checks import require_solver
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class Campaign:
         Raises:
             ConfigError: the program or the mock vehicle refuses its configuration; the message
                 names the case and the key.
+            MissingExtraError: CasADi is not installed, and guidance is predictive.
         """
         factors = {name: _stored_value(name, value) for name, value in planned.values.items()}
         changes: dict[str, Any] = {}
@@ -69,7 +71,7 @@ class Campaign:
                     changes[key] = self._new_value(name, key, value)
         try:
             config = with_keys(self.base, changes)
-            _check_flyable(config)
+            require_solver(config)
             fault = self._fault(planned.values)
         except ConfigError as error:
             case = Case(planned.index, planned.seed, factors, self.base, None, {}, 0.0)
@@ -124,14 +126,6 @@ class Campaign:
             return {}
         folder = f"{path.parent.as_posix()}/"
         return {name: text for name, text in self.files.items() if name.startswith(folder)}
-
-
-def _check_flyable(config: Config) -> None:
-    if config.guidance.kind == "nmpc":
-        raise ConfigError(
-            "guidance.kind: nmpc solves in a process of its own, for which the virtual clock of a "
-            "campaign does not wait; compare it by `companion study track`"
-        )
 
 
 def _stored_value(name: str, value: Any) -> Value:

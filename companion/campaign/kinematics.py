@@ -31,7 +31,7 @@ from companion.control.inner_loop import planner
 from companion.files.yaml_file import ConfigError
 from companion.guidance import Corners, Steps
 from companion.guidance.reference import Pose
-from companion.recording.measurements.verdict import STRAIGHTNESS
+from companion.recording.measurements.verdict import MAX_LINE_DISTANCE
 
 
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
@@ -108,7 +108,7 @@ def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -
         "rate_max_rad_s": figures.rate_max,
     }
     is_finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
-    is_straight = is_finite and figures.cross_axis_max <= STRAIGHTNESS * longest_target
+    is_straight = is_finite and figures.cross_axis_max <= MAX_LINE_DISTANCE * longest_target
     result = "ok" if is_straight else "not straight" if is_finite else "not finite"
     return {
         "ok": is_straight,

@@ -119,7 +119,7 @@ def _add_doctor(commands: Commands) -> None:
         type=number(0.01, 3600.0),
         default=10.0,
         metavar="SECONDS",
-        help="longest wait until the vehicle is ready (10)",
+        help="longest wait until the vehicle is ready, s (10)",
     )
     fix_or_undo = command.add_mutually_exclusive_group()
     add_flag(

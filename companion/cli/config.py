@@ -52,7 +52,7 @@ def _named_keys(config: Config, name: str) -> list[ConfigKey]:
 
 
 def _suggestions(known: list[ConfigKey], name: str) -> list[str]:
-    """The keys whose names contain a mistyped name, else the most similar section or keys."""
+    """Suggestions for an unknown name: the keys that contain it, else the most similar ones."""
     dotted = {f"{key.section}.{key.name}": key for key in known}
     containing = [each for each, key in dotted.items() if name in key.name]
     if containing:

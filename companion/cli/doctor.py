@@ -97,7 +97,7 @@ def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None
 
 
 def _response(config: Config) -> list[Finding]:
-    """The expected response, and whether the gain is too large for the vehicle."""
+    """The finding on the expected response: whether the gain is too large for the vehicle."""
     if config.planner_name not in PLANNER_NAMES:
         return []
     response = expected_response(config)
@@ -116,7 +116,10 @@ class _DoctorRun:
         self.result: dict[str, Any] = {}
 
     async def run_checks(self, wait: float, *, fix: bool, without_asking: bool) -> int:
-        """Run the checks and report; with `fix`, set parameters and repeat. Return exit code."""
+        """Check the vehicle and report; with `fix`, set parameters and check again.
+
+        `wait` is the longest wait until the vehicle is ready, s. Returns the exit code.
+        """
         config = self._config
         async with open_session(config, self._make_link) as vehicle:
             self.say(f"Asking the vehicle on {config.link.endpoint} …")
@@ -128,8 +131,8 @@ class _DoctorRun:
             except (LinkTimeout, LinkLost) as error:
                 return self._report(vehicle.unanswered_findings(error))
             drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
-            flown, refusals = _maneuvers(config, drag)
-            evidence = replace(evidence, maneuvers=flown, known_drag=drag)
+            maneuvers, refusals = _maneuvers(config, drag)
+            evidence = replace(evidence, maneuvers=maneuvers, known_drag=drag)
             findings = [*refusals, *run_checks(config, evidence), *_response(config)]
             code = self._report(findings)
             if fix:
@@ -140,7 +143,7 @@ class _DoctorRun:
         return open_link(self._config, None, notice)
 
     def report_interrupt(self) -> int:
-        """Report that Ctrl-C ended the run, and which parameters it had set; return exit code."""
+        """Report Ctrl-C, and which parameters were set before it; return the exit code."""
         self.say("Interrupted; every parameter that was set is listed above.")
         changes = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result |= {"result": "interrupted", "changes": changes}

@@ -33,7 +33,7 @@ from companion.recording.summary_tables import flight_table, words_text
 
 
 def with_options(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
-    """The configuration as changed by the options of the command line, and by `planner`, its name.
+    """The configuration as changed by the options of the command line and the planner's name.
 
     Raises:
         ConfigError: options and configuration contradict each other, or the trajectory, or a
@@ -118,7 +118,7 @@ def fly(
             shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
             raise
     # The vehicle is handed back and the record is complete: signals may interrupt again.
-    interrupts.raise_interrupt(interrupts.unhandled())
+    interrupts.raise_interrupt(interrupts.signals_with_default_handler())
     with suppress(OSError):
         console.print(flight_table(summary))
         console.print(f"Recorded in {folder}", soft_wrap=True)
@@ -132,7 +132,7 @@ def fly(
 
 
 def write_flight_page(folder: Path) -> str:
-    """Write the page about a flight; return where the page is, or why there is none, in words."""
+    """Write the page about a flight; return a sentence: where it is, or why there is none."""
     from companion.report.page import write_report  # noqa: PLC0415  after the flight only
 
     try:

@@ -89,7 +89,7 @@ def _log_of(given: Path) -> Path:
 
 
 def _suggestion(folder: Path) -> str:
-    """The end of a message: the log in a folder, else the newest flight in a folder of flights."""
+    """End of an error message that suggests the log in `folder`, else the newest flight there."""
     if (folder / TLOG_FILE).is_file():
         return f"; write --log {shlex.quote(str(folder / TLOG_FILE))}"
     flights = sorted(folder.glob(f"*/{TLOG_FILE}"), key=lambda log: log.stat().st_mtime)
@@ -126,16 +126,16 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
         _print_json(options, {"result": str(error), "log": str(log), **_figures(vehicle)})
         return EXIT_FAILURE
     _write_fit(out, text, flown_folder=None if options.log is not None else log.parent)
-    kept = {
+    kept_values = {
         axis: f"kept from the configuration ({keys.described()}): {vehicle.axes[axis].flaw()}"
         for axis, keys in kept_axes(vehicle, configured_axes).items()
     }
     with suppress(OSError):
         console.print(vehicle_table(vehicle, GRAVITY))
-        for axis, words in kept.items():
+        for axis, words in kept_values.items():
             console.print(f"{axis}: {words}", style="bold yellow", soft_wrap=True)
         console.print(_how_to_include(out, options.config), soft_wrap=True)
-    result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept}
+    result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept_values}
     _print_json(options, {**result, **_figures(vehicle)})
     return EXIT_OK
 
@@ -149,7 +149,7 @@ def _configured_axes(log: Path) -> dict[str, AxisKeys]:
 
 
 def _flight_name(log: Path) -> str:
-    """The name of a flight's folder, or of another program's log; `?` for what is not UTF-8."""
+    """Name of a flight's folder or of another program's log, with `?` for bytes not in UTF-8."""
     path = log.resolve()
     name = path.parent.name if path.name == TLOG_FILE else path.name
     return name.encode("utf-8", "replace").decode("utf-8")[:_LONGEST_NAME]

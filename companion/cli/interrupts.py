@@ -25,10 +25,10 @@ _DEFAULT_HANDLERS: dict[signal.Signals, Handler] = {
 }
 
 
-def unhandled() -> list[signal.Signals]:
-    """Those of the three signals that still have their default handler.
+def signals_with_default_handler() -> list[signal.Signals]:
+    """Those of SIGINT, SIGTERM and SIGHUP that still have their default handler.
 
-    With `nohup`, SIGHUP is not among them, because it is ignored.
+    `nohup` has SIGHUP ignored, so SIGHUP is then not among them.
     """
     return [
         number

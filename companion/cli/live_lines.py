@@ -34,15 +34,15 @@ def status_lines(status: FlightStatus) -> list[str]:
 
 def _activity(status: FlightStatus) -> str:
     if status.maneuver is not None:
-        of_duration = (
+        duration_text = (
             "" if status.maneuver_duration is None else f" of {status.maneuver_duration:.0f}"
         )
-        return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{of_duration} s"
+        return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{duration_text} s"
     return f"{status.detail or 'working'} ({allowed_time(status.elapsed, status.timeout)})"
 
 
 def allowed_time(elapsed: float, timeout: float) -> str:
-    """Time that a phase has lasted, and its limit, s."""
+    """Text with the time that a phase has lasted and its limit, s."""
     return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
 
 
@@ -89,18 +89,18 @@ class LiveLines:
 
     def show(self, lines: Sequence[str], *, alarm: bool = False) -> None:
         """Replace the lines; with `alarm`, the last one shows an alarm."""
-        go_back, columns = self._to_first_line(), self._columns()
+        to_first_line, columns = self._to_first_line(), self._columns()
         plain = lines if self._is_unicode else [ascii_for(line) for line in lines]
         self._lines = [line[: columns - 1] for line in plain]
         drawn = list(self._lines)
         if alarm and drawn:
             drawn[-1] = _RED.format(drawn[-1])
-        self._write(go_back + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
+        self._write(to_first_line + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
 
-    def above(self, text: str) -> None:
+    def write_above(self, text: str) -> None:
         """Write `text`, which consists of whole lines, above the status lines."""
-        kept = "".join(f"{line}\n" for line in self._lines)
-        self._write(f"{self._to_first_line()}\x1b[J{text}{kept}")
+        status_text = "".join(f"{line}\n" for line in self._lines)
+        self._write(f"{self._to_first_line()}\x1b[J{text}{status_text}")
 
     def clear(self) -> None:
         """Remove the lines."""

@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit code. Without arguments those of this process are used."""
     if arguments is None:
         _use_utf8_names()
-    our_signals = interrupts.unhandled()
+    our_signals = interrupts.signals_with_default_handler()
     interrupts.leave_at_once(our_signals)
     try:
         try:
@@ -59,7 +59,7 @@ def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:
     """Parse the arguments and import their command; return a function that runs it."""
     # Our matrices are small: a second thread takes twice the CPU time and is slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from companion.cli.text_streams import lost_output, print_anything  # noqa: PLC0415
+    from companion.cli.text_streams import output_fault, print_anything  # noqa: PLC0415
 
     print_anything()
     from companion.cli.command_line import parse  # noqa: PLC0415
@@ -67,7 +67,7 @@ def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:
     try:
         options = parse(arguments)
     finally:
-        lost_output()  # no error if nobody reads the help to its end
+        output_fault()  # no error if nobody reads the help to its end
     from companion.cli.run import command_of, run  # noqa: PLC0415
 
     command = command_of(options)

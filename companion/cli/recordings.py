@@ -61,14 +61,14 @@ def export(options: argparse.Namespace) -> int:
     from companion.recording.export import export_csv, export_parquet  # noqa: PLC0415
 
     record = read_flight(options.folder)
-    into: Path = options.into or options.folder / "export"
+    out_folder: Path = options.into or options.folder / "export"
     write = export_parquet if options.parquet else export_csv
     try:
-        into.mkdir(parents=True, exist_ok=True)
-        written = write(record, into)
+        out_folder.mkdir(parents=True, exist_ok=True)
+        row_counts = write(record, out_folder)
     except OSError as error:
-        raise ConfigError(f"{into}: cannot write there: {error.strerror}") from error
-    for path, rows in written.items():
+        raise ConfigError(f"{out_folder}: cannot write there: {error.strerror}") from error
+    for path, rows in row_counts.items():
         print(f"{path}  {rows:,} rows")
     return EXIT_OK if _is_whole(record) else EXIT_FAILURE
 

@@ -9,7 +9,7 @@ from importlib import import_module
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_USAGE
-from companion.cli.text_streams import lost_output
+from companion.cli.text_streams import output_fault
 from companion.demo import VehicleStoppedError
 from companion.extras import MissingExtraError
 from companion.files.os_errors import reason_of
@@ -29,9 +29,9 @@ _USAGE_ERRORS = (
     RecordError,
     SigningError,
 )
-"""The command line or the configuration is wrong, or something that it names cannot be used."""
+"""Errors of the command line, the configuration, or what they name: exit code 2."""
 _FLIGHT_ERRORS = LinkError, VehicleStoppedError
-"""The flight failed, or something that it needs failed."""
+"""Errors of the flight or of what it needs: exit code 1."""
 
 Command = Callable[[argparse.Namespace], int]
 
@@ -68,13 +68,13 @@ def run(command: Command, options: argparse.Namespace) -> int:
         if options.debug:
             traceback.print_exc()
         _print_error(f"internal error: {error!r}; run again with --debug to see where it happened")
-    lost = lost_output()
+    fault = output_fault()
     # An error without a file may be that of standard output, which is reported below.
-    if os_error is not None and (lost is None or os_error.filename is not None):
+    if os_error is not None and (fault is None or os_error.filename is not None):
         file = "" if os_error.filename is None else f"{os_error.filename}: "
         _print_error(f"{file}{reason_of(os_error)}")
-    if lost:
-        _print_error(f"standard output cannot be written: {lost}")
+    if fault:
+        _print_error(f"standard output cannot be written: {fault}")
         return code or EXIT_FAILURE
     return code
 

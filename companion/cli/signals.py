@@ -9,7 +9,7 @@ from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
 SECOND_CTRL_C_AFTER = 1.0
-"""A repeated Ctrl-C leaves the flight only this long after the one before, s: keys bounce."""
+"""Shortest time after the previous Ctrl-C at which another leaves the flight, s: keys bounce."""
 
 HOW_TO_LEAVE = (
     f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints at once: then the "
@@ -47,11 +47,11 @@ class SignalHandler:
                 self._hand_back(number.name)
 
     def _handle_ctrl_c(self) -> None:
-        before, self._ctrl_c_at = self._ctrl_c_at, self._clock()
-        if before is None:
+        previous, self._ctrl_c_at = self._ctrl_c_at, self._clock()
+        if previous is None:
             self._hand_back("the user (Ctrl-C)")
             self._session.note(HOW_TO_LEAVE)
-        elif self._ctrl_c_at - before >= SECOND_CTRL_C_AFTER:
+        elif self._ctrl_c_at - previous >= SECOND_CTRL_C_AFTER:
             self._session.leave()
 
     def _hand_back(self, cause: str) -> None:

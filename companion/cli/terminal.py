@@ -35,7 +35,7 @@ class _PrintThread:
         self._thread = threading.Thread(target=self._print_lines, name="terminal", daemon=True)
         self._thread.start()
 
-    def say(self, print_line: Callable[[], None]) -> bool:
+    def queue_line(self, print_line: Callable[[], None]) -> bool:
         """Queue a call that prints a line; return false if the queue is full."""
         try:
             self._lines.put_nowait(print_line)
@@ -103,17 +103,19 @@ class TerminalObserver:
     def phase(self, name: str, waits_for: str) -> None:
         """Show that a phase began."""
         self._status_printed_at = 0.0
-        self._printer.say(lambda: self._print(f"[bold]{name:<10}[/] waiting for {waits_for}", True))
+        self._printer.queue_line(
+            lambda: self._print(f"[bold]{name:<10}[/] waiting for {waits_for}", True)
+        )
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Print periodically what the phase waits for, unless live lines already show it."""
         if self._live is None and elapsed - self._status_printed_at >= _STATUS_PERIOD:
             self._status_printed_at = elapsed
             text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
-            self._printer.say(lambda: self._print(f"           {text}"))
+            self._printer.queue_line(lambda: self._print(f"           {text}"))
 
     def status(self, status: FlightStatus) -> None:
-        """Redraw the live lines if they are old; a stalled terminal skips states."""
+        """Redraw the live lines once per `_REDRAW_PERIOD`; a stalled terminal skips states."""
         self._newest = status
         now = time.monotonic()
         if (
@@ -124,27 +126,27 @@ class TerminalObserver:
         ):
             return
         self._drawn_at = now
-        self._redraw_queued = self._printer.say(self._draw)
+        self._redraw_queued = self._printer.queue_line(self._draw)
 
     def event(self, time: float, text: str) -> None:
         """Show an event."""
-        self._printer.say(lambda: self._print(f"  {time:6.1f} s  {text}"))
+        self._printer.queue_line(lambda: self._print(f"  {time:6.1f} s  {text}"))
 
     def close(self) -> None:
         """Remove the live lines after the last event."""
-        self._printer.say(self._clear)
+        self._printer.queue_line(self._clear)
         self._printer.close()
 
     async def ask_landing(self) -> bool:
         """Ask whether to land; without a terminal the vehicle continues to hold."""
         if sys.stdin is None or sys.stdin.closed or not sys.stdin.isatty():
-            self._printer.say(
+            self._printer.queue_line(
                 lambda: self._print("The vehicle holds. Take it over, or command a landing.")
             )
             return False
         self._asking = True
-        self._printer.say(self._clear)
-        self._printer.say(
+        self._printer.queue_line(self._clear)
+        self._printer.queue_line(
             lambda: self._print("The vehicle holds. Land it now? [y/N] (Ctrl-C ends the flight) ")
         )
         try:
@@ -169,7 +171,7 @@ class TerminalObserver:
             return
         with self._console.capture() as captured:
             self._write(text, markup)
-        self._live.above(captured.get())
+        self._live.write_above(captured.get())
 
     def _write(self, text: str, markup: bool) -> None:
         self._console.print(text, highlight=False, markup=markup, soft_wrap=True)

@@ -68,12 +68,12 @@ class _Output(io.TextIOWrapper):
             raise
 
 
-def lost_output() -> str | None:
+def output_fault() -> str | None:
     """Why the text printed so far does not reach standard output.
 
     Returns:
-        None: it does. Empty: the reader has stopped, as after `| head`. Otherwise: the reason in
-        words. After a failure, later text is discarded, or Python would report it again at its end.
+        None: nothing is lost. Empty: the reader has stopped, as after `| head`. Otherwise: the
+        reason. Later text is then discarded, or Python would report the failure again at exit.
     """
     failure: OSError | None = getattr(sys.stdout, "failure", None)
     try:

@@ -94,7 +94,7 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
 
 
 def _flyable(config: Config) -> Config:
-    """The configuration with planner `auto` and maneuver `hover`, not those of `identify`."""
+    """The configuration with planner `auto` and maneuver `hover` instead of those of `identify`."""
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
     )

@@ -1,4 +1,4 @@
-"""Which kind of YAML file a user gave where another kind is wanted, and which command takes it."""
+"""Recognises a YAML file of the wrong kind, and names the command that takes it."""
 
 from collections.abc import Iterable, Mapping
 from enum import Enum
@@ -9,7 +9,7 @@ from companion.files.yaml_file import ConfigError
 
 
 class FileKind(Enum):
-    """The kinds of YAML files; the value is how messages call it."""
+    """The kinds of YAML files; each value is the name in messages."""
 
     CONFIG = "a configuration"
     TRAJECTORY = "a trajectory file"
@@ -22,13 +22,13 @@ CAMPAIGN_KEYS = (
 )  # fmt: skip
 """The keys of a campaign file. Its model, in `companion.campaign`, may not be imported here."""
 TRAJECTORY_KEYS = ("hover", "line", "circle", "helix", "figure_eight", "waypoints", "csv")
-"""The keys of a trajectory file. Its model uses this module."""
+"""The keys of a trajectory file. Its model imports this module, so it is not imported here."""
 _KEYS: Mapping[FileKind, Iterable[str]] = {
     FileKind.CONFIG: Config.model_fields,
     FileKind.TRAJECTORY: TRAJECTORY_KEYS,
     FileKind.CAMPAIGN: CAMPAIGN_KEYS,
 }
-_TAKEN_BY: Mapping[FileKind, str] = {
+_USED_BY: Mapping[FileKind, str] = {
     FileKind.CONFIG: "`companion fly --config` flies it, and the key `config` of a campaign file "
     "names it",
     FileKind.TRAJECTORY: "`companion fly --trajectory` flies it",
@@ -52,4 +52,4 @@ def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> Non
     found = {kind: len(given.intersection(known)) for kind, known in _KEYS.items()}
     likely = max(found, key=lambda kind: (found[kind], kind is wanted))
     if likely is not wanted:
-        raise ConfigError(f"{path} is {likely.value}, not {wanted.value}; {_TAKEN_BY[likely]}")
+        raise ConfigError(f"{path} is {likely.value}, not {wanted.value}; {_USED_BY[likely]}")

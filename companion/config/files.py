@@ -13,7 +13,7 @@ from companion.config.file_kinds import FileKind, require_kind
 from companion.config.root import MOST_INCLUDED
 from companion.config.trajectory_file import is_table
 from companion.files import bounded_yaml, yaml_file
-from companion.files.bounded_yaml import Where
+from companion.files.bounded_yaml import KeyPath
 from companion.files.value_faults import shortened
 from companion.files.yaml_faults import dotted_keys
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
@@ -111,7 +111,7 @@ class _IncludeReader:
         Raises:
             ConfigError: see `load`.
         """
-        for path in _included(chain[-1], own.keys):
+        for path in _included_paths(chain[-1], own.keys):
             self.add((*chain, path), self._read_included(*chain, path))
         _merge(self.merged, own)
 
@@ -121,7 +121,7 @@ class _IncludeReader:
         if len(self.files) > MOST_INCLUDED:
             raise ConfigError(f"{chain[0]}: more than {MOST_INCLUDED} files are included")
         if realpath(path) in map(realpath, chain[:-1]):
-            names = " includes ".join(str(one) for one in chain)
+            names = " includes ".join(str(each) for each in chain)
             raise ConfigError(f"{chain[0]}: a file must not include itself: {names}")
         if len(chain) - 1 > _MAX_DEPTH:
             raise ConfigError(
@@ -135,7 +135,7 @@ class _IncludeReader:
         return part
 
 
-def _included(path: Path, own: dict[str, Any]) -> list[Path]:
+def _included_paths(path: Path, own: dict[str, Any]) -> list[Path]:
     names = own.get(_INCLUDE, [])
     names = [names] if isinstance(names, str) else names
     if not isinstance(names, list) or not all(
@@ -166,7 +166,7 @@ def _merge(merged: Contents, part: Contents) -> None:
     for section, values in part.keys.items():
         data.setdefault(section, {})
         if isinstance(values, dict) and isinstance(data[section], dict):
-            replaced_keys: set[Where] = {(section, key) for key in values}
+            replaced_keys: set[KeyPath] = {(section, key) for key in values}
             data[section] = {**data[section], **values}
         else:
             replaced_keys = {where for where in merged.places if where[:1] == (section,)}
@@ -243,5 +243,5 @@ def shipped(name: str) -> Path:
 
 
 def json_schema() -> str:
-    """JSON Schema of the file, for editors to complete and check while typing."""
+    """JSON Schema of a configuration file, for editors to complete and check while typing."""
     return json.dumps(Config.model_json_schema(), indent=2, ensure_ascii=False) + "\n"

@@ -10,7 +10,7 @@ from companion.files.yaml_file import PathKey, Section
 Seconds = Annotated[float, Field(gt=0.0, le=3600.0)]
 
 ACCELERATION_STEPS = ("steps", "corners")
-"""Maneuvers that are steps of the acceleration, flown by the attitude without feedback."""
+"""Maneuvers that command steps of the acceleration without position feedback."""
 OPEN_LOOP = (*ACCELERATION_STEPS, "identify")
 """Maneuvers without a position reference, so without a tracking error."""
 
@@ -75,16 +75,16 @@ class StepsConfig(Section):
 
 
 class CornersConfig(Section):
-    """Maneuver `corners`: acceleration steps that avoid level, to show how planners differ."""
+    """Maneuver `corners`: acceleration steps that never pass level, to compare planners."""
 
     north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
-    """North coefficient of each corner, up to its sign. The tilt's sine is √(north² + east²)."""
+    """Magnitude of each corner's north coefficient. The tilt's sine is √(north² + east²)."""
     east_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
-    """East coefficient of each corner. North 0.4 and east 0.5 give the steps of the paper's
-    figure 2."""
+    """Magnitude of each corner's east coefficient. North 0.4 and east 0.5 give the steps in figure
+    2 of Xu & Pei."""
     duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
-    """Duration of each corner step. A step that has not settled bends the line of the next one,
-    so a low gain needs longer steps. Longer steps carry the vehicle farther."""
+    """Duration of each corner step. A low gain needs longer steps: if a step has not settled, the
+    response to the next one is not straight. Longer steps carry the vehicle farther."""
     settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
     """Position hold at the end."""
 

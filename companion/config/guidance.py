@@ -41,8 +41,8 @@ class PlannerConfig(Section):
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0, json_schema_extra=TUNABLE)] = 5.0
     """Gain p: the acceleration approaches its target with the time constant 1/p."""
     yaw_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 2.0
-    """Gain of the heading: it approaches its target with the time constant 1/yaw_gain. quaternion,
-    so3 and euler use gain_per_s instead.
+    """Gain of the heading: it approaches its target with the time constant 1/yaw_gain_per_s.
+    quaternion, so3 and euler use gain_per_s instead.
     """
 
     @model_validator(mode="after")
@@ -57,10 +57,10 @@ class GuidanceConfig(Section):
     kind: Annotated[str, Field(max_length=50, json_schema_extra={"enum": list(GUIDANCE_NAMES)})] = (
         LINEAR
     )
-    """linear: linear guidance. nmpc: nonlinear model predictive control follows trajectories, in
-    its own process (extra `nmpc`); linear guidance flies everything else, and takes over when
-    the solver gives no answer. Guidance of another package is named by its entry point in
-    `companion.guidance`.
+    """linear: LQR position hold with a wind observer. nmpc: nonlinear model predictive control
+    follows trajectories, in its own process (extra `nmpc`); linear guidance flies everything else,
+    also while the solver gives no answer. Guidance of another package is named by its entry point
+    in `companion.guidance`.
     """
     rate_hz: Annotated[float, Field(ge=10.0, le=100.0)] = 50.0
     """Rate at which guidance computes a new target."""
@@ -96,7 +96,8 @@ class GuidanceConfig(Section):
     max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 6.0
     """Largest acceleration by wind that the observer may estimate."""
     lead: bool = True
-    """Lead the targets by the known attitude response, so that the vehicle does not lag."""
+    """Compute each target for a time ahead, the delay of the attitude response, so that the vehicle
+    does not lag behind the reference."""
     height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 1.5
     """Vertical speed commanded per metre of height error."""
     climb_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 3.5

@@ -30,16 +30,16 @@ class Difference(NamedTuple):
         return f"{self.section}.{self.key}".rstrip(".")
 
     def __str__(self) -> str:
-        return f"{self.name} from {shown(self.before)} to {shown(self.after)}"
+        return f"{self.name} from {value_text(self.before)} to {value_text(self.after)}"
 
 
-def shown(value: Any) -> str:
+def value_text(value: Any) -> str:
     """A value as YAML writes it, numbers without trailing zeros."""
     return "null" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @cache
-def changeable() -> dict[tuple[str, str], str]:
+def changeable_keys() -> dict[tuple[str, str], str]:
     """The keys that may change in flight: (section, key) -> permitted change, in words."""
     return {
         (section, key): str(extra[IN_FLIGHT])
@@ -76,22 +76,24 @@ def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> 
     """
     for section, keys in values.items():
         for key in keys:
-            full, model = f"{section}.{key}".rstrip("."), sections().get(section)
+            full_name, model = f"{section}.{key}".rstrip("."), sections().get(section)
             known = section in Config.model_fields if model is None else key in model.model_fields
             if not known:
-                raise ConfigError(f"{name}: there is no key `{full}`")
-            if (section, key) not in changeable():
+                raise ConfigError(f"{name}: there is no key `{full_name}`")
+            if (section, key) not in changeable_keys():
                 raise ConfigError(
-                    f"{name}: {full} cannot be changed in flight; "
+                    f"{name}: {full_name} cannot be changed in flight; "
                     "a change applies from the next flight on"
                 )
-    wanted = changed(now, values, name)
+    new_config = changed(now, values, name)
     for section, keys in values.items():
         for key in keys:
-            first, new = (getattr(getattr(config, section), key) for config in (start, wanted))
-            if changeable()[section, key] == UP_TO_START and new > first:
+            checked, new = (
+                getattr(getattr(config, section), key) for config in (start, new_config)
+            )
+            if changeable_keys()[section, key] == UP_TO_START and new > checked:
                 raise ConfigError(
-                    f"{name}: {section}.{key} {new:g} is more than {first:g}, the value checked "
+                    f"{name}: {section}.{key} {new:g} is more than {checked:g}, the value checked "
                     "before take-off; in flight you may lower it, and raise it back to that value"
                 )
-    return wanted
+    return new_config

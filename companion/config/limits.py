@@ -1,4 +1,4 @@
-"""Limits of commands, and of the age of data."""
+"""Configuration sections with the limits of commands, and of the age of data."""
 
 from math import tan
 from typing import Annotated, Literal
@@ -27,7 +27,8 @@ class LimitsConfig(Section):
     )
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
-    """tight: limit only where the rate would be exceeded. paper: equation 33, slower."""
+    """tight: scale the tilt rate only where it would exceed max_tilt_rate_deg_s. paper: equation 33
+    of Xu & Pei, which makes the response slower."""
     recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
     """Beyond this tilt the planner first rotates the vehicle towards level by the shortest way.
     quaternion, so3 and euler do not.
@@ -49,8 +50,8 @@ class LimitsConfig(Section):
     fence_floor_m: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
     """Fence: smallest height above home. Below it, safety.fence_action follows."""
     min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
-    """Smallest battery charge. Below it the program does not arm; in flight, safety.battery_action
-    follows."""
+    """Smallest battery charge. Below this charge the program does not arm; in flight,
+    safety.battery_action follows."""
 
     max_tilt = Si("max_tilt_deg")
     max_tilt_rate = Si("max_tilt_rate_deg_s")
@@ -59,7 +60,7 @@ class LimitsConfig(Section):
     min_battery = Si("min_battery_percent")
 
     @property
-    def largest_horizontal(self) -> float:
+    def max_horizontal_acceleration(self) -> float:
         """Largest horizontal acceleration by `max_tilt` at constant height, m/s²."""
         return GRAVITY * tan(self.max_tilt)
 
@@ -82,8 +83,8 @@ class DeadmanConfig(Section):
     target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
     """Largest age of the guidance target. With an older target no sample is answered."""
     position_stale_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 300.0
-    """Largest age of the position, by its arrival and by its time stamp. With an older position,
-    guidance and setpoints stop.
+    """Largest age of the position, since its arrival and since its time stamp. With an older
+    position, guidance and setpoints stop.
     """
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
     """After this time without a setpoint the program hands back. Keep it below the autopilot's own

@@ -30,9 +30,9 @@ class ConfigKey(NamedTuple):
     section: str
     name: str
     value: Any
-    """Its value, as plain data that YAML can hold."""
+    """Value of the key, as plain data that YAML can hold."""
     default: Any
-    """Its default, as plain data too."""
+    """Default of the key, as plain data that YAML can hold."""
     unit: str
     """Unit such as °/s; empty without a unit."""
     allowed: str
@@ -43,29 +43,29 @@ class ConfigKey(NamedTuple):
 
 def sections() -> dict[str, type[BaseModel]]:
     """The sections of the file, in the file's order."""
-    kinds = {name: field.annotation for name, field in Config.model_fields.items()}
+    types = {name: field.annotation for name, field in Config.model_fields.items()}
     return {
-        name: kind
-        for name, kind in kinds.items()
-        if isinstance(kind, type) and issubclass(kind, BaseModel)
+        name: type_
+        for name, type_ in types.items()
+        if isinstance(type_, type) and issubclass(type_, BaseModel)
     }
 
 
 def keys(config: Config) -> Iterator[ConfigKey]:
     """Every key, with its value in a configuration."""
     values, defaults = config.model_dump(mode="json"), Config().model_dump(mode="json")
-    for section, described in _descriptions().items():
-        for name, words in described.items():
+    for section, descriptions in _descriptions().items():
+        for name, words in descriptions.items():
             yield ConfigKey(section, name, values[section][name], defaults[section][name], *words)
 
 
 @cache
 def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
     """Unit, range and meaning of every key, by section and name."""
-    described: dict[str, dict[str, tuple[str, str, str]]] = {}
+    descriptions: dict[str, dict[str, tuple[str, str, str]]] = {}
     for section, model in sections().items():
         schema = model.model_json_schema()["properties"]
-        described[section] = {
+        descriptions[section] = {
             name: (
                 unit_of(name),
                 _allowed(schema[name]),
@@ -73,7 +73,7 @@ def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
             )
             for name, field in model.model_fields.items()
         }
-    return described
+    return descriptions
 
 
 def changed_keys(config: Config) -> Iterator[ConfigKey]:
@@ -81,10 +81,10 @@ def changed_keys(config: Config) -> Iterator[ConfigKey]:
     return (key for key in keys(config) if key.value != key.default)
 
 
-def as_yaml(described: Iterable[ConfigKey]) -> str:
+def as_yaml(config_keys: Iterable[ConfigKey]) -> str:
     """Keys as commented YAML that is a valid configuration."""
     models, lines, section = sections(), list[str](), ""
-    for key in described:
+    for key in config_keys:
         if key.section != section:
             section = key.section
             lines += ["", *_comment(models[section].__doc__ or "", ""), f"{section}:"]
@@ -97,10 +97,10 @@ def as_yaml(described: Iterable[ConfigKey]) -> str:
     return "\n".join(lines).strip() + "\n"
 
 
-def as_markdown(described: Iterable[ConfigKey]) -> str:
+def as_markdown(config_keys: Iterable[ConfigKey]) -> str:
     """Keys as Markdown tables, one for each section."""
     models, lines, section = sections(), list[str](), ""
-    for key in described:
+    for key in config_keys:
         if key.section != section:
             section = key.section
             lines += ["", f"## {section}", "", _one_line(models[section].__doc__ or ""), ""]

@@ -88,7 +88,7 @@ class Config(Section):
 
     @property
     def fence(self) -> Fence:
-        """The fence, for a vehicle whose motion is known without delay."""
+        """The fence of `limits` and `safety`, with `estimate_delay` 0 s."""
         limits, safety = self.limits, self.safety
         return Fence(
             limits.fence_radius_m,
@@ -109,7 +109,7 @@ class Config(Section):
 
 
 def _contradictions(config: Config) -> Iterator[str]:
-    """The rules between sections that are broken, each as a message."""
+    """A message for each broken rule between sections."""
     limits, thrust, deadman = config.limits, config.thrust, config.deadman
     if config.planner.name == MODEL_FOLLOWING and not config.vehicle.response_known:
         yield "planner.name: model-following needs vehicle.lag_ms and vehicle.dead_time_ms"
@@ -124,7 +124,7 @@ def _contradictions(config: Config) -> Iterator[str]:
 
 
 def _thrust_contradictions(config: Config) -> Iterator[str]:
-    """Like `_contradictions`: whether thrust can hold the height at the largest tilt."""
+    """A message if the thrust cannot hold the height at the largest tilt."""
     limits, thrust = config.limits, config.thrust
     curve = ThrustCurve(thrust.curve_factor)
     hover_share = curve.share(thrust.hover_thrust)
@@ -147,7 +147,7 @@ def _thrust_contradictions(config: Config) -> Iterator[str]:
 
 
 def _maneuver_contradictions(config: Config) -> Iterator[str]:
-    """Like `_contradictions`, for the maneuvers that are flown."""
+    """Messages about keys of the maneuvers that contradict other sections."""
     limits, flight, corners = config.limits, config.flight, config.corners
     largest_coefficient = sin(limits.max_tilt)
     if "steps" in flight.maneuvers and config.steps.coefficient > largest_coefficient:
@@ -159,10 +159,10 @@ def _maneuver_contradictions(config: Config) -> Iterator[str]:
             "limits.max_tilt_deg"
         )
     slows_down = "trajectory" in flight.maneuvers and flight.slow_down
-    if slows_down and flight.slow_down_reserve_m_s2 >= limits.largest_horizontal:
+    if slows_down and flight.slow_down_reserve_m_s2 >= limits.max_horizontal_acceleration:
         yield (
             f"flight.slow_down_reserve_m_s2 {flight.slow_down_reserve_m_s2:g} must be less "
-            f"than the {limits.largest_horizontal:.2f} m/s² that limits.max_tilt_deg "
+            f"than the {limits.max_horizontal_acceleration:.2f} m/s² that limits.max_tilt_deg "
             f"{limits.max_tilt_deg:g} gives; lower it"
         )
     if "identify" in flight.maneuvers:
@@ -170,7 +170,7 @@ def _maneuver_contradictions(config: Config) -> Iterator[str]:
 
 
 def _identify_contradictions(config: Config) -> Iterator[str]:
-    """Like `_contradictions`, for the maneuver `identify`."""
+    """Messages about keys of `identify` that contradict other sections."""
     limits, identify = config.limits, config.identify
     if len(config.flight.maneuvers) > 1:
         yield "flight.maneuvers: identify must be the only maneuver of a flight"

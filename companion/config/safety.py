@@ -30,7 +30,7 @@ MOST_MONITORS = 20
 
 
 class SafetyConfig(Section):
-    """Limits of the other safety monitors (see `limits`, `deadman`), and all monitors' actions."""
+    """Actions of all safety monitors, and those limits that are not in `limits` or `deadman`."""
 
     hold_s: Annotated[float, Field(gt=0.0, le=60.0)] = 3.0
     """Longest hold after a breach. The vehicle lands as soon as the breach has ended, or after this
@@ -50,7 +50,7 @@ class SafetyConfig(Section):
     reaction_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
     """Assumed delay before the vehicle brakes at the fence; it may still accelerate meanwhile."""
     fence_action: Ending = "land"
-    """Action outside the fence. Within braking distance the maneuver ends in a hold."""
+    """Action outside the fence. Within braking distance of the fence, a hold ends the maneuver."""
     battery_action: Literal["warn", "hand_back", "land"] = "land"
     """Action if the battery is below limits.min_battery_percent, or not reported for 5 s."""
     position_action: Ending = "land"
@@ -59,8 +59,8 @@ class SafetyConfig(Section):
     max_reset_m: Annotated[float, Field(ge=0.01, le=20.0)] = 1.0
     """Largest sum of the estimator's position jumps in a flight. References move with each jump."""
     max_reset_deg: Annotated[float, Field(gt=0.0, le=120.0)] = 45.0
-    """Largest sum of the estimator's heading jumps in a flight; half of it for jumps of the thrust
-    axis.
+    """Largest sum of the estimator's heading jumps in a flight. The limit for jumps of the thrust
+    axis (tilt) is half as large.
     """
     max_resets: Annotated[int, Field(ge=0, le=30)] = 3
     """Largest number of estimator resets within 30 s."""

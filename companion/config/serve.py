@@ -27,9 +27,9 @@ class ServeConfig(Section):
     may always command; all others only read, unless they sign with the vehicle's key.
     """
     control: bool = True
-    """Fly the setpoints of clients (extra `serve`). false: pass them on as everything else."""
+    """Fly the setpoints of clients (extra `serve`). false: pass them on like all other messages."""
     setpoint_timeout_ms: Annotated[float, Field(ge=100.0, le=2000.0)] = 500.0
-    """Longest time between setpoints of a client. After it the vehicle is held."""
+    """Longest time between setpoints of a client. After a longer time the vehicle is held."""
     hold_s: Annotated[float, Field(ge=0.0, le=600.0)] = 5.0
     """Time for which the vehicle is held after a client's setpoints stop, before it is handed back.
     """
@@ -38,6 +38,7 @@ class ServeConfig(Section):
     max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 3.0
     """Largest horizontal acceleration after a jump of the commanded position or velocity."""
     max_jerk_m_s3: Annotated[float, Field(ge=1.0, le=100.0)] = 8.0
-    """Largest jerk after such a jump. Divided by gravity it is the tilt rate in rad/s."""
+    """Largest horizontal jerk after a jump of the commanded position or velocity. Divided by
+    gravity it is the tilt rate in rad/s."""
 
     setpoint_timeout = Si("setpoint_timeout_ms")

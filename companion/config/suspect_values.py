@@ -10,11 +10,12 @@ from companion.files.value_faults import mistaken_unit
 
 BODY_RATE = "safety.max_body_rate_deg_s"
 _USUAL_VALUES = {"_deg_s2": 1000.0, "_ms": 50.0}
-"""Usual value of a key whose default is null, by the end of the key's name."""
+"""Usual value of a key whose default is null, by the suffix of the key."""
 _MAX_SUSPECT_SHARE = 1.0 / 20.0
-"""A value may be in the wrong unit if it is below this share of the usual value."""
+"""A value is suspect only if it is below this share of the usual value."""
 _MIN_MEANT_SHARE = 1.0 / 5.0
-"""Second condition: converted from the other unit, the value is above this share of the usual."""
+"""A value is suspect only if converting it from the mistaken unit gives more than this share of the
+usual value."""
 
 
 class SuspectValue(NamedTuple):
@@ -24,7 +25,7 @@ class SuspectValue(NamedTuple):
     found: str
     """The present value, as a clause."""
     because: str
-    """The consequence of the value."""
+    """Why the value is suspect: its consequence, as a clause."""
     fix: str
     """What the user should do."""
 
@@ -48,7 +49,7 @@ def suspect_values(config: Config) -> Iterator[SuspectValue]:
 
 
 def _body_rate(config: Config) -> Iterator[SuspectValue]:
-    """Whether the planner may command rates at which a safety monitor ends the flight."""
+    """The body rate limit, if the planner may command rates that trip its safety monitor."""
     limits, allowed = config.limits, config.safety.max_body_rate_deg_s
     commanded = hypot(limits.max_tilt_rate_deg_s, limits.max_yaw_rate_deg_s)
     if allowed <= commanded:
@@ -67,19 +68,22 @@ def _units(config: Config) -> Iterator[SuspectValue]:
             continue
         usual = key.default
         if usual is None:
-            usual = next((v for end, v in _USUAL_VALUES.items() if key.name.endswith(end)), None)
+            usual = next(
+                (v for suffix, v in _USUAL_VALUES.items() if key.name.endswith(suffix)), None
+            )
         if key.value == key.default or not isinstance(usual, int | float) or not usual:
             continue
-        unit, meant = mistaken_unit(key.name, key.value)
+        unit, converted = mistaken_unit(key.name, key.value)
         if (
-            meant > key.value
+            converted > key.value
             and key.value < usual * _MAX_SUSPECT_SHARE
-            and meant > usual * _MIN_MEANT_SHARE
+            and converted > usual * _MIN_MEANT_SHARE
         ):
             name = f"{key.section}.{key.name}"
             yield SuspectValue(
                 name,
                 f"{name} is {key.value:g} {key.unit}",
-                f"that is unusually small; {key.value:g} {unit} would be {meant:.4g} {key.unit}",
-                f"write {meant:.4g} if that was meant",
+                f"that is unusually small; {key.value:g} {unit} would be "
+                f"{converted:.4g} {key.unit}",
+                f"write {converted:.4g} if that was meant",
             )

@@ -126,11 +126,11 @@ def _table_notes(
     if table.unused:
         names = ", ".join(table.unused[:_MOST_COLUMNS_SHOWN])
         notes.append(f"{path.name}: these columns are not used: {names}")
-    lasts = float(table.times[-1])
-    if trajectory.duration > lasts + _SHORTEST_RAMP:
+    table_duration = float(table.times[-1])
+    if trajectory.duration > table_duration + _SHORTEST_RAMP:
         notes.append(
             f"{path.name} begins or ends in motion: ramps from and to rest make it last "
-            f"{trajectory.duration:.1f} s instead of {lasts:.1f} s"
+            f"{trajectory.duration:.1f} s instead of {table_duration:.1f} s"
         )
     if table.times.size <= _MOST_ROWS_COMPARED:
         notes += _detour_notes(trajectory, table.times, "give more rows")
@@ -233,5 +233,5 @@ def read(path: Path) -> LoadedTrajectory:
             return loaded
     except TrajectoryError as error:
         # The errors of a table name it already.
-        named = is_table(path) and str(error).startswith(str(path))
-        raise ConfigError(str(error) if named else f"{path}: {error}") from error
+        names_file = is_table(path) and str(error).startswith(str(path))
+        raise ConfigError(str(error) if names_file else f"{path}: {error}") from error

@@ -28,7 +28,7 @@ Acceleration = Annotated[float, Field(ge=0.01, le=100.0)]
 Jerk = Annotated[float, Field(ge=0.01, le=1000.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
 Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
-Place = tuple[Offset, Offset, Offset]
+Point = tuple[Offset, Offset, Offset]
 FixedOrAlong = Literal["fixed", "along"]
 
 
@@ -46,7 +46,7 @@ class HoverShape(Section):
 class LineShape(Section):
     """A straight line with limited jerk, rest to rest."""
 
-    to_m: Place
+    to_m: Point
     """End point: north, east, down from the start."""
     speed_m_s: Speed
     """Largest speed."""
@@ -114,8 +114,8 @@ class FigureEightShape(_LapShape):
     peak_speed_m_s: Speed
     """Speed at the fastest point: the middle for gerono, the tips for bernoulli."""
     shape: Literal["gerono", "bernoulli"] = "gerono"
-    """gerono: (A sin φ, A sin φ cos φ). bernoulli: the same over 1 + cos² φ, with rounder loops.
-    Between acceleration and braking, φ increases at a constant rate."""
+    """gerono: (A sin φ, A sin φ cos φ), A = half_width_m. bernoulli: the same over 1 + cos² φ, with
+    rounder loops. Between acceleration and braking, φ increases at a constant rate."""
 
     def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
@@ -126,12 +126,12 @@ class FigureEightShape(_LapShape):
 class WaypointsShape(Section):
     """A path through waypoints: minimum snap without stops, or straight legs with stops."""
 
-    points_m: Annotated[tuple[Place, ...], Field(min_length=1, max_length=1000)]
-    """Waypoints: north, east, down from the start; without the start itself."""
+    points_m: Annotated[tuple[Point, ...], Field(min_length=1, max_length=1000)]
+    """Waypoints: north, east, down from the start; the start itself is left out."""
     speed_m_s: Speed
     """Largest speed."""
     acceleration_m_s2: Acceleration = 3.0
-    """Largest acceleration. The path is flown as fast as this and speed_m_s allow."""
+    """Largest acceleration. The path is flown as fast as acceleration_m_s2 and speed_m_s allow."""
     stops: bool = False
     """true: straight lines between the points, with a stop at each. false: one smooth curve through
     all points, which leaves these lines; a flight says by how much."""

@@ -32,7 +32,7 @@ _UNITS = {
 
 def unit_of(name: str) -> str:
     """The unit of a key or a measured figure, from its suffix; empty without a unit."""
-    return next((unit for end, unit in _UNITS.items() if name.endswith(end)), "")
+    return next((unit for suffix, unit in _UNITS.items() if name.endswith(suffix)), "")
 
 
 def seconds(milliseconds: float) -> float:
@@ -41,7 +41,7 @@ def seconds(milliseconds: float) -> float:
 
 
 def share(percent: float) -> float:
-    """Percent as a share of 1, by telemetry's formula: equal percentages give equal shares."""
+    """Percent as a share of 1, divided as in `companion.vehicle.state`: equal values stay equal."""
     return percent / 100.0
 
 
@@ -61,14 +61,14 @@ def converted(value: float | None, convert: Conversion) -> float | None:
 
 
 class Si(property):
-    """A value of a section in SI units, beside the key that the user writes.
+    """A key's value in SI units, as a property beside the key that the user writes.
 
     `max_tilt = Si("max_tilt_deg")` is read as `limits.max_tilt`, in rad. It is a property, so that
     pydantic does not take it for a key.
     """
 
     def __init__(self, key: str) -> None:
-        convert = next(each for end, each in _CONVERSIONS.items() if key.endswith(end))
+        convert = next(each for suffix, each in _CONVERSIONS.items() if key.endswith(suffix))
         super().__init__(lambda section: convert(getattr(section, key)))
 
     @overload

@@ -17,7 +17,8 @@ AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
 class AxisKeys(NamedTuple):
     """Response of one axis of the rate loop, as keys of `vehicle`.
 
-    None: lag or dead time is unknown, there is no slew limit, the response is first order.
+    None has a meaning for each key: `lag_ms` or `dead_time_ms` unknown; no slew limit
+    (`acceleration_limit_deg_s2`); a first-order response (`damping`).
     """
 
     lag_ms: float | None
@@ -41,7 +42,10 @@ class AxisKeys(NamedTuple):
         return converted(self.acceleration_limit_deg_s2, radians)
 
     def overridden_by(self, *keys: float | None) -> "AxisKeys":
-        """A copy with those `keys` that are not None; with a new lag the old damping is dropped."""
+        """A copy with new values, given in the order of the fields, where they are not None.
+
+        A new lag without a damping makes the response first order.
+        """
         base = self if keys[0] is None else self._replace(damping=None)
         return AxisKeys(*(a if b is None else b for a, b in zip(base, keys, strict=True)))
 
@@ -88,7 +92,10 @@ class VehicleConfig(Section):
 
     @property
     def axes(self) -> "dict[str, AxisKeys]":
-        """The known response of each axis, by name; null for pitch or yaw: the value of roll."""
+        """The known response of roll, pitch and yaw; null for pitch or yaw: the value of roll.
+
+        Yaw is always first order.
+        """
         roll = AxisKeys(
             self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
         )
@@ -128,11 +135,11 @@ class ThrustConfig(Section):
     correction_limit: Annotated[float, Field(ge=0.0, le=2.0)] = 0.8
     """Largest correction of hover_thrust in flight: 0.8 permits a factor from 1/1.8 to 1.8."""
     correction_time_s: Annotated[float, Field(ge=0.2, le=60.0)] = 1.5
-    """Time constant of the correction after a slow change. An initial error is corrected at once.
-    """
+    """Time constant with which the corrected hover thrust follows a change in flight. An initial
+    error is corrected at once."""
     curve_factor: Share = 0.0
-    """f in thrust = f·u² + (1 − f)·u. 0 where the autopilot linearises the thrust itself (PX4:
-    THR_MDL_FAC, ArduPilot: MOT_THST_EXPO)."""
+    """f in thrust = f·u² + (1 − f)·u, where u is the normalised thrust sent. 0 where the autopilot
+    linearises the thrust itself (PX4: THR_MDL_FAC, ArduPilot: MOT_THST_EXPO)."""
     battery_exponent: Annotated[float, Field(ge=0.0, le=3.0)] = 2.0
     """Thrust is proportional to the battery voltage to this power. 0: the autopilot compensates the
     voltage, or does not measure it."""

@@ -18,8 +18,8 @@ class CommandMaker:
 
     Args:
         guidance: makes targets from references.
-        flown: provides the reference.
-        estimate: provides the state of the vehicle, and takes the commanded vertical thrust.
+        flown_source: provides the reference.
+        estimate: provides the state of the vehicle; is given the commanded vertical thrust.
         learning: provides the largest tilt and the thrust limits.
         period: period of guidance, s.
 
@@ -31,18 +31,18 @@ class CommandMaker:
     def __init__(
         self,
         guidance: Guidance,
-        flown: FlownSource,
+        flown_source: FlownSource,
         estimate: MotionEstimate,
         learning: HoverLearning,
         period: float,
     ) -> None:
         self.guidance = guidance
         self.predictive: Predictive | None = None
-        self._flown, self._estimate, self._learning = flown, estimate, learning
+        self._flown_source, self._estimate, self._learning = flown_source, estimate, learning
         self._period = period
 
     def guidance_input(self, now: float) -> GuidanceInput:
-        """The estimated motion at `now` (s of event-loop time) and when a command takes effect.
+        """Estimate the motion at `now` (s of event-loop time) and when a command takes effect.
 
         Raises:
             RuntimeError: no position has come yet.
@@ -62,24 +62,23 @@ class CommandMaker:
     ) -> tuple[Reference, GuidanceCommand | None]:
         """The reference at `now`, and the command that follows it.
 
-        The command is None if guidance, such as that of another package, returned a value that is
-        not finite.
+        The command is None if the guidance (a plug-in, for example) returned NaN or infinity.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             inputs: motion of the vehicle, wind, drag and thrust limits.
             heading: present heading of the vehicle, rad.
             frame: the frame without heading resets.
             offboard_active: whether the autopilot obeys the setpoints.
         """
         # Target and heading are made from references at the same times.
-        reference_at = cache(self._flown.reference(now, inputs.now, heading))
+        reference_at = cache(self._flown_source.reference(now, inputs.now, heading))
         reference = reference_at(now)
         linear = self.guidance.command(reference_at, now, inputs)
         if self.predictive is not None:
             vehicle = self._estimate.vehicle(now, inputs)
-            following = self._flown.following(now)
-            linear = self.predictive.replacement_for(linear, frame, vehicle, following)
+            followed = self._flown_source.followed_trajectory(now)
+            linear = self.predictive.replacement_for(linear, frame, vehicle, followed)
         target, later, down = linear
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self._learning.limit_tilt(each, down) for each in (target, later))

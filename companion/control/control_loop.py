@@ -34,16 +34,16 @@ In lockstep the link keeps setpoints until the step ends, and sends only the las
 
 _MISFIT_REASONS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 _END_THE_STREAM = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
-"""Outcomes of a sample that complete `end_stream`: it was answered (None), or there is a reason why
-no later sample can be answered either."""
+"""Outcomes of a sample after which `end_stream` releases control: it was answered (None), or no
+later sample can be answered either."""
 
 
 class ControlLoop:
     """Answers each fresh attitude sample with one setpoint; nothing else sends setpoints.
 
-    After a gap in the setpoints the autopilot may have left offboard, and PX4 would enter it again
-    on the next setpoint. So after a gap while `taking_over` or `offboard_active`, the loop requests
-    the mode and sends nothing until `resume`.
+    After a gap in the setpoints the autopilot may have left offboard, and PX4 would enter offboard
+    again on the next setpoint. So after a gap while `taking_over` or `offboard_active`, the loop
+    requests offboard and sends nothing until `resume`.
 
     Attributes:
         command: the newest command, written by guidance; None before the first and after
@@ -99,9 +99,9 @@ class ControlLoop:
         self._recorder.retune(limits)
 
     def on_sample(self, sample: AttitudeSample) -> None:
-        """Answer `sample` or count why not, when it arrives (in lockstep: when its step ends)."""
+        """Answer an arrived sample, or count why not (in lockstep: called when its step ends)."""
         if not self._recorder.on:
-            self._take(sample)
+            self._handle_sample(sample)
             return
         flags = LoopFlags(
             self.on,
@@ -111,10 +111,10 @@ class ControlLoop:
             self.is_same_vehicle(),
         )
         self._recorder.begin()
-        self._take(sample)
+        self._handle_sample(sample)
         self._recorder.end(sample, flags, self.record.reason)
 
-    def _take(self, sample: AttitudeSample) -> None:
+    def _handle_sample(self, sample: AttitudeSample) -> None:
         if sample.misfit is None and self.resets.on_attitude(sample):
             self.planner.restart()
         record = self.record
@@ -145,7 +145,7 @@ class ControlLoop:
             self.release()
 
     def _after_gap(self, now: float) -> bool:
-        """Whether setpoints wait for `resume` after a gap; at a new gap, request the mode."""
+        """Whether setpoints wait for `resume` after a gap; at a new gap, request offboard."""
         if not (self.offboard_active or self.taking_over):
             return False
         gap = now - self.record.gap_from
@@ -160,7 +160,7 @@ class ControlLoop:
     ) -> Unanswered | None:
         """Send the setpoint for a sample; return why it could not be sent, or None."""
         try:
-            rates, thrust = self._answer(sample, command, period)
+            rates, thrust = self._compute_setpoint(sample, command, period)
             # This process may have been stopped since the sample came.
             now = self._recorder.checked_at = self._clock()
             if sample.age + now - sample.received > self._deadlines.telemetry_stale:
@@ -174,7 +174,7 @@ class ControlLoop:
         self._note_answer(sample, command, rates, thrust)
         return None
 
-    def _answer(
+    def _compute_setpoint(
         self, sample: AttitudeSample, command: GuidanceCommand, period: float
     ) -> tuple[BodyRates, float]:
         """Body rates and thrust for a sample.

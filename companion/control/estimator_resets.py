@@ -9,8 +9,8 @@ work in a frame without these jumps:
 - Poses, references and targets have headings without jumps. `EstimatorResets.frame` converts
   between these and the estimator's headings and attitudes.
 
-Horizontal accelerations stay in the estimator's frame, in which position is measured. So they
-become right at once when the estimator corrects its heading.
+Horizontal accelerations stay in the estimator's frame, in which position is measured. So a heading
+correction of the estimator also corrects them at once.
 """
 
 from collections import deque
@@ -24,20 +24,22 @@ from companion.guidance.reference import Vector, minus
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LONGEST_ATTITUDE_GAP = 0.1
-"""Longest time between two compared attitudes, s; over a longer time the body rates are unknown."""
+"""Longest time between two attitudes compared for a jump, s; beyond it the rates are unknown."""
 _LONGEST_CORRECTED_GAP = 0.025
-"""Longest time between two attitudes whose unexplained turn is added to `corrections`, s; over a
-longer time the body rates are too uncertain."""
+"""Longest time between two attitudes that add to `EstimatorResets.corrections`, s; over a longer
+time the body rates are too uncertain."""
 _SMALLEST_ATTITUDE_JUMP = radians(4.0)
 """Smallest attitude jump that is recognised, rad; smaller ones count as noise."""
 _SMALLEST_POSITION_JUMP = 0.2
 """Smallest position jump that is recognised, m; smaller ones count as noise."""
 _LONGEST_POSITION_GAP = 0.5
-"""Longest time between two compared positions, s."""
+"""Longest time between two positions that are compared for a jump, s."""
 _LARGEST_ACCELERATION_CHANGE = 10.0
-"""Largest change of the acceleration between two positions, m/s²."""
+"""Assumed largest change of the vehicle's acceleration between two positions, m/s²; a position
+change that it explains is no jump."""
 _ONE_RESET_TIME = 0.5
-"""Jumps within this time count as one reset, s; ODOMETRY comes at 10 Hz."""
+"""Time within which several jumps count as one reset, s. ODOMETRY, which counts the same reset,
+comes at 10 Hz."""
 
 
 class EstimatorResets:

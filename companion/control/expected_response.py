@@ -16,7 +16,7 @@ from companion.control.inner_loop import (
 from companion.guidance import InnerResponse
 
 _NOTICEABLE_SHARE = 0.99
-"""A change is reported if it reduces the time constant to less than this share."""
+"""A change is reported if it reduces the time constant below this share of the present one."""
 
 _GAIN_KEY, _RATE_LIMIT_KEY = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
 _LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
@@ -24,22 +24,21 @@ _LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
 
 @dataclass(frozen=True, slots=True)
 class ExpectedResponse:
-    """The response to the largest step of `steps`, from −coefficient to coefficient."""
+    """Predicted response to the largest step of the maneuver `steps`, −0.3 to 0.3 for example."""
 
     coefficient: float
     """`steps.coefficient`, at which the step ends."""
     time_constant: float
     """Time until 63 % of the step is covered, s."""
     time_constants_without: dict[str, float]
-    """Name of a cause of delay -> time constant (s) if this cause changes: with twice the gain, or
-    without the rate limit, the lag or the dead time."""
+    """Time constant (s) by the name of a cause of delay if only this cause changes: with twice the
+    gain, or without the rate limit, the lag or the dead time."""
     gain: float
     """Gain p of the planner, 1/s."""
     largest_gain: float | None
     """The largest sensible gain, 1/s; None if lag and dead time are not known."""
     shortest_time_constant: float | None = None
-    """Time constant with `largest_gain` and without the rate limit, s; None if `largest_gain`
-    is."""
+    """Time constant with `largest_gain` and without the rate limit, s; None: no `largest_gain`."""
 
     @property
     def limited_by(self) -> str:
@@ -59,14 +58,16 @@ class ExpectedResponse:
             if time < _NOTICEABLE_SHARE * self.time_constant
         )
         tilt = degrees(asin(self.coefficient))
-        floor = ""
+        shortest_text = ""
         shortest = self.shortest_time_constant
         if shortest is not None:
-            floor = f"; the largest sensible gain without rate limit would give {shortest:.2f} s"
+            shortest_text = (
+                f"; the largest sensible gain without rate limit would give {shortest:.2f} s"
+            )
         return (
             f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
             f"expected to have a time constant of {self.time_constant:.2f} s; "
-            f"{self.limited_by} limits it most ({changes}){floor}"
+            f"{self.limited_by} limits it most ({changes}){shortest_text}"
         )
 
     def gain_sentence(self) -> str:
@@ -100,7 +101,7 @@ def expected_response(config: Config) -> ExpectedResponse:
     time_constants_without = {
         _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step, speed),
         _RATE_LIMIT_KEY: response.step_time(step),
-        **_without_the_vehicle(config, response, speed),
+        **_without_rate_loop_delays(config, response, speed),
     }
     return ExpectedResponse(
         config.steps.coefficient,
@@ -112,21 +113,23 @@ def expected_response(config: Config) -> ExpectedResponse:
     )
 
 
-def _without_the_vehicle(config: Config, response: InnerResponse, speed: float) -> dict[str, float]:
-    """Time constants (s) without lag and without dead time; empty if these are unknown."""
+def _without_rate_loop_delays(
+    config: Config, response: InnerResponse, speed: float
+) -> dict[str, float]:
+    """Time constants (s) without the rate loop's lag, and without its dead time; empty: unknown."""
     if not config.vehicle.response_known:
         return {}
     step = 2.0 * config.steps.coefficient
     axes = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
-    unlagged = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=axes)})
+    without_lag = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=axes)})
     return {
-        _LAG_CAUSE: tilt_response(unlagged).step_time(step, speed),
+        _LAG_CAUSE: tilt_response(without_lag).step_time(step, speed),
         _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step, speed),
     }
 
 
 def _largest_speed(config: Config) -> float:
-    """Speed of the coefficients (1/s) at the largest tilt rate and half of `steps.coefficient`."""
+    """Speed of a coefficient at the tilt rate limit, 1/s, at half of `steps.coefficient`."""
     roll, pitch, _ = rates_along(0.5 * config.steps.coefficient, 0.0, 1.0, 0.0)
     return config.limits.max_tilt_rate / hypot(roll, pitch)
 

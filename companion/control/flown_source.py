@@ -2,7 +2,7 @@
 
 from math import dist, inf
 
-from companion.control.predictive import Following
+from companion.control.predictive import FollowedTrajectory
 from companion.guidance import Pose, Reference, VehicleMotion
 from companion.guidance.braking import Braking
 from companion.guidance.follow import Follow
@@ -41,25 +41,25 @@ class FlownSource:
         self.pose, self._braking = Pose(braking.stop, braking.heading), braking
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
-        """Fly `source` from `pose`; `now` in s of event-loop time."""
+        """Fly `source` from `pose`; `now` is event-loop time, s."""
         source.begin(now, pose)
         self.pose, self.source, self.begun_at, self._braking = pose, source, now, None
 
-    def braking_left(self, now: float) -> float:
-        """Time until the vehicle has come to rest for a hold, s; `now` in s of event-loop time."""
-        return 0.0 if self._braking is None else max(0.0, self._braking.ends - now)
+    def remaining_braking_time(self, now: float) -> float:
+        """Time until the vehicle has come to rest for a hold, s; `now` is event-loop time, s."""
+        return 0.0 if self._braking is None else max(0.0, self._braking.end_time - now)
 
     def finished(self, now: float) -> bool:
         """Whether there is a source and it has reached its end."""
         return self.source is not None and self.source.finished(now)
 
     def reference(self, now: float, motion: VehicleMotion, heading: float) -> ReferenceAt:
-        """The reference as a function of event-loop time (s).
+        """Return the reference as a function of event-loop time (s).
 
-        Without source and pose it is the present position of the vehicle.
+        Without source and pose the reference is the present position of the vehicle.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             motion: present motion of the vehicle.
             heading: present heading of the vehicle, rad.
         """
@@ -68,22 +68,22 @@ class FlownSource:
             return source.reference(now, motion)
         if self._braking is not None:
             return self._braking.at
-        held = (
+        held_reference = (
             Reference(motion.position_ned, heading=heading)
             if pose is None
             else Reference(pose.position_ned, heading=pose.heading)
         )
-        return lambda _: held
+        return lambda _: held_reference
 
-    def following(self, now: float) -> Following | None:
+    def followed_trajectory(self, now: float) -> FollowedTrajectory | None:
         """The trajectory that is followed at `now`, s of event-loop time; None if none is."""
         source = self.source
         if not isinstance(source, ManeuverSource) or source.begun_at is None or self.pose is None:
             return None
-        part, elapsed = source.maneuvers.part_at(now - source.begun_at)
-        if not isinstance(part, Follow):
+        maneuver, elapsed = source.maneuvers.part_at(now - source.begun_at)
+        if not isinstance(maneuver, Follow):
             return None
-        return Following(part, elapsed, self.pose)
+        return FollowedTrajectory(maneuver, elapsed, self.pose)
 
     def source_commanding_rates(self, now: float, motion: VehicleMotion) -> str | None:
         """Name of the source if it commands body rates in open loop at `now`; else None."""
@@ -95,11 +95,11 @@ class FlownSource:
     def tracking_error(
         self, now: float, reference: Reference, motion: VehicleMotion
     ) -> float | None:
-        """Distance from the reference, m; `now` in s of event-loop time.
+        """Distance from the reference, m; `now` is event-loop time, s.
 
-        It is None without a pose, and while the reference does not hold the position. After that
-        it stays None until the vehicle is back at its reference, but at most for `_RETURN_TIME`.
-        Another time without position hold in between does not extend this time.
+        None without a pose, and in open loop (the reference does not hold the position). After open
+        loop it stays None until the vehicle has returned to its reference, at most for
+        `_RETURN_TIME` in all, even if open loop begins again meanwhile.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         since = self._returning_since

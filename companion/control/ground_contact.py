@@ -7,18 +7,18 @@ from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 _STILL_SPEED = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
 _LIFTED_HEIGHT = 1.0
-"""A climb by more than this since the take-off command means that the vehicle has lifted off, m."""
+"""Climb since the take-off command, m, above which the vehicle counts as lifted off."""
 _MAX_SPEED_AGE = 0.5
-"""A vertical speed older than this is ignored, s."""
+"""Largest age of a vertical speed that is used, s."""
 _LANDED_TIME = 0.5
-"""The landed flag must be set for this long after a landing, s."""
+"""Time for which the landed flag must be set before the vehicle counts as landed, s."""
 
 
 class GroundContact:
     """Compares the landed flag (EXTENDED_SYS_STATE) with height, vertical speed and sent commands.
 
-    A landed flag that is wrong in flight must not stop the motors. So zero thrust counts as unsafe
-    while height or vertical speed contradict the flag.
+    A wrong landed flag must not stop the motors in flight. So zero thrust counts as unsafe while
+    height or vertical speed contradict the flag.
 
     Args:
         state: the vehicle's telemetry.
@@ -62,15 +62,12 @@ class GroundContact:
 
     @property
     def standing(self) -> bool:
-        """Whether the landed flag is set, and the vehicle has not lifted off.
-
-        After a take-off command the vehicle has lifted off as soon as it rises.
-        """
+        """Whether the landed flag is set and the vehicle has not risen since a take-off command."""
         return self._state.landed and not self._left_ground and not self._rising()
 
     @property
     def lifted(self) -> bool:
-        """Whether flag, height or climb say that the vehicle has left the ground."""
+        """Whether landed flag, height or vertical speed show that the vehicle left the ground."""
         return self._state.flying or self._left_ground or self._rising()
 
     @property

@@ -11,15 +11,15 @@ class GuidanceCommand(NamedTuple):
     """One command from guidance; it holds until the next one."""
 
     target: Target
-    """Target of the planner; only its heading is in the frame without estimator resets."""
+    """Target of the planner: north and east in the estimator's frame, heading in `frame`."""
     acceleration_down: float
-    """Acceleration downwards that thrust and gravity shall give, m/s²."""
+    """Wanted vertical acceleration by thrust and gravity together, positive down, m/s²."""
     made_at: float
     """When guidance made the command, s of event-loop time."""
     idle: bool = False
     """Whether zero body rates and zero thrust are sent; only on the ground."""
     is_step: bool = False
-    """Whether this is an open-loop step whose response is measured."""
+    """Whether the command is part of an open-loop step whose response is measured."""
     body_rates: BodyRates | None = None
     """Body rates that replace the planner's, within the limits, rad/s; None: the planner's are
     sent."""
@@ -29,8 +29,8 @@ class GuidanceCommand(NamedTuple):
     frame: HeadingFrame = HeadingFrame()
     """The frame without estimator resets, as it was when the command was made."""
     later: Target | None = None
-    """The target `period` after `made_at`; the target moves there on a straight line and then
-    stays. None: the target is constant."""
+    """Target at the time `made_at` + `period`; in between, the target is interpolated linearly,
+    and later it is constant. None: the target is constant from the beginning."""
     period: float = 0.0
     """Period of the guidance loop, s."""
 

@@ -30,12 +30,12 @@ class GuidanceLoop:
     """Writes a new `GuidanceCommand` to the control loop at a steady rate while position is fresh.
 
     On the ground the command is idle until a take-off is commanded. After that, guidance damps the
-    motion while it has no pose. `hold_here` stops and holds a pose; `follow` flies a source from
-    it. If open-loop rates tilt the vehicle too far, the source ends, and the vehicle brakes and
-    holds. Poses and references are in the frame without resets, so no reset moves the vehicle.
+    motion until it gets a pose. `hold_here` stops and holds a pose; `follow` flies a source from
+    that pose. If open-loop rates tilt the vehicle too far, the source ends, and the vehicle brakes
+    and holds. Poses and references are in the frame without resets, so no reset moves the vehicle.
 
     Attributes:
-        flown: the held pose and the source that is flown from it.
+        flown_source: the held pose and the source that is flown from it.
         bound_to_hold: True after `give_up`: from then on no source may be flown.
         motion: motion of the vehicle at the last step, without resets, or None.
         acceleration: horizontal acceleration of the vehicle at the last step, m/s², NED.
@@ -66,18 +66,18 @@ class GuidanceLoop:
         clock: Callable[[], float],
         vehicle_clock: Clock,
     ) -> None:
-        self.flown = FlownSource()
+        self.flown_source = FlownSource()
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
         self.acceleration: Horizontal = (0.0, 0.0)
         self.tracking_error: float | None = None
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
-        self.maker = CommandMaker(guidance, self.flown, estimate, self.learning, period)
+        self.maker = CommandMaker(guidance, self.flown_source, estimate, self.learning, period)
         self._loop = loop
         self._ground = ground
-        self.record = TrackingRecord(trace, self.flown)
-        self.hold = Hold(self.flown, self.maker, self.learning, max_tilt, assumed_braking)
+        self.record = TrackingRecord(trace, self.flown_source)
+        self.hold = Hold(self.flown_source, self.maker, self.learning, max_tilt, assumed_braking)
         self._fresh = FreshPosition(state, vehicle_clock, max_position_age)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
@@ -98,7 +98,7 @@ class GuidanceLoop:
     def stand_by(self) -> None:
         """Hold no pose: idle on the ground, damp the motion in the air."""
         self._recorder.action(self._clock(), "stand_by")
-        self.flown.clear()
+        self.flown_source.clear()
 
     def hold_here(self) -> None:
         """Brake, and hold the place where the vehicle stops, with the present heading.
@@ -111,18 +111,18 @@ class GuidanceLoop:
         self.hold.begin(now, self._heading())
 
     @property
-    def braking_left(self) -> float:
+    def remaining_braking_time(self) -> float:
         """Time until the vehicle has come to rest for a hold, s."""
-        return self.flown.braking_left(self._clock())
+        return self.flown_source.remaining_braking_time(self._clock())
 
     def hold_reference(self) -> None:
         """Hold the pose of the present reference, after a maneuver; raises as `hold_here`."""
         now = self._clock()
         self._recorder.action(now, "hold_reference")
         motion = self.maker.guidance_input(now).now
-        reference = self.flown.reference(now, motion, self._heading())(now)
-        self.flown.clear()
-        self.flown.pose = Pose(reference.position_ned, reference.heading)
+        reference = self.flown_source.reference(now, motion, self._heading())(now)
+        self.flown_source.clear()
+        self.flown_source.pose = Pose(reference.position_ned, reference.heading)
 
     def give_up(self) -> None:
         """Brake and hold, and never fly a source again; raises as `hold_here`."""
@@ -143,18 +143,18 @@ class GuidanceLoop:
             return
         now = self._clock()
         self._recorder.action(now, "follow")
-        if self.flown.pose is None:
+        if self.flown_source.pose is None:
             self.hold.begin(now, self._heading())
-        assert self.flown.pose is not None
-        self.flown.begin(source, self.flown.pose, now)
+        assert self.flown_source.pose is not None
+        self.flown_source.begin(source, self.flown_source.pose, now)
 
     @property
     def finished(self) -> bool:
         """Whether the source has reached its end."""
-        return self.flown.finished(self._clock())
+        return self.flown_source.finished(self._clock())
 
     async def run(self) -> None:
-        """Make commands until cancelled; missed steps are not repeated."""
+        """Make commands until cancelled; missed steps are skipped."""
         while True:
             self.step()
             await self._ticker.tick()
@@ -183,19 +183,19 @@ class GuidanceLoop:
         standing = self._ground.standing
         may_idle = standing and self._ground.may_idle
         before, active = self._loop.command, self._loop.offboard_active
-        made = self._step(now, position, standing=standing, may_idle=may_idle)
+        output = self._step(now, position, standing=standing, may_idle=may_idle)
         command = self._loop.command
         self._recorder.step(
             StepFlags(position is not None, standing, may_idle, active),
             now,
-            made,
+            output,
             None if command is before else command,
         )
 
     def _step(
         self, now: float, position: LocalPosition | None, *, standing: bool, may_idle: bool
     ) -> StepOutput | None:
-        """Make one command; return what it was computed from, or None if none was computed."""
+        """Make one command; return its inputs and reference, or None if none was computed."""
         if position is None:
             self.learning.pause()
             return None
@@ -215,7 +215,7 @@ class GuidanceLoop:
         self.motion, self.acceleration = inputs.now, inputs.acceleration
         self.hold.begin_if_tilted(now, inputs.now, self._q, self._heading())
         reference = self._write_command(now, inputs)
-        self.tracking_error = self.flown.tracking_error(now, reference, inputs.now)
+        self.tracking_error = self.flown_source.tracking_error(now, reference, inputs.now)
         if not standing:
             self.learning.step(
                 now,
@@ -223,10 +223,10 @@ class GuidanceLoop:
                 offboard_active=self._loop.offboard_active,
                 steady=reference.thrust_is_steady,
             )
-        measured_at = self.estimate.vehicle_time(now, position)
+        vehicle_time = self.estimate.vehicle_time(now, position)
         if self._loop.offboard_active:
-            self.record.add(now, measured_at, reference, inputs.now)
-        return StepOutput(measured_at, self._q, inputs, reference, self.tracking_error)
+            self.record.add(now, vehicle_time, reference, inputs.now)
+        return StepOutput(vehicle_time, self._q, inputs, reference, self.tracking_error)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`, unless it would not be finite; return the reference."""

@@ -26,9 +26,9 @@ class HeadingFrame(NamedTuple):
         return estimated if self.offset == 0.0 else turned_about_vertical(estimated, -self.offset)
 
     def target(self, target: Target) -> Target:
-        """The target in this frame; only its horizontal part is in the estimator's frame.
+        """Convert a target of guidance to this frame.
 
-        Guidance makes such targets: their headings do not jump with the estimator's.
+        Its horizontal part is in the estimator's frame; its heading is in this frame already.
         """
         if self.offset == 0.0:
             return target

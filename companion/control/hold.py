@@ -12,32 +12,32 @@ from companion.guidance.braking import AssumedBraking, brake
 
 
 class Hold:
-    """Begins a hold when it is asked to, or when open-loop rates tilt the vehicle too far.
+    """Begins a hold on request, or when open-loop body rates tilt the vehicle too far.
 
     Args:
-        flown: what guidance flies; the hold replaces it.
+        flown_source: what guidance flies; the hold replaces it.
         maker: provides the estimated motion of the vehicle.
         learning: learns the hover thrust, which limits the tilt at which the height is held.
         max_tilt: largest tilt in open loop, rad.
-        assumed: reaction and braking that the monitors of the fence assume.
+        assumed_braking: reaction and braking that the monitors of the fence assume.
 
     Attributes:
         max_tilt: largest tilt in open loop, rad; it may change in flight.
-        given_up: why a source was given up for its tilt, or None.
+        give_up_reason: why a source was given up because of its tilt, or None.
     """
 
     def __init__(
         self,
-        flown: FlownSource,
+        flown_source: FlownSource,
         maker: CommandMaker,
         learning: HoverLearning,
         max_tilt: float,
-        assumed: AssumedBraking,
+        assumed_braking: AssumedBraking,
     ) -> None:
         self.max_tilt = max_tilt
-        self.given_up: str | None = None
-        self._flown, self._maker, self._learning = flown, maker, learning
-        self._assumed = assumed
+        self.give_up_reason: str | None = None
+        self._flown_source, self._maker, self._learning = flown_source, maker, learning
+        self._assumed_braking = assumed_braking
 
     def begin(self, now: float, heading: float) -> None:
         """Brake, and hold this heading (rad) at the place where the vehicle stops.
@@ -47,26 +47,30 @@ class Hold:
         Raises:
             RuntimeError: no position has come yet.
         """
-        if self._flown.braking_left(now) > 0.0:
+        if self._flown_source.remaining_braking_time(now) > 0.0:
             return  # it goes on braking: a new beginning would stop it further away
         motion = self._maker.guidance_input(now).now
         deceleration = GRAVITY * tan(self._largest_tilt())
-        self._flown.hold(brake(now, motion, heading, deceleration, self._assumed))
+        self._flown_source.hold(brake(now, motion, heading, deceleration, self._assumed_braking))
 
     def begin_if_tilted(
         self, now: float, motion: VehicleMotion, q: Quaternion, heading: float
     ) -> None:
         """Give up a source that commands body rates, and hold, if `q` is tilted too far."""
-        name = self._flown.source_commanding_rates(now, motion)
+        name = self._flown_source.source_commanding_rates(now, motion)
         if name is None:
             return
-        tilt, most = tilt_angle(q[1], q[2]), self._largest_tilt()
-        if tilt <= most:
+        tilt, largest_tilt = tilt_angle(q[1], q[2]), self._largest_tilt()
+        if tilt <= largest_tilt:
             return
-        limit = f"limits.max_tilt_deg = {degrees(most):.0f}"
-        if most < self.max_tilt:
-            limit = f"the {degrees(most):.0f}° up to which limits.max_thrust holds the height"
-        self.given_up = f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
+        limit = f"limits.max_tilt_deg = {degrees(largest_tilt):.0f}"
+        if largest_tilt < self.max_tilt:
+            limit = (
+                f"the {degrees(largest_tilt):.0f}° up to which limits.max_thrust holds the height"
+            )
+        self.give_up_reason = (
+            f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
+        )
         self.begin(now, heading)
 
     def _largest_tilt(self) -> float:

@@ -15,12 +15,11 @@ _CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
 _USUAL_RATE_LOOP_DELAY = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
 _STIFF_HOLD_DELAYS = 0.065, 0.08
-"""Delays of the rate loop between which the hold changes from stiff to normal, s: dead time, plus
-half the lag, plus half the time in which the rate loop slews to the largest roll-pitch rate."""
+"""Delay of the rate loop up to which the hold is stiff, and from which it is normal, s: dead time
++ half the lag + half the time to slew to the largest roll-pitch rate."""
 _SHORTEST_DELAY = 0.275
-"""Shortest delay T that sets the weights of the hold, s; a shorter one counts as this. Higher
-weights would amplify the noise of the estimate: the rate loop would always slew, and the vehicle
-would swing."""
+"""Lower bound of the delay T from which the weights of the hold follow, s. Higher weights would
+amplify the noise of the estimate: the rate loop would always slew, and the vehicle would swing."""
 _SECOND_ORDER_SHARE = 0.2
 """Share of a second-order lag that is added to the delay T of the hold. The hold then keeps the
 stability margins that it has with a first-order model of PX4's rate loop."""
@@ -36,16 +35,15 @@ _CALM_BANDWIDTH = 1.0
 _POSITION_TIME_CONSTANT = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
 _POSITION_PULL = 4.0, 8.0
-"""`ObserverSettings.position_pull` with a slow and with a quick rate loop, 1/s. It is needed
-because the velocities of PX4 and ArduPilot are off by 0.05 m/s for seconds (measured)."""
+"""`ObserverSettings.position_pull` with a slow and with a quick rate loop, 1/s. Without this pull,
+the velocities of PX4 and ArduPilot, off by 0.05 m/s for seconds (measured), would be trusted."""
 _TRUSTED_PULL_INCREASE = 5.0
 """`ObserverSettings.pull_increase` with a quick rate loop, 1/s. With recorded errors of PX4's and
 ArduPilot's estimators the vehicle then moves 5 to 25 % less."""
 _CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_FILTER_TIMES = 0.1, 0.04
-"""Time constant of the two low-pass filters on the position correction in motion, with a normal and
-a quick observer, s."""
+"""`CorrectionSettings.filter_time` with a normal and with a quick observer, s."""
 _LARGEST_CORRECTION = 0.2
 """Largest anticipated correction, m: the noise of a bad GPS must not move the vehicle."""
 
@@ -66,10 +64,10 @@ def hold_weights(config: Config) -> Weights:
     )
 
 
-def _falling_share(value: float, one_and_zero: tuple[float, float]) -> float:
-    """Share that is 1 up to the first of two values and 0 from the second on; linear between."""
-    one, zero = one_and_zero
-    return min(max(0.0, (zero - value) / (zero - one)), 1.0)
+def _falling_share(value: float, bounds: tuple[float, float]) -> float:
+    """Share that is 1 up to the lower bound and 0 from the upper one on; linear in between."""
+    lower, upper = bounds
+    return min(max(0.0, (upper - value) / (upper - lower)), 1.0)
 
 
 def _hold_stiffness(config: Config) -> float:
@@ -82,13 +80,10 @@ def _hold_stiffness(config: Config) -> float:
 
 
 def slewing_delay(config: Config) -> float:
-    """Half the time in which the rate loop slews to the largest roll-pitch rate, s.
-
-    It is 0 if no slew limit is known.
-    """
+    """Half the time in which the rate loop slews to the largest roll-pitch rate, s; 0: no limit."""
     axes = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
-    slews = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
-    return 0.5 * config.limits.max_tilt_rate / min(slews) if slews else 0.0
+    limits = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
+    return 0.5 * config.limits.max_tilt_rate / min(limits) if limits else 0.0
 
 
 def _rate_loop_delay(config: Config) -> float:
@@ -105,11 +100,11 @@ def _rate_loop_delay(config: Config) -> float:
 def observer_quickness(config: Config) -> float:
     """How quick a motion observer the rate loop and the planner's gain allow: 0 normal, 1 quick.
 
-    It is 0 if the bandwidth of the wind estimate is configured, or in a flight that identifies the
+    Always 0 if the bandwidth of the wind estimate is configured, or in a flight that identifies the
     vehicle.
 
     A quick observer follows the corrected position, so errors of the autopilot's velocity matter
-    less. Its commands are less calm: on a rate loop like PX4's, body rates in hover double.
+    less. The commands are less calm then: on a rate loop like PX4's, body rates in hover double.
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
@@ -119,7 +114,7 @@ def observer_quickness(config: Config) -> float:
 
 
 def _gain_quickness(config: Config) -> float:
-    """How quick an observer the planner's gain allows, 0..1: the gain amplifies its noise.
+    """How quick an observer the planner's gain allows, 0..1; the gain amplifies the noise.
 
     The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of 7.5 and a quick
     observer.
@@ -163,7 +158,7 @@ def disturbance_bandwidth(config: Config) -> float:
 def attitude_delay(config: Config) -> float:
     """Delay of the attitude behind its target, s; assumes a usual rate loop if none is identified.
 
-    A gain above the largest sensible one is replaced by it: more gain hardly makes the attitude
+    The gain counts as at most the largest sensible gain: more gain hardly makes the attitude
     quicker, and a stiffer hold would oscillate.
     """
     excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s

@@ -1,4 +1,4 @@
-"""Learns the hover thrust from the motion, the thrust that was flown, and the voltage."""
+"""Learns the hover thrust from the motion, the thrust setpoints and the battery voltage."""
 
 from math import sin
 
@@ -33,14 +33,14 @@ class HoverLearning:
 
     @property
     def thrust_limits(self) -> tuple[float, float]:
-        """Smallest and largest available specific thrust by the learned hover thrust, m/s²."""
+        """Smallest and largest available specific thrust, from the learned hover thrust, m/s²."""
         hover_thrust = self._hover_thrust
         return hover_thrust.smallest_specific_thrust, hover_thrust.largest_specific_thrust
 
     @property
-    def hover(self) -> float:
+    def learned_hover(self) -> float:
         """Learned normalised thrust at hover, at the battery voltage just after take-off, 0..1."""
-        return self._hover_thrust.learned
+        return self._hover_thrust.learned_hover
 
     @property
     def present_hover(self) -> float:
@@ -48,13 +48,13 @@ class HoverLearning:
         return self._hover_thrust.present_hover
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
-        """Largest tilt at which 95 % of the largest thrust give `acceleration_down` (m/s²), rad."""
+        """Largest tilt, rad, at which 95 % of the largest thrust give `acceleration_down`, m/s²."""
         return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted_thrust)
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""
-        most = sin(self.largest_tilt(acceleration_down))
-        north, east = limited(target.north, target.east, most)
+        largest = sin(self.largest_tilt(acceleration_down))
+        north, east = limited(target.north, target.east, largest)
         return target._replace(north=north, east=east)
 
     def on_ground(self) -> None:
@@ -69,7 +69,7 @@ class HoverLearning:
         """Learn from the newest telemetry.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             q: newest attitude.
             offboard_active: whether the autopilot obeys the setpoints.
             steady: whether the commanded thrust is steady; the rotors lag behind a changing thrust.
@@ -78,19 +78,20 @@ class HoverLearning:
         if battery is not None:
             self._hover_thrust.note_voltage(battery.received, battery.voltage_v)
         self._had_control = self._had_control or offboard_active
-        learns = (
+        can_learn = (
             steady
             if offboard_active
             else not self._had_control and self._note_autopilot_thrust(now, q)
         )
-        if learns and position is not None:
+        if can_learn and position is not None:
             self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
         else:
             self._hover_thrust.pause()
 
     def mismatch_warning(self) -> str | None:
         """Advice to set thrust.hover_thrust, if the learned one differs by over 15 %; else None."""
-        configured, learned = self._hover_thrust.configured, self._hover_thrust.learned
+        hover_thrust = self._hover_thrust
+        configured, learned = hover_thrust.configured_hover, hover_thrust.learned_hover
         if not self._had_control or abs(learned - configured) <= _MISMATCH_SHARE * configured:
             return None
         return (

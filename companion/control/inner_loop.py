@@ -32,7 +32,7 @@ def planner(config: Config) -> Planner:
     """
     name, limits = config.planner_name, rate_limits(config)
 
-    def made(law: Any) -> Planner:
+    def make(law: Any) -> Planner:
         return make_planner(
             law,
             gain=config.planner.gain_per_s,
@@ -43,21 +43,21 @@ def planner(config: Config) -> Planner:
         )
 
     if name in PLANNER_NAMES:
-        return made(name)
+        return make(name)
     law = plugin("planner.name", plugins.PLANNERS, name)
     try:
         # A planner may remember the trial, so the one that flies is another.
-        tried, flown = (PluginPlanner(made(law), limits) for _ in range(2))
+        trial_planner, flight_planner = (PluginPlanner(make(law), limits) for _ in range(2))
     except Exception as error:
         raise ConfigError(f"planner.name: {name} cannot be made: {error!r}") from error
     try:
-        tried.rates(*_TRIAL_INPUT)
+        trial_planner.rates(*_TRIAL_INPUT)
     except (AttitudeError, UserCodeError) as error:
         raise ConfigError(
             f"planner.name: {name} cannot be flown: {error}; "
             "`companion.testing.check_planner` tries more attitudes"
         ) from error
-    return flown
+    return flight_planner
 
 
 def law_constants(config: Config) -> Constants:
@@ -72,9 +72,9 @@ def plugin(key: str, group: str, name: str) -> Any:
     """Load a class or function of another package.
 
     Args:
-        key: configuration key that names it, for messages.
-        group: its group of entry points.
-        name: its name in this group.
+        key: configuration key that names the plug-in, for messages.
+        group: group of entry points of the plug-in.
+        name: name of the plug-in in this group.
 
     Raises:
         ConfigError: the plug-in is not installed or cannot be loaded.
@@ -144,8 +144,8 @@ def tilt_response(config: Config) -> InnerResponse:
 def slower_tilt(config: Config) -> tuple[float, float]:
     """The larger lag and the larger dead time of roll and pitch, s; 0 if unknown.
 
-    With `model-following` the coefficients respond with these, because it delays the axis with the
-    shorter dead time. With other planners they are the worse case of both axes.
+    The planner `model-following` delays the axis with the shorter dead time, so both axes respond
+    with the larger values. With other planners these values are the worse case of both axes.
     """
     axes = config.vehicle.axes
     tilt = axes["roll"], axes["pitch"]

@@ -12,7 +12,7 @@ from companion.vehicle.records import AttitudeSample
 _KEPT_SETPOINTS = 512
 """Number of latest setpoints that are kept; at 400 Hz more than a second."""
 _KEPT_GAPS = 32
-"""Number of latest gaps that are kept; far fewer gaps end a flight."""
+"""Number of latest gaps that are kept; a flight ends after far fewer gaps."""
 
 
 class Unanswered(Enum):
@@ -38,8 +38,8 @@ class Unanswered(Enum):
     def is_refusal(self) -> bool:
         """Whether the data were fresh, but no valid setpoint could be computed or sent.
 
-        For the other reasons no setpoint was computed: sample or command was missing, stale or out
-        of order, the mode was not confirmed after a gap, or it may be another vehicle.
+        The other reasons: sample or command is missing, stale or out of order, offboard is not
+        confirmed after a gap, or the sample may come from another vehicle.
         """
         return self in _REFUSALS
 
@@ -68,19 +68,19 @@ _REFUSALS = {
 
 @dataclass(frozen=True, slots=True)
 class Deadlines:
-    """Times, s, after which data are too old or a setpoint is too late."""
+    """Times after which data are too old or a setpoint is too late."""
 
     telemetry_stale: float
-    """Largest age of a sample that is answered."""
+    """Largest age of a sample that is answered, s."""
     target_stale: float
-    """Largest age of a command from guidance that is used."""
+    """Largest age of a command from guidance that is used, s."""
     deadline: float
-    """Longest time from a sample's arrival to its setpoint; a longer one is counted."""
+    """Largest time from a sample's arrival to its setpoint that is not counted as missed, s."""
 
 
 @dataclass(slots=True)
 class LoopRecord:
-    """Counters since the loop was made, and latest times in s of event-loop time."""
+    """Counters since the loop was made, and latest times."""
 
     samples: int = 0
     """Samples received while the loop was on."""
@@ -99,23 +99,23 @@ class LoopRecord:
     )
     """Body rates (rad/s) and thrust of the latest setpoints, the newest last."""
     last_sample: float = -inf
-    """When the newest sample arrived."""
+    """When the newest sample arrived, s of event-loop time."""
     last_vehicle_time: float = -inf
-    """Vehicle time of the newest usable sample, s."""
+    """Vehicle time of the newest sample that fits the vehicle's clock, s."""
     last_answer: float = -inf
-    """When the newest answered sample arrived."""
+    """When the newest answered sample arrived, s of event-loop time."""
     gap_from: float = inf
-    """Beginning of the present time without setpoints: `last_answer`. It is inf, so that no gap is
-    counted, before the first answer and after `ControlLoop.resume`."""
+    """Time from which the present gap between setpoints counts: `last_answer`; inf (no gap) before
+    the first answer and after `ControlLoop.resume`."""
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
-    """When the first answerable sample after each of the latest gaps arrived. A gap is a time
-    longer than `Deadlines.telemetry_stale` without a setpoint, while offboard is active or
-    requested."""
+    """Ends of the latest gaps, s of event-loop time: arrival of the first sample that could be
+    answered. A gap is a time longer than `Deadlines.telemetry_stale` without a setpoint, while
+    offboard is active or requested."""
     setpoint_intervals: IntervalSums = field(default_factory=IntervalSums)
-    """Time from each setpoint to the next one, without gaps."""
+    """Time from each setpoint to the next one, without gaps, s."""
 
     def note_arrival(self, sample: AttitudeSample) -> float:
-        """Note an arrived sample; return the vehicle time since the last usable one, s."""
+        """Note an arrived sample; return the time since `last_vehicle_time`, s of vehicle time."""
         self.last_sample = sample.received
         period = sample.vehicle_time - self.last_vehicle_time
         if sample.misfit is None:
@@ -147,7 +147,10 @@ class LoopRecord:
 
     @property
     def stale(self) -> int:
-        """Number of samples unanswered for reasons that are no refusal; see `is_refusal`."""
+        """Number of samples not answered because data were stale, missing or out of order.
+
+        All reasons count that are no refusal (`Unanswered.is_refusal`).
+        """
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 
     @property

@@ -30,7 +30,7 @@ _DRAG_MISMATCH = 0.15
 
 
 class MotionEstimate:
-    """Feeds the motion observer on the vehicle's clock, and predicts the motion.
+    """Passes measurements to the motion observer, on the vehicle's clock; predicts the motion.
 
     Args:
         observer: estimates position, velocity and disturbance.
@@ -113,8 +113,8 @@ class MotionEstimate:
         measured = self._correction.corrected(
             position.vehicle_time, VehicleMotion(position.position_ned, (north, east, down))
         )
-        known = self._modelled_acceleration(slope, measured)
-        self._observer.observe(position.vehicle_time, measured, known, self._correction.trust)
+        modelled = self._modelled_acceleration(slope, measured)
+        self._observer.observe(position.vehicle_time, measured, modelled, self._correction.trust)
         if offboard_active and before is not None:
             self._learn_drag(before, position, slope)
 
@@ -124,7 +124,7 @@ class MotionEstimate:
         """The motion at `now` and `ahead` seconds later, with thrust, disturbance and drag.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             ahead: prediction time, s.
             thrust_limits: smallest and largest available specific thrust, m/s².
 
@@ -134,16 +134,17 @@ class MotionEstimate:
         if self._position is None:
             raise RuntimeError("guidance was asked to hold before any position came")
         time = self.vehicle_time(now, self._position)
-        still = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
+        measured = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
         slope = self._slopes.mean(self._position.vehicle_time, time)
-        motion = self._observer.at(time, self._modelled_acceleration(slope, still)) or still
+        motion = self._observer.at(time, self._modelled_acceleration(slope, measured)) or measured
         slope = self._slopes.mean(self._position.vehicle_time, time + ahead)
-        later = self._observer.at(time + ahead, self._modelled_acceleration(slope, motion)) or still
+        modelled = self._modelled_acceleration(slope, motion)
+        predicted = self._observer.at(time + ahead, modelled) or measured
         north, east = self._slopes.newest
         thrust = self.vertical_thrust * north, self.vertical_thrust * east
         disturbance, drag = self._observer.disturbance, self.drag.drag
         return GuidanceInput(
-            motion, later, thrust, disturbance, drag, thrust_limits, self._axis_drag
+            motion, predicted, thrust, disturbance, drag, thrust_limits, self._axis_drag
         )
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
@@ -166,7 +167,7 @@ class MotionEstimate:
         )
 
     def vehicle_time(self, now: float, position: LocalPosition) -> float:
-        """`now` (s of event-loop time) on the vehicle's clock, s.
+        """Convert `now` from event-loop time to the time of the vehicle's clock, s.
 
         Before the offset of that clock is known, `position` counts as measured when it arrived.
         """
@@ -203,9 +204,9 @@ class MotionEstimate:
     def _modelled_acceleration(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
         """Horizontal acceleration due to thrust and drag, m/s², without the disturbance."""
         north, east, _ = motion.velocity_ned
-        slowed = self.drag.drag.deceleration(motion.velocity_ned)
-        more_north, more_east = self._axis_drag.deceleration(north, east)
+        drag = self.drag.drag.deceleration(motion.velocity_ned)
+        axis_drag = self._axis_drag.deceleration(north, east)
         return (
-            self.vertical_thrust * slope[0] - slowed[0] - more_north,
-            self.vertical_thrust * slope[1] - slowed[1] - more_east,
+            self.vertical_thrust * slope[0] - drag[0] - axis_drag[0],
+            self.vertical_thrust * slope[1] - drag[1] - axis_drag[1],
         )

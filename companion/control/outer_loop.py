@@ -37,8 +37,8 @@ from companion.guidance.plugin_guidance import PluginGuidance
 from companion.guidance.position_correction import PositionCorrection
 from companion.nmpc import Settings, Solver
 
-_LOCKSTEP_DEADLINE = 1.0
-"""Deadline of the solver in lockstep, where the vehicle waits, s of wall time."""
+_DEADLINE_IF_VEHICLE_WAITS = 1.0
+"""Deadline of the solver if the vehicle waits for it, s of wall time."""
 
 
 def make_guidance(config: Config) -> Guidance:
@@ -61,11 +61,11 @@ def make_guidance(config: Config) -> Guidance:
     factory = plugin("guidance.kind", plugins.GUIDANCE, kind)
     try:
         # Guidance may remember the trial, so the one that flies is another.
-        tried, flown = factory(settings), factory(settings)
+        trial_guidance, flight_guidance = factory(settings), factory(settings)
     except Exception as error:
         raise ConfigError(f"guidance.kind: {kind} cannot be made: {error!r}") from error
-    _require_command(kind, tried, thrust_limits(config))
-    return PluginGuidance(flown)
+    _require_command(kind, trial_guidance, thrust_limits(config))
+    return PluginGuidance(flight_guidance)
 
 
 def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:
@@ -118,7 +118,7 @@ def linear_settings(config: Config) -> LinearSettings:
         ),
         tilt=tilt,
         heading=heading,
-        max_horizontal=limits.largest_horizontal,
+        max_horizontal=limits.max_horizontal_acceleration,
         thrust_lag=config.thrust.lag,
         period=period,
     )
@@ -141,24 +141,37 @@ def motion_estimate(
     )
 
 
-def predictive(config: Config, part: Follow, note: Callable[[str], None]) -> Predictive:
+def predictive(
+    config: Config, maneuver: Follow, note: Callable[[str], None], *, vehicle_waits: bool
+) -> Predictive:
     """Predictive control of one trajectory; starts its process.
+
+    Args:
+        config: configuration of the flight.
+        maneuver: the maneuver that flies the trajectory.
+        note: called with messages for the user.
+        vehicle_waits: whether the vehicle waits for the solver: in lockstep or on a virtual clock.
 
     Raises:
         ConfigError: see `predictive_settings`.
         MissingExtraError: the solver is not installed.
     """
-    settings = predictive_settings(config)
+    settings = predictive_settings(config, vehicle_waits=vehicle_waits)
     return Predictive(
-        lambda report: Solver(settings, part.trajectory, report),
+        lambda report: Solver(settings, maneuver.trajectory, report),
         period=settings.lead,
-        lockstep=config.link.lockstep,
+        vehicle_waits=vehicle_waits,
         note=note,
     )
 
 
-def predictive_settings(config: Config) -> Settings:
+def predictive_settings(config: Config, *, vehicle_waits: bool = False) -> Settings:
     """The settings of predictive control: response and limits of the vehicle.
+
+    Args:
+        config: configuration of the flight.
+        vehicle_waits: whether the vehicle waits for the solver, whose deadline is then longer than
+            the period of guidance.
 
     Raises:
         ConfigError: the planner's response is too fast for the steps of the horizon, or gravity
@@ -179,7 +192,7 @@ def predictive_settings(config: Config) -> Settings:
             min_thrust=min_thrust,
             max_thrust=max_thrust,
             lead=period,
-            deadline=_LOCKSTEP_DEADLINE if config.link.lockstep else period,
+            deadline=_DEADLINE_IF_VEHICLE_WAITS if vehicle_waits else period,
         )
     except ValueError as error:
         raise ConfigError(

@@ -37,7 +37,7 @@ class PlannerRunner:
 
     Attributes:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
-            along its axes, or None.
+            along the axes of that target (ArduPilot), or None.
         on_attitude_target: called with each new ATTITUDE_TARGET before the planner gets it.
         planner_input: attitude and target that the planner last got, or None.
     """
@@ -47,9 +47,9 @@ class PlannerRunner:
         self.on_attitude_target: Callable[[AttitudeTarget], None] | None = None
         self.planner_input: tuple[Quaternion, Target] | None = None
         self._planner = planner
-        self._follower = planner if isinstance(planner, ModelFollowingPlanner) else None
+        self._model_follower = planner if isinstance(planner, ModelFollowingPlanner) else None
         self._resets, self._limits = resets, limits
-        self._steps = StepFrame()
+        self._step_frame = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
         self._passed_target: AttitudeTarget | None = None
@@ -72,18 +72,18 @@ class PlannerRunner:
         self._planned_at = -inf
 
     @property
-    def planned(self) -> PlannedTilt | None:
-        """The plan in effect at the newest sample; None for a planner without a plan."""
-        return None if self._follower is None else self._follower.planned
+    def planned_tilt(self) -> PlannedTilt | None:
+        """Coefficients planned by `model-following` at the newest sample; None: another planner."""
+        return None if self._model_follower is None else self._model_follower.planned
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """An attitude of the autopilot in the frame that the planner sees."""
-        return self._steps.frame.attitude(self._resets.frame.attitude(q))
+        return self._step_frame.frame.attitude(self._resets.frame.attitude(q))
 
     def rates(
         self, sample: AttitudeSample, command: GuidanceCommand, arrival_period: float
     ) -> BodyRates:
-        """Body rates for a sample, limited, rad/s: those in the command, or else the planner's.
+        """Body rates for a sample, rad/s, limited: those in the command, or else the planner's.
 
         Args:
             sample: the sample to answer.
@@ -110,10 +110,12 @@ class PlannerRunner:
         period = sample.vehicle_time - self._planned_at
         # Over a gap the body rates are not known, so the frame does not follow the estimator.
         stepping = is_step and period <= _LONGEST_PERIOD
-        self._steps.advance(self._resets.corrections, min(abs(period), 10.0), stepping=stepping)
+        self._step_frame.advance(
+            self._resets.corrections, min(abs(period), 10.0), stepping=stepping
+        )
         q = self.attitude(sample.q)
         if not is_step:
-            target = self._steps.frame.target(target)
+            target = self._step_frame.frame.target(target)
         if period > _LONGEST_PERIOD:
             self._planner.reset(q, sample.body_rates)
             # A gap is not the period of the samples, so an earlier period is used.
@@ -124,7 +126,7 @@ class PlannerRunner:
         self.planner_input = q, target
         # A vehicle's clock that stood still or went back must not keep the sample unanswered.
         rates = self._planner.rates(q, target, max(SHORTEST_PERIOD, period), sample.body_rates)
-        return rates if self._passed_target is None else self._steps.rates(q, rates)
+        return rates if self._passed_target is None else self._step_frame.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
         """Pass a new ATTITUDE_TARGET to the planner once a sample is at least as new.

@@ -15,16 +15,16 @@ from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
 
 _LONGEST_SOLVER_START = 30.0
-"""In lockstep, longest wait for the solver to start, s of wall time."""
+"""If the vehicle waits, longest wait for the solver to start, s of wall time."""
 _LONGEST_ANSWER_WAIT = 1.0
-"""In lockstep, longest wait for an answer, s of wall time."""
+"""If the vehicle waits, longest wait for an answer, s of wall time."""
 
 
-class Following(NamedTuple):
-    """The trajectory that is followed now."""
+class FollowedTrajectory(NamedTuple):
+    """The trajectory maneuver that is flown at present."""
 
-    part: Follow
-    """The trajectory as a maneuver."""
+    maneuver: Follow
+    """The maneuver that flies the trajectory."""
     time: float
     """Time since the maneuver began, s."""
     pose: Pose
@@ -46,13 +46,14 @@ class PredictiveRecord:
 class Predictive:
     """Requests the solver's answer for the next step, at each step of guidance.
 
-    Linear guidance also makes a command at every step. It is flown at once if an answer is late,
-    failed or implausible. The first trouble of each kind is reported.
+    Linear guidance also makes a command at every step. This command is flown at once if an answer
+    is late, failed or implausible. The first trouble of each kind is reported.
 
     Args:
         solver: starts the solver's process; its argument is called with each trouble.
         period: period of guidance, s.
-        lockstep: whether to wait for the solver's answers, because the vehicle waits, too.
+        vehicle_waits: whether the vehicle waits for the solver's answers: in lockstep or on a
+            virtual clock.
         note: called with messages for the user.
 
     Attributes:
@@ -64,14 +65,14 @@ class Predictive:
         solver: Callable[[Callable[[Trouble, str], None]], Solver],
         *,
         period: float,
-        lockstep: bool,
+        vehicle_waits: bool,
         note: Callable[[str], None],
     ) -> None:
         self.record = PredictiveRecord()
         self._note = note
         self._period = period
-        self._lockstep = lockstep
-        self._number = 0
+        self._vehicle_waits = vehicle_waits
+        self._request_number = 0
         self._inputs: deque[Input] = deque(maxlen=50)
         self._solver = solver(self._report)
 
@@ -84,52 +85,53 @@ class Predictive:
         linear: LinearCommand,
         frame: HeadingFrame,
         vehicle: Vehicle,
-        following: Following | None,
+        followed: FollowedTrajectory | None,
     ) -> LinearCommand:
         """The solver's answer for this step if there is one, else `linear`; requests the next one.
 
-        The solver works in the estimator's frame, whose heading jumps at each reset. Its target is
-        constant for a period, which its model takes into account.
+        The solver works in the estimator's frame, whose heading jumps at each reset. The solver's
+        target is constant for a period, which its model takes into account.
 
         Args:
             linear: command of linear guidance.
             frame: the frame without heading resets.
             vehicle: present state of the vehicle.
-            following: the trajectory that is followed, or None.
+            followed: the trajectory that is followed, or None.
         """
         target, down = linear.target, linear.down
         target = target._replace(heading=frame.estimated_heading(target.heading))
-        answer = None if following is None else self._answer(vehicle.time)
+        answer = None if followed is None else self._answer(vehicle.time)
         if answer is not None:
             self.record.flown_answers += 1
             self.record.computing_seconds.append(answer.computing_seconds)
             target, down = _command_of(answer)
         self._record_input(vehicle.time, target, down)
-        if following is not None:
-            self._request(vehicle, following, frame)
+        if followed is not None:
+            self._request(vehicle, followed, frame)
         if answer is None:
             return linear
         target = target._replace(heading=frame.heading(target.heading))
         return LinearCommand(target, target, down)
 
     def _answer(self, now: float) -> Answer | None:
-        if self._lockstep:
+        if self._vehicle_waits:
             self._wait_until_ready()
-        answer = self._solver.take(_LONGEST_ANSWER_WAIT if self._lockstep else 0.0)
+        answer = self._solver.take(_LONGEST_ANSWER_WAIT if self._vehicle_waits else 0.0)
         # The answer may be for an earlier step, if guidance has missed steps.
         if answer is None or abs(answer.time - now) > self._period:
             return None
         return answer
 
-    def _request(self, vehicle: Vehicle, following: Following, frame: HeadingFrame) -> None:
-        part, pose = following.part, following.pose
-        at = following.time - part.turn_duration
-        if at < 0.0:
+    def _request(self, vehicle: Vehicle, followed: FollowedTrajectory, frame: HeadingFrame) -> None:
+        maneuver, pose = followed.maneuver, followed.pose
+        trajectory_time = followed.time - maneuver.turn_duration
+        if trajectory_time < 0.0:
             return
-        self._number += 1
-        turned = pose.heading if part.trajectory.holds_heading else 0.0
-        start = Start(pose.position_ned, frame.estimated_heading(turned))
-        self._solver.request(Request(self._number, vehicle, at, start, tuple(self._inputs)))
+        self._request_number += 1
+        heading = pose.heading if maneuver.trajectory.holds_heading else 0.0
+        inputs = tuple(self._inputs)
+        start = Start(pose.position_ned, frame.estimated_heading(heading))
+        self._solver.request(Request(self._request_number, vehicle, trajectory_time, start, inputs))
 
     def _record_input(self, now: float, target: Target, down: float) -> None:
         lift = GRAVITY - down

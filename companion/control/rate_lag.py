@@ -18,9 +18,9 @@ _HALF_LEARNED_SQUARES = 0.01
 class RateLag:
     """Learns the lag of the reported body rates behind the reported attitude.
 
-    The turn of the attitude between two samples differs from the mean of the two rates times their
-    distance in time. The difference is the lag times the change of the rates. It is learned from
-    roll and pitch only, because the estimator also changes the heading when the body does not turn.
+    The rotation between two attitudes differs from the mean of the two body rates times the time
+    between the samples. The difference is the lag times the change of the rates. The lag is learned
+    from roll and pitch only, because the estimator also changes the heading of a body at rest.
 
     All rotations have the same weight. So a lag that changes in flight, for example when a filter
     of the autopilot is switched, is followed slowly. That matters little: on the mock vehicles,

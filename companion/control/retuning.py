@@ -65,11 +65,8 @@ class Retuning:
         self._loop, self._guidance_loop = loop, guidance_loop
 
     @contextmanager
-    def stepped_by(self, before_step: Callable[[float], None]) -> Iterator[None]:
-        """Call `before_step` with the time, s, at the beginning of each guidance step.
-
-        This ends with the block.
-        """
+    def before_each_step(self, before_step: Callable[[float], None]) -> Iterator[None]:
+        """Call `before_step` with the time, s, before each guidance step while the block runs."""
         self._guidance_loop.before_step = before_step
         try:
             yield
@@ -133,8 +130,8 @@ def value_in_effect(config: Config, difference: Difference, value: float | None)
     """`value`, or for null the value that the program computes from `config`."""
     if value is not None:
         return value
-    comes_to = {
+    computed = {
         "guidance.position_weight_per_s4": lambda: hold_weights(config).position,
         "guidance.velocity_weight_per_s2": lambda: hold_weights(config).velocity,
     }
-    return comes_to[difference.name]()
+    return computed[difference.name]()

@@ -19,7 +19,7 @@ class SampleRecorder:
 
     Args:
         recorder: recorder of the flight, or None.
-        planner: provides the planner's input; calls back with each new ATTITUDE_TARGET.
+        planner: provides the planner's input, and reports each new ATTITUDE_TARGET.
         limits: limits of the body rates.
         thrust_limits: smallest and largest thrust that is sent, 0..1.
         clock: returns event-loop time, s.
@@ -66,9 +66,9 @@ class SampleRecorder:
             thrust: thrust, 0..1.
             latency_ns: time since the sample's arrival, ns.
         """
-        planned = not command.idle and command.body_rates is None
-        inputs = self._planner.planner_input if planned else None
-        plan = self._planner.planned if planned else None
+        asked_planner = not command.idle and command.body_rates is None
+        inputs = self._planner.planner_input if asked_planner else None
+        plan = self._planner.planned_tilt if asked_planner else None
         self._answer = Answer(
             rates, thrust, latency_ns, inputs, plan, command.is_step, command.idle
         )

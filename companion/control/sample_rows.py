@@ -12,7 +12,7 @@ from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
-from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.loop_channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
@@ -21,7 +21,7 @@ from companion.vehicle.records import AttitudeSample, AttitudeTarget
 _REASON_CODES: dict[Unanswered | None, int] = {None: 0}
 _REASON_CODES.update({reason: number for number, reason in enumerate(Unanswered, start=2)})
 CONTROL_OFF = 1
-"""Code of a sample that came while the loop was off."""
+"""Code in the column `unanswered` of a sample that came while the loop was off."""
 _MISFIT_CODES = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
 _LIMIT_REACHED_SHARE = 1.0 - 1e-9
 """A body rate of at least this share of its limit counts as limited."""
@@ -42,23 +42,23 @@ class LoopFlags(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A setpoint that was sent, and its inputs."""
+    """A setpoint that was sent, and the inputs from which it was computed."""
 
     rates: BodyRates
     """Body rates, rad/s."""
     thrust: float
     """Thrust, 0..1."""
     latency_ns: int
-    """Time since the sample's arrival, ns."""
+    """Time from the sample's arrival to the setpoint, ns."""
     planner_input: tuple[Quaternion, Target] | None
     """Attitude and target that the planner got; None: the planner was not asked, because guidance
     commanded body rates or idle."""
-    planned: PlannedTilt | None
-    """The plan in effect at the sample, or None."""
+    planned_tilt: PlannedTilt | None
+    """Coefficients planned by `model-following` at the sample, or None."""
     is_step: bool
-    """See `GuidanceCommand`."""
+    """Whether the setpoint belongs to an open-loop step whose response is measured."""
     idle: bool
-    """See `GuidanceCommand`."""
+    """Whether zero body rates and zero thrust were sent, on the ground."""
 
 
 class SampleEntry(NamedTuple):
@@ -66,11 +66,11 @@ class SampleEntry(NamedTuple):
 
     sample: AttitudeSample
     reason: Unanswered | None
-    """Why it is unanswered, or None."""
+    """Why the sample is unanswered, or None."""
     flags: LoopFlags
     """State of the loop before the answer."""
     checked_at: float
-    """When its age was checked before sending, s of event-loop time; NaN: it was not."""
+    """When the sample's age was checked before sending, s of event-loop time; NaN: not checked."""
     answer: Answer | None
     """Setpoint that was sent, or None."""
 
@@ -93,7 +93,7 @@ class SampleRows:
         sample, reason, flags, checked_at, answer = entry
         code = _REASON_CODES[reason] if flags.on else CONTROL_OFF
         data = SAMPLE.packing.pack(
-            CDR,
+            CDR_HEADER,
             sample.received,
             sample.vehicle_time,
             sample.time_boot_ms,
@@ -108,18 +108,18 @@ class SampleRows:
         )
         writer.message("/sample", time_ns, data)
         if answer is not None:
-            data = SETPOINT.packing.pack(CDR, *self._setpoint(sample, flags, answer))
+            data = SETPOINT.packing.pack(CDR_HEADER, *self._setpoint(sample, flags, answer))
             writer.message("/setpoint", time_ns, data)
 
     def attitude_target(self, writer: McapWriter, time_ns: int, target: AttitudeTarget) -> None:
         """Write a new ATTITUDE_TARGET."""
-        data = ATTITUDE_TARGET.packing.pack(CDR, target.time_boot_ms, *target.q)
+        data = ATTITUDE_TARGET.packing.pack(CDR_HEADER, target.time_boot_ms, *target.q)
         writer.message("/attitude_target", time_ns, data)
 
     def _setpoint(
         self, sample: AttitudeSample, flags: LoopFlags, answer: Answer
     ) -> tuple[float, ...]:
-        rates, thrust, latency_ns, planner_input, planned, is_step, idle = answer
+        rates, thrust, latency_ns, planner_input, planned_tilt, is_step, idle = answer
         q, target = planner_input or (sample.q, _NO_TARGET)
         _, ax, ay = tilt_products(*q)
         roll, pitch, yaw = rates
@@ -133,7 +133,7 @@ class SampleRows:
             *q,
             -2.0 * ay,
             2.0 * ax,
-            *((nan, nan) if planned is None else planned[:2]),
+            *((nan, nan) if planned_tilt is None else planned_tilt[:2]),
             # A program's own rates may be NumPy's, whose truth values cannot be packed.
             bool(sqrt(roll * roll + pitch * pitch) >= self._tilt_rate),
             bool(abs(yaw) >= self._yaw_rate),

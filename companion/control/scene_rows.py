@@ -28,10 +28,10 @@ _HALF_ROOT = sqrt(0.5)
 _MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EVERY, _PATHS_EVERY, _BODY_EVERY = 2, 5, 10
-"""With guidance at 50 Hz the thrust is drawn every 0.1 s. Every second drawing adds a point to the
-paths, every fifth sends the paths, every tenth sends the body.
+"""Numbers of drawings after which a point is added to the paths, the paths are sent, and the body
+is sent. With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows.
 
-All are repeated, because a viewer may join late or jump in the recording.
+Everything is sent again and again, because a viewer may join late or jump in the recording.
 """
 _GAP_NS = 1_000_000_000
 """A pause longer than this between two drawings starts new paths, ns."""
@@ -44,8 +44,8 @@ _FRONT_COLOR: Color = (0.85, 0.35, 0.1, 0.8)
 _BACK_COLOR: Color = (0.3, 0.3, 0.35, 0.8)
 _THRUST_COLOR: Color = (0.1, 0.7, 0.3, 1.0)
 _COMMANDED_THRUST_COLOR: Color = (0.85, 0.2, 0.75, 0.7)
-_FLOWN_COLOR: Color = (0.1, 0.5, 0.95, 1.0)
-_REFERENCE_COLOR: Color = (0.95, 0.65, 0.1, 1.0)
+_FLOWN_PATH_COLOR: Color = (0.1, 0.5, 0.95, 1.0)
+_REFERENCE_PATH_COLOR: Color = (0.95, 0.65, 0.1, 1.0)
 _ROTOR_DISTANCE = 0.18
 """Distance of a rotor from the axes of the body, m."""
 
@@ -72,8 +72,8 @@ class SceneRows:
 
     def __init__(self) -> None:
         self._command: GuidanceCommand | None = None
-        self._flown: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
-        self._reference: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
+        self._flown_path: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
+        self._reference_path: deque[Vector] = deque(maxlen=_MAX_PATH_POINTS)
         self._count = self._newest_ns = 0
 
     def note_command(self, command: GuidanceCommand) -> None:
@@ -96,15 +96,18 @@ class SceneRows:
         scene = (thrust,) if self._count % _BODY_EVERY else (_BODY_ENTITY, thrust)
         writer.message("/scene", time_ns, scene_message(time_ns, scene))
         if time_ns - self._newest_ns > _GAP_NS:
-            self._flown.clear()
-            self._reference.clear()
+            self._flown_path.clear()
+            self._reference_path.clear()
         self._newest_ns = time_ns
         if self._count % _POINT_EVERY == 0:
-            self._flown.append(position)
-            self._reference.append(reference)
+            self._flown_path.append(position)
+            self._reference_path.append(reference)
         self._count += 1
         if self._count % _PATHS_EVERY == 0:
-            lines = (Line(self._reference, _REFERENCE_COLOR), Line(self._flown, _FLOWN_COLOR))
+            lines = (
+                Line(self._reference_path, _REFERENCE_PATH_COLOR),
+                Line(self._flown_path, _FLOWN_PATH_COLOR),
+            )
             paths = (Entity("paths", "world", lines=lines),)
             writer.message("/paths", time_ns, scene_message(time_ns, paths))
 
@@ -122,7 +125,7 @@ class SceneRows:
 
 
 def _wanted_attitude(command: GuidanceCommand) -> Quaternion | None:
-    """An attitude with the thrust direction that guidance commands; None with body rates."""
+    """An attitude with the commanded thrust direction; None if body rates are commanded."""
     north, east = command.target[:2]
     if command.body_rates is not None or not north * north + east * east < 1.0:
         return None

@@ -10,28 +10,30 @@ _SHORTEST_STEP = 0.035
 
 
 class Slew:
-    """Interpolates from the present configuration to the wanted one; times are in s on one clock.
+    """Interpolates from the present configuration to the wanted one; times are in s of one clock.
 
     Attributes:
-        settled: the newest configuration that was fully in effect.
+        settled_config: the newest configuration that was completely in effect.
 
     Args:
         config: the present configuration, which is also the wanted one at first.
     """
 
     def __init__(self, config: Config) -> None:
-        self._present = self._start = self._wanted = self.settled = config
+        self._present_config = self._start_config = self._wanted_config = config
+        self.settled_config = config
         self._began_at: float | None = None
         self._stepped_at = 0.0
 
     def jump(self, wanted: Config) -> None:
-        """Take the wanted values at once, because no loop flies yet or any more."""
-        self._present = self._wanted = self.settled = wanted
+        """Take the wanted values at once, because control has not begun yet or has ended."""
+        self._present_config = self._wanted_config = self.settled_config = wanted
         self._began_at = None
 
     def begin(self, wanted: Config, now: float) -> None:
         """Begin to move from the present values to the wanted ones."""
-        self._start, self._wanted, self._began_at = self._present, wanted, now
+        self._start_config, self._wanted_config = self._present_config, wanted
+        self._began_at = now
 
     def stop(self) -> None:
         """Stay at the present values."""
@@ -47,8 +49,8 @@ class Slew:
             return None
         self._stepped_at = now
         share = (now - self._began_at) / SLEW_TIME
-        self._present = interpolated(self._start, self._wanted, share)
-        values = tuning(self._present)
+        self._present_config = interpolated(self._start_config, self._wanted_config, share)
+        values = tuning(self._present_config)
         if share >= 1.0:
-            self._began_at, self.settled = None, self._wanted
+            self._began_at, self.settled_config = None, self._wanted_config
         return values

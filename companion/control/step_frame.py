@@ -2,7 +2,7 @@
 
 A step should be a straight line in the world. An estimator corrects its heading most when the
 vehicle accelerates after a hover: by 1.3° within the first step on ArduCopter's simulator, which
-bends that line by 0.015. The body rates show that the vehicle did not turn. So while steps are
+bends the line of the coefficients by 0.015. The body rates show no turn. So while steps are
 flown, the planner sees an attitude without the heading changes that body rates do not explain.
 
 In closed loop, guidance computes each acceleration in the estimator's frame. The horizontal target

@@ -25,14 +25,21 @@ class StepRecorder:
         self,
         flags: StepFlags,
         now: float,
-        made: StepOutput | None,
+        output: StepOutput | None,
         command: GuidanceCommand | None,
     ) -> None:
-        """Record a step that began at `now`, s of event-loop time."""
+        """Record a step that began at `now`, s of event-loop time.
+
+        Args:
+            flags: state of the vehicle at the step.
+            now: event-loop time, s.
+            output: result of the step, or None.
+            command: the command for the control loop; None: no new command.
+        """
         if self._recorder is None:
             return
         state = self._state
-        read = StepInput(
+        inputs = StepInput(
             now,
             state.position,
             self._vehicle_clock.offset,
@@ -42,7 +49,7 @@ class StepRecorder:
             state.armed,
             flags,
         )
-        self._recorder.add(now, self._rows.step, StepEntry(read, made, command))
+        self._recorder.add(now, self._rows.step, StepEntry(inputs, output, command))
 
     def action(self, now: float, name: str) -> None:
         """Record a call by which a phase controls guidance at `now`, s of event-loop time."""

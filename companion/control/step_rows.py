@@ -12,7 +12,7 @@ from companion.control.scene_rows import SceneRows
 from companion.guidance import GuidanceInput, Reference
 from companion.guidance.reference import Vector
 from companion.recording.mcap_file import cdr
-from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.loop_channels import GUIDANCE, INPUT, TARGET
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
@@ -61,7 +61,7 @@ class StepInput(NamedTuple):
 class StepOutput(NamedTuple):
     """The result of a guidance step."""
 
-    measured_at: float
+    vehicle_time: float
     """When the step began, on the vehicle's clock, s."""
     q: Quaternion
     """Newest attitude."""
@@ -70,7 +70,7 @@ class StepOutput(NamedTuple):
     reference: Reference
     """Reference of the step."""
     error: float | None
-    """Distance from the reference, m, or None."""
+    """Distance from the reference, m; None as in `FlownSource.tracking_error`."""
 
 
 class StepEntry(NamedTuple):
@@ -79,7 +79,7 @@ class StepEntry(NamedTuple):
     inputs: StepInput
     """The telemetry that the step read."""
     output: StepOutput | None
-    """Its result; None without a fresh position or while idle on the ground."""
+    """Result of the step; None without a fresh position or while idle on the ground."""
     command: GuidanceCommand | None
     """The command for the control loop; None: no new command."""
 
@@ -95,38 +95,40 @@ class StepRows:
 
     def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
         """Write the inputs, the result and the command of a step."""
-        read, made, command = entry
-        writer.message("/guidance_input", time_ns, INPUT.packing.pack(CDR, *_input_row(read)))
+        inputs, output, command = entry
+        writer.message(
+            "/guidance_input", time_ns, INPUT.packing.pack(CDR_HEADER, *_input_row(inputs))
+        )
         if command is not None:
-            data = TARGET.packing.pack(CDR, *_target_row(command))
+            data = TARGET.packing.pack(CDR_HEADER, *_target_row(command))
             writer.message("/target", time_ns, data)
             self._scene.note_command(command)
-        if made is not None:
+        if output is not None:
             data = GUIDANCE.packing.pack(
-                CDR, read.time, *_guidance_row(made), read.flags.offboard_active
+                CDR_HEADER, inputs.time, *_guidance_row(output), inputs.flags.offboard_active
             )
             writer.message("/guidance", time_ns, data)
             self._count += 1
             if self._count % _POSE_EVERY == 0:
-                self._draw(writer, time_ns, made)
+                self._draw(writer, time_ns, output)
             if self._count % _SCENE_EVERY == 0:
-                here = _east_north_up(made.inputs.now.position_ned)
-                there = _east_north_up(made.reference.position_ned)
-                self._scene.draw(writer, time_ns, made.q, here, there)
+                position = _east_north_up(output.inputs.now.position_ned)
+                reference = _east_north_up(output.reference.position_ned)
+                self._scene.draw(writer, time_ns, output.q, position, reference)
 
-    def _draw(self, writer: McapWriter, time_ns: int, made: StepOutput) -> None:
-        pose = (*_east_north_up(made.inputs.now.position_ned), *_enu_from_flu(made.q))
+    def _draw(self, writer: McapWriter, time_ns: int, output: StepOutput) -> None:
+        pose = (*_east_north_up(output.inputs.now.position_ned), *_enu_from_flu(output.q))
         writer.message("/tf", time_ns, self._transform.message(time_ns, pose))
         writer.message("/pose", time_ns, self._pose.message(time_ns, pose))
         # Drawn with the attitude of the vehicle, because a reference has none.
-        there = (*_east_north_up(made.reference.position_ned), *_enu_from_flu(made.q))
-        writer.message("/reference", time_ns, self._pose.message(time_ns, there))
+        reference_pose = (*_east_north_up(output.reference.position_ned), *_enu_from_flu(output.q))
+        writer.message("/reference", time_ns, self._pose.message(time_ns, reference_pose))
 
 
-def _input_row(read: StepInput) -> tuple[float, ...]:
-    position, battery, thrust = read.position, read.battery, read.autopilot_thrust
+def _input_row(inputs: StepInput) -> tuple[float, ...]:
+    position, battery, thrust = inputs.position, inputs.battery, inputs.autopilot_thrust
     return (
-        read.time,
+        inputs.time,
         *(
             (nan,) * 8
             if position is None
@@ -137,14 +139,14 @@ def _input_row(read: StepInput) -> tuple[float, ...]:
                 *position.velocity_ned,
             )
         ),
-        _nan_if_none(read.clock_offset),
+        _nan_if_none(inputs.clock_offset),
         nan if battery is None else battery.received,
         nan if battery is None else _nan_if_none(battery.voltage_v),
         nan if thrust is None else thrust.received,
         nan if thrust is None else thrust.thrust,
-        _nan_if_none(read.height),
-        read.armed is True,
-        *read.flags,
+        _nan_if_none(inputs.height),
+        inputs.armed is True,
+        *inputs.flags,
     )
 
 
@@ -163,16 +165,16 @@ def _target_row(command: GuidanceCommand) -> tuple[float, ...]:
     )
 
 
-def _guidance_row(made: StepOutput) -> tuple[float, ...]:
-    inputs, reference = made.inputs, made.reference
+def _guidance_row(output: StepOutput) -> tuple[float, ...]:
+    inputs, reference = output.inputs, output.reference
     return (
-        made.measured_at,
+        output.vehicle_time,
         *reference.position_ned,
         *reference.velocity_ned,
         reference.heading,
         *inputs.now.position_ned,
         *inputs.now.velocity_ned,
-        _nan_if_none(made.error),
+        _nan_if_none(output.error),
         *inputs.disturbance,
         inputs.drag.linear,
         inputs.drag.quadratic,

@@ -14,23 +14,23 @@ class Ticker:
 
     def __init__(self, period: float, clock: Callable[[], float]) -> None:
         self._period, self._clock = period, clock
-        self._due = clock()
-        self._soon = False
+        self._next_start = clock()
+        self._triggered = False
         self._waiting: asyncio.Future[None] | None = None
 
     def trigger(self) -> None:
         """End the wait of `tick` at once, and begin the next period then."""
-        self._soon = True
+        self._triggered = True
         if self._waiting is not None:
             _wake(self._waiting)
 
     async def tick(self) -> None:
-        """Wait for the next period or for `trigger`; missed periods are not repeated."""
-        self._due = max(self._due + self._period, self._clock())
-        if not self._soon:
-            await self._sleep(self._due - self._clock())
-        if self._soon:
-            self._soon, self._due = False, self._clock()
+        """Wait for the next period or for `trigger`; missed periods are skipped."""
+        self._next_start = max(self._next_start + self._period, self._clock())
+        if not self._triggered:
+            await self._sleep(self._next_start - self._clock())
+        if self._triggered:
+            self._triggered, self._next_start = False, self._clock()
 
     async def _sleep(self, seconds: float) -> None:
         loop = asyncio.get_running_loop()

@@ -16,16 +16,16 @@ class FlownPart(NamedTuple):
     name: str
     """Name to show to the user."""
     elapsed: float
-    """Time since it began, s."""
+    """Time since the maneuver or source began, s."""
     duration: float | None
-    """Its duration, s; None: the source decides when it ends."""
+    """Duration of the maneuver, s; None: a source, which decides itself when it ends."""
     part: object
     """The maneuver or the source itself."""
 
 
-def flown_part(flown: FlownSource, now: float) -> FlownPart | None:
+def flown_part(flown_source: FlownSource, now: float) -> FlownPart | None:
     """The maneuver or source that is flown at `now` (s of event-loop time); None: neither is."""
-    source, begun_at = flown.source, flown.begun_at
+    source, begun_at = flown_source.source, flown_source.begun_at
     if source is None or begun_at is None or source.finished(now):
         return None
     if not isinstance(source, ManeuverSource):
@@ -39,16 +39,16 @@ class TrackingRecord:
 
     Args:
         trace: the trace of the flight.
-        flown: the source that guidance flies.
+        flown_source: the source that guidance flies.
 
     Attributes:
         note: called with a message for each maneuver that begins.
     """
 
-    def __init__(self, trace: FlightTrace, flown: FlownSource) -> None:
+    def __init__(self, trace: FlightTrace, flown_source: FlownSource) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self._trace = trace
-        self._flown = flown
+        self._flown_source = flown_source
         self._recorded_part: object = None
 
     def add(
@@ -57,12 +57,12 @@ class TrackingRecord:
         """Record one step of guidance.
 
         Args:
-            now: s of event-loop time.
+            now: event-loop time, s.
             vehicle_time: the same time on the vehicle's clock, s.
             reference: reference at this time.
             motion: motion of the vehicle at this time.
         """
-        flown = flown_part(self._flown, now)
+        flown = flown_part(self._flown_source, now)
         part = None if flown is None else flown.part
         if part is not self._recorded_part:
             self._recorded_part = part

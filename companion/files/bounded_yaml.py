@@ -15,7 +15,7 @@ MOST_BYTES = 250_000
 """Largest size of a file, bytes. A thousand waypoints take 50 kB."""
 MOST_NODES = 6000
 """Largest number of keys, values, lists and mappings together."""
-DEEPEST = 20
+DEEPEST_NESTING = 20
 """Largest nesting depth of lists and mappings."""
 LONGEST_TEXT = 4096
 """Largest number of characters of a value."""
@@ -50,7 +50,7 @@ class YamlError(Exception):
         self.line = line
 
 
-Where = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 """Path to a value from the root of the document: keys, and positions in lists."""
 
 
@@ -58,7 +58,7 @@ class Document(NamedTuple):
     """A YAML document."""
 
     root: Any
-    lines: dict[Where, int]
+    lines: dict[KeyPath, int]
     """The line on which each key and each item of a list stands, from 1."""
 
 
@@ -120,7 +120,7 @@ class _Dumper(yaml.SafeDumper):
     """Quotes texts that YAML 1.1 or 1.2 would read as numbers: 12e5, 0o17."""
 
     def ignore_aliases(self, data: Any) -> bool:
-        """Write no aliases: `parse` refuses them."""
+        """Always true: no alias is written, because `parse` refuses aliases."""
         return True
 
 
@@ -135,12 +135,12 @@ class _Builder:
 
     Attributes:
         root: the document so far.
-        lines: line numbers of its keys and items.
+        lines: line number of each key and each item of a list, from 1.
     """
 
     def __init__(self) -> None:
         self.root: Any = None
-        self.lines: dict[Where, int] = {}
+        self.lines: dict[KeyPath, int] = {}
         self._path: list[str | int] = []
         # From the outermost node to the innermost; a key is None while the next event is a key.
         self._open_nodes: list[dict[str, Any] | list[Any]] = []
@@ -181,8 +181,8 @@ class _Builder:
         self._path += path_part
         self._open_nodes.append(node)
         self._pending_keys.append(None)
-        if len(self._open_nodes) > DEEPEST:
-            raise YamlError(f"nested deeper than {DEEPEST} levels", line)
+        if len(self._open_nodes) > DEEPEST_NESTING:
+            raise YamlError(f"nested deeper than {DEEPEST_NESTING} levels", line)
 
     def _add(
         self, value: Any, event: yaml.ScalarEvent | yaml.CollectionStartEvent, line: int

@@ -3,7 +3,7 @@
 DISK_TIMEOUT = 5.0
 """Time allowed for the disk to take written data, s."""
 DISK_HANGS = f"the disk did not answer for {DISK_TIMEOUT:g} s"
-"""The reason given if the disk takes longer."""
+"""The reason in messages if the disk takes longer than `DISK_TIMEOUT`."""
 
 
 def reason_of(error: OSError) -> str:

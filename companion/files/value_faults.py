@@ -9,7 +9,7 @@ from companion.files.similar_names import name_hint
 
 _LONGEST_SHOWN = 60
 _LARGEST_HINTED = 1e12
-"""Beyond it a value has no hint of another unit; it may be too large for a float."""
+"""Larger values get no hint of a mistaken unit; they may be too large for a float."""
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
 
@@ -34,7 +34,7 @@ _BOUNDS: dict[str, Callable[[float, float], bool]] = {
     "le": lambda value, bound: value <= bound,
     "lt": lambda value, bound: value < bound,
 }
-_MUST: Mapping[str, str] = {
+_REQUIREMENTS: Mapping[str, str] = {
     "greater_than_equal": "must be at least {ge:.12g}",
     "greater_than": "must be more than {gt:.12g}",
     "less_than_equal": "must be at most {le:.12g}",
@@ -62,7 +62,7 @@ def shortened(value: Any) -> str:
 def mistaken_unit(key: str, value: float) -> tuple[str, float]:
     """The unit often mistaken for the key's unit; the value converted from it to the key's unit."""
     unit, convert = next(
-        (unit, convert) for end, unit, convert in _MISTAKEN_UNITS if key.endswith(end)
+        (unit, convert) for suffix, unit, convert in _MISTAKEN_UNITS if key.endswith(suffix)
     )
     return unit, convert(value)
 
@@ -84,12 +84,12 @@ def value_fault(detail: Any, key: str | int) -> str:
     if kind == "literal_error":
         choices = re.findall(r"'([^']*)'", context["expected"])
         return f" must be {_alternatives(choices)}{got}{name_hint(value, choices)}"
-    must = _MUST.get(kind, "has a value that cannot be used here").format(**context)
+    must = _REQUIREMENTS.get(kind, "has a value that cannot be used here").format(**context)
     return f" {must}{got}{_unit_hint(detail, str(key))}"
 
 
 def _own_message(detail: Any) -> str:
-    """The message of a validator of ours, in small letters."""
+    """The message of a validator of ours, with a small first letter."""
     message: str = detail["msg"].removeprefix("Value error, ")
     return f"{message[:1].lower()}{message[1:]}"
 

@@ -24,34 +24,36 @@ _UNION_MEMBER = re.compile(r".*\[.*\]|(constrained-)?(str|int|float|bool)")
 """The part of a location that names a member of a union, and not a key."""
 
 
-def kinds_in(annotation: Any) -> frozenset[Any]:
+def types_in(annotation: Any) -> frozenset[Any]:
     """A type and its type arguments, at any depth, as of unions and annotated types."""
-    return _kinds_in(annotation)
+    return _types_in(annotation)
 
 
 @cache  # a function of its own, because mypy does not regard a type as hashable
-def _kinds_in(annotation: Any) -> frozenset[Any]:
-    return frozenset({annotation}).union(*(kinds_in(part) for part in get_args(annotation)))
+def _types_in(annotation: Any) -> frozenset[Any]:
+    return frozenset({annotation}).union(*(types_in(part) for part in get_args(annotation)))
 
 
-def told_details(details: list[Any]) -> list[Any]:
+def essential_details(details: list[Any]) -> list[Any]:
     """The errors that a user needs, without those that follow from others.
 
     Dropped are "too short" for a list that is short only because an item was refused, further
     missing items of one list, and the errors of all members of a union but one.
     """
-    told: list[Any] = []
+    essential: list[Any] = []
     for detail in details:
         kind, location = detail["type"], detail["loc"]
-        inside = [d["loc"] for d in details if len(d["loc"]) > len(location)]
-        if kind == "too_short" and any(each[: len(location)] == location for each in inside):
-            continue
-        if _is_missing_item(detail) and any(
-            _is_missing_item(each) and each["loc"][:-1] == location[:-1] for each in told
+        deeper_locations = [d["loc"] for d in details if len(d["loc"]) > len(location)]
+        if kind == "too_short" and any(
+            each[: len(location)] == location for each in deeper_locations
         ):
             continue
-        told.append(detail)
-    return _one_member(told)
+        if _is_missing_item(detail) and any(
+            _is_missing_item(each) and each["loc"][:-1] == location[:-1] for each in essential
+        ):
+            continue
+        essential.append(detail)
+    return _one_member(essential)
 
 
 def _one_member(details: list[Any]) -> list[Any]:
@@ -140,7 +142,7 @@ def _types_at(location: Location, model: type[BaseModel]) -> list[Any]:
 
 
 def _type_inside(kind: Any, part: int | str) -> Any:
-    """The type of one key or item of a section, dictionary or list; None if it has none."""
+    """Type of the key or item `part` in a section, dictionary or list; None: no such part."""
     arguments = get_args(kind)
     if isinstance(kind, type) and issubclass(kind, BaseModel) and str(part) in kind.model_fields:
         return kind.model_fields[str(part)].annotation
@@ -170,29 +172,29 @@ def _unknown_key(location: Location, value: Any, model: type[BaseModel]) -> str:
     section, _, key = name.partition(".")
     if len(location) == 1 and ((section,), key) in _keys(model):
         return f"contains a dot; write `{section}: {{{key}: {shortened(value)}}}`"
-    around = _types_at(location[:-1], model)
-    section_keys = [key for kind in around for key in getattr(kind, "model_fields", ())]
+    section_types = _types_at(location[:-1], model)
+    section_keys = [key for kind in section_types for key in getattr(kind, "model_fields", ())]
     other_keys = [(key, place) for place, key in _keys(model) if place != location[:-1]]
     if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in section_keys):
         same_name = [".".join((*place, key)) for key, place in other_keys if key == name]
         if same_name:
-            return f"is in the wrong section; write {_either(same_name)}"
+            return f"is in the wrong section; write {_joined_by_or(same_name)}"
     near = nearest(name, section_keys, MIN_SIMILARITY)
     if not isinstance(value, dict):
         far = nearest(name, [key for key, _ in other_keys], MIN_SIMILARITY_ELSEWHERE)
         if far and (not near or similarity(name, far) > similarity(name, near)):
             places = [".".join((*place, key)) for key, place in other_keys if key == far]
-            return f"is not a known key; did you mean {_either(places)}?"
+            return f"is not a known key; did you mean {_joined_by_or(places)}?"
     hint = f"did you mean `{near}`?" if near else f"known here: {', '.join(section_keys)}"
     return f"is not a known key; {hint}"
 
 
 def dotted_keys(name: str, model: type[BaseModel]) -> str:
     """Up to three dotted keys with this name, joined by "or"; empty if no section has the key."""
-    return _either([".".join((*place, key)) for place, key in _keys(model) if key == name])
+    return _joined_by_or([".".join((*place, key)) for place, key in _keys(model) if key == name])
 
 
-def _either(places: list[str]) -> str:
+def _joined_by_or(places: list[str]) -> str:
     """The first three of some dotted keys, joined by "or"."""
     return " or ".join(f"`{place}`" for place in places[:_MOST_SUGGESTIONS])
 
@@ -200,6 +202,6 @@ def _either(places: list[str]) -> str:
 def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:
     """The keys in the sections of a file's top level: (path of the section, key)."""
     for section, field in model.model_fields.items():
-        for kind in kinds_in(field.annotation):
+        for kind in types_in(field.annotation):
             if isinstance(kind, type) and issubclass(kind, BaseModel):
                 yield from (((section,), key) for key in kind.model_fields)

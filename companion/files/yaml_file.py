@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
-from companion.files.bounded_yaml import MOST_BYTES, Where, YamlError
-from companion.files.yaml_faults import explained, kinds_in, told_details
+from companion.files.bounded_yaml import MOST_BYTES, KeyPath, YamlError
+from companion.files.yaml_faults import essential_details, explained, types_in
 
 Model = TypeVar("Model", bound="Section")
 
@@ -57,7 +57,7 @@ class Section(BaseModel):
     if not TYPE_CHECKING:  # a type checker shall see the keys as arguments
 
         def __init__(self, /, **keys: Any) -> None:
-            """Check the keys, as those of a file.
+            """Make a section in a program; the keys are checked like those of a file.
 
             Raises:
                 ConfigError: an unknown key or a bad value.
@@ -72,13 +72,13 @@ class Section(BaseModel):
 
     @field_validator("*", mode="before")
     @classmethod
-    def _not_converted(cls, value: Any, field: ValidationInfo) -> Any:
+    def _refuse_conversion(cls, value: Any, field: ValidationInfo) -> Any:
         """Refuse what pydantic would convert: "20" or true as a number, "yes" as a boolean.
 
         Paths that name nothing, are too long, or hold a null character are refused, too; `~` in a
         path is expanded.
         """
-        kinds = kinds_in(cls.model_fields[str(field.field_name)].annotation)
+        kinds = types_in(cls.model_fields[str(field.field_name)].annotation)
         if bool in kinds and not isinstance(value, bool):
             raise ValueError("must be true or false")
         if isinstance(value, bool) and bool not in kinds:
@@ -115,7 +115,7 @@ class Contents(NamedTuple):
     """A YAML file that was read but not yet checked against a model."""
 
     keys: dict[str, Any]
-    places: dict[Where, Place]
+    places: dict[KeyPath, Place]
     """Where each key and each item of a list stands."""
 
 
@@ -182,7 +182,7 @@ def validated(
     data: dict[str, Any],
     name: str,
     model: type[Model],
-    places: Mapping[Where, Place] | None = None,
+    places: Mapping[KeyPath, Place] | None = None,
 ) -> Model:
     """Check data that was already read; errors call it `name`.
 
@@ -202,10 +202,10 @@ def validated(
 
 
 def _config_error(
-    error: ValidationError, name: str, model: type[Section], places: Mapping[Where, Place]
+    error: ValidationError, name: str, model: type[Section], places: Mapping[KeyPath, Place]
 ) -> ConfigError:
-    """The error of `validated` for an error of pydantic."""
-    details = told_details(error.errors(include_url=False))
+    """The `ConfigError` for a pydantic error: up to five faults with file and line."""
+    details = essential_details(error.errors(include_url=False))
     faults, previous_place = [], Place("")
     for detail in details[:_MOST_FAULTS_SHOWN]:
         place = place_of(detail["loc"], places, name)
@@ -220,7 +220,7 @@ def _config_error(
     return ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else ""))
 
 
-def place_of(where: Where, places: Mapping[Where, Place], name: str) -> Place:
+def place_of(where: KeyPath, places: Mapping[KeyPath, Place], name: str) -> Place:
     """The place of a key, else of the innermost section or list around it that has a place.
 
     If none has one: the file `name` without a line.

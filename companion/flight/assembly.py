@@ -68,7 +68,7 @@ def assemble(
     context.guidance_loop.record.note = rate_requester.note = flight.note
     changes = changes or Changes(config)
     memory = _drag_memory(context, folder, flight.note, changes)
-    _prepare_trajectories(context, flight.note)
+    _prepare_trajectories(context, flight.note, real_time=real_time)
     if record is not None:
         record.metadata("configuration", flattened(changes.at_flight_start.model_dump(mode="json")))
         record.begin(flight.began, description(changes.at_flight_start, plan, real_time=real_time))
@@ -128,14 +128,18 @@ def _drag_memory(
     return memory
 
 
-def _prepare_trajectories(context: FlightContext, note: Callable[[str], None]) -> None:
+def _prepare_trajectories(
+    context: FlightContext, note: Callable[[str], None], *, real_time: bool
+) -> None:
     """Report how trajectory files were read, and start the solver that follows them, if any."""
     for part in context.maneuvers.parts:
         if isinstance(part, Follow):
             for text in part.notes:
                 note(text)
             if context.config.guidance.kind == "nmpc":
-                context.guidance_loop.maker.predictive = predictive(context.config, part, note)
+                context.guidance_loop.maker.predictive = predictive(
+                    context.config, part, note, vehicle_waits=not real_time
+                )
 
 
 def _reporter(

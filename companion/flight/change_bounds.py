@@ -3,7 +3,7 @@
 from math import inf
 
 from companion.config import Config
-from companion.config.in_flight import Difference, changeable, differences, shown
+from companion.config.in_flight import Difference, changeable_keys, differences, value_text
 from companion.control.hold_settings import flies_identify
 from companion.control.retuning import value_in_effect
 from companion.files.yaml_file import ConfigError
@@ -37,7 +37,7 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
         ValueError: weights cannot be computed from the configuration.
     """
     for each in differences(before, after):
-        if (each.section, each.key) not in changeable():
+        if (each.section, each.key) not in changeable_keys():
             continue  # such as `include`, which is no value
         why = _refusal(before, after, each)
         if why is not None:
@@ -58,7 +58,7 @@ def _refusal(before: Config, after: Config, change: Difference) -> str | None:
         return f"{key} must not become 0 in flight"
     smallest = _SMALLEST_VALUES.get(key)
     if smallest is not None and change.after < smallest:
-        return f"{key} must be at least {smallest:g} in flight, not {shown(change.after)}"
+        return f"{key} must be at least {smallest:g} in flight, not {value_text(change.after)}"
     old = value_in_effect(before, change, change.before)
     new = value_in_effect(after, change, change.after)
     low, high = min(old, new), max(old, new)

@@ -108,7 +108,7 @@ class Changes:
         """
         try:
             wanted = changed_in_flight(self.start, self.wanted, values, by)
-            require_moderate(self._slew.settled, wanted, by)
+            require_moderate(self._slew.settled_config, wanted, by)
             require_moderate(self.wanted, wanted, by)
         except ConfigError as error:
             raise ChangeRefusedError(str(error)) from error
@@ -166,7 +166,7 @@ class Changes:
             self._record_change(self.at_flight_start, at_once=True)
         note_before, self.note = self.note, note
         try:
-            with retuning.stepped_by(self.step):
+            with retuning.before_each_step(self.step):
                 yield
         finally:
             self._retuning = self._record = None

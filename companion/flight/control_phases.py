@@ -58,7 +58,7 @@ async def fly_commanded(context: FlightContext, commands: Source) -> None:
     await _fly(context, commands, lambda: f"commanded by {commands.name}")
     context.guidance_loop.hold_here()
     context.detail = "the vehicle to stop"
-    await asyncio.sleep(context.guidance_loop.braking_left)
+    await asyncio.sleep(context.guidance_loop.remaining_braking_time)
 
 
 async def _fly(context: FlightContext, source: Source, progress: Callable[[], str]) -> None:
@@ -68,7 +68,7 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
         FlightEnded: guidance gave up, the source failed, or the thrust is too small to steer.
     """
     now = asyncio.get_running_loop().time
-    await asyncio.sleep(context.guidance_loop.braking_left)
+    await asyncio.sleep(context.guidance_loop.remaining_braking_time)
     began, sent = now(), context.loop.record.setpoints
     tilt_margin = _TiltMargin(context)
     tilt_margin.check()
@@ -79,8 +79,8 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
         context.setpoint_rate_hz = (
             (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
         )
-        if context.guidance_loop.hold.given_up is not None:
-            raise FlightEnded(context.guidance_loop.hold.given_up)
+        if context.guidance_loop.hold.give_up_reason is not None:
+            raise FlightEnded(context.guidance_loop.hold.give_up_reason)
         if source.failure is not None:
             raise FlightEnded(source.failure, Exit.HOLD)
         tilt_margin.check()

@@ -69,5 +69,5 @@ def _edges(
 
 
 def _write(writer: McapWriter, time_ns: int, points: list[Point]) -> None:
-    fence = Entity("fence", "world", lines=(Line(points, _FENCE_COLOR, pairs=True),))
+    fence = Entity("fence", "world", lines=(Line(points, _FENCE_COLOR, separate_pairs=True),))
     writer.message("/fence", time_ns, scene_message(time_ns, (fence,)))

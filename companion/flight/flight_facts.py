@@ -28,7 +28,7 @@ def _learned_settings(context: FlightContext) -> dict[str, str]:
     learning, estimate = context.guidance_loop.learning, context.guidance_loop.estimate
     settings: dict[str, str] = {}
     if learning.mismatch_warning() is not None:
-        settings["thrust.hover_thrust"] = f"{learning.hover:.2f}"
+        settings["thrust.hover_thrust"] = f"{learning.learned_hover:.2f}"
     if estimate.mismatch_warning() is not None:
         drag = estimate.drag.drag
         settings["guidance.drag_per_s"] = f"{drag.linear:.2f}"
@@ -70,7 +70,7 @@ def facts_of(
         vehicle_uid=context.same_vehicle.uid,
         armed=state.armed,
         mode=state.mode,
-        unheard=_silence_duration(context, now),
+        silence=_silence_duration(context, now),
         battery=(reporter.battery_at_takeoff, end),
         min_battery=config.limits.min_battery,
         max_tilt=config.limits.max_tilt,

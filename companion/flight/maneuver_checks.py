@@ -200,7 +200,7 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
 
 def with_reserve(config: Config, envelope: Envelope) -> Envelope:
     """The limits with a tilt that keeps `flight.slow_down_reserve_m_s2` of acceleration unused."""
-    most = config.limits.largest_horizontal - config.flight.slow_down_reserve_m_s2
+    most = config.limits.max_horizontal_acceleration - config.flight.slow_down_reserve_m_s2
     return replace(envelope, max_tilt=atan(most / GRAVITY))
 
 

@@ -39,7 +39,7 @@ def not_begun(sequence: ManeuverSequence) -> ManeuverSequence:
     """A copy whose maneuvers have not begun: `Follow` remembers the pose where it began."""
     return ManeuverSequence(
         [
-            replace(part, _turned=None, _pose=None) if isinstance(part, Follow) else part
+            replace(part, _with_turn=None, _pose=None) if isinstance(part, Follow) else part
             for part in sequence.parts
         ]
     )

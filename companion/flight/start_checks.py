@@ -47,9 +47,18 @@ def require_extras(config: Config) -> None:
     Raises:
         MissingExtraError: a package is not installed.
     """
+    require_solver(config)
+    require_backend(config)
+
+
+def require_solver(config: Config) -> None:
+    """Check that the package of predictive control is installed.
+
+    Raises:
+        MissingExtraError: the package is not installed.
+    """
     if config.guidance.kind == "nmpc":
         require("casadi", "nmpc", "guidance.kind: nmpc")
-    require_backend(config)
 
 
 def require_backend(config: Config) -> None:

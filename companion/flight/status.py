@@ -153,7 +153,7 @@ class StatusReporter:
         """The present state."""
         now, context = self._clock(), self._context
         (phase, entered), record = self._phase(), context.loop.record
-        flown = flown_part(context.guidance_loop.flown, now)
+        flown = flown_part(context.guidance_loop.flown_source, now)
         return FlightStatus(
             time=now - self._began,
             airborne=None if self.takeoff is None else now - self.takeoff,

@@ -49,7 +49,7 @@ class StatusRows:
         remaining = None if battery is None else battery.remaining
         return (
             now,
-            learning.hover,
+            learning.learned_hover,
             *learning.thrust_limits,
             context.loop.record.thrust,
             nan if voltage is None else voltage,

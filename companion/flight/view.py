@@ -27,7 +27,7 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
         wind_north_m_s2=wind[0],
         wind_east_m_s2=wind[1],
         height_m=state.height,
-        hover_thrust=guidance_loop.learning.hover,
+        hover_thrust=guidance_loop.learning.learned_hover,
         frames=stats.frames,
         frames_lost=stats.lost,
         round_trip_ms=None if round_trip is None else 1e3 * round_trip,
@@ -83,7 +83,7 @@ def _motion_values(context: FlightContext, now: float) -> dict[str, float | None
 def _reference(context: FlightContext, now: float) -> Reference | None:
     """The reference that is flown, if the autopilot obeys us and there is one."""
     guidance_loop = context.guidance_loop
-    flown, motion = guidance_loop.flown, guidance_loop.motion
+    flown, motion = guidance_loop.flown_source, guidance_loop.motion
     if not context.loop.offboard_active or flown.pose is None or motion is None:
         return None
     return flown.reference(now, motion, 0.0)(now)

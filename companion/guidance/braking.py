@@ -6,8 +6,8 @@ from typing import NamedTuple
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 
 _DECELERATION_SHARE = 0.47
-"""Mean deceleration of a smooth stop as a share of the largest horizontal acceleration. Its peak is
-0.7 of that largest acceleration; 0.3 are left for wind and feedback."""
+"""Mean deceleration of a smooth stop, as a share of the largest horizontal acceleration. The peak
+is a share of 0.7; the other 0.3 are for wind and feedback."""
 _LARGEST_JERK = 8.0
 """Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
 _REST_SPEED = 0.1
@@ -17,11 +17,11 @@ _NOTICE_TIME = 0.1
 
 
 class AssumedBraking(NamedTuple):
-    """How the fence's monitor assumes that the vehicle brakes; it must not stop further away.
+    """Braking that the fence's monitor assumes; the vehicle must not stop further away than that.
 
     Attributes:
         reaction: delay before the vehicle brakes, s (`safety.reaction_s`).
-        deceleration: constant deceleration after it, m/s² (`safety.braking_m_s2`).
+        deceleration: constant deceleration after this delay, m/s² (`safety.braking_m_s2`).
     """
 
     reaction: float
@@ -69,14 +69,14 @@ class Braking(NamedTuple):
     duration: float
 
     @property
-    def ends(self) -> float:
+    def end_time(self) -> float:
         """When the vehicle is at rest, s of event-loop time."""
         return self.begun_at + self.duration
 
     @property
     def stop(self) -> Vector:
         """Place where the vehicle stops, m NED."""
-        return self.at(self.ends).position_ned
+        return self.at(self.end_time).position_ned
 
     def at(self, time: float) -> Reference:
         """The reference at `time`, s of event-loop time."""
@@ -84,14 +84,15 @@ class Braking(NamedTuple):
         if duration == 0.0:
             return Reference(self.motion.position_ned, heading=self.heading)
         u = min(max(0.0, (time - self.begun_at) / duration), 1.0)
-        way = duration * u * (1.0 - u * u + 0.5 * u * u * u)
-        left = 1.0 - u * u * (3.0 - 2.0 * u)
-        slowing = 6.0 * u * (1.0 - u) / duration
+        # Distance, speed and deceleration, for an initial speed of 1 m/s.
+        distance = duration * u * (1.0 - u * u + 0.5 * u * u * u)
+        speed = 1.0 - u * u * (3.0 - 2.0 * u)
+        deceleration = 6.0 * u * (1.0 - u) / duration
         (north, east, down), (v_north, v_east, _) = self.motion
         return Reference(
-            (north + way * v_north, east + way * v_east, down),
-            (left * v_north, left * v_east, 0.0),
-            (-slowing * v_north, -slowing * v_east, 0.0),
+            (north + distance * v_north, east + distance * v_east, down),
+            (speed * v_north, speed * v_east, 0.0),
+            (-deceleration * v_north, -deceleration * v_east, 0.0),
             self.heading,
         )
 
@@ -102,7 +103,7 @@ def brake(
     """The braking that begins now.
 
     Args:
-        now: s of event-loop time.
+        now: event-loop time, s.
         motion: motion of the vehicle.
         heading: the heading to keep, rad.
         acceleration: largest horizontal acceleration, m/s².

@@ -21,7 +21,7 @@ class _Doublet(NamedTuple):
 
     Attributes:
         step: T, s.
-        body_rates: A of a doublet of body rates, rad/s; None: it is one of vertical acceleration.
+        body_rates: A of a doublet of body rates, rad/s; None: a doublet of vertical acceleration.
         climb_acceleration: A of a doublet of vertical acceleration, m/s², positive up.
     """
 
@@ -31,7 +31,7 @@ class _Doublet(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """Duration, s; that of a doublet of body rates includes the rest after it."""
+        """Duration, s, including the rest after a doublet of body rates."""
         return 4.0 * self.step + (0.0 if self.body_rates is None else _REST_TIME)
 
     def at(self, time: float, hold: Reference) -> Reference:
@@ -72,8 +72,8 @@ class Doublets:
 
     Each axis is excited with half its rate, then with the full rate. The angle changes by A·T at
     most and then returns to its value before the doublet. Three equal doublets of the vertical
-    acceleration follow. They are flown in closed loop: the reference contains the doublet. Position
-    hold corrects the drift for `settle` seconds before each doublet and at the end.
+    acceleration follow, in closed loop: the reference contains the doublet. Position hold corrects
+    the drift for `settle` seconds before each doublet and at the end.
 
     Attributes:
         tilt_rate: A of roll and pitch, rad/s.

@@ -115,8 +115,8 @@ class DragEstimate:
         along_axes = AxisDrag(1.0, heading).deceleration(velocity[0], velocity[1])
         for axis in (0, 1):
             self._along_axes[axis] += dt * along_axes[axis]
-            self._passed[axis] += dt * velocity[axis]
-            self._squared[axis] += dt * speed * velocity[axis]
+            self._displacement[axis] += dt * velocity[axis]
+            self._speed_times_velocity[axis] += dt * speed * velocity[axis]
             self._residual[axis] += dt * residual[axis]
         self._span += dt
         if self._span >= _SHORTEST_WINDOW:
@@ -124,19 +124,22 @@ class DragEstimate:
             self._forget_window()
 
     def _update_filter(self) -> None:
-        """Update the filter with the window: one measurement of north and one of east."""
+        """Update the filter with the means since the last update, one for north, one for east."""
         span = self._span
-        self.top_speed = max(self.top_speed, hypot(*self._passed) / span)
+        self.top_speed = max(self.top_speed, hypot(*self._displacement) / span)
         for wind in (2, 3):
             self._covariance[wind, wind] += span * _WIND_CHANGE**2
         for axis in (0, 1):
             row = np.zeros(5)
-            row[0], row[1] = -self._passed[axis] / span, -self._squared[axis] / span
+            row[0], row[1] = (
+                -self._displacement[axis] / span,
+                -self._speed_times_velocity[axis] / span,
+            )
             row[2 + axis], row[4] = 1.0, -self._along_axes[axis] / span
             spread = self._covariance @ row
             variance = float(row @ spread) + _MEASUREMENT_DEVIATION**2
-            most = _CLAMP_DEVIATIONS * sqrt(variance)
-            innovation = clamp(self._residual[axis] / span - float(row @ self._state), most)
+            limit = _CLAMP_DEVIATIONS * sqrt(variance)
+            innovation = clamp(self._residual[axis] / span - float(row @ self._state), limit)
             gain = spread / variance
             self._innovation_sum += innovation * innovation / variance
             self._measurements += 1
@@ -147,16 +150,20 @@ class DragEstimate:
     def _drag_within_bounds(self) -> Drag:
         """The most likely drag within the bounds.
 
-        If the quadratic drag is clamped, the linear drag is the most likely one with it.
+        If the quadratic drag is clamped, the linear drag is the most likely one for that value.
         """
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
-        within = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)
-        linear += float(p[0, 1] / p[1, 1]) * (within - quadratic) if p[1, 1] > 0.0 else 0.0
+        clamped = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)
+        linear += float(p[0, 1] / p[1, 1]) * (clamped - quadratic) if p[1, 1] > 0.0 else 0.0
         return Drag(
-            min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_LINEAR_INCREASE), within
+            min(max(linear, 0.0), self.prior_drag.linear + _LARGEST_LINEAR_INCREASE), clamped
         )
 
     def _forget_window(self) -> None:
         self._span = 0.0
-        self._passed, self._squared, self._residual = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+        self._displacement, self._speed_times_velocity, self._residual = (
+            [0.0, 0.0],
+            [0.0, 0.0],
+            [0.0, 0.0],
+        )
         self._along_axes = [0.0, 0.0]

@@ -6,7 +6,7 @@ from math import isfinite
 import numpy as np
 
 from companion.drag import Drag
-from companion.guidance.reference import GRAVITY, Reference, VehicleMotion
+from companion.guidance.reference import GRAVITY, Reference, VehicleMotion, VerticalMode
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
     return gains
 
 
-_LARGEST_VERTICAL = 0.5 * GRAVITY
+_LARGEST_VERTICAL_ACCELERATION = 0.5 * GRAVITY
 """Largest acceleration that is commanded up or down, m/s²."""
 
 
@@ -101,21 +101,21 @@ class HeightGains:
 def acceleration_down(
     gains: HeightGains, reference: Reference, motion: VehicleMotion, ahead: Reference, drag: Drag
 ) -> float:
-    """The acceleration downwards that thrust and gravity shall give, m/s², at most g/2 up or down.
+    """Acceleration that thrust and gravity together shall give, m/s² downwards, from −g/2 to g/2.
 
     Args:
         gains: gains and limits of the height cascade.
         reference: the reference now.
         motion: the present motion.
         ahead: the reference one rotor lag later; its acceleration and velocity are fed forward.
-        drag: drag of the vehicle, which thrust balances in climb and descent. If the reference does
-            not hold the height, its vertical acceleration is commanded without drag and feedback.
+        drag: drag of the vehicle, which thrust balances in climb and descent; with
+            `VerticalMode.ACCELERATION` neither drag nor feedback is added.
     """
     wanted = ahead.acceleration_ned[2]
-    if reference.holds_height:
+    if reference.vertical is not VerticalMode.ACCELERATION:
         error = reference.position_ned[2] - motion.position_ned[2]
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)
         wanted += gains.climb * (speed - motion.velocity_ned[2])
         wanted += drag.deceleration(ahead.velocity_ned)[2]
-    return min(max(wanted, -_LARGEST_VERTICAL), _LARGEST_VERTICAL)
+    return min(max(wanted, -_LARGEST_VERTICAL_ACCELERATION), _LARGEST_VERTICAL_ACCELERATION)

@@ -42,10 +42,10 @@ class Breach(NamedTuple):
 
     Attributes:
         limit: the configuration key of the limit that is breached.
-        relation: how the place lies to the limit, such as "beyond"; the key follows it.
+        relation: words between `where` and `limit` in the message, such as "beyond".
         where: the place in words, such as "12.0 m above where control began".
-        distance_outside: m; negative for a place inside the fence but within the margin; 0 if it
-            was not computed (polygon without a margin, unknown origin).
+        distance_outside: distance outside the fence, m; negative for a place inside the fence but
+            within the margin; 0: not computed (polygon without a margin, unknown origin).
     """
 
     limit: str
@@ -136,22 +136,23 @@ class Fence:
         Args:
             offset: position of the vehicle relative to where control began, m NED; numbers, or
                 arrays of them.
-            velocity: m/s NED; numbers, or arrays of them.
-            acceleration: north and east, m/s²; numbers, or arrays of them.
+            velocity: velocity, m/s NED; numbers, or arrays of them.
+            acceleration: acceleration north and east, m/s²; numbers, or arrays of them.
         """
-        (north, east, down), twice = velocity, 2.0 * self.deceleration
+        (north, east, down), twice_deceleration = velocity, 2.0 * self.deceleration
         reaction = self.reaction + self.estimate_delay
         gain_north, gain_east = reaction * acceleration[0], reaction * acceleration[1]
         # The square of the speed after the reaction time, minus the square of the present speed.
-        gained = gain_north * (2.0 * north + gain_north) + gain_east * (2.0 * east + gain_east)
-        counts = (gained > 0.0) * 1.0
-        gain_north, gain_east = counts * gain_north, counts * gain_east
+        increase = gain_north * (2.0 * north + gain_north) + gain_east * (2.0 * east + gain_east)
+        is_faster = (increase > 0.0) * 1.0
+        gain_north, gain_east = is_faster * gain_north, is_faster * gain_east
         later_north, later_east = north + gain_north, east + gain_east
-        braking = (later_north * later_north + later_east * later_east) ** 0.5 / twice
+        later_speed = (later_north * later_north + later_east * later_east) ** 0.5
+        half_braking_time = later_speed / twice_deceleration
         return (
-            offset[0] + reaction * (north + 0.5 * gain_north) + braking * later_north,
-            offset[1] + reaction * (east + 0.5 * gain_east) + braking * later_east,
-            offset[2] + (self.reaction + abs(down) / twice) * down,
+            offset[0] + reaction * (north + 0.5 * gain_north) + half_braking_time * later_north,
+            offset[1] + reaction * (east + 0.5 * gain_east) + half_braking_time * later_east,
+            offset[2] + (self.reaction + abs(down) / twice_deceleration) * down,
         )
 
     def stop_breach(
@@ -165,11 +166,11 @@ class Fence:
     ) -> Breach | None:
         """The breach at the place where the vehicle would stop; None: it would stop inside.
 
-        The arguments are those of `stop` and `breach`; `height` is the vehicle's present one.
+        The arguments are those of `stop` and `breach`; `height` is the vehicle's present height.
         """
         stop = self.stop(offset, velocity, acceleration)
-        sunk = stop[2] - offset[2]
-        return self.breach(stop, None if height is None else height - sunk, origin, margin)
+        descent = stop[2] - offset[2]
+        return self.breach(stop, None if height is None else height - descent, origin, margin)
 
 
 def inside(north: float, east: float, polygon: Sequence[Corner]) -> bool:

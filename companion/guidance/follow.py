@@ -16,7 +16,7 @@ def circle(radius: float, speed: float, laps: float) -> "HeldHeadingManeuver":
     """Maneuver `circle`: a circle from rest at the vehicle's position; it ends at rest.
 
     Args:
-        radius: m.
+        radius: radius of the circle, m.
         speed: steady speed after speeding up and before slowing down, m/s.
         laps: number of laps, including speeding up and slowing down. If it is not whole, the
             circle does not end where it began.
@@ -74,7 +74,7 @@ class Follow:
     trajectory: Trajectory
     yaw_rate: float
     notes: tuple[str, ...] = ()
-    _turned: Trajectory | None = None
+    _with_turn: Trajectory | None = None
     _pose: Pose | None = None
 
     @property
@@ -84,19 +84,21 @@ class Follow:
 
     @property
     def duration(self) -> float:
-        """Duration with the first turn, s; with the longest one while the start is unknown."""
-        if self._turned is not None:
-            return self._turned.duration
+        """Duration with the turn before the trajectory, s; before the start, with a full turn."""
+        if self._with_turn is not None:
+            return self._with_turn.duration
         longest_turn = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
         return longest_turn + self.trajectory.duration
 
     @property
     def turn_duration(self) -> float:
-        """Duration of the first turn, s; 0 while the start is unknown."""
-        return 0.0 if self._turned is None else self._turned.duration - self.trajectory.duration
+        """Duration of the turn before the trajectory, s; 0 until the start is known."""
+        return (
+            0.0 if self._with_turn is None else self._with_turn.duration - self.trajectory.duration
+        )
 
     def check_times(self) -> list[float]:
-        """The times at which to check the trajectory, s, without the first turn.
+        """The times at which to check the trajectory, s; the turn before it is not checked.
 
         Raises:
             TrajectoryError: the trajectory is too long to be checked.
@@ -104,16 +106,16 @@ class Follow:
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference `time` seconds after the maneuver, with its turn, began at `start`."""
-        if self._turned is None or start is not self._pose:
+        """The reference `time` seconds after the maneuver (its turn first) began at `start`."""
+        if self._with_turn is None or start is not self._pose:
             self._pose = start
-            self._turned = turned_first(self.trajectory, start.heading, self.yaw_rate)
-        held = start.heading if self.trajectory.holds_heading else 0.0
-        return _reference_from(start, self._turned.at(time), held)
+            self._with_turn = turned_first(self.trajectory, start.heading, self.yaw_rate)
+        heading = start.heading if self.trajectory.holds_heading else 0.0
+        return _reference_from(start, self._with_turn.at(time), heading)
 
 
 def _reference_from(start: Pose, sample: Sample, heading: float) -> Reference:
-    """The reference of a sample whose position counts from `start`, and heading from `heading`."""
+    """Convert a sample, relative to the pose `start` and the heading `heading`, to a reference."""
     north, east, down = start.position_ned
     return Reference(
         (north + sample.position[0], east + sample.position[1], down + sample.position[2]),

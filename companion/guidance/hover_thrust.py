@@ -72,18 +72,18 @@ class HoverThrust:
         return self._settings.lowest, self._settings.highest
 
     @property
-    def configured(self) -> float:
-        """Normalised thrust at hover in the settings."""
+    def configured_hover(self) -> float:
+        """Configured normalised thrust at hover, 0..1."""
         return self._settings.hover
 
     @property
-    def learned(self) -> float:
-        """Learned normalised thrust at hover, at the battery voltage just after take-off."""
+    def learned_hover(self) -> float:
+        """Learned normalised thrust at hover, at the battery voltage just after take-off, 0..1."""
         return self._curve.signal(GRAVITY / self._filter.gain)
 
     @property
     def present_hover(self) -> float:
-        """Learned normalised thrust at hover, at the present battery voltage."""
+        """Learned normalised thrust at hover, at the present battery voltage, 0..1."""
         return self._to_normalised(GRAVITY)
 
     @property
@@ -109,9 +109,9 @@ class HoverThrust:
         """Normalised thrust for a wanted vertical acceleration, clamped to `limits`.
 
         Args:
-            acceleration_down: acceleration that thrust and gravity shall give, m/s², positive down.
+            acceleration_down: wanted acceleration by thrust and gravity, m/s², positive down.
             q: attitude.
-            body_rates: rad/s.
+            body_rates: measured body rates, rad/s.
         """
         settings = self._settings
         cosine = cos_tilt_ahead(q, body_rates, settings.lag)
@@ -153,7 +153,7 @@ class HoverThrust:
         self._window_start = None
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
-        """Take the battery voltage (V; None: not known) at a time in s."""
+        """Take the battery voltage (V; None: unknown), received at `time`, s of event-loop time."""
         self._battery.note(time, voltage)
 
     def on_ground(self) -> None:

@@ -27,8 +27,8 @@ class InnerResponse:
 
     Attributes:
         gain: gain p of the planner, 1/s.
-        lag: s; 0: the response is of first order.
-        dead_time: s.
+        lag: lag of the rate loop, s; 0: the response is of first order.
+        dead_time: dead time of the rate loop, s.
         follows_model: True: the planner accounts for the dead time, and the response is that of its
             model, delayed: ċ + lag·c̈ = gain·(c_d(t − dead_time) − c). False: the planner compares
             the target with the measurement, and both are delayed:
@@ -76,12 +76,12 @@ class InnerResponse:
 
     def target(self, path: CoefficientPath, time: float) -> Coefficients:
         """The target at `time` that makes the coefficients follow `path` without error."""
-        acts = time + self.dead_time
-        before, there, after = path(acts - _PATH_STEP), path(acts), path(acts + _PATH_STEP)
-        held = there if self.follows_model or self.dead_time == 0.0 else path(time)
+        effect = time + self.dead_time  # when the target takes effect
+        before, then, after = path(effect - _PATH_STEP), path(effect), path(effect + _PATH_STEP)
+        measured = then if self.follows_model or self.dead_time == 0.0 else path(time)
         return Coefficients(
-            held.north + self._lead(before.north, there.north, after.north),
-            held.east + self._lead(before.east, there.east, after.east),
+            measured.north + self._lead(before.north, then.north, after.north),
+            measured.east + self._lead(before.east, then.east, after.east),
         )
 
     def heading_target(self, heading: Callable[[float], float], time: float) -> tuple[float, float]:
@@ -94,22 +94,22 @@ class InnerResponse:
             heading: the wanted heading as a function of event-loop time, rad.
             time: s of event-loop time.
         """
-        acts = time + self.dead_time
-        there = heading(acts)
-        before = there - wrap_angle(there - heading(acts - _PATH_STEP))
-        after = there + wrap_angle(heading(acts + _PATH_STEP) - there)
+        effect = time + self.dead_time  # when the target takes effect
+        then = heading(effect)
+        before = then - wrap_angle(then - heading(effect - _PATH_STEP))
+        after = then + wrap_angle(heading(effect + _PATH_STEP) - then)
         rate = 0.5 * (after - before) / _PATH_STEP
-        held = there if self.follows_model else heading(time)
+        measured = then if self.follows_model else heading(time)
         if self.gain == 0.0:
-            return held, rate
-        bend = (after - 2.0 * there + before) / (_PATH_STEP * _PATH_STEP)
-        return held + self.lag * bend / self.gain, rate
+            return measured, rate
+        acceleration = (after - 2.0 * then + before) / (_PATH_STEP * _PATH_STEP)
+        return measured + self.lag * acceleration / self.gain, rate
 
-    def _lead(self, before: float, there: float, after: float) -> float:
+    def _lead(self, before: float, then: float, after: float) -> float:
         """(ċ + lag·c̈)/gain from central differences of three coefficients."""
         speed = 0.5 * (after - before) / _PATH_STEP
-        bend = (after - 2.0 * there + before) / (_PATH_STEP * _PATH_STEP)
-        return (speed + self.lag * bend) / self.gain
+        acceleration = (after - 2.0 * then + before) / (_PATH_STEP * _PATH_STEP)
+        return (speed + self.lag * acceleration) / self.gain
 
 
 IMMEDIATE = InnerResponse(gain=inf, lag=0.0, dead_time=0.0, follows_model=True)

@@ -1,4 +1,4 @@
-"""Linear guidance: follows a reference without lag; its targets lead the known tilt response."""
+"""Linear guidance: follows a reference without lag, because it compensates the tilt's delay."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -79,8 +79,8 @@ class GuidanceInput(NamedTuple):
     def deceleration(self, velocity: Vector) -> Horizontal:
         """Horizontal deceleration by drag, m/s², at a velocity in m/s, NED."""
         north, east, _ = self.drag.deceleration(velocity)
-        more_north, more_east = self.axis_drag.deceleration(velocity[0], velocity[1])
-        return north + more_north, east + more_east
+        axis_north, axis_east = self.axis_drag.deceleration(velocity[0], velocity[1])
+        return north + axis_north, east + axis_east
 
 
 class LinearCommand(NamedTuple):
@@ -89,7 +89,7 @@ class LinearCommand(NamedTuple):
     Attributes:
         target: the planner's target now.
         later: the target one period later; between the two the target moves on a straight line.
-        down: acceleration downwards that thrust and gravity shall give, m/s².
+        down: wanted vertical acceleration by thrust and gravity, m/s², positive down.
     """
 
     target: Target
@@ -199,40 +199,41 @@ class LinearGuidance:
         self._trim.take(target, pausing=pausing)
         return LinearCommand(target, later, down)
 
-    def _feedback(self, now: Reference, acts: Reference, inputs: GuidanceInput) -> Horizontal:
+    def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> Horizontal:
         """Horizontal acceleration that corrects errors and disturbance, m/s².
 
-        `now` is the reference now, `acts` the reference when the feedback takes effect.
+        Args:
+            now: the present reference.
+            later: the reference at the time when the feedback takes effect.
+            inputs: motion, thrust and disturbance of the vehicle.
         """
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.horizontal is HorizontalMode.ACCELERATION:
             return limited(-wind[0], -wind[1], settings.max_horizontal)
-        wanted, slowed = [], inputs.deceleration(inputs.now.velocity_ned)
+        wanted, drag = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
-            place = inputs.predicted.position_ned[axis] - acts.position_ned[axis]
-            speed = inputs.predicted.velocity_ned[axis] - acts.velocity_ned[axis]
-            acceleration = (
-                inputs.thrust[axis] - slowed[axis] + wind[axis] - now.acceleration_ned[axis]
-            )
+            position_error = inputs.predicted.position_ned[axis] - later.position_ned[axis]
+            velocity_error = inputs.predicted.velocity_ned[axis] - later.velocity_ned[axis]
+            acceleration = inputs.thrust[axis] - drag[axis] + wind[axis]
             wanted.append(
-                -gains.position * place
-                - gains.velocity * speed
-                - gains.acceleration * acceleration
+                -gains.position * position_error
+                - gains.velocity * velocity_error
+                - gains.acceleration * (acceleration - now.acceleration_ned[axis])
                 - wind[axis]
             )
         return limited(wanted[0], wanted[1], settings.max_horizontal)
 
     def _coefficients(
-        self, reference: Reference, more: Horizontal, down: float, inputs: GuidanceInput
+        self, reference: Reference, feedback: Horizontal, down: float, inputs: GuidanceInput
     ) -> Coefficients:
-        """Coefficients for the reference's acceleration and drag, plus `more`.
+        """Coefficients for the reference's acceleration, its drag, and the feedback (m/s²).
 
-        `more` is the feedback, `down` the vertical acceleration of the command, m/s².
+        `down` is the vertical acceleration of the command, m/s².
         """
-        slowed = inputs.deceleration(reference.velocity_ned)
+        drag = inputs.deceleration(reference.velocity_ned)
         north, east = limited(
-            reference.acceleration_ned[0] + slowed[0] + more[0],
-            reference.acceleration_ned[1] + slowed[1] + more[1],
+            reference.acceleration_ned[0] + drag[0] + feedback[0],
+            reference.acceleration_ned[1] + drag[1] + feedback[1],
             self._settings.max_horizontal,
         )
         north, east, down = height_first((north, east, down), *inputs.thrust_limits)

@@ -57,7 +57,7 @@ class Steps:
 
     Attributes:
         coefficient: length of the coefficients c: the sine of the tilt.
-        step: T, s.
+        step: T, the duration of the first part of a doublet, s.
         settle: time of position hold after each doublet, s.
     """
 
@@ -88,24 +88,24 @@ class Steps:
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
         index = min(max(int(time / self._doublet_period), 0), len(self.DIRECTIONS) - 1)
-        within = time - index * self._doublet_period - _HOLD_PAUSE
-        rest = Reference(start.position_ned, heading=start.heading)
-        if within < 0.0:
-            return rest._replace(horizontal=HorizontalMode.ACCELERATION)
-        if within >= 4.0 * self.step:
-            return rest
-        sign = -1.0 if self.step <= within < 3.0 * self.step else 1.0
+        doublet_time = time - index * self._doublet_period - _HOLD_PAUSE
+        hold = Reference(start.position_ned, heading=start.heading)
+        if doublet_time < 0.0:
+            return hold._replace(horizontal=HorizontalMode.ACCELERATION)
+        if doublet_time >= 4.0 * self.step:
+            return hold
+        sign = -1.0 if self.step <= doublet_time < 3.0 * self.step else 1.0
         north, east = self.DIRECTIONS[index]
         c = sign * self.coefficient
         coefficients = Coefficients(c * north, c * east)
-        return rest._replace(horizontal=TiltCommand(coefficients, trimmed=True))
+        return hold._replace(horizontal=TiltCommand(coefficients, trimmed=True))
 
 
 @dataclass(frozen=True, slots=True)
 class Corners:
     """Acceleration steps between the corners of a rectangle, none of them through level.
 
-    Such steps show the differences between the planners, as in the paper's figure 2; a step through
+    Such steps show the differences between the planners, as in figure 2 of Xu & Pei; a step through
     level is straight with every planner. Before the first step the position hold pauses, so that
     the attitude comes to rest. The corners are added to the coefficients of this attitude. The
     acceleration goes round the rectangle twice, the second time mirrored. With an ideal response
@@ -114,7 +114,7 @@ class Corners:
 
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
-            √(north² + east²). 0.4 and 0.5 give the step of the paper's figure 2.
+            √(north² + east²). 0.4 and 0.5 give the step of that figure 2.
         step: duration of each corner, s; the one at which the second round begins lasts twice that.
         settle: time of position hold at the end, s.
     """
@@ -148,15 +148,15 @@ class Corners:
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, steps of the acceleration coefficients to each corner, a hold."""
-        rest = Reference(start.position_ned, heading=start.heading)
+        hold = Reference(start.position_ned, heading=start.heading)
         if time < _HOLD_PAUSE:
-            return rest._replace(horizontal=HorizontalMode.ACCELERATION)
+            return hold._replace(horizontal=HorizontalMode.ACCELERATION)
         index = int((time - _HOLD_PAUSE) / self.step)
         if index >= len(self.CORNERS):
-            return rest
+            return hold
         north, east = self.CORNERS[index]
         coefficients = Coefficients(self.north * north, self.east * east)
-        return rest._replace(horizontal=TiltCommand(coefficients, trimmed=True))
+        return hold._replace(horizontal=TiltCommand(coefficients, trimmed=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ class ManeuverSequence:
     """Maneuvers one after the other, all from the same starting pose.
 
     Attributes:
-        parts: the maneuvers; empty if none is known before the flight: it must not be flown then.
+        parts: the maneuvers; empty: none is known before the flight, and nothing can be flown.
     """
 
     parts: Sequence[Maneuver]
@@ -182,7 +182,7 @@ class ManeuverSequence:
     def part_at(self, time: float) -> tuple[Maneuver, float]:
         """The part that is flown at `time`, and the time since that part began.
 
-        Before the beginning it is the first part, after the end the last one.
+        Before the beginning the first part is returned, after the end the last one.
 
         Raises:
             ValueError: the sequence is empty.
@@ -197,5 +197,5 @@ class ManeuverSequence:
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference of the part that is flown at `time`."""
-        part, within = self.part_at(time)
-        return part.at(within, start)
+        part, part_time = self.part_at(time)
+        return part.at(part_time, start)

@@ -1,4 +1,4 @@
-"""Observer of horizontal position, velocity and disturbance (wind, bias); history of the tilt."""
+"""Observer of horizontal position, velocity and disturbance (wind, bias); history of the slope."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -22,9 +22,9 @@ class ObserverGains(NamedTuple):
     of the velocity plus `ObserverSettings.pull` times the error of the position.
 
     Attributes:
-        position: m per m.
-        velocity: m/s per m/s.
-        disturbance: m/s² per m/s.
+        position: correction of the position per error, m per m.
+        velocity: correction of the velocity per error, m/s per m/s.
+        disturbance: correction of the disturbance per error, m/s² per m/s.
     """
 
     position: float
@@ -39,10 +39,10 @@ class ObserverSettings:
     Attributes:
         bandwidth: both poles of the error of velocity and disturbance, rad/s.
         position_time: time constant with which the position follows the measured one, s.
-        position_pull: velocity error that counts for each metre of position error, 1/s.
+        position_pull: velocity error that has the effect of 1 m of position error, 1/s.
         largest_disturbance: largest estimated disturbance, m/s².
-        bandwidth_increase: relative increase of `bandwidth` at a trust of 1.
-        pull_increase: increase of `position_pull` at a trust of 1, 1/s.
+        bandwidth_increase: relative increase of `bandwidth` at a `PositionCorrection.trust` of 1.
+        pull_increase: increase of `position_pull` at a `PositionCorrection.trust` of 1, 1/s.
     """
 
     bandwidth: float
@@ -53,14 +53,14 @@ class ObserverSettings:
     pull_increase: float = 0.0
 
     def pull(self, dt: float, trust: float) -> float:
-        """`position_pull` at this `dt` and `trust`, 1/s; arguments as in `gains`."""
+        """`position_pull`, 1/s, increased by `trust` and limited for `dt`, as in `gains`."""
         return min(self.position_pull + trust * self.pull_increase, _LARGEST_PULL_TIMES_STEP / dt)
 
     def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:
         """The gains for two measurements that are `dt` seconds apart.
 
         Args:
-            dt: s.
+            dt: time between the two measurements, s.
             trust: trust in the positions, 0 to 1 (`PositionCorrection.trust`).
         """
         bandwidth = (1.0 + trust * self.bandwidth_increase) * self.bandwidth
@@ -99,8 +99,8 @@ class MotionObserver:
     ) -> None:
         """Take a measured position and velocity.
 
-        The first measurement replaces the estimate. So does one that comes 1 s or more after the
-        last one, or that is not newer than it.
+        The first measurement replaces the estimate, and so does a measurement that is not newer
+        than the last one or comes 1 s or more after it.
 
         Args:
             time: vehicle time of the measurement, s.
@@ -117,7 +117,7 @@ class MotionObserver:
         settings, disturbance = self._settings, self.disturbance
         gains, pull = settings.gains(dt, trust), settings.pull(dt, trust)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
-        found = [0.0, 0.0]
+        estimated = [0.0, 0.0]
         for axis in (0, 1):
             acceleration = modelled[axis] + disturbance[axis]
             p = motion.position_ned[axis] + dt * (
@@ -128,12 +128,12 @@ class MotionObserver:
             error = velocity[axis] - v + pull * position_error
             position[axis] = p + gains.position * position_error
             velocity[axis] = v + gains.velocity * error
-            found[axis] = disturbance[axis] + gains.disturbance * error
+            estimated[axis] = disturbance[axis] + gains.disturbance * error
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
-        self.disturbance = limited(found[0], found[1], settings.largest_disturbance)
+        self.disturbance = limited(estimated[0], estimated[1], settings.largest_disturbance)
 
     def rotate_disturbance(self, angle: float) -> None:
-        """Rotate the disturbance by `angle` (rad), because the estimated heading jumped by it.
+        """Rotate the disturbance by `angle` (rad), by which the estimated heading has jumped.
 
         The vehicle itself did not turn, so it must keep the tilt that balances the disturbance.
         """

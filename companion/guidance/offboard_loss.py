@@ -2,7 +2,7 @@
 
 First the autopilot holds the last rates and the last thrust: the thrust axis keeps turning along a
 great circle, while drag slows the vehicle. The part of the rates that is feedback may have any
-direction; it widens the result by a spread. Then the autopilot's failsafe levels the vehicle, and
+direction, so it adds a spread to the result. Then the autopilot's failsafe levels the vehicle, and
 brakes it or lets it drift. `tests/flight/test_killed.py` compares this with the mock vehicles.
 """
 
@@ -31,10 +31,10 @@ class MotionAtLoss(NamedTuple):
     """Motion and thrust at the moment when the setpoints end.
 
     Attributes:
-        offset: Position from where control began, m NED.
-        velocity: m/s NED.
-        thrust: Specific thrust, m/s² NED; at hover it is (0, 0, −g).
-        thrust_rate: Derivative of `thrust`, m/s³ NED.
+        offset: position from where control began, m NED.
+        velocity: velocity, m/s NED.
+        thrust: specific thrust, m/s² NED; at hover it is (0, 0, −g).
+        thrust_rate: derivative of `thrust`, m/s³ NED.
     """
 
     offset: Vector
@@ -47,11 +47,11 @@ class LossFailsafe(NamedTuple):
     """The vehicle and its offboard-loss failsafe.
 
     Attributes:
-        hold_time: Time for which the autopilot holds the last rates, s.
-        brakes: True: the failsafe brakes the vehicle. False: it drifts until drag stops it.
-        drag: Drag of the vehicle; no drag if it is unknown.
-        max_tilt_rate: Largest tilt rate that is sent, rad/s.
-        fence: The fence, whose braking formula is used.
+        hold_time: time for which the autopilot holds the last rates, s.
+        brakes: whether the failsafe brakes the vehicle; False: it drifts until drag stops it.
+        drag: drag of the vehicle; no drag if it is unknown.
+        max_tilt_rate: largest tilt rate that is sent, rad/s.
+        fence: the fence, whose braking formula is used.
     """
 
     hold_time: float
@@ -62,13 +62,13 @@ class LossFailsafe(NamedTuple):
 
 
 class Reach(NamedTuple):
-    """Where the vehicle can stop, relative to its position when the setpoints ended; m.
+    """Where the vehicle can stop and climb to, relative to where the setpoints ended.
 
     Attributes:
-        place: Point (north, east) where it stops if the last rates contain no feedback.
-        spread: Radius around `place` within which it stops if they contain feedback.
-        up: Largest climb.
-        down: Largest fall.
+        place: point (north, east) of the stop if the last rates contain no feedback, m.
+        spread: radius around `place` in which the stop lies if they contain feedback, m.
+        up: largest climb, m.
+        down: largest fall, m.
     """
 
     place: tuple[float, float]
@@ -77,8 +77,8 @@ class Reach(NamedTuple):
     down: float
 
     @property
-    def away(self) -> float:
-        """The largest horizontal distance, m."""
+    def largest_distance(self) -> float:
+        """The largest horizontal distance of the stop, m."""
         return hypot(*self.place) + self.spread
 
 
@@ -86,12 +86,12 @@ class _HeldResult(NamedTuple):
     """Motion of the vehicle from the loss of setpoints until the autopilot stops holding the rates.
 
     Attributes:
-        displacement: Displacement without feedback, m NED.
-        velocity: Velocity without feedback, m/s NED.
-        feedback_displacement: Displacement that feedback adds in the worst direction, m.
-        feedback_speed: Speed that feedback adds in the worst direction, m/s.
-        highest: Greatest height above the start, without feedback, m.
-        tilt: Largest possible tilt, rad.
+        displacement: displacement without feedback, m NED.
+        velocity: velocity without feedback, m/s NED.
+        feedback_displacement: displacement that feedback adds in the worst direction, m.
+        feedback_speed: speed that feedback adds in the worst direction, m/s.
+        highest: greatest height above the start, without feedback, m.
+        tilt: largest possible tilt, rad.
     """
 
     displacement: Vector
@@ -107,10 +107,9 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
     held = _held_motion(at_loss, loss)
     specific_thrust = hypot(*at_loss.thrust)
     speed = hypot(*held.velocity[:2])
-    widest = speed + held.feedback_speed
-    stop, farthest = (
-        _stopping_distance(value, held.tilt, specific_thrust, loss) for value in (speed, widest)
-    )
+    largest_speed = speed + held.feedback_speed
+    stop = _stopping_distance(speed, held.tilt, specific_thrust, loss)
+    farthest_stop = _stopping_distance(largest_speed, held.tilt, specific_thrust, loss)
     north, east = (
         displacement + (stop * component / speed if speed > 0.0 else 0.0)
         for displacement, component in zip(held.displacement[:2], held.velocity[:2], strict=True)
@@ -124,7 +123,7 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
     )
     return Reach(
         (north, east),
-        held.feedback_displacement + farthest - stop,
+        held.feedback_displacement + farthest_stop - stop,
         up,
         _fall_distance(held, specific_thrust),
     )
@@ -136,22 +135,26 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     step = duration / _INTEGRATION_STEPS
     specific_thrust = hypot(*at_loss.thrust)
     axis: Vector = _scaled(at_loss.thrust, 1.0 / specific_thrust)
-    along = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
-    across: Vector = _plus_scaled(at_loss.thrust_rate, axis, -along)
-    rate = hypot(*across) / specific_thrust
-    ahead = _scaled(across, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
+    axial = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
+    lateral: Vector = _plus_scaled(at_loss.thrust_rate, axis, -axial)
+    rate = hypot(*lateral) / specific_thrust
+    direction = _scaled(lateral, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
     rate = min(rate, loss.max_tilt_rate)
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
     displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     feedback_displacement = feedback_speed = highest = 0.0
     for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
-        thrust = _plus_scaled(_scaled(axis, cos(angle)), ahead, sin(angle))
-        velocity = _plus_scaled(_slowed(velocity, loss.drag, step), thrust, specific_thrust * step)
+        thrust = _plus_scaled(_scaled(axis, cos(angle)), direction, sin(angle))
+        velocity = _plus_scaled(
+            _after_drag(velocity, loss.drag, step), thrust, specific_thrust * step
+        )
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
         displacement = _plus_scaled(displacement, velocity, step)
-        stray = 2.0 * specific_thrust * sin(0.5 * min(pi, feedback * (index + 0.5) * step))
-        feedback_speed += (stray - loss.drag.linear * feedback_speed) * step
+        # The acceleration by a thrust axis that feedback has turned by this angle.
+        feedback_angle = min(pi, feedback * (index + 0.5) * step)
+        acceleration = 2.0 * specific_thrust * sin(0.5 * feedback_angle)
+        feedback_speed += (acceleration - loss.drag.linear * feedback_speed) * step
         feedback_displacement += feedback_speed * step
         highest = max(highest, -displacement[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback * duration
@@ -166,9 +169,9 @@ def _stopping_distance(
     """Horizontal distance from the end of the held rates to the stop, m."""
     if loss.brakes:
         return float(loss.fence.stop((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
-    levelled = _level_time(tilt)
-    speed += specific_thrust * sin(min(tilt, 0.5 * pi)) * levelled
-    return speed * levelled + speed / max(loss.drag.linear, _SMALLEST_DRAG)
+    level_time = _level_time(tilt)
+    speed += specific_thrust * sin(min(tilt, 0.5 * pi)) * level_time
+    return speed * level_time + speed / max(loss.drag.linear, _SMALLEST_DRAG)
 
 
 def _fall_distance(held: _HeldResult, specific_thrust: float) -> float:
@@ -199,8 +202,8 @@ def _plus_scaled(a: Vector, b: Vector, factor: float) -> Vector:
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
-def _slowed(velocity: Vector, drag: Drag, span: float) -> Vector:
-    """Apply drag for `span` s to the horizontal velocity only: the worst fall is undamped."""
+def _after_drag(velocity: Vector, drag: Drag, span: float) -> Vector:
+    """Velocity after `span` s of horizontal drag, m/s NED; the worst case of a fall has no drag."""
     north, east, _ = drag.deceleration((velocity[0], velocity[1], 0.0))
     return velocity[0] - north * span, velocity[1] - east * span, velocity[2]
 
@@ -208,8 +211,8 @@ def _slowed(velocity: Vector, drag: Drag, span: float) -> Vector:
 def path_thrust(acceleration: Vector, velocity: Vector, drag: Drag) -> Vector:
     """Specific thrust that a path with this acceleration and velocity needs, m/s² NED."""
     north, east, down = acceleration
-    slowed = drag.deceleration(velocity)
-    return north + slowed[0], east + slowed[1], down - GRAVITY
+    deceleration = drag.deceleration(velocity)
+    return north + deceleration[0], east + deceleration[1], down - GRAVITY
 
 
 def tilted_thrust(north: float, east: float) -> Vector:

@@ -1,4 +1,4 @@
-"""Guidance of another package: what its code raises is named as an error of that package."""
+"""Guidance of another package; an exception of its code is reported as that package's error."""
 
 from companion.attitude import Target
 from companion.guidance.linear import Guidance, GuidanceInput, LinearCommand

@@ -13,8 +13,8 @@ positions need a shorter one (`CorrectionSettings.filter_time`)."""
 _WINDOW_PER_NOISE = 0.1
 """Growth of `filter_time` with the noise of r, s per m/s; r is defined in `PositionCorrection`."""
 _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
-"""Noise of r below which positions count as smooth, and above which as noisy, m/s. It is at most
-0.1 m/s on PX4 and ArduPilot; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
+"""Noise of r below which positions count as smooth, and above which as noisy, m/s. The noise of PX4
+and ArduPilot is at most 0.1 m/s; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _LARGEST_CHANGE = 0.08
 """Before r is filtered, it is limited to this distance from the filtered r, m/s. ArduPilot stamps
 its position in whole milliseconds: at 5 m/s a stamp that is off by 1 ms changes one r by 0.25 m/s.
@@ -22,8 +22,8 @@ Real corrections of its estimator change r by 0.02 m/s, with peaks of 0.1 m/s (m
 _NOISE_TIME = 1.0
 """Time constant with which the noise of r is estimated, s."""
 _MOVING_SPEED = 2.0
-"""Speed from which the positions are trusted fully, m/s. Below it their errors are small and mostly
-noise: a real PX4 then hovers with half the body rates and the same true position error."""
+"""Speed from which the positions are trusted fully, m/s. At lower speed, position errors are small
+and mostly noise: with less trust a real PX4 hovers with half the body rates, equally exactly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class CorrectionSettings:
     """How much of the estimator's correction is anticipated.
 
     Attributes:
-        estimator_time: time constant of the estimator's correction, s: 1/(its position gain).
+        estimator_time: time constant of the estimator's correction, s: 1/(position gain).
         filter_time: time constant of each of the two low-pass filters while the vehicle moves and
             its positions are smooth, s, positive; at rest it is twice that.
         largest_correction: largest anticipated correction, m.
@@ -121,26 +121,26 @@ class PositionCorrection:
         for axis in (0, 1):
             explained = 0.5 * (v_before[axis] + v_now[axis])
             raw[axis] = (p_now[axis] - p_before[axis]) / dt - explained
-        kept = exp(-dt / self._filter_window(raw, dt))
+        kept_share = exp(-dt / self._filter_window(raw, dt))
         change = limited(raw[0] - self._filtered[0], raw[1] - self._filtered[1], _LARGEST_CHANGE)
         for axis in (0, 1):
-            filtered[axis] = self._filtered[axis] + (1.0 - kept) * change[axis]
+            filtered[axis] = self._filtered[axis] + (1.0 - kept_share) * change[axis]
             wanted = settings.estimator_time * filtered[axis]
-            correction[axis] = wanted + kept * (self._correction[axis] - wanted)
+            correction[axis] = wanted + kept_share * (self._correction[axis] - wanted)
         self._raw = raw[0], raw[1]
-        most = (
+        largest = (
             settings.largest_correction / settings.estimator_time
             if settings.estimator_time > 0.0
             else 0.0
         )
-        self._filtered = limited(filtered[0], filtered[1], most)
+        self._filtered = limited(filtered[0], filtered[1], largest)
         self._correction = limited(correction[0], correction[1], settings.largest_correction)
 
     def _filter_window(self, raw: list[float], dt: float) -> float:
         """Time constant of the low-pass filters, s, from the changes of r between two positions."""
         change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
-        kept = exp(-dt / _NOISE_TIME)
-        self._noise = change * change + kept * (self._noise - change * change)
+        kept_share = exp(-dt / _NOISE_TIME)
+        self._noise = change * change + kept_share * (self._noise - change * change)
         shortest = self._settings.filter_time
         longest = max(shortest, _LONGEST_WINDOW)
         window = min(shortest + _WINDOW_PER_NOISE * sqrt(self._noise), longest)

@@ -22,8 +22,8 @@ class PredictedMotion(NamedTuple):
     Attributes:
         time: time since the maneuver began, s.
         offset: position from where the maneuver began, m.
-        velocity: m/s.
-        acceleration: m/s²; in open loop the acceleration by tilt, without drag.
+        velocity: velocity, m/s.
+        acceleration: acceleration, m/s²; in open loop that by tilt, without drag.
     """
 
     time: float
@@ -33,12 +33,12 @@ class PredictedMotion(NamedTuple):
 
 
 def predict(
-    part: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG
+    maneuver: Maneuver, heading: float = 0.0, drag: Drag = NO_DRAG
 ) -> Iterator[PredictedMotion]:
     """The predicted motion at each of the maneuver's `check_times`, beginning at rest.
 
     Args:
-        part: the maneuver.
+        maneuver: the maneuver.
         heading: heading at the beginning, rad.
         drag: drag in still air.
 
@@ -47,13 +47,13 @@ def predict(
     """
     start = Pose((0.0, 0.0, 0.0), heading)
     before, open_loop = 0.0, _OpenLoop(heading, drag)
-    for time in part.check_times():
-        reference = part.at(time, start)
-        between = part.at(0.5 * (before + time), start)
+    for time in maneuver.check_times():
+        reference = maneuver.at(time, start)
+        midway = maneuver.at(0.5 * (before + time), start)
         moment = PredictedMotion(
             time, reference.position_ned, reference.velocity_ned, reference.acceleration_ned
         )
-        yield moment if between.closed_loop else open_loop.advance(moment, between, time - before)
+        yield moment if midway.closed_loop else open_loop.advance(moment, midway, time - before)
         if reference.closed_loop:
             open_loop = _OpenLoop(heading, drag)
         before = time
@@ -64,7 +64,7 @@ class _OpenLoop:
 
     def __init__(self, heading: float, drag: Drag) -> None:
         self._heading, self._drag = heading, drag
-        self._place = self._speed = (0.0, 0.0)
+        self._offset = self._velocity = (0.0, 0.0)
         self._roll = self._pitch = 0.0
 
     def advance(
@@ -73,20 +73,20 @@ class _OpenLoop:
         """Integrate the commands of `reference` over `span` s.
 
         Returns:
-            `moment`, its horizontal motion replaced by the integrated one.
+            `moment`, with the integrated motion as its horizontal motion.
         """
-        (north, east), (fast_north, fast_east) = self._place, self._speed
+        (north, east), (v_north, v_east) = self._offset, self._velocity
         by_tilt = self._acceleration(reference, span)
-        slowed = self._drag.deceleration((fast_north, fast_east, 0.0))
-        pushed = by_tilt[0] - slowed[0], by_tilt[1] - slowed[1]
-        self._place = (
-            north + span * (fast_north + 0.5 * span * pushed[0]),
-            east + span * (fast_east + 0.5 * span * pushed[1]),
+        drag = self._drag.deceleration((v_north, v_east, 0.0))
+        a_north, a_east = by_tilt[0] - drag[0], by_tilt[1] - drag[1]
+        self._offset = (
+            north + span * (v_north + 0.5 * span * a_north),
+            east + span * (v_east + 0.5 * span * a_east),
         )
-        self._speed = fast_north + span * pushed[0], fast_east + span * pushed[1]
+        self._velocity = v_north + span * a_north, v_east + span * a_east
         return moment._replace(
-            offset=(*self._place, moment.offset[2]),
-            velocity=(*self._speed, moment.velocity[2]),
+            offset=(*self._offset, moment.offset[2]),
+            velocity=(*self._velocity, moment.velocity[2]),
             acceleration=(*by_tilt, moment.acceleration[2]),
         )
 

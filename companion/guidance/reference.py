@@ -18,14 +18,14 @@ LARGEST_JERK = 50.0
 
 
 class Pose(NamedTuple):
-    """Position (m) and heading (rad) that is held, or from which a maneuver begins."""
+    """Position (m NED) and heading (rad) that is held, or from which a maneuver begins."""
 
     position_ned: Vector
     heading: float
 
 
 class VehicleMotion(NamedTuple):
-    """Position in m and velocity in m/s of the vehicle."""
+    """Position (m NED) and velocity (m/s NED) of the vehicle."""
 
     position_ned: Vector
     velocity_ned: Vector
@@ -35,9 +35,9 @@ class HorizontalMode(Enum):
     """How guidance follows the horizontal part of a reference in closed loop.
 
     Attributes:
-        POSITION: it corrects errors of position, velocity and acceleration.
-        ACCELERATION: it commands the acceleration alone. Position and velocity are not corrected;
-            drag at the reference's velocity and the disturbance are compensated.
+        POSITION: guidance corrects errors of position, velocity and acceleration.
+        ACCELERATION: guidance commands the acceleration alone. Position and velocity are not
+            corrected; drag at the reference's velocity and the disturbance are compensated.
     """
 
     POSITION = auto()
@@ -49,8 +49,8 @@ class TiltCommand(NamedTuple):
 
     Attributes:
         coefficients: north and east; the sine of the tilt is their length.
-        trimmed: whether guidance adds the trim: the mean target of the latest time in
-            `HorizontalMode.ACCELERATION`. It balances wind and the error of the estimated attitude.
+        trimmed: whether guidance adds the trim, which balances wind and the error of the estimated
+            attitude: the mean target of the latest time in `HorizontalMode.ACCELERATION`.
     """
 
     coefficients: Coefficients
@@ -65,10 +65,10 @@ class VerticalMode(Enum):
     """How guidance follows the vertical part of a reference.
 
     Attributes:
-        HEIGHT: it corrects errors of height and climb rate.
-        HEIGHT_IN_STEPS: the same, but the vertical acceleration jumps. The rotors do not follow
+        HEIGHT: guidance corrects errors of height and climb rate.
+        HEIGHT_IN_STEPS: as HEIGHT, but the vertical acceleration jumps. The rotors do not follow
             jumps, so the hover thrust is not learned meanwhile.
-        ACCELERATION: it commands the acceleration alone, without drag and feedback.
+        ACCELERATION: guidance commands the acceleration alone, without drag and feedback.
     """
 
     HEIGHT = auto()
@@ -77,12 +77,12 @@ class VerticalMode(Enum):
 
 
 class ThrustCommand(NamedTuple):
-    """Normalised thrust that replaces the one guidance computes.
+    """Normalised thrust that replaces the thrust that guidance computes.
 
     Guidance still computes the vertical acceleration as in `VerticalMode.HEIGHT`.
 
     Attributes:
-        thrust: 0..1.
+        thrust: normalised thrust, 0..1.
     """
 
     thrust: float
@@ -99,7 +99,7 @@ class Reference(NamedTuple):
         velocity_ned: velocity in m/s.
         acceleration_ned: acceleration in m/s².
         heading: heading in rad.
-        heading_rate: its rate in rad/s.
+        heading_rate: derivative of the heading in rad/s.
         horizontal: how the horizontal motion is commanded: in closed loop by position or by
             acceleration; in open loop by tilt or by body rates in rad/s, which command the
             heading, too.
@@ -141,8 +141,8 @@ class Reference(NamedTuple):
 
     @property
     def holds_height(self) -> bool:
-        """Whether the vertical acceleration contains a correction of the height."""
-        return self.vertical is not VerticalMode.ACCELERATION
+        """Whether the vehicle should be at the height of the reference."""
+        return self.vertical in (VerticalMode.HEIGHT, VerticalMode.HEIGHT_IN_STEPS)
 
     @property
     def thrust_is_steady(self) -> bool:
@@ -167,12 +167,12 @@ def minus(left: Vector, right: Vector) -> Vector:
     return left[0] - right[0], left[1] - right[1], left[2] - right[2]
 
 
-def limited(north: float, east: float, most: float) -> Horizontal:
-    """The vector, shortened to `most` if it is longer; its direction is kept."""
+def limited(north: float, east: float, largest: float) -> Horizontal:
+    """The vector, shortened to the length `largest` if it is longer; its direction is kept."""
     length = hypot(north, east)
-    if length <= most:
+    if length <= largest:
         return north, east
-    return north * most / length, east * most / length
+    return north * largest / length, east * largest / length
 
 
 def rotated(north: float, east: float, angle: float) -> Horizontal:
@@ -182,15 +182,15 @@ def rotated(north: float, east: float, angle: float) -> Horizontal:
 
 
 def change_rate(
-    old: Sequence[float], new: Sequence[float], since: float, most: float
+    old: Sequence[float], new: Sequence[float], dt: float, largest: float
 ) -> tuple[float, ...] | None:
     """Rate of change of a commanded vector; None if it has jumped.
 
     Args:
         old: components in the previous command.
         new: components in the present command.
-        since: time between the two commands, s.
-        most: largest rate of change that does not count as a jump.
+        dt: time between the two commands, s.
+        largest: largest rate of change that does not count as a jump.
     """
-    rate = tuple((b - a) / since for a, b in zip(old, new, strict=True))
-    return rate if hypot(*rate) <= most else None
+    rate = tuple((b - a) / dt for a, b in zip(old, new, strict=True))
+    return rate if hypot(*rate) <= largest else None

@@ -57,8 +57,8 @@ class ManeuverSource:
 
     Attributes:
         maneuvers: the maneuvers to fly.
-        begun_at: when they began, s of event-loop time, or None.
-        pose: the pose at which they began, or None.
+        begun_at: when the maneuvers began, s of event-loop time, or None.
+        pose: the pose at which the maneuvers began, or None.
         failure: always None; when a maneuver is given up, guidance itself begins a hold.
     """
 
@@ -97,8 +97,8 @@ class ManeuverSource:
 class CommandedSource:
     """References that another program or the user's code gives one by one.
 
-    After each reference the source extrapolates it by its velocity, acceleration and jerk. If a
-    reference becomes older than `max_age` before the next one comes, the source fails: the vehicle
+    Until the next reference the source extrapolates the newest one by its velocity, acceleration
+    and jerk. If the newest reference becomes older than `max_age`, the source fails: the vehicle
     holds its position, and later references are not flown.
 
     Args:
@@ -116,13 +116,13 @@ class CommandedSource:
         self.pose: Pose | None = None
         self._max_age = max_age
         self._begins_within = begins_within
-        self._held: Reference | None = None
+        self._hold_reference: Reference | None = None
         self._newest: Reference | None = None
         self._given_at = 0.0
         self._jerk = _NO_JERK
         self._base: Reference | None = None
         self._base_at = 0.0
-        self._all_given = False
+        self._ended = False
         self._failure: str | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -134,10 +134,10 @@ class CommandedSource:
 
         Args:
             reference: the reference at `now`.
-            now: s of event-loop time.
+            now: event-loop time, s.
             jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
-                an earlier reference, and is 0 for the first reference, for one of another kind
-                (`_kind`) and after a jump of the acceleration.
+                an earlier reference; 0 for the first reference, after a jump of the acceleration,
+                and if the two are commanded in different ways (`_loops_closed`).
         """
         self._require_fresh(now)
         self._jerk = self._jerk_towards(reference, now) if jerk_ned is None else jerk_ned
@@ -150,9 +150,9 @@ class CommandedSource:
         """
         before, since = self._base, now - self._base_at
         if before is not None and since < _SHORTEST_JERK_TIME:
-            return self._jerk if _kind(before) == _kind(reference) else _NO_JERK
+            return self._jerk if _loops_closed(before) == _loops_closed(reference) else _NO_JERK
         self._base, self._base_at = reference, now
-        if before is None or _kind(before) != _kind(reference):
+        if before is None or _loops_closed(before) != _loops_closed(reference):
             return _NO_JERK
         old, new = before.acceleration_ned, reference.acceleration_ned
         north, east, down = change_rate(old, new, since, LARGEST_JERK) or _NO_JERK
@@ -160,7 +160,7 @@ class CommandedSource:
 
     def end(self) -> None:
         """Note that no more references will come."""
-        self._all_given = True
+        self._ended = True
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The newest reference, extrapolated; before the first one, a hold of the initial pose.
@@ -170,11 +170,11 @@ class CommandedSource:
         self._require_fresh(now)
         newest, given_at, jerk = self._newest, self._given_at, self._jerk
         if newest is not None and self._failure is None:
-            return lambda time: continued(newest, jerk, time - given_at)
-        if self._held is None or newest is None:
-            self._held = self._hold(motion)
-        held = self._held
-        return lambda _: held
+            return lambda time: extrapolated(newest, jerk, time - given_at)
+        if self._hold_reference is None or newest is None:
+            self._hold_reference = self._hold(motion)
+        hold_reference = self._hold_reference
+        return lambda _: hold_reference
 
     def _hold(self, motion: VehicleMotion) -> Reference:
         """Hold the pose where the source began; after references, hold the present position."""
@@ -186,7 +186,7 @@ class CommandedSource:
     def _require_fresh(self, now: float) -> None:
         """Note a failure if the newest reference is too old, or the first one is overdue."""
         allowed = self._begins_within if self._newest is None else self._max_age
-        if self._failure is None and not self._all_given and now - self._given_at > allowed:
+        if self._failure is None and not self._ended and now - self._given_at > allowed:
             self._failure = f"{self.name} gave no new command for {allowed:g} s"
 
     @property
@@ -200,18 +200,18 @@ class CommandedSource:
 
     def finished(self, now: float) -> bool:
         """Whether `end` was called."""
-        return self._all_given
+        return self._ended
 
 
-def _kind(reference: Reference) -> tuple[bool, bool, bool]:
-    """Whether it is in closed loop, and whether it holds the position, and the height.
+def _loops_closed(reference: Reference) -> tuple[bool, bool, bool]:
+    """Whether a reference closes the horizontal loop, holds the position, and holds the height.
 
-    Accelerations of references of different kinds are not comparable.
+    The accelerations of two references are comparable only if all three are equal.
     """
     return reference.closed_loop, reference.holds_position, reference.holds_height
 
 
-def continued(reference: Reference, jerk_ned: Vector, elapsed: float) -> Reference:
+def extrapolated(reference: Reference, jerk_ned: Vector, elapsed: float) -> Reference:
     """The reference `elapsed` seconds later, at a constant jerk (m/s³) and heading rate."""
     t, t2, t3 = elapsed, 0.5 * elapsed**2, elapsed**3 / 6.0
     p0, p1, p2 = reference.position_ned

@@ -1,4 +1,4 @@
-"""Specific thrust (m/s²) for a wanted acceleration; how curve and battery make it normalised."""
+"""Specific thrust (m/s²) for a wanted acceleration; thrust curve, and loss of thrust by voltage."""
 
 from math import acos, hypot, isfinite, sqrt
 
@@ -72,9 +72,9 @@ def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
     north, east, down = wanted
     lift = min(max(GRAVITY - down, 0.0), largest)
     spare = (TILT_THRUST_SHARE * largest) ** 2 - lift * lift
-    length, most = hypot(north, east), sqrt(max(spare, 0.0))
-    if length > most:
-        north, east, length = north * most / length, east * most / length, most
+    length, limit = hypot(north, east), sqrt(max(spare, 0.0))
+    if length > limit:
+        north, east, length = north * limit / length, east * limit / length, limit
     if lift * lift + length * length < smallest * smallest:
         lift = sqrt(smallest * smallest - length * length)
     return north, east, GRAVITY - lift
@@ -130,23 +130,23 @@ class BatterySag:
     def __init__(self, exponent: float) -> None:
         self.factor = 1.0
         self._exponent = exponent
-        self._first: float | None = None
+        self._first_voltage: float | None = None
         self._ratio = 1.0
         self._time = 0.0
 
     def reset(self) -> None:
         """Take the next voltage as V₀; called on the ground."""
-        self._first = None
+        self._first_voltage = None
         self._ratio = self.factor = 1.0
 
     def note(self, time: float, voltage: float | None) -> None:
-        """Take the voltage of the whole battery (V) at a time in s; an unusable one is ignored."""
+        """Take the voltage of the whole battery (V) at `time` (s); an unusable one is ignored."""
         if voltage is None or not isfinite(voltage) or voltage <= 0.0 or self._exponent == 0.0:
             return
-        if self._first is None:
-            self._first = voltage
-        passed, self._time = time - self._time, time
-        ratio = voltage / self._first
-        if passed > 0.0 and _PLAUSIBLE_RATIO[0] < ratio < _PLAUSIBLE_RATIO[1]:
-            self._ratio += passed / (passed + _VOLTAGE_FILTER_TIME) * (ratio - self._ratio)
+        if self._first_voltage is None:
+            self._first_voltage = voltage
+        dt, self._time = time - self._time, time
+        ratio = voltage / self._first_voltage
+        if dt > 0.0 and _PLAUSIBLE_RATIO[0] < ratio < _PLAUSIBLE_RATIO[1]:
+            self._ratio += dt / (dt + _VOLTAGE_FILTER_TIME) * (ratio - self._ratio)
             self.factor = self._ratio**self._exponent

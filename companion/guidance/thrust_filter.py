@@ -30,7 +30,7 @@ _REJECTION_TIME = 1.0
 """Time constant of the low-pass filter that finds lasting rejections, s."""
 
 _LASTING_REJECTION = 0.2
-"""If the low-pass filter's output is beyond ± this at a rejection, the variance is reset.
+"""Magnitude of the low-pass filter's output from which a rejection resets the variance.
 
 That takes about 0.25 s of rejections. The filter's input is the squared ratio of the innovation to
 its gate, at most 1, with the sign of the innovation: +1 for a rejected measurement that is too
@@ -77,26 +77,27 @@ class ThrustFilter:
 
         Args:
             span: duration of the measurement, s.
-            share: mean share of thrust, 0..1; its component along the measured axis.
-            specific_thrust: mean specific thrust along that axis, measured, m/s².
+            share: mean share of full thrust, 0..1: the part along the measured axis.
+            specific_thrust: measured mean specific thrust along the same axis, m/s².
             extra_variance: variance to add to the learned variance of the measurements, (m/s²)².
         """
         self._variance = min(self._variance + self._drift * span, self._first_variance)
         innovation = specific_thrust - self.gain * share
         expected = share * share * self._variance + self._noise + extra_variance
         ratio = innovation * innovation / (_GATE_DEVIATIONS * _GATE_DEVIATIONS * expected)
-        passed = min(1.0, span / _REJECTION_TIME)
-        self._rejections += passed * (copysign(min(ratio, 1.0), innovation) - self._rejections)
+        new_share = min(1.0, span / _REJECTION_TIME)
+        self._rejections += new_share * (copysign(min(ratio, 1.0), innovation) - self._rejections)
         if ratio > 1.0:
             if abs(self._rejections) > _LASTING_REJECTION:
                 self._variance, self._rejections = self._first_variance, 0.0
             return
-        kalman = self._variance * share / expected
-        self.gain = min(max(self.gain + kalman * innovation, self._bounds[0]), self._bounds[1])
-        self._variance *= 1.0 - kalman * share
+        kalman_gain = self._variance * share / expected
+        gain = self.gain + kalman_gain * innovation
+        self.gain = min(max(gain, self._bounds[0]), self._bounds[1])
+        self._variance *= 1.0 - kalman_gain * share
         self._learn_noise(span, share, specific_thrust - self.gain * share)
 
     def _learn_noise(self, span: float, share: float, residual: float) -> None:
-        seen = residual * residual + share * share * self._variance
-        noise = self._noise + min(1.0, span / _NOISE_TIME) * (seen - self._noise)
+        estimate = residual * residual + share * share * self._variance
+        noise = self._noise + min(1.0, span / _NOISE_TIME) * (estimate - self._noise)
         self._noise = min(max(noise, _SMALLEST_NOISE), _LARGEST_NOISE)

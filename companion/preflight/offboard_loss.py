@@ -100,7 +100,7 @@ def worst_reach(
         if breach is None:
             breach, breach_time = _breach(config, motion.offset, reached, loss.fence), time
         worst = WorstReach(
-            max(worst.away, reached.away),
+            max(worst.away, reached.largest_distance),
             max(worst.up, reached.up),
             max(worst.down, reached.down),
             breach,

@@ -134,11 +134,11 @@ class BackgroundFile(ABC, Generic[T]):
 
     def _write_waiting(self, file: ItemFile[T]) -> None:
         """Write the items that are waiting now; items that arrive later wait for the next call."""
-        left = len(self._waiting)
-        size = max(_SMALLEST_SLICE, -(-left // _MOST_SLICES))
-        while left > 0:
-            items = [self._waiting.popleft() for _ in range(min(size, left))]
-            left -= len(items)
+        remaining = len(self._waiting)
+        size = max(_SMALLEST_SLICE, -(-remaining // _MOST_SLICES))
+        while remaining > 0:
+            items = [self._waiting.popleft() for _ in range(min(size, remaining))]
+            remaining -= len(items)
             self._write_slice(file, items)
             self._sync_when_due(file)
             if not self._closing.is_set():

@@ -33,7 +33,7 @@ class Invocation(NamedTuple):
 
 
 class ClosingWords(NamedTuple):
-    """The summary in words."""
+    """The summary of a flight in words."""
 
     headline: str
     """What flew, and whether it was good."""
@@ -43,7 +43,7 @@ class ClosingWords(NamedTuple):
     """Suggested next command line, or None."""
     good: bool
     """Whether the flight was good; see `is_good`."""
-    flown: bool
+    completed: bool
     """Whether the maneuvers were flown to their end."""
 
 
@@ -54,55 +54,55 @@ def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWor
         figures: result of `Summary.as_dict`.
         invocation: see `Invocation`; None: no next command is suggested.
     """
-    flown, good = figures["result"] == "ok", is_good(figures)
-    headline, lines = _headline_and_reasons(figures) if flown else _ended_early(figures)
+    completed, good = figures["result"] == "ok", is_good(figures)
+    headline, lines = _headline_and_reasons(figures) if completed else _ended_early(figures)
     return ClosingWords(
         headline,
         tuple(lines),
         None if invocation is None else _next_command(figures, invocation),
         good,
-        flown,
+        completed,
     )
 
 
 def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     judged, advice = checks(figures), list(figures["advice"])
-    beyond = [check for check in judged if not check.good]
+    failed_checks = [check for check in judged if not check.good]
     names = _joined_by_and([maneuver["name"] for maneuver in figures["maneuvers"]])
     if is_good(figures):
         headline = f"The flight was good: {names}, all within their limits."
-    elif beyond:
+    elif failed_checks:
         headline = (
-            f"The flight was not good: {names}, {len(beyond)} of {len(judged)} figures beyond "
-            "their limits."
+            f"The flight was not good: {names}, {len(failed_checks)} of {len(judged)} figures "
+            "beyond their limits."
         )
     elif all(LOST_ROWS in text for text in advice):
         headline = f"The flight was good, as far as it could be recorded: {names}."
     else:
         headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
-    lines = _beyond_limit(beyond)
+    lines = _beyond_limit(failed_checks)
     lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
     lines += _by_subject([check for check in judged if check.good])
     return headline, [*lines, _extent_line(figures)]
 
 
-def _beyond_limit(beyond: list[Check]) -> list[str]:
-    return [f"! {check.what}: {check.found}; {check.remedy}" for check in beyond]
+def _beyond_limit(failed_checks: list[Check]) -> list[str]:
+    return [f"! {check.what}: {check.found}; {check.remedy}" for check in failed_checks]
 
 
 def _by_subject(good: Sequence[Check]) -> list[str]:
-    """One line for each subject of the passed checks, with all their figures."""
-    found: dict[str, list[str]] = {}
+    """One line for each `Check.what` of the passed checks, with the figures of these checks."""
+    figures_by_subject: dict[str, list[str]] = {}
     for check in good:
-        found.setdefault(check.what, []).append(check.found)
-    return [f"  {what}: {'; '.join(words)}" for what, words in found.items()]
+        figures_by_subject.setdefault(check.what, []).append(check.found)
+    return [f"  {what}: {'; '.join(words)}" for what, words in figures_by_subject.items()]
 
 
 def _extent_line(figures: Figures) -> str:
     extent = figures["extent"]
     # After a full disk the figures count only what was recorded.
-    least = "at least " if any(LOST_ROWS in text for text in figures["advice"]) else ""
-    parts = [f"{least}{extent['under_control_s']:.0f} s under our control"]
+    at_least = "at least " if any(LOST_ROWS in text for text in figures["advice"]) else ""
+    parts = [f"{at_least}{extent['under_control_s']:.0f} s under our control"]
     for key, words in (
         ("height_max_m", "up to {:.1f} m high"),
         ("maneuver_speed_max_m_s", "{:.1f} m/s fast"),
@@ -120,10 +120,12 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     remedy = "nothing needs fixing" if interrupted else advice
     if figures["at_the_end"]["armed"]:
         on_ground = end["since_takeoff_s"] is None  # or the take-off was not heard
-        what = "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
-        then = "" if interrupted else f"; then: {remedy}"
+        first_step = (
+            "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
+        )
+        next_step = "" if interrupted else f"; then: {remedy}"
         armed = "is armed" if _final_silence(figures) is None else "was armed when last heard"
-        remedy = f"the vehicle {armed}: {what}{then}"
+        remedy = f"the vehicle {armed}: {first_step}{next_step}"
     result = figures["result"].rstrip(".")
     return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
         f"  when: {_when_ended(end)}",
@@ -168,7 +170,7 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
         return f"{invocation.program} {shlex.join(words)}"
 
     again = invocation.arguments
-    own = (
+    config_options = (
         None
         if invocation.config is None
         else ["--config", invocation.config, *_shared_options(again)]
@@ -181,24 +183,24 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
         and end["phase"] in _PHASES_BEFORE_TAKEOFF
         and end["since_takeoff_s"] is None
     ):
-        return None if own is None else command("doctor", *own)
+        return None if config_options is None else command("doctor", *config_options)
     if end is None and figures["settings"]:
         changes = [f"{key}={value}" for key, value in figures["settings"].items()]
         return command(*again, *(word for change in changes for word in ("--set", change)))
-    if end is None and own is not None and figures["planner"] == "first-order":
-        return command("identify", *own)
+    if end is None and config_options is not None and figures["planner"] == "first-order":
+        return command("identify", *config_options)
     return command("plot", figures["log"]) if figures["log"] is not None else None
 
 
 def _shared_options(arguments: Sequence[str]) -> list[str]:
     """The options that changed the configuration and that other commands take as well."""
-    kept: list[str] = []
+    shared: list[str] = []
     for word, value in zip(arguments, (*arguments[1:], ""), strict=True):
         if word in _SHARED_OPTIONS:
-            kept += (word, value)
+            shared += (word, value)
         elif word.partition("=")[0] in _SHARED_OPTIONS:
-            kept.append(word)
-    return kept
+            shared.append(word)
+    return shared
 
 
 def _joined_by_and(names: Sequence[str]) -> str:

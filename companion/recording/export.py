@@ -53,15 +53,15 @@ def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
         OSError: a file cannot be written.
         RecordError: the record is not valid.
     """
-    written = {}
+    row_counts = {}
     for name, columns in tables(record):
         path = folder / f"{name}.csv"
         rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         with path.open("w", encoding="utf-8") as file:
             file.write(",".join(columns) + "\n")
             file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
-        written[path] = _row_count(columns)
-    return written
+        row_counts[path] = _row_count(columns)
+    return row_counts
 
 
 def export_parquet(record: FlightRecord, folder: Path) -> dict[Path, int]:
@@ -76,12 +76,12 @@ def export_parquet(record: FlightRecord, folder: Path) -> dict[Path, int]:
     from pyarrow import Table as ArrowTable  # noqa: PLC0415  an extra
     from pyarrow import parquet  # noqa: PLC0415
 
-    written = {}
+    row_counts = {}
     for name, columns in tables(record):
         path = folder / f"{name}.parquet"
         parquet.write_table(ArrowTable.from_pydict(columns), path)
-        written[path] = _row_count(columns)
-    return written
+        row_counts[path] = _row_count(columns)
+    return row_counts
 
 
 def _row_count(columns: dict[str, NDArray[np.generic]]) -> int:

@@ -74,7 +74,7 @@ class FlightRecord:
     epoch: float
     """Unix time at which our clock read 0, s; 0 if our clock is the vehicle's."""
     metadata: Mapping[str, Mapping[str, str]]
-    """"flight" (versions, start, seed and so on) and others, by name."""
+    """Metadata records by name, such as "flight" with versions, start and seed."""
 
     def rows(self, name: str) -> Rows:
         """All rows of a channel of numbers, such as "sample" or "guidance", in the file's order.
@@ -105,7 +105,7 @@ class FlightRecord:
     def fault(self) -> str | None:
         """Why the record holds less than the flight, as a sentence; None: it holds all.
 
-        If the flight was killed, it has no summary, and a record that ends there has no fault.
+        A record that ends because its flight was killed (no `summary.json`) has no fault.
         """
         if self.damage is not None:
             return (
@@ -213,7 +213,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
         content = read_mcap(path)
     except OSError as error:
         if not (killed_at_start and isinstance(error, FileNotFoundError)):
-            raise RecordError(_not_a_flight(path, error)) from error
+            raise RecordError(_why_not_a_flight(path, error)) from error
         content = McapContent()
     flight = content.metadata.setdefault("flight", {})
     if not flight and killed_at_start and content.damage is None:
@@ -234,7 +234,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
     )
 
 
-def _not_a_flight(path: Path, error: OSError) -> str:
+def _why_not_a_flight(path: Path, error: OSError) -> str:
     """Why the record at `path` cannot be opened, and which folder was probably meant."""
     flights = sorted(path.parent.glob(f"*/{RECORD_FILE}"))
     if isinstance(error, FileNotFoundError) and flights:

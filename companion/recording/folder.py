@@ -1,4 +1,4 @@
-"""The folder of one flight."""
+"""Makes the folder of a flight."""
 
 from datetime import UTC, datetime
 from pathlib import Path

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.batch import SendBatch
-from companion.recording.mcap_file.fields import CDR, Channel
+from companion.recording.mcap_file.fields import CDR_HEADER, Channel
 from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
 from companion.recording.mcap_file.writer import McapWriter
 
@@ -21,8 +21,8 @@ _MOST_WAITING = 50_000
 _INFORMATION, _WARNING = 2, 3
 
 Encoder = Callable[[McapWriter, int, Any], None]
-"""Writes the messages of an entry. Arguments: the file; the time in ns since 1970 (in vehicle
-time: since the vehicle's boot); the values."""
+"""Writes the messages of an entry. Arguments: the file; the time in ns since 1970 (if the flight
+runs in vehicle time: since the vehicle's boot); the values."""
 
 
 class Entry(NamedTuple):
@@ -45,7 +45,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         on_failure: see `BackgroundFile`.
         on_bad_entry: called with a message, from the writing thread, at the first entry that cannot
             be recorded.
-        stream: takes the messages also, in batches, in the writing thread; None: nothing does.
+        stream: also receives the messages, in batches, in the writing thread; None: no live stream.
     """
 
     def __init__(
@@ -181,4 +181,4 @@ def _write_log(writer: McapWriter, time_ns: int, values: tuple[str, str]) -> Non
 
 def _write_row(writer: McapWriter, time_ns: int, values: tuple[Channel, Sequence[float]]) -> None:
     channel, numbers = values
-    writer.message(channel.topic, time_ns, channel.packing.pack(CDR, *numbers))
+    writer.message(channel.topic, time_ns, channel.packing.pack(CDR_HEADER, *numbers))

@@ -114,14 +114,14 @@ class Series:
     Args:
         columns: names of the columns.
         spool: writes the rows that are not kept in memory.
-        kept: number of newest rows that are always in memory.
+        rows_in_memory: number of newest rows that are always in memory.
 
     Attributes:
         columns: names of the columns.
         lost: rows that were lost because the disk was full or too slow.
     """
 
-    def __init__(self, columns: tuple[str, ...], spool: Spool, kept: int = 0) -> None:
+    def __init__(self, columns: tuple[str, ...], spool: Spool, rows_in_memory: int = 0) -> None:
         self.columns = columns
         self.lost = 0
         self._spool = spool
@@ -129,7 +129,7 @@ class Series:
         self._file = None if spool.folder is None else SpooledFile(spool.folder)
         self._full = _CHUNK_ROWS * len(columns)
         self._chunk = array("d")
-        most = None if self._file is None else -(-kept // _CHUNK_ROWS)
+        most = None if self._file is None else -(-rows_in_memory // _CHUNK_ROWS)
         self._recent: deque[array[float]] = deque(maxlen=most)
         self._put_count = 0
 
@@ -151,16 +151,16 @@ class Series:
         """
         wanted = max(0, len(self) - since) * len(self.columns)
         parts: list[array[float]] = [self._chunk]
-        have = len(self._chunk)
+        available = len(self._chunk)
         for chunk in reversed(self._recent):
-            if have >= wanted:
+            if available >= wanted:
                 break
             parts.insert(0, chunk)
-            have += len(chunk)
-        if self._file is not None and have < wanted and self._spool.flush():
+            available += len(chunk)
+        if self._file is not None and available < wanted and self._spool.flush():
             numbers = np.concatenate([self._file.read(len(self.columns)), self._chunk])
         else:  # in memory, or all that there is while the disk does not answer
-            self.lost = max(self.lost, (wanted - have) // len(self.columns))
+            self.lost = max(self.lost, (wanted - available) // len(self.columns))
             numbers = np.concatenate(parts)
         return numbers[max(0, len(numbers) - wanted) :].reshape(-1, len(self.columns))
 

@@ -30,7 +30,7 @@ def flight_table(summary: Summary) -> RenderableType:
 
 def words_text(words: ClosingWords) -> Text:
     """The closing words as coloured text."""
-    style = "green" if words.good else "yellow" if words.flown else "red"
+    style = "green" if words.good else "yellow" if words.completed else "red"
     text = Text(words.headline, style=f"bold {style}")
     for line in words.lines:
         text.append(f"\n{line}", style="yellow" if line.startswith("!") else "not bold default")
@@ -105,14 +105,14 @@ def _tracking(summary: Summary) -> RenderableType:
     table = _empty_table(
         "Tracking by maneuver", "horizontal RMS", "largest", "height RMS", "largest"
     )
-    for flown in summary.maneuvers():
+    for maneuver in summary.maneuvers():
         level = (
-            ("open loop", f"{flown.drift:.2f} m away")
-            if flown.open_loop
-            else (_with_unit(flown.level_rms, "m", 2), _with_unit(flown.level_max, "m", 2))
+            ("open loop", f"{maneuver.drift:.2f} m away")
+            if maneuver.open_loop
+            else (_with_unit(maneuver.level_rms, "m", 2), _with_unit(maneuver.level_max, "m", 2))
         )
-        heights = _with_unit(flown.height_rms, "m", 2), _with_unit(flown.height_max, "m", 2)
-        table.add_row(flown.name, *level, *heights)
+        heights = _with_unit(maneuver.height_rms, "m", 2), _with_unit(maneuver.height_max, "m", 2)
+        table.add_row(maneuver.name, *level, *heights)
     return table
 
 
@@ -122,9 +122,9 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
     words = f"predictive control: {figures.flown_answers} answers flown"
     if figures.flown_answers:
         words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
-    replaced = ", ".join(f"{count} {name}" for name, count in figures.troubles.items())
+    replaced = ", ".join(f"{count} {name}" for name, count in figures.replaced_answers.items())
     if replaced:
-        words += f"; linear guidance replaced {sum(figures.troubles.values())}: {replaced}"
+        words += f"; linear guidance replaced {sum(figures.replaced_answers.values())}: {replaced}"
     return Text(words)
 
 

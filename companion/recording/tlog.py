@@ -1,7 +1,7 @@
 """Writes the flight's MAVLink frames, sent and received, as a `.tlog`, which ground stations read.
 
-A record is the time in microseconds since 1970 (in vehicle time: since the vehicle's boot), 8 bytes
-big endian, then the frame as it was on the wire.
+A record is the time in microseconds since 1970 (if the flight runs in vehicle time: since the
+vehicle's boot), 8 bytes big endian, then the frame as it was on the wire.
 """
 
 import os
@@ -17,11 +17,11 @@ _MOST_WAITING = 20_000
 """Largest number of frames that wait to be written."""
 _STAMP = struct.Struct(">Q")
 
-Record = tuple[float, bytes]
+TimedFrame = tuple[float, bytes]
 """Time when the frame was seen, s on the flight's clock, and the frame."""
 
 
-class TlogWriter(BackgroundFile[Record]):
+class TlogWriter(BackgroundFile[TimedFrame]):
     """Writes frames to a file; it never delays the flight or raises an exception in it.
 
     Args:
@@ -49,7 +49,7 @@ class _TlogFile:
         self._epoch = epoch
         self._file = path.open("wb", buffering=1 << 16)
 
-    def write(self, items: Sequence[Record]) -> None:
+    def write(self, items: Sequence[TimedFrame]) -> None:
         epoch, write = self._epoch, self._file.write
         for time, frame in items:
             write(_STAMP.pack(round((epoch + time) * 1e6)) + frame)

@@ -72,7 +72,7 @@ class FlightTrace:
         self._spool = Spool(folder)
         self.response = Series(_RESPONSE, self._spool)
         self.tracking = Series(_TRACKING, self._spool)
-        self.rates = Series(_RATES, self._spool, kept=_KEPT_RATES)
+        self.rates = Series(_RATES, self._spool, rows_in_memory=_KEPT_RATES)
         self.newest_latency_ns = 0
         self.latencies_ns = Series(("latency_ns",), self._spool)
         self.motion = Series(_MOTION, self._spool)
@@ -122,9 +122,9 @@ class FlightTrace:
             self.recorder.maneuver(time, vehicle_time, name)
 
     def lost_rows_warning(self) -> str | None:
-        """A warning for the user if rows were lost; None: none were."""
-        kept = self.response, self.tracking, self.rates, self.latencies_ns, self.motion
-        lost = sum(series.lost for series in kept)
+        """A warning for the user if rows were lost, else None."""
+        all_series = self.response, self.tracking, self.rates, self.latencies_ns, self.motion
+        lost = sum(series.lost for series in all_series)
         if lost == 0:
             return None
         why = self._spool.failure or "the disk was too slow"

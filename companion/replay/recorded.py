@@ -25,7 +25,7 @@ Row = dict[str, Any]
 """A message of `flight.mcap`: value by column name."""
 
 _TARGET_COLUMNS = "north", "east", "heading_rad", "heading_rate_rad_s"
-_MISFITS = (None, Misfit.NOT_NEWER, Misfit.AHEAD)  # by number in the record
+_MISFIT_BY_CODE = (None, Misfit.NOT_NEWER, Misfit.AHEAD)  # by number in the record
 
 
 class Setpoint(NamedTuple):
@@ -42,9 +42,8 @@ class RecordedSample(NamedTuple):
     """The sample; `received_ns`, from which latencies are computed, is 0."""
     flags: LoopFlags
     """State of the control loop when the sample arrived."""
-    checked: float
-    """Time of the last check of the sample's age, before sending, s on our clock; NaN: not
-    checked."""
+    checked_at: float
+    """Time when the sample's age was checked before sending, s on our clock; NaN: not checked."""
     reason: str
     """"answered", or why it is unanswered; one of `UNANSWERED_CODES`."""
     setpoint: Setpoint | None
@@ -120,7 +119,7 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
         _quaternion(row),
         _rates(row, "measured"),
         row["age_s"],
-        _MISFITS[row["misfit"]],
+        _MISFIT_BY_CODE[row["misfit"]],
         bool(row["age_known"]),
     )
     setpoint = None if sent is None else Setpoint(_rates(sent, "commanded"), sent["thrust"])
@@ -133,7 +132,7 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
 def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> RecordedStep:
     """The step in a row of `INPUT`, with its rows of `TARGET` and `GUIDANCE`.
 
-    None: the step gave no command, or had no reference.
+    `target` is None if the step gave no command, `guidance` if it had no reference.
     """
     position = None
     if not isnan(row["position_received_s"]):

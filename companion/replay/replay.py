@@ -55,7 +55,7 @@ class ReplayedSample(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether flight and replay sent the same setpoint to the bit, or none for one reason."""
+        """Whether flight and replay sent equal setpoints to the bit, or none for equal reasons."""
         return self.recorded == self.replayed and self.recorded_reason == self.replayed_reason
 
 
@@ -130,7 +130,7 @@ class Replay:
         if loop.awaiting_mode and not flags.awaiting_mode:
             loop.resume()
         self._accepts_setpoint = entry.reason != "not_sent"
-        self._now = sample.received if isnan(entry.checked) else entry.checked
+        self._now = sample.received if isnan(entry.checked_at) else entry.checked_at
         self._sent = None
         loop.on_sample(sample)
         self._guidance.note_attitude(sample)
@@ -200,7 +200,7 @@ class Replay:
 
 
 def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
-    """The drag assumed for the maneuvers: as configured, otherwise as when the flight began."""
+    """The drag assumed for the maneuvers: as configured, else as recorded before the flight."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
     flight = record.metadata["flight"]

@@ -1,4 +1,4 @@
-"""Recorded flights to look at: a page without other files, for one flight or several; a picture."""
+"""Shows recorded flights: one HTML page about one flight or several, or a picture of a flight."""
 
 PAGE = "report.html"
 """Name of the page in a flight's folder."""

@@ -8,11 +8,11 @@ from companion.recording.measurements.response import first_order
 from companion.recording.measurements.second_order import nearest_second_order
 from companion.report.flight_data import FlightData
 from companion.report.plots import (
-    FLIGHTS,
-    IDEAL,
-    MEASURED,
-    NEAREST,
-    REFERENCE,
+    FLIGHT_COLOURS,
+    IDEAL_COLOUR,
+    MEASURED_COLOUR,
+    NEAREST_COLOUR,
+    REFERENCE_COLOUR,
     Plot,
     axes,
     limit_lines,
@@ -35,10 +35,10 @@ def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
     """The first doublet of each flight and its nearest linear model; empty without doublets."""
     traces = []
     for number, flight in enumerate(flights):
-        if flight.runs:
-            run, model = flight.runs[0], nearest_second_order(flight.runs)
+        if flight.step_runs:
+            run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)
             time, along = run.time - run.time[0], run.direction
-            colour = FLIGHTS[number % len(FLIGHTS)]
+            colour = FLIGHT_COLOURS[number % len(FLIGHT_COLOURS)]
             traces.append(line(f"{flight.name}: measured", time, run.measured @ along, colour))
             nearest = f"{flight.name}: nearest model, {1e3 * model.dead_time:.0f} ms dead time"
             traces.append(line(nearest, time, model.path(run) @ along, colour, dash="dash"))
@@ -52,19 +52,19 @@ def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
 
 def _step_response(flight: FlightData) -> Plot:
     """The first doublet along its own direction, with the ideal and the nearest linear model."""
-    if not flight.runs:
+    if not flight.step_runs:
         return Plot("", "", [])
-    run, model = flight.runs[0], nearest_second_order(flight.runs)
+    run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)
     along, time = run.direction, run.time - run.time[0]
     nearest = f"nearest model: {1e3 * model.dead_time:.0f} ms dead time, second order"
     traces = [
-        line("target", time, run.target @ along, REFERENCE, dash="dot"),
-        line("measured", time, run.measured @ along, MEASURED),
-        line(nearest, time, model.path(run) @ along, NEAREST, dash="dash"),
+        line("target", time, run.target @ along, REFERENCE_COLOUR, dash="dot"),
+        line("measured", time, run.measured @ along, MEASURED_COLOUR),
+        line(nearest, time, model.path(run) @ along, NEAREST_COLOUR, dash="dash"),
     ]
     if np.isfinite(flight.gain):
         ideal = f"ideal: first order, {1.0 / flight.gain:.2g} s"
-        traces.append(line(ideal, time, first_order(run, 1.0 / flight.gain) @ along, IDEAL))
+        traces.append(line(ideal, time, first_order(run, 1.0 / flight.gain) @ along, IDEAL_COLOUR))
     note = (
         "The first doublet along its direction. The response is linear if it follows the nearest "
         "model; that model is slower than the ideal by the vehicle's own rate loop."
@@ -75,8 +75,8 @@ def _step_response(flight: FlightData) -> Plot:
 def _step_paths(flight: FlightData) -> Plot:
     """The first doublets as paths in the plane of the coefficients, east and north."""
     traces = []
-    for number, run in enumerate(flight.runs[:_STEPS_SHOWN]):
-        colour = FLIGHTS[number % len(FLIGHTS)]
+    for number, run in enumerate(flight.step_runs[:_STEPS_SHOWN]):
+        colour = FLIGHT_COLOURS[number % len(FLIGHT_COLOURS)]
         north, east = run.measured.T
         traces.append(line(f"{number + 1}, {run.compass}", east, north, colour))
     layout = axes(x="a_E, east", y="a_N, north")
@@ -87,7 +87,10 @@ def _step_paths(flight: FlightData) -> Plot:
 
 def _coefficients(flight: FlightData) -> Iterator[Plot]:
     for column, axis in enumerate(("north", "east")):
-        shown = (("target", "target", REFERENCE), ("measured", "coefficients", MEASURED))
+        shown = (
+            ("target", "target", REFERENCE_COLOUR),
+            ("measured", "coefficients", MEASURED_COLOUR),
+        )
         traces = [
             over_time(label, flight.curves[curve_name], column, colour)
             for label, curve_name, colour in shown
@@ -102,7 +105,10 @@ def _rates(flight: FlightData) -> Iterator[Plot]:
     for column, axis in enumerate(("roll", "pitch", "yaw")):
         traces = [
             over_time(curve_name, flight.curves[curve_name], column, colour)
-            for curve_name, colour in (("commanded", REFERENCE), ("measured", MEASURED))
+            for curve_name, colour in (
+                ("commanded", REFERENCE_COLOUR),
+                ("measured", MEASURED_COLOUR),
+            )
             if curve_name in flight.curves
         ]
         if traces:
@@ -115,10 +121,10 @@ def _rates(flight: FlightData) -> Iterator[Plot]:
 def _thrust(flight: FlightData) -> Plot:
     if "thrust" not in flight.curves:
         return Plot("", "", [])
-    traces = [over_time("sent", flight.curves["thrust"], 0, MEASURED)]
+    traces = [over_time("sent", flight.curves["thrust"], 0, MEASURED_COLOUR)]
     if "hover_thrust" in flight.curves:
         learned = flight.curves["hover_thrust"]
-        traces.append(over_time("learned at hover", learned, 0, NEAREST, dash="dash"))
+        traces.append(over_time("learned at hover", learned, 0, NEAREST_COLOUR, dash="dash"))
     traces += limit_lines([flight], "thrust")
     layout = time_axis([flight], y="thrust, 0..1")
     return Plot("Thrust", "Normalised collective thrust.", traces, layout, 280)
@@ -128,7 +134,7 @@ def _latency(flight: FlightData) -> Plot:
     curve = flight.curves.get("latency")
     if curve is None or not curve.values.any():  # In lockstep, all latencies are 0.
         return Plot("", "", [])
-    traces = [over_time("latency", curve, 0, MEASURED), *limit_lines([flight], "latency")]
+    traces = [over_time("latency", curve, 0, MEASURED_COLOUR), *limit_lines([flight], "latency")]
     layout = time_axis([flight], y="latency, ms")
     note = "From the arrival of a sample to its setpoint, in this program."
     return Plot("Latency", note, traces, layout, 280)

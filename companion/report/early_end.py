@@ -26,8 +26,8 @@ class CrossedLimit:
     key: str
     """Configuration key of the limit."""
     levels: tuple[float, ...] = ()
-    """Values of the limit, in the curve's unit. The curve must not cross them, except "latency",
-    which must not do so often."""
+    """Values of the limit, in the curve's unit. The flight ends if the curve crosses one; "latency"
+    may cross it, but not often."""
     outline: tuple[tuple[float, float], ...] = ()
     """Fence around the track, (N, 2) north and east, m; empty for other curves."""
 
@@ -90,13 +90,16 @@ def _fence_side(config: Config, reason: str, record: FlightRecord) -> CrossedLim
     None: nothing was flown under control, or the polygon is given in degrees, which no plot shows.
     """
     guidance, limits = record.rows("guidance"), config.limits
-    flown = guidance[guidance["offboard_active"] == 1]
-    if len(flown) == 0:
+    controlled = guidance[guidance["offboard_active"] == 1]
+    if len(controlled) == 0:
         return None
-    north, east = float(flown["estimated_north_m"][0]), float(flown["estimated_east_m"][0])
+    north, east = (
+        float(controlled["estimated_north_m"][0]),
+        float(controlled["estimated_east_m"][0]),
+    )
     if "fence_ceiling_m" in reason or "fence_floor_m" in reason:
         motion = record.rows("motion")
-        start_time = record.since_start(flown["time_s"][:1])
+        start_time = record.since_start(controlled["time_s"][:1])
         start_height = float(np.interp(start_time, motion["time_s"], motion["height_m"])[0])
         ceiling = "fence_ceiling_m" in reason
         return CrossedLimit(

@@ -30,7 +30,7 @@ class Span(NamedTuple):
     begin: float
     end: float
     name: str
-    """Shown to the user."""
+    """Name shown to the user."""
 
 
 class Curve(NamedTuple):
@@ -68,11 +68,11 @@ class FlightData:
     events: tuple[Event, ...] = ()
     differences: tuple[ConfigKey, ...] | None = None
     """Keys of the configuration that are not the default; None: unknown."""
-    runs: list[StepRun] = field(default_factory=list)
+    step_runs: list[StepRun] = field(default_factory=list)
     """The doublets in open loop, in vehicle time."""
     gain: float = float("nan")
-    """p of the planner, 1/s; NaN: unknown."""
-    end: EndMark | None = None
+    """Gain p of the planner, 1/s; NaN: unknown."""
+    early_end: EndMark | None = None
     """The early end of the flight; None: none, or unknown."""
 
     @property
@@ -114,9 +114,9 @@ def recorded(folder: Path) -> FlightData:
         maneuvers=_maneuvers(record, phases),
         events=tuple(each for each in record.events if each.source != "phase"),
         differences=None if config is None else tuple(changed_keys(config)),
-        runs=step_runs(trace_of(record).response_rows()),
+        step_runs=step_runs(trace_of(record).response_rows()),
         gain=float(record.metadata["flight"].get("gain_per_s", "nan")),
-        end=early_end(figures, record, config),
+        early_end=early_end(figures, record, config),
     )
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from companion.config.flight import OPEN_LOOP
 from companion.report.flight_data import FlightData
 from companion.report.plots import (
-    CROSSED,
-    FLIGHTS,
-    MEASURED,
-    REFERENCE,
+    CROSSED_COLOUR,
+    FLIGHT_COLOURS,
+    MEASURED_COLOUR,
+    REFERENCE_COLOUR,
     Plot,
     axes,
     even_indices,
@@ -42,7 +42,7 @@ def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
 
 
 def _colour(flights: Sequence[FlightData], number: int) -> str:
-    return MEASURED if len(flights) == 1 else FLIGHTS[number % len(FLIGHTS)]
+    return MEASURED_COLOUR if len(flights) == 1 else FLIGHT_COLOURS[number % len(FLIGHT_COLOURS)]
 
 
 def _name(flights: Sequence[FlightData], flight: FlightData, label: str) -> str:
@@ -61,7 +61,7 @@ def _track_from_above(flights: Sequence[FlightData]) -> Plot:
                 values = flight.curves[curve_name].values
                 positions = values[even_indices(len(values))]
                 is_only_reference = curve_name == "reference" and len(flights) == 1
-                colour = REFERENCE if is_only_reference else _colour(flights, number)
+                colour = REFERENCE_COLOUR if is_only_reference else _colour(flights, number)
                 name = _name(flights, flight, "flown" if curve_name == "position" else curve_name)
                 east, north = positions[:, _EAST], positions[:, _NORTH]
                 traces.append(line(name, east, north, colour, dash=dash))
@@ -77,14 +77,14 @@ def _track_from_above(flights: Sequence[FlightData]) -> Plot:
 def _end_cross(flights: Sequence[FlightData]) -> list[dict[str, Any]]:
     """A cross at the place where a single flight ended early."""
     flight = flights[0]
-    if len(flights) > 1 or flight.end is None or "position" not in flight.curves:
+    if len(flights) > 1 or flight.early_end is None or "position" not in flight.curves:
         return []
     curve = flight.curves["position"]
-    row = min(int(np.searchsorted(curve.time, flight.end.time)), len(curve.time) - 1)
+    row = min(int(np.searchsorted(curve.time, flight.early_end.time)), len(curve.time) - 1)
     north, east = curve.values[row : row + 1, _NORTH], curve.values[row : row + 1, _EAST]
-    marker = {"symbol": "x", "size": 11, "color": CROSSED}
-    cross = line("ended early", east, north, CROSSED, mode="markers", marker=marker)
-    return [{**cross, "hovertext": flight.end.reason}]
+    marker = {"symbol": "x", "size": 11, "color": CROSSED_COLOUR}
+    cross = line("ended early", east, north, CROSSED_COLOUR, mode="markers", marker=marker)
+    return [{**cross, "hovertext": flight.early_end.reason}]
 
 
 def _track_in_space(flights: Sequence[FlightData]) -> Plot:
@@ -95,7 +95,7 @@ def _track_in_space(flights: Sequence[FlightData]) -> Plot:
         if "position" in flight.curves:
             traces.append(_track(_name(flights, flight, "flown"), flight, "position", colour))
         if "reference" in flight.curves and len(flights) == 1:
-            traces.append(_track("reference", flight, "reference", REFERENCE))
+            traces.append(_track("reference", flight, "reference", REFERENCE_COLOUR))
     scene: dict[str, Any] = {
         **axes(x="east, m", y="north, m", z="height, m"),
         "camera": {"eye": _CAMERA_POSITION, "center": {"x": 0.0, "y": 0.0, "z": -0.15}},
@@ -170,11 +170,11 @@ def _error_plot(flights: Sequence[FlightData]) -> Plot:
 def _largest_error(flights: Sequence[FlightData]) -> float | None:
     """The largest error in the maneuvers that have a reference throughout, m, to scale the plot.
 
-    None: the plot shows all errors. It does so for several flights, after an early end, if there is
-    no such maneuver, and if the errors elsewhere are not larger.
+    None: the plot shows all errors, because there are several flights, the flight ended early, no
+    maneuver has a reference throughout, or no error elsewhere is larger.
     """
     flight = flights[0]
-    if len(flights) > 1 or flight.end is not None or "error" not in flight.curves:
+    if len(flights) > 1 or flight.early_end is not None or "error" not in flight.curves:
         return None
     time, error = flight.curves["error"].time, flight.curves["error"].values[:, 0]
     errors = [error[(time >= span.begin) & (time < span.end)] for span in flight.maneuvers]
@@ -200,7 +200,7 @@ def _speed(flights: Sequence[FlightData]) -> Plot:
             motion, colour = flight.curves["motion"], _colour(flights, number)
             traces.append(over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
             tilt = _name(flights, flight, "tilt, °")
-            tilt_colour = REFERENCE if len(flights) == 1 else colour
+            tilt_colour = REFERENCE_COLOUR if len(flights) == 1 else colour
             traces.append(over_time(tilt, motion, 2, tilt_colour, dash="dot", yaxis="y2"))
     traces += limit_lines(flights, "speed") + limit_lines(flights, "tilt", yaxis="y2")
     layout = time_axis(flights, y="speed, m/s", y2="tilt, °")

@@ -88,7 +88,7 @@ def _check_numbers(flight: FlightData, folder: Path) -> None:
 def _panels(flight: FlightData) -> "list[Callable[[Axes], None]]":
     """Functions that draw the upper panels."""
     panels: list[Callable[[Axes], None]] = []
-    if flight.runs:
+    if flight.step_runs:
         ideal = 1.0 / flight.gain
         panels += [
             lambda axes: _draw_steps(axes, flight, ideal),
@@ -104,7 +104,7 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
 
     `ideal` is the time constant of the ideal model, s.
     """
-    run, model = flight.runs[0], nearest_second_order(flight.runs)
+    run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)
     along, time = run.direction, run.time - run.time[0]
     nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
     axes.plot(time, run.target @ along, color=_TARGET, label="target")
@@ -123,7 +123,7 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
 
 def _draw_plane(axes: "Axes", flight: FlightData) -> None:
     """All doublets, north over east coefficient: a linear response moves on straight lines."""
-    for number, run in enumerate(flight.runs):
+    for number, run in enumerate(flight.step_runs):
         style = _STYLES[number % len(_STYLES)]
         north, east = run.measured.T
         axes.plot(east, north, style, color=_MEASURED, label=run.compass)

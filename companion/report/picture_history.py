@@ -44,8 +44,8 @@ def draw_history(panels: Sequence["Axes"], flight: FlightData) -> None:
         if name in flight.curves:
             curve = flight.curves[name]
             axes.plot(curve.time, curve.values[:, column], color=_LINE, linewidth=1.2)
-        if flight.end is not None:
-            axes.axvline(flight.end.time, color=_END, linewidth=1.5)
+        if flight.early_end is not None:
+            axes.axvline(flight.early_end.time, color=_END, linewidth=1.5)
         axes.set_ylabel(title)
         axes.grid(alpha=0.3)
         axes.set_xlim(begin, begin + (1.0 + _MARGIN_AFTER_END) * length)
@@ -71,12 +71,12 @@ def _name_maneuvers(axes: "Axes", flight: FlightData) -> None:
             va="bottom",
             fontsize="small",
         )
-    if flight.end is not None:
-        reason = flight.end.reason
+    if flight.early_end is not None:
+        reason = flight.early_end.reason
         if len(reason) > _LONGEST_REASON:
             reason = f"{reason[:_LONGEST_REASON]}…"
         axes.set_title(
-            _without_formulas(f"ended at {flight.end.time:.1f} s: {reason}"),
+            _without_formulas(f"ended at {flight.early_end.time:.1f} s: {reason}"),
             color=_END,
             fontsize="medium",
             pad=18,

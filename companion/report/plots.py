@@ -12,10 +12,11 @@ import numpy as np
 from companion.report.early_end import EndMark
 from companion.report.flight_data import Curve, FlightData, Floats, Span
 
-MEASURED, REFERENCE, IDEAL, NEAREST = "#0072b2", "#d55e00", "#999999", "#009e73"
-CROSSED = "#c1121f"
+MEASURED_COLOUR, REFERENCE_COLOUR = "#0072b2", "#d55e00"
+IDEAL_COLOUR, NEAREST_COLOUR = "#999999", "#009e73"
+CROSSED_COLOUR = "#c1121f"
 """Colour of an early end, and of the limit that was crossed."""
-FLIGHTS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+FLIGHT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """One colour for each flight of a comparison."""
 _MAX_POINTS = 2000
 """Lines with more points are thinned to about this number, more than the pixels of a screen."""
@@ -29,7 +30,7 @@ class Plot:
     """One plot of the page."""
 
     title: str
-    """Shown above it."""
+    """Title above the plot."""
     note: str
     """Text above the plot: the quantities shown, and how a good flight looks."""
     traces: list[dict[str, Any]]
@@ -55,12 +56,12 @@ def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str,
 
 def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) -> dict[str, Any]:
     """A column of a curve over time, thinned so that extremes are kept."""
-    kept = kept_indices(curve.values[:, column])
-    return line(name, curve.time[kept], curve.values[kept, column], colour, **more)
+    indices = kept_indices(curve.values[:, column])
+    return line(name, curve.time[indices], curve.values[indices, column], colour, **more)
 
 
 def kept_indices(values: Floats) -> Any:
-    """Indices (M,) of the points to draw: the extremes of each of many slices, and their gaps."""
+    """Indices (M,) of the points to draw: the extremes of many slices, and a NaN for each gap."""
     count = len(values)
     if count <= _MAX_POINTS:
         return np.arange(count)
@@ -105,7 +106,7 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
         layout["xaxis"]["range"] = [0.0, max(ends)]
     if len(flights) > 1:
         return layout
-    maneuvers, end = flights[0].maneuvers, flights[0].end
+    maneuvers, end = flights[0].maneuvers, flights[0].early_end
     mark = {"shapes": [], "annotations": []} if end is None else end_mark(end)
     shades = [_maneuver_shade(span, number) for number, span in enumerate(maneuvers)]
     return {
@@ -122,20 +123,20 @@ def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, A
 
 
 def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[dict[str, Any]]:
-    """Lines at the limit that ended a single flight early, if it bounds `curve`."""
-    end = flights[0].end if len(flights) == 1 else None
+    """Lines at the limit that ended a single flight early, if the limit bounds `curve`."""
+    end = flights[0].early_end if len(flights) == 1 else None
     if end is None or end.limit is None or end.limit.curve != curve:
         return []
     limit, last = end.limit, end.time if flights[0].end_time is None else flights[0].end_time
     if limit.outline:
         north, east = np.array(limit.outline).T
-        return [line(f"limit: {limit.key}", east, north, CROSSED, dash="dash", **more)]
+        return [line(f"limit: {limit.key}", east, north, CROSSED_COLOUR, dash="dash", **more)]
     return [
         line(
             f"limit: {limit.key}",
             np.array([0.0, last]),
             np.array([level, level]),
-            CROSSED,
+            CROSSED_COLOUR,
             dash="dash",
             showlegend=number == 0,
             **more,
@@ -182,7 +183,7 @@ def _vertical_line(time: float) -> dict[str, Any]:
         "x1": time,
         "y0": 0,
         "y1": 1,
-        "line": {"color": CROSSED, "width": 1.5},
+        "line": {"color": CROSSED_COLOUR, "width": 1.5},
     }
 
 
@@ -196,5 +197,5 @@ def _end_label(end: EndMark) -> dict[str, Any]:
         "showarrow": False,
         "text": f"ended {end.time:.1f} s",
         "hovertext": end.reason,
-        "font": {"size": 11, "color": CROSSED},
+        "font": {"size": 11, "color": CROSSED_COLOUR},
     }

@@ -21,10 +21,10 @@ class Table(NamedTuple):
     """A table of texts."""
 
     title: str
-    """Shown above it."""
+    """Title above the table."""
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
-    """One text for each column."""
+    """Rows, each with one text for each column."""
 
 
 def flight_tables(flight: FlightData) -> list[Table]:
@@ -36,9 +36,11 @@ def flight_tables(flight: FlightData) -> list[Table]:
 
 def events_at_end(flight: FlightData) -> list[Table]:
     """The events around the early end of a flight; no table if there was none, or no event."""
-    if flight.end is None:
+    if flight.early_end is None:
         return []
-    around = [each for each in flight.events if abs(each.time - flight.end.time) <= _END_WINDOW]
+    around = [
+        each for each in flight.events if abs(each.time - flight.early_end.time) <= _END_WINDOW
+    ]
     rows = [(f"{each.time:.1f}", each.source, each.text) for each in around[:_MAX_EVENTS]]
     title = f"Events within {_END_WINDOW:.0f} s of the end"
     return [Table(title, ("time, s", "from", "what happened"), rows)] if rows else []
@@ -59,7 +61,7 @@ def extremes(flight: FlightData) -> str:
 
 
 def configuration(flight: FlightData) -> Table:
-    """The keys that are not the default."""
+    """The configuration keys whose values are not the default."""
     rows = [
         (f"{key.section}.{key.name}", _value_text(key.value), _value_text(key.default), key.unit)
         for key in flight.differences or ()

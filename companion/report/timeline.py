@@ -4,9 +4,16 @@ from collections.abc import Iterator
 from typing import Any
 
 from companion.report.flight_data import FlightData, Span
-from companion.report.plots import IDEAL, MEASURED, REFERENCE, Plot, axes, end_mark
+from companion.report.plots import (
+    IDEAL_COLOUR,
+    MEASURED_COLOUR,
+    REFERENCE_COLOUR,
+    Plot,
+    axes,
+    end_mark,
+)
 
-_EVENT_COLOURS = {2: MEASURED, 3: "#e69f00", 4: REFERENCE}
+_EVENT_COLOURS = {2: MEASURED_COLOUR, 3: "#e69f00", 4: REFERENCE_COLOUR}
 """Colour of an event, by its level."""
 _LANES = ("events", "maneuvers", "phases", "modes")
 """Lanes of events, maneuvers and phases or modes, from the bottom up."""
@@ -29,7 +36,9 @@ def timeline(flight: FlightData) -> Iterator[Plot]:
                 "text": [event.text for event in flight.events],
                 "hovertemplate": "%{x:.1f} s: %{text}<extra></extra>",
                 "marker": {
-                    "color": [_EVENT_COLOURS.get(event.level, IDEAL) for event in flight.events]
+                    "color": [
+                        _EVENT_COLOURS.get(event.level, IDEAL_COLOUR) for event in flight.events
+                    ]
                 },
             }
         )
@@ -37,9 +46,9 @@ def timeline(flight: FlightData) -> Iterator[Plot]:
     layout["yaxis"] = {"categoryorder": "array", "categoryarray": list(_LANES)}
     layout |= {"barmode": "overlay", "showlegend": False}
     note = "Point at a mark to read the event."
-    if flight.end is not None:
-        layout |= end_mark(flight.end, above=True)
-        note = f"{flight.end.sentence()} {note}"
+    if flight.early_end is not None:
+        layout |= end_mark(flight.early_end, above=True)
+        note = f"{flight.early_end.sentence()} {note}"
     yield Plot("Timeline", note, traces, layout, 240)
 
 

@@ -117,7 +117,7 @@ class ServedFlight:
     def is_ending(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
         begun = self._source.start_pose is not None
-        flown = self._assembled.context.guidance_loop.flown
+        flown = self._assembled.context.guidance_loop.flown_source
         given_up = begun and flown.source is not self._source
         return given_up or self._assembled.flight.failed_in is not None
 

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common
 from companion.extras import require
 from companion.testing.setpoints import ReceivedSetpoint, received_setpoint
 from sitl_mock.control_channel import Truth, add_fault, truth
-from sitl_mock.exchange import Arrived, Exchange
+from sitl_mock.exchange import Exchange, ReceivedDatagram
 from sitl_mock.link.framing import decode
 from sitl_mock.physics.vehicle_step import Plant, PythonPlant
 from sitl_mock.settings import load_settings
@@ -93,7 +93,7 @@ class MockVehicle:
         self._simulation = Simulation(whole, plant=_plant(compiled))
         self._exchange = Exchange(whole, self._simulation)
         self._exchange.on_message = self._record_setpoint
-        self._arrived: list[Arrived] = []
+        self._arrived: list[ReceivedDatagram] = []
         self._begun = False
 
     # --- true state
@@ -185,7 +185,7 @@ class MockVehicle:
 
         def vehicle_time_ns() -> int:
             if simulation.effects.clock_frozen:
-                return simulation.state.shown_us * 1000
+                return simulation.state.stamp_us * 1000
             return min(max(clock_ns(), simulation.time_us * 1000), simulation.next_us * 1000)
 
         simulation.set_clock(vehicle_time_ns)

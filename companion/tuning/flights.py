@@ -221,7 +221,7 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
 
 def _tolerable_wind(config: Config, course: Course, mock: Config) -> Mapping[str, float]:
     """The wind of the course, or a weaker one whose drag leaves a part of the tilt limit."""
-    largest = _LARGEST_RESERVE * config.limits.largest_horizontal
+    largest = _LARGEST_RESERVE * config.limits.max_horizontal_acceleration
     factor = min(1.0, largest / max(_wind_deceleration(course, mock), 1e-9))
     return {key: factor * value for key, value in course.wind.items()}
 
@@ -235,5 +235,5 @@ def _wind_deceleration(course: Course, mock: Config) -> float:
 
 def _reserve(config: Config, course: Course, mock: Config) -> float:
     """Horizontal acceleration that a course must leave for feedback and wind drag, m/s²."""
-    largest = _LARGEST_RESERVE * config.limits.largest_horizontal
+    largest = _LARGEST_RESERVE * config.limits.max_horizontal_acceleration
     return min(config.flight.slow_down_reserve_m_s2 + _wind_deceleration(course, mock), largest)

@@ -14,20 +14,20 @@ from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.vehicle import ActuatorCommand
 
 HOVER_LEARNING_TIME_S = 10.0
-"""MOT_THST_HOVER follows the thrust of a steady hover with this time constant."""
+"""Time constant with which MOT_THST_HOVER follows the thrust of a steady hover, s."""
 # In ArduPilot's own modes the attitude target is shaped; the mock shapes the rates instead. Its yaw
 # response is slow, so a yaw gain as high as ATC_ANG_YAW_P (4.5) would oscillate.
 _ATTITUDE_GAINS = AttitudeGains(4.5, 4.5, 1.5, 1.0, (radians(180.0), radians(180.0), radians(45.0)))
 
 
 class ActuatorOutput:
-    """Computes the command of the rate loop and the rotors, and learns the hover thrust.
+    """Computes the command to the rate loop and the rotors, and learns the hover thrust.
 
     Args:
         state: the autopilot's state; its ``attitude_target`` is written here.
-        parameters: MOT_THST_HOVER is learned.
-        guided: during its take-off the rotors turn on the ground.
-        hold: its climb rate shows whether the vehicle hovers.
+        parameters: the autopilot's parameters; MOT_THST_HOVER is written here.
+        guided: the task of GUIDED; during a take-off the rotors turn on the ground.
+        hold: the position hold, whose climb rate shows whether the vehicle hovers.
         throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """
 
@@ -49,7 +49,7 @@ class ActuatorOutput:
 
     @property
     def taking_off(self) -> bool:
-        """Whether GUIDED takes off."""
+        """Whether a take-off in GUIDED is under way."""
         return self._state.mode is Mode.GUIDED and self._guided.task is Task.TAKE_OFF
 
     @property
@@ -57,35 +57,35 @@ class ActuatorOutput:
         """Cosine of the angle between the body's down axis and the vertical."""
         return body_z(self._state.estimate.q)[2]
 
-    def follow(self, output: PositionOutput, dt: float) -> ActuatorCommand:
-        """Return the command for the output of the position controller, valid for ``dt`` s."""
+    def position_command(self, output: PositionOutput, dt: float) -> ActuatorCommand:
+        """Return the command for the position controller's output of a period of ``dt`` s."""
         self.thrust = output.thrust
         self._learn_hover(output, dt)
-        return self.attitude(output.q, output.thrust)
+        return self.attitude_command(output.q, output.thrust)
 
     def _learn_hover(self, output: PositionOutput, dt: float) -> None:
-        """Follow the thrust of a steady, level hover, if MOT_HOVER_LEARN is set."""
+        """Move MOT_THST_HOVER towards the thrust of a level hover, if MOT_HOVER_LEARN is set."""
         state, parameters = self._state, self._parameters
-        steady = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
-        if parameters["MOT_HOVER_LEARN"] and steady and self.cos_tilt > cos(radians(5.0)):
+        is_steady = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
+        if parameters["MOT_HOVER_LEARN"] and is_steady and self.cos_tilt > cos(radians(5.0)):
             hover = float(parameters["MOT_THST_HOVER"])
             change = dt / HOVER_LEARNING_TIME_S * (output.thrust - hover)
             parameters.set("MOT_THST_HOVER", hover + change)
 
-    def attitude(self, target: Quaternion, thrust: float) -> ActuatorCommand:
+    def attitude_command(self, target: Quaternion, thrust: float) -> ActuatorCommand:
         """Return the command that turns to an attitude, with ArduPilot's normalised thrust.
 
         ATTITUDE_TARGET reports `self.thrust`, which has no angle boost.
         """
         self._state.attitude_target.q = target
         self._state.attitude_target.thrust = self.thrust
-        return self.rates(self.rates_towards(target), thrust)
+        return self.rate_command(self.rates_towards(target), thrust)
 
     def rates_towards(self, target: Quaternion) -> Vector:
         """Return the body rates that turn to an attitude, rad/s."""
         return attitude_rates(self._state.estimate.q, target, 0.0, _ATTITUDE_GAINS)
 
-    def rates(self, rates: Vector, thrust: float) -> ActuatorCommand:
+    def rate_command(self, rates: Vector, thrust: float) -> ActuatorCommand:
         """Return the command for rates (rad/s) and normalised thrust.
 
         On the ground the thrust is 0, except during a take-off in GUIDED.

@@ -7,14 +7,14 @@ from sitl_mock.ardupilot.texts import INFO, ArduPilotAnnouncer
 from sitl_mock.autopilot.state import State
 
 RECORDED_READY_S = 41.6
-"""Time after boot from which the position estimate allows arming in GUIDED, s. All times here are
-recorded; `Boot` scales them such that this one becomes ``mock.prearm_delay_s``."""
+"""Recorded time after boot from which the position estimate allows arming in GUIDED, s. `Boot`
+scales all recorded times such that this time becomes ``mock.prearm_delay_s``."""
 INITIALISED_S = 2.4
 """Time after boot, s, from which the vehicle can be armed with ``force`` and change its mode."""
 ORIGIN_S = 20.0
 """Time after boot, s, from which the estimator has an origin."""
 HOME_S = 23.5
-"""Time after boot, s, from which the pre-arm checks pass in modes that need no position."""
+"""Time after boot, s, from which home is set, so that modes without position can be armed."""
 RUNTIME_PERIOD_US = 30_000_000
 """Period at which STAT_RUNTIME is sent, us."""
 
@@ -41,13 +41,13 @@ _TEXTS = (
     (RECORDED_READY_S, "EKF3 IMU0 is using GPS"),
     (RECORDED_READY_S, "EKF3 IMU1 is using GPS"),
 )
-"""Texts that the boot sends, with their times, s."""
+"""(time after boot, s; text that is sent then)."""
 _SAVED_PARAMETERS = (
     (0.16, "COMPASS_DEV_ID"),
     (1.87, "BARO1_GND_PRESS"),
     (INITIALISED_S, "INS_GYR_ID"),
 )
-"""Parameters that the boot saves and sends, with their times, s."""
+"""(time after boot, s; parameter that is saved and sent then)."""
 
 
 class Notifier(NamedTuple):
@@ -59,7 +59,7 @@ class Notifier(NamedTuple):
 
 
 class Boot:
-    """Tracks the boot over the time since the start.
+    """Tracks the progress of the boot.
 
     Args:
         state: state of the autopilot, for the time.
@@ -82,22 +82,22 @@ class Boot:
         self._next_runtime_us = RUNTIME_PERIOD_US
 
     def reached(self, recorded_s: float) -> bool:
-        """Whether the boot has come as far as the recorded boot was after ``recorded_s`` s."""
+        """Whether the time ``recorded_s`` of the recorded boot, scaled to this boot, has passed."""
         return self._state.time_us >= recorded_s * self._scale * 1e6
 
     @property
     def initialised(self) -> bool:
-        """Whether the autopilot arms (with ``force``) and changes its mode."""
+        """Whether the autopilot can be armed (with ``force``) and can change its mode."""
         return self.reached(INITIALISED_S)
 
     @property
     def origin_set(self) -> bool:
-        """Whether the estimator has an origin, and thus home a position."""
+        """Whether the estimator has an origin, so that the position of home is known."""
         return self.reached(ORIGIN_S)
 
     @property
     def home_set(self) -> bool:
-        """Whether home is set for the pre-arm checks."""
+        """Whether the pre-arm checks accept home as set."""
         return self.reached(HOME_S)
 
     def step(self) -> None:

@@ -6,7 +6,7 @@ from sitl_mock.ardupilot.boot import Boot, Notifier
 from sitl_mock.ardupilot.failsafe import ArduPilotFailsafe
 from sitl_mock.ardupilot.guided import FatalSetpointError, Guided, Task, attitude_setpoint
 from sitl_mock.ardupilot.mode_control import ArduPilotModeControl
-from sitl_mock.ardupilot.modes import NEEDS_POSITION, PILOT_MODES, arming_problem
+from sitl_mock.ardupilot.modes import MODE_FOR_PX4_MODE, POSITION_MODES, arming_problem
 from sitl_mock.ardupilot.texts import CRITICAL, INFO
 from sitl_mock.autopilot.commander import ACCEPTED, FAILED
 from sitl_mock.autopilot.events import EventKind
@@ -16,11 +16,12 @@ from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 
-LANDED_TO_DISARM_US = 500_000
-"""LAND disarms this long after the landing (recorded)."""
+LANDED_DISARM_DELAY_US = 500_000
+"""Delay from the landing until LAND disarms, us (recorded)."""
 _OWN_COMPONENT = 1
-YAW_ALIGNED_M = 2.8
-"""Above this height the estimator realigns its heading, once per flight (recorded: 2.7 to 2.9)."""
+YAW_ALIGNMENT_HEIGHT_M = 2.8
+"""Height above home at which the estimator realigns its heading, m (recorded: 2.7 to 2.9). It does
+so once per flight."""
 
 
 class ArduPilotCommander:
@@ -28,7 +29,7 @@ class ArduPilotCommander:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         vehicle: the vehicle, for its battery.
         control: begins each mode that is entered.
         guided: the task of GUIDED.
@@ -49,7 +50,7 @@ class ArduPilotCommander:
         boot: Boot,
     ) -> None:
         self.refusal: str | None = None
-        self.pilot = False
+        self.pilot_simulated = False
         self.failsafe = ArduPilotFailsafe(
             state, parameters, vehicle, notifier.announce, self._act_on_failsafe
         )
@@ -70,8 +71,8 @@ class ArduPilotCommander:
     def under_setpoints(self) -> bool:
         """Whether attitude setpoints control the vehicle in GUIDED."""
         state = self._state
-        follows = state.mode is Mode.GUIDED and self._guided.task is Task.ANGLE
-        return follows and state.armed and not state.landed
+        follows_attitude = state.mode is Mode.GUIDED and self._guided.task is Task.ANGLE
+        return follows_attitude and state.armed and not state.landed
 
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips all checks but those of boot and crash."""
@@ -84,7 +85,7 @@ class ArduPilotCommander:
             return FAILED
         state.armed = True
         state.armed_at_us = self._landed_since_us = state.time_us
-        state.flown = self._yaw_aligned = False
+        state.took_off = self._yaw_aligned = False
         state.home_ned = state.estimate.position_ned
         state.home_set_at_us = state.time_us
         self._announce(EventKind.ARMED, "")
@@ -112,7 +113,7 @@ class ArduPilotCommander:
         state = self._state
         if not self._boot.initialised or mode is state.mode:
             return ACCEPTED
-        if state.armed and mode in NEEDS_POSITION and not state.position_valid:
+        if state.armed and mode in POSITION_MODES and not state.position_valid:
             self._announce(EventKind.MODE_DENIED, mode.name)
             return FAILED
         self._enter_mode(mode)
@@ -131,21 +132,21 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def take_over(self, mode: Mode) -> None:
-        """Let the pilot take over in a mode (fault injection)."""
-        self.pilot = True
-        self.request_mode(PILOT_MODES.get(mode, mode))
+        """Enter a mode as a pilot who takes over would (fault injection)."""
+        self.pilot_simulated = True
+        self.request_mode(MODE_FOR_PX4_MODE.get(mode, mode))
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
         """Record a heartbeat, for the ground station failsafe."""
         self.failsafe.receive_heartbeat(heartbeat)
 
     def take_setpoint(self, message: Message) -> None:
-        """Accept a setpoint in GUIDED; ignore one with the autopilot's own ids."""
+        """Accept a setpoint in GUIDED, unless the sender has the autopilot's own MAVLink ids."""
         state = self._state
-        own = (self._parameters["MAV_SYSID"], _OWN_COMPONENT)
+        own_ids = (self._parameters["MAV_SYSID"], _OWN_COMPONENT)
         if state.mode is not Mode.GUIDED:
             return
-        if (message.get_srcSystem(), message.get_srcComponent()) == own:
+        if (message.get_srcSystem(), message.get_srcComponent()) == own_ids:
             return
         if message.get_type() == "SET_ATTITUDE_TARGET":
             self._take_attitude_setpoint(message)
@@ -189,17 +190,17 @@ class ArduPilotCommander:
             self._disarm_on_ground()
 
     def _align_yaw(self) -> None:
-        """Announce the alignment of the heading in the air, at sufficient height."""
+        """Announce the heading alignment in the air, above `YAW_ALIGNMENT_HEIGHT_M`."""
         state = self._state
         height = state.home_ned[2] - state.estimate.position_ned[2]
-        if self._yaw_aligned or height < YAW_ALIGNED_M:
+        if self._yaw_aligned or height < YAW_ALIGNMENT_HEIGHT_M:
             return
         self._yaw_aligned = True
         for unit in (0, 1):
             self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
 
     def _update_prearm_problem(self) -> str | None:
-        """Store in the state why arming is refused now, None if it is allowed; return the same."""
+        """Store in the state and return why arming is refused now; None if it is allowed."""
         state = self._state
         state.prearm_problem = arming_problem(
             state,
@@ -218,8 +219,8 @@ class ArduPilotCommander:
             return
         waited = state.time_us - self._landed_since_us
         delay = self._parameters["DISARM_DELAY"] * 1e6
-        if self._control.landing and state.flown:
-            if waited >= LANDED_TO_DISARM_US:
+        if self._control.landing and state.took_off:
+            if waited >= LANDED_DISARM_DELAY_US:
                 self._stop_motors(EventKind.DISARMED_BY_LANDING)
         elif 0.0 < delay <= waited:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)
@@ -239,7 +240,7 @@ class ArduPilotCommander:
         state = self._state
         if state.landed:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)
-        elif mode in NEEDS_POSITION and not state.position_valid:
+        elif mode in POSITION_MODES and not state.position_valid:
             self._enter_mode(Mode.LAND)
         elif state.mode is not mode:
             self._enter_mode(mode)

@@ -76,13 +76,17 @@ class ArduPilotCommands(Commands):
 
     def data_stream(self, message: Message, link: Link) -> None:
         """REQUEST_DATA_STREAM: start or stop a group of messages on this link; 0 means all."""
-        requested = message.req_stream_id
-        groups = _STREAM_GROUPS.values() if requested == 0 else [_STREAM_GROUPS.get(requested, ())]
-        rate = message.req_message_rate
-        interval = 1e6 / rate if message.start_stop and rate else -1.0
+        requested_group = message.req_stream_id
+        groups = (
+            _STREAM_GROUPS.values()
+            if requested_group == 0
+            else [_STREAM_GROUPS.get(requested_group, ())]
+        )
+        rate_hz = message.req_message_rate
+        interval_us = 1e6 / rate_hz if message.start_stop and rate_hz else -1.0
         for group in groups:
             for message_id in group:
-                link.streams.set_interval(message_id, interval, self._state.time_us)
+                link.streams.set_interval(message_id, interval_us, self._state.time_us)
 
     def _set_mode(self, command: Command, _: Link) -> int:
         base_mode, custom_mode = command.parameters[:2]
@@ -98,10 +102,10 @@ class ArduPilotCommands(Commands):
             return DENIED
         message_id, interval_us = int(command.parameters[0]), command.parameters[1]
         if message_id in self._builders:
-            refused = link.streams.set_interval(message_id, interval_us, self._state.time_us)
+            refusal = link.streams.set_interval(message_id, interval_us, self._state.time_us)
         else:
-            refused = f"No ap_message for mavlink id ({message_id})"
-        if refused is None:
+            refusal = f"No ap_message for mavlink id ({message_id})"
+        if refusal is None:
             return ACCEPTED
-        self._announce.say(refused, INFO)
+        self._announce.say(refusal, INFO)
         return DENIED

@@ -1,8 +1,8 @@
 """ArduCopter's parameters, and the defaults of its simulated vehicle (measured).
 
 Parameters have the types and defaults of its simulated quadrotor, and the names of 4.7 where they
-were recorded. Those marked * have an effect in the mock. The others exist because clients read them
-or users look for them.
+were recorded. Parameters marked * have an effect in the mock. The others exist because clients read
+them or users look for them.
 """
 
 from typing import Any
@@ -93,13 +93,13 @@ _PARAMETERS: tuple[tuple[str, int | float, int], ...] = (
 )
 
 ARDUPILOT_PARAMETERS = tuple(Parameter(name, value) for name, value, _ in _PARAMETERS)
-ARDUPILOT_TYPES = {name: int(kind) for name, _, kind in _PARAMETERS}
+ARDUPILOT_TYPES = {name: int(param_type) for name, _, param_type in _PARAMETERS}
 """MAV_PARAM_TYPE by name."""
 BURST_MS = 5.6
 """Period of the bursts of the simulator's telemetry, ms (measured: 5.4 to 5.8)."""
 ROTOR_LAG_MS = 22.5
-"""Time constant of the specific thrust, ms. It replaces the measured dead time of 15 ms and lag of
-5 ms together."""
+"""Time constant of the specific thrust, ms: one lag in place of the measured dead time of 15 ms and
+lag of 5 ms."""
 
 RATE_LAG_MS = 11.0
 """Delay of the gyro's low pass, ms (measured)."""
@@ -148,24 +148,24 @@ def _with_rotor_lag(gains: AxisGains, inertia: float) -> AxisGains:
     drag = default_airframe.rotational_drag_n_m_s
     lag_ratio = ROTOR_LAG_MS / default_airframe.rotor_lag_ms
     stiffness = gains.proportional_n_m_s + drag
-    steady = (gains.proportional_n_m_s + gains.feed_forward_n_m_s) / stiffness
+    steady_gain = (gains.proportional_n_m_s + gains.feed_forward_n_m_s) / stiffness
     proportional = lag_ratio * stiffness - drag
     return gains.model_copy(
         update={
             "proportional_n_m_s": proportional,
-            "feed_forward_n_m_s": steady * lag_ratio * stiffness - proportional,
+            "feed_forward_n_m_s": steady_gain * lag_ratio * stiffness - proportional,
             "damping_n_m_s2": lag_ratio * (inertia + gains.damping_n_m_s2) - inertia,
         }
     )
 
 
 def _rate_loop() -> RateLoopConfig:
-    measured = RateLoopConfig.ardupilot()
+    measured_loop = RateLoopConfig.ardupilot()
     x, y, z = AirframeConfig().inertia_kg_m2
     return RateLoopConfig(
-        roll=_with_rotor_lag(measured.roll, x),
-        pitch=_with_rotor_lag(measured.pitch, y),
-        yaw=_with_rotor_lag(measured.yaw, z),
+        roll=_with_rotor_lag(measured_loop.roll, x),
+        pitch=_with_rotor_lag(measured_loop.pitch, y),
+        yaw=_with_rotor_lag(measured_loop.yaw, z),
     )
 
 
@@ -173,13 +173,13 @@ RATE_LOOP = _rate_loop()
 
 
 def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
-    """Return the ``mock:`` section, completed by these defaults."""
+    """Return the ``mock:`` section, completed by the defaults of ArduCopter's simulator."""
     top_level = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
-    filled = {**top_level, **section}
-    if filled["rate_loop"] == "ardupilot":
-        filled["rate_loop"] = RATE_LOOP
+    completed = {**top_level, **section}
+    if completed["rate_loop"] == "ardupilot":
+        completed["rate_loop"] = RATE_LOOP
     sensors = {"rate_lag_ms": RATE_LAG_MS, "stamp_slips_hz": STAMP_SLIPS_HZ}
     for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY), ("sensors", sensors)):
-        given = section.get(key, {})
-        filled[key] = {**defaults, **given} if isinstance(given, dict) else given
-    return filled
+        configured = section.get(key, {})
+        completed[key] = {**defaults, **configured} if isinstance(configured, dict) else configured
+    return completed

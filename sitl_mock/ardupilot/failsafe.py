@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from sitl_mock.ardupilot.modes import NEEDS_POSITION, PILOTED
+from sitl_mock.ardupilot.modes import PILOTED_MODES, POSITION_MODES
 from sitl_mock.autopilot.events import Announce, EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import BatteryWarning, Mode, State
@@ -27,7 +27,7 @@ _BATTERY_ACTIONS = {
     7: Mode.BRAKE,
 }
 """Mode for each value of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT. Termination (5) is not simulated."""
-_PILOT_CONTINUES = 16
+_GCS_CONTINUE_IF_PILOT_CONTROL = 16
 """Bit of FS_OPTIONS: the loss of the ground station has no effect in a pilot's mode."""
 
 
@@ -39,7 +39,7 @@ class ArduPilotFailsafe:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         vehicle: for the battery's voltage.
         announce: sends texts.
         act: enters the mode of a failsafe, or disarms a vehicle that is on the ground.
@@ -92,7 +92,8 @@ class ArduPilotFailsafe:
             self.gcs_lost = True
             self._announce(EventKind.GCS_LOST, "")
             pilot_continues = (
-                int(parameters["FS_OPTIONS"]) & _PILOT_CONTINUES and state.mode in PILOTED
+                int(parameters["FS_OPTIONS"]) & _GCS_CONTINUE_IF_PILOT_CONTROL
+                and state.mode in PILOTED_MODES
             )
             mode = _GCS_ACTIONS.get(enabled)
             if mode is not None and not pilot_continues:
@@ -136,8 +137,8 @@ class ArduPilotFailsafe:
         """Land if the position is lost in a mode that needs it and FS_EKF_ACTION demands it."""
         state = self._state
         lost = state.armed and not state.position_valid
-        began = lost and not self._position_lost and state.mode in NEEDS_POSITION
-        self._position_lost = lost and (self._position_lost or began)
-        if began and self._parameters["FS_EKF_ACTION"]:
+        loss_began = lost and not self._position_lost and state.mode in POSITION_MODES
+        self._position_lost = lost and (self._position_lost or loss_began)
+        if loss_began and self._parameters["FS_EKF_ACTION"]:
             self._announce(EventKind.POSITION_LOST, "")
             self._act(Mode.LAND)

@@ -1,4 +1,4 @@
-"""The task of GUIDED, and the setpoints of attitude that it accepts."""
+"""The task of GUIDED, and the attitude setpoints that it accepts."""
 
 from enum import Enum, auto
 from math import isnan
@@ -15,7 +15,7 @@ from sitl_mock.link.framing import Message
 
 _ALL_RATES_IGNORED = ROLL_OR_PITCH_RATE_IGNORED | YAW_RATE_IGNORED
 _UNIT_LENGTH_TOLERANCE = 1e-3
-"""Largest difference of the squared length of a quaternion from 1."""
+"""Largest accepted difference of a quaternion's squared length from 1."""
 
 
 class FatalSetpointError(Exception):
@@ -25,8 +25,8 @@ class FatalSetpointError(Exception):
 def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
     """Decode a SET_ATTITUDE_TARGET by ArduCopter's type-mask rules (measured).
 
-    Return None, on which the vehicle holds its position, if the mask ignores the throttle or only
-    some of the rates, or if the attitude is not of unit length. Rates may be NaN or infinite.
+    Return None if the mask ignores the throttle or only some of the rates, or if the attitude is
+    not of unit length; the vehicle then holds its position. Rates may be NaN or infinite.
 
     Raises:
         FatalSetpointError: the attitude has a NaN.
@@ -40,10 +40,10 @@ def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
     if mask & ATTITUDE_IGNORED:
         return AttitudeSetpoint(None, rates, rates[2], message.thrust)
     w, x, y, z = message.q
-    square = w * w + x * x + y * y + z * z
-    if isnan(square):
+    squared_length = w * w + x * x + y * y + z * z
+    if isnan(squared_length):
         raise FatalSetpointError
-    if abs(square - 1.0) > _UNIT_LENGTH_TOLERANCE:
+    if abs(squared_length - 1.0) > _UNIT_LENGTH_TOLERANCE:
         return None
     return AttitudeSetpoint((w, x, y, z), rates, rates[2], message.thrust)
 
@@ -60,25 +60,25 @@ class Task(Enum):
 
 
 class Guided:
-    """The task and its setpoint. A new task replaces the present one at once, even a take-off."""
+    """The task of GUIDED and its setpoint. A new task replaces any other, even a take-off."""
 
     def __init__(self) -> None:
         self.task = Task.HOLD
         self.takeoff_height = 0.0
-        """Height of TAKE_OFF, m above home."""
+        """Height at which a take-off ends, m above home."""
         self.setpoint: Setpoint | None = None
         """The latest setpoint."""
         self.setpoint_us = 0
-        """Its vehicle time, us."""
-        self.changed = True
-        """Whether the task has just begun; `GuidedFlight` clears this."""
+        """Vehicle time at which the latest setpoint was received, us."""
+        self.task_changed = True
+        """Whether the task began after the last `GuidedFlight.command`."""
 
     def hold(self) -> None:
         """Hold the present position."""
         self._begin(Task.HOLD)
 
-    def arrive(self) -> None:
-        """End a take-off: hold the position reached."""
+    def end_takeoff(self) -> None:
+        """End a take-off: hold the position that it reached."""
         self.task = Task.HOLD
 
     def take_off(self, height: float) -> None:
@@ -93,10 +93,10 @@ class Guided:
         if self.task is not task:
             self._begin(task)
 
-    def silent(self, now_us: int, timeout_s: float) -> bool:
+    def setpoint_timed_out(self, now_us: int, timeout_s: float) -> bool:
         """Whether the latest setpoint is older than GUID_TIMEOUT (``timeout_s``)."""
         return now_us - self.setpoint_us > timeout_s * 1e6
 
     def _begin(self, task: Task) -> None:
         self.task = task
-        self.changed = True
+        self.task_changed = True

@@ -1,4 +1,4 @@
-"""The control in GUIDED: take-off, setpoints of attitude or position, hold."""
+"""The control in GUIDED: take-off, attitude or position setpoints, hold."""
 
 from math import isnan
 
@@ -14,15 +14,15 @@ from sitl_mock.physics.quaternion import from_yaw
 from sitl_mock.physics.vehicle import ActuatorCommand
 
 THRUST_AS_THRUST = 8
-"""Bit of GUID_OPTIONS: a setpoint's thrust is thrust, not a climb rate."""
+"""Bit of GUID_OPTIONS: the thrust field of a setpoint is a thrust, not a climb rate."""
 SPOOL_UP_US = 2_000_000
 """Spool-up of the rotors after NAV_TAKEOFF, us (recorded: the vehicle lifts off after 2.3 s)."""
 ARRIVAL_DECELERATION = 0.55
 """Deceleration at the end of a take-off, m/s^2 (recorded)."""
 ARRIVAL_TOLERANCE_M = 0.1
-"""A take-off ends this far below its height, m."""
+"""Distance below the take-off height at which a take-off ends, m."""
 _MIN_CLIMB_RATE = 0.1
-"""Smallest climb rate of a take-off, m/s, so that it reaches its height."""
+"""Smallest climb rate of a take-off, m/s; without it the take-off height is never reached."""
 
 
 class GuidedFlight:
@@ -50,53 +50,53 @@ class GuidedFlight:
         self._hold = hold
         self._output = output
         self._spooling_since_us = 0
-        self._silent = False
+        self._timed_out = False
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
         guided = self._guided
-        began, guided.changed = guided.changed, False
-        if began:
+        task_began, guided.task_changed = guided.task_changed, False
+        if task_began:
             self._hold.begin()
             self._spooling_since_us = self._state.time_us
         match guided.task, guided.setpoint:
             case Task.TAKE_OFF, _:
                 return self._take_off(dt)
             case Task.ANGLE, AttitudeSetpoint() as setpoint:
-                return self._follow_angle(setpoint, dt, began=began)
+                return self._follow_angle(setpoint, dt, task_began=task_began)
             case Task.POSITION, PositionSetpoint() as setpoint:
                 return self._follow_position(setpoint, dt)
-        return self._output.follow(self._hold.step(0.0, dt), dt)
+        return self._output.position_command(self._hold.step(0.0, dt), dt)
 
     def _take_off(self, dt: float) -> ActuatorCommand:
         state, guided = self._state, self._guided
         if state.landed and state.time_us - self._spooling_since_us < SPOOL_UP_US:
             self._hold.begin()
-            return self._output.rates((0.0, 0.0, 0.0), 0.0)
+            return self._output.rate_command((0.0, 0.0, 0.0), 0.0)
         remaining = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
-        fastest = 0.01 * self._parameters["WPNAV_SPEED_UP"]
-        speed = max(_MIN_CLIMB_RATE, approach_speed(remaining, ARRIVAL_DECELERATION, fastest))
+        max_speed = 0.01 * self._parameters["WPNAV_SPEED_UP"]
+        speed = max(_MIN_CLIMB_RATE, approach_speed(remaining, ARRIVAL_DECELERATION, max_speed))
         if remaining < ARRIVAL_TOLERANCE_M:
-            guided.arrive()
-        return self._output.follow(self._hold.step(speed, dt), dt)
+            guided.end_takeoff()
+        return self._output.position_command(self._hold.step(speed, dt), dt)
 
     def _follow_angle(
-        self, setpoint: AttitudeSetpoint, dt: float, *, began: bool
+        self, setpoint: AttitudeSetpoint, dt: float, *, task_began: bool
     ) -> ActuatorCommand:
         """Follow rates or an attitude; after GUID_TIMEOUT level the vehicle and hold its height."""
         state, parameters = self._state, self._parameters
         state.position_controlled = False
-        was_silent = self._silent and not began
-        self._silent = self._guided.silent(state.time_us, parameters["GUID_TIMEOUT"])
+        was_timed_out = self._timed_out and not task_began
+        self._timed_out = self._guided.setpoint_timed_out(state.time_us, parameters["GUID_TIMEOUT"])
         is_thrust = bool(int(parameters["GUID_OPTIONS"]) & THRUST_AS_THRUST)
-        is_climb_rate = self._silent or not is_thrust
+        is_climb_rate = self._timed_out or not is_thrust
         state.height_controlled = is_climb_rate
-        if self._silent and not was_silent:
+        if self._timed_out and not was_timed_out:
             self._hold.begin()
         if is_climb_rate:
             up = 0.01 * parameters["WPNAV_SPEED_UP"]
             down = 0.01 * parameters["WPNAV_SPEED_DN"]
-            climb = 0.0 if self._silent else climb_rate_of_setpoint(setpoint.thrust, up, down)
+            climb = 0.0 if self._timed_out else climb_rate_of_setpoint(setpoint.thrust, up, down)
             thrust = self._hold.step(climb, dt, level=True).thrust
             state.position_target.active = False
         else:
@@ -105,22 +105,22 @@ class GuidedFlight:
         # The angle boost always applies to a climb rate; to a thrust only if it is enabled.
         if is_climb_rate or parameters["ATC_ANGLE_BOOST"]:
             thrust = angle_boosted(thrust, self._output.cos_tilt)
-        if self._silent:
-            return self._output.attitude(from_yaw(self._hold.yaw), thrust)
+        if self._timed_out:
+            return self._output.attitude_command(from_yaw(self._hold.yaw), thrust)
         rates = setpoint.rates or (0.0, 0.0, 0.0)
         if setpoint.q is None:
             state.attitude_target.q = state.estimate.q
-            return self._output.rates(rates, thrust)
+            return self._output.rate_command(rates, thrust)
         p, q, r = self._output.rates_towards(setpoint.q)
         state.attitude_target.q = setpoint.q
-        return self._output.rates((p + rates[0], q + rates[1], r + rates[2]), thrust)
+        return self._output.rate_command((p + rates[0], q + rates[1], r + rates[2]), thrust)
 
     def _follow_position(self, setpoint: PositionSetpoint, dt: float) -> ActuatorCommand:
         guided, parameters = self._guided, self._parameters
-        silent = guided.silent(self._state.time_us, parameters["GUID_TIMEOUT"])
-        if silent and isnan(setpoint.position[0]):
+        timed_out = guided.setpoint_timed_out(self._state.time_us, parameters["GUID_TIMEOUT"])
+        if timed_out and isnan(setpoint.position[0]):
             guided.hold()
-            return self._output.follow(self._hold.step(0.0, dt), dt)
+            return self._output.position_command(self._hold.step(0.0, dt), dt)
         hold = self._hold
         speeds = (
             0.01 * parameters["WPNAV_SPEED"],
@@ -129,4 +129,4 @@ class GuidedFlight:
         )
         demand = setpoint_demand(setpoint, self._state.estimate.q, hold.yaw, speeds, dt)
         hold.yaw = demand.yaw
-        return self._output.follow(hold.follow(demand, dt), dt)
+        return self._output.position_command(hold.follow(demand, dt), dt)

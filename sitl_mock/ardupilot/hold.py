@@ -13,9 +13,9 @@ from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 STOPPING_S = 0.65
-"""The held point is the position plus the velocity times this, s (recorded on entering LAND)."""
-_HEIGHT_INTEGRAL = 1.0
-"""Acceleration per climb rate error and second, 1/s^2; chosen for a steady hover, not measured."""
+"""Distance from the vehicle to the held point per speed, s (recorded on entering LAND)."""
+_CLIMB_RATE_INTEGRAL_GAIN = 1.0
+"""Integral gain of the climb rate, 1/s^2; chosen for a steady hover, not measured."""
 _CLIMB_LIMIT = 10.0
 """Largest climb and descent of the height controller, m/s. It is high, because the callers limit
 the climb rate that they ask for."""
@@ -36,7 +36,7 @@ class ClimbProfile:
         self.acceleration = 0.0
 
     def step(self, climb_rate: float, acceleration: float, dt: float) -> None:
-        """Advance by ``dt`` s towards a climb rate, with at most this ``acceleration``."""
+        """Advance by ``dt`` s towards a climb rate, with at most ``acceleration``, m/s^2."""
         largest_change = acceleration * dt
         change = max(-largest_change, min(largest_change, climb_rate - self.rate))
         self.acceleration = change / dt
@@ -44,9 +44,9 @@ class ClimbProfile:
         self.height += self.rate * dt
 
 
-def approach_speed(distance: float, deceleration: float, fastest: float) -> float:
-    """Return the largest speed that can stop within the distance, at most ``fastest``, m/s."""
-    return min(fastest, sqrt(2.0 * deceleration * max(0.0, distance)))
+def approach_speed(distance: float, deceleration: float, max_speed: float) -> float:
+    """Return the largest speed that can stop within the distance, at most ``max_speed``, m/s."""
+    return min(max_speed, sqrt(2.0 * deceleration * max(0.0, distance)))
 
 
 class PositionHold:
@@ -78,7 +78,7 @@ class PositionHold:
         self._controller.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift point, height and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         dx, dy, dz = position_step
         self.point = (self.point[0] + dx, self.point[1] + dy)
         self.climb.height -= dz
@@ -107,7 +107,7 @@ class PositionHold:
         return self.follow(demand, dt)
 
     def follow(self, demand: PositionDemand, dt: float) -> PositionOutput:
-        """Return attitude and thrust of one period of ``dt`` s for a demand, not for the hold."""
+        """Return attitude and thrust of one period of ``dt`` s for a position demand."""
         state = self._state
         estimate = state.estimate
         output = self._controller.step(demand, estimate.position_ned, estimate.velocity_ned, dt)
@@ -124,7 +124,7 @@ class PositionHold:
             parameters["PSC_VELXY_P"],
             parameters["PSC_VELZ_P"],
             parameters["PSC_VELXY_I"],
-            _HEIGHT_INTEGRAL,
+            _CLIMB_RATE_INTEGRAL_GAIN,
             radians(0.01 * parameters["ANGLE_MAX"]),
             parameters["MOT_THST_HOVER"],
             0.0,

@@ -14,16 +14,15 @@ from sitl_mock.physics.quaternion import Vector, from_yaw
 from sitl_mock.physics.vehicle import STILL, ActuatorCommand
 
 TOUCHDOWN_THRUST_RATE = 0.43
-"""After contact in LAND the normalised thrust decreases by this per second (recorded: landed after
-1.6 s)."""
+"""Decrease of the normalised thrust after contact in LAND, 1/s (recorded: landed after 1.6 s)."""
 
 
 class ArduPilotModeControl:
     """The `ModeControl` of ArduCopter.
 
     Args:
-        state: the autopilot's state; the echoes of the targets are written here.
-        parameters: gains, limits and speeds; MOT_THST_HOVER is learned.
+        state: the autopilot's state; its command and targets are written here.
+        parameters: gains, limits and speeds; MOT_THST_HOVER is written here.
         guided: the task of GUIDED.
         throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """
@@ -65,7 +64,7 @@ class ArduPilotModeControl:
 
     @property
     def taking_off(self) -> bool:
-        """Whether GUIDED takes off."""
+        """Whether a take-off in GUIDED is under way."""
         return self._output.taking_off
 
     def hover_throttle(self) -> float:
@@ -73,7 +72,7 @@ class ArduPilotModeControl:
         return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
         state = self._state
         state.position_target.active = False
         # Modes that hold a position report it even when disarmed (recorded in GUIDED).
@@ -87,7 +86,7 @@ class ArduPilotModeControl:
         elif state.landed and not self.taking_off:
             self._hold.begin()
             self._output.thrust = 0.0
-            command = self._output.rates((0.0, 0.0, 0.0), 0.0)
+            command = self._output.rate_command((0.0, 0.0, 0.0), 0.0)
         else:
             command = self._fly(dt)
         state.attitude_target.rates = command[1:4]
@@ -100,16 +99,18 @@ class ArduPilotModeControl:
             return self._guided_flight.command(dt)
         if mode is Mode.STABILIZE:
             # A pilot with centred sticks: level at the hover thrust.
-            hover = float(self._parameters["MOT_THST_HOVER"])
-            return self._output.attitude(
-                from_yaw(self._hold.yaw), angle_boosted(hover, self._output.cos_tilt)
+            hover_thrust = float(self._parameters["MOT_THST_HOVER"])
+            return self._output.attitude_command(
+                from_yaw(self._hold.yaw), angle_boosted(hover_thrust, self._output.cos_tilt)
             )
         if self.landing:
             return self._land(dt)
         if mode is Mode.RTL:
             return self._return_home(dt)
         self._state.height_controlled = True
-        return self._output.follow(self._hold.step(0.0, dt, level=mode is Mode.ALT_HOLD), dt)
+        return self._output.position_command(
+            self._hold.step(0.0, dt, level=mode is Mode.ALT_HOLD), dt
+        )
 
     def _return_home(self, dt: float) -> ActuatorCommand:
         parameters, return_home = self._parameters, self._return
@@ -119,9 +120,9 @@ class ArduPilotModeControl:
             self._hold.point = (home[0], home[1])
         remaining = return_home.height - self._hold.climb.height
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
-        fastest = 0.01 * parameters["WPNAV_SPEED_UP"]
-        return self._output.follow(
-            self._hold.step(approach_speed(remaining, acceleration, fastest), dt), dt
+        max_speed = 0.01 * parameters["WPNAV_SPEED_UP"]
+        return self._output.position_command(
+            self._hold.step(approach_speed(remaining, acceleration, max_speed), dt), dt
         )
 
     def _land(self, dt: float) -> ActuatorCommand:
@@ -129,14 +130,14 @@ class ArduPilotModeControl:
         state, parameters = self._state, self._parameters
         if state.contact:
             self._output.thrust = max(0.0, self._output.thrust - TOUCHDOWN_THRUST_RATE * dt)
-            return self._output.attitude(from_yaw(self._hold.yaw), self._output.thrust)
-        slow = 0.01 * parameters["LAND_SPEED"]
+            return self._output.attitude_command(from_yaw(self._hold.yaw), self._output.thrust)
+        land_speed = 0.01 * parameters["LAND_SPEED"]
         height = state.home_ned[2] - state.estimate.position_ned[2]
         remaining = height - 0.01 * parameters["LAND_ALT_LOW"]
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
         sink_rate = max(
-            slow, approach_speed(remaining, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"])
+            land_speed, approach_speed(remaining, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"])
         )
         level = not state.position_valid
         state.position_controlled = not level
-        return self._output.follow(self._hold.step(-sink_rate, dt, level=level), dt)
+        return self._output.position_command(self._hold.step(-sink_rate, dt, level=level), dt)

@@ -1,4 +1,4 @@
-"""ArduCopter's modes: their numbers, what each needs, and whether it may be armed."""
+"""ArduCopter's modes: their numbers, what each needs, and what forbids arming."""
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -15,19 +15,19 @@ MODE_NUMBERS: dict[Mode, int] = {
 }
 """HEARTBEAT.custom_mode of each mode."""
 MODES_BY_NUMBER = {number: mode for mode, number in MODE_NUMBERS.items()}
-NEEDS_POSITION = frozenset({Mode.GUIDED, Mode.LOITER, Mode.RTL, Mode.BRAKE})
+POSITION_MODES = frozenset({Mode.GUIDED, Mode.LOITER, Mode.RTL, Mode.BRAKE})
 """Modes that need a horizontal position."""
-NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND, Mode.BRAKE})
+UNARMABLE_MODES = frozenset({Mode.RTL, Mode.LAND, Mode.BRAKE})
 """Modes in which ArduCopter cannot be armed."""
 
-PILOT_MODES = {
+MODE_FOR_PX4_MODE = {
     Mode.POSCTL: Mode.LOITER,
     Mode.ALTCTL: Mode.ALT_HOLD,
     Mode.STABILIZED: Mode.STABILIZE,
     Mode.MANUAL: Mode.STABILIZE,
 }
-"""PX4's name of a pilot's mode -> ArduCopter's mode."""
-PILOTED = frozenset({Mode.STABILIZE, Mode.ALT_HOLD, Mode.LOITER})
+"""Pilot's mode of PX4 -> the corresponding mode of ArduCopter."""
+PILOTED_MODES = frozenset({Mode.STABILIZE, Mode.ALT_HOLD, Mode.LOITER})
 """Modes that a pilot flies."""
 
 
@@ -65,7 +65,7 @@ def arming_problem(
         home_set: whether home is set.
         crashed: whether the vehicle has crashed.
         gcs_failsafe: whether the ground station failsafe is active.
-        refusal: the reason that a fault gives, None without such a fault.
+        refusal: reason of an active `RefuseArming` fault, None without one.
     """
     mode: Mode = state.mode
     problems = (
@@ -73,8 +73,8 @@ def arming_problem(
         (refusal is not None, refusal),
         (crashed, "Vehicle has crashed"),
         (not home_set, "AHRS: waiting for home"),
-        (mode in NEEDS_POSITION and not state.position_valid, "Need Position Estimate"),
-        (mode in NOT_ARMABLE, "Mode not armable"),
+        (mode in POSITION_MODES and not state.position_valid, "Need Position Estimate"),
+        (mode in UNARMABLE_MODES, "Mode not armable"),
         (state.battery_warning > BatteryWarning.OK, "Battery failsafe on"),
         (gcs_failsafe, "GCS failsafe on"),
     )

@@ -23,30 +23,34 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
 
     def attitude_target(self) -> Message:
         """Return ATTITUDE_TARGET: the shaped target, which leads the body, and its rates."""
-        shaped = self._vehicle.attitude_target
-        if shaped is None:
+        shaped_target = self._vehicle.attitude_target
+        if shaped_target is None:
             return super().attitude_target()
         return dialect.MAVLink_attitude_target_message(
-            self._boot_ms, 0, shaped.target, *shaped.rates, self._state.attitude_target.thrust
+            self._boot_ms,
+            0,
+            shaped_target.target,
+            *shaped_target.rates,
+            self._state.attitude_target.thrust,
         )
 
     def global_position_int(self) -> Message:
         """Return GLOBAL_POSITION_INT, with zeros if there is no position."""
-        zeros = dialect.MAVLink_global_position_int_message(self._boot_ms, *(0,) * 8)
-        return super().global_position_int() or zeros
+        zero_message = dialect.MAVLink_global_position_int_message(self._boot_ms, *(0,) * 8)
+        return super().global_position_int() or zero_message
 
     def raw_imu(self) -> Message:
-        """Return RAW_IMU: mg, mrad/s, mgauss."""
+        """Return RAW_IMU in mg, mrad/s and mgauss (the field of a level vehicle heading north)."""
         estimate = self._state.estimate
         return dialect.MAVLink_raw_imu_message(
-            self._state.shown_us,
+            self._state.stamp_us,
             *(round(1e3 * force / GRAVITY) for force in estimate.specific_force_frd),
             *(round(1e3 * rate) for rate in estimate.body_rates),
             *(round(1e3 * field) for field in MAGNETIC_FIELD_NED),
         )
 
     def scaled_pressure(self) -> Message:
-        """Return SCALED_PRESSURE."""
+        """Return SCALED_PRESSURE at the estimated height, at 35 degrees C."""
         return dialect.MAVLink_scaled_pressure_message(
             self._boot_ms, self.pressure_hpa(), 0.0, 3500
         )

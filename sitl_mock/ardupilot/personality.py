@@ -25,13 +25,13 @@ from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import FloatEncoding
-from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
+from sitl_mock.autopilot.personality import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
 
 LANDED_AFTER_US = 1_000_000
-"""A contact with low thrust for this time, us, is a landing."""
+"""Time of ground contact with low thrust after which the vehicle has landed, us."""
 POSITION_TIMEOUT_US = 10_000_000
 """Time for which the position stays valid without GPS, us; not measured."""
 DEFAULT_LOOP_HZ = 400.0
@@ -78,7 +78,7 @@ class ArduPilot:
         """Return the mode of a custom_mode, None if the mock does not have it."""
         return MODES_BY_NUMBER.get(custom_mode)
 
-    def rules(self, parts: VehicleParts) -> Rules:
+    def behaviour(self, parts: VehicleParts) -> Behaviour:
         """Build ArduCopter's behaviour for one vehicle."""
         state, parameters, links = parts.state, parts.parameters, parts.links
         announce = ArduPilotAnnouncer(links)
@@ -89,7 +89,7 @@ class ArduPilot:
             announce,
             send_home=lambda: _send_once(commands, _HOME_MESSAGES, links),
             send_parameter=lambda name: protocol.send_changed(
-                name, [link for link in links if link.heard]
+                name, [link for link in links if link.client_heard]
             ),
         )
         boot = Boot(state, notifier, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
@@ -98,7 +98,7 @@ class ArduPilot:
         )
         builders = self._builders(parts, boot)
         commands = ArduPilotCommands(state, commander, builders, announce)
-        return Rules(
+        return Behaviour(
             control,
             commander,
             commands,
@@ -108,11 +108,11 @@ class ArduPilot:
                 announce,
                 hover_thrust=control.hover_throttle,
                 landed_after_us=LANDED_AFTER_US,
-                climbing=lambda: control.taking_off,
+                is_climbing=lambda: control.taking_off,
             ),
             builders,
             handlers={"REQUEST_DATA_STREAM": commands.data_stream},
-            converged_us=parts.ready_us,
+            position_valid_from_us=parts.ready_us,
             position_timeout_us=lambda: POSITION_TIMEOUT_US,
         )
 

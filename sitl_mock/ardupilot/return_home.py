@@ -9,7 +9,7 @@ from sitl_mock.autopilot.state import State
 _HOME_RADIUS_M = 2.0
 """Distance at which the vehicle has reached home (WPNAV_RADIUS)."""
 _CLIMB_TOLERANCE_M = 0.3
-"""The climb ends this far below the height of the flight home, m."""
+"""Distance below the height of the flight home at which the climb ends, m."""
 
 
 class Leg(Enum):
@@ -40,7 +40,7 @@ class ReturnHome:
     def begin(self) -> None:
         """Choose the height of the flight home: RTL_ALT, less near home (RTL_CONE_SLOPE).
 
-        It is at least the present height.
+        The height is at least the present one.
         """
         state, parameters = self._state, self._parameters
         present_height = -state.estimate.position_ned[2]
@@ -50,7 +50,7 @@ class ReturnHome:
         self.leg = Leg.CLIMB
 
     def step(self) -> None:
-        """Start the next leg when this one is complete."""
+        """Start the next leg when the present one is complete."""
         state = self._state
         if self.leg is Leg.CLIMB:
             if self.height + state.estimate.position_ned[2] < _CLIMB_TOLERANCE_M:

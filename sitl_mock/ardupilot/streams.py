@@ -8,8 +8,8 @@ stays. A message is sent in the first cycle after it is due and keeps its phase:
 
 from collections.abc import Mapping
 
-LONGEST_MS = 60_000
-"""Longest interval; longer ones are reduced to it."""
+MAX_INTERVAL_MS = 60_000
+"""Longest interval of a stream, ms; a longer request is reduced to it."""
 
 
 class ArduPilotStreams:
@@ -43,7 +43,7 @@ class ArduPilotStreams:
         if interval_us < 0.0:
             self._intervals.pop(message_id, None)
             return None
-        rounded_us = 1000 * min(int(interval_us) // 1000, LONGEST_MS)
+        rounded_us = 1000 * min(int(interval_us) // 1000, MAX_INTERVAL_MS)
         if interval_us == 0.0:
             rounded_us = self._defaults.get(message_id, 0)
             if not rounded_us:
@@ -60,7 +60,10 @@ class ArduPilotStreams:
         return self._intervals.get(message_id, -1)
 
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
-        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent."""
+        """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
+
+        ``status_us`` (for PX4) is ignored.
+        """
         due = []
         booting = slot_us < self._booting_until_us
         last_due_us = self._last_due_us

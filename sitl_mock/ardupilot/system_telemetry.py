@@ -30,7 +30,7 @@ _EKF_NO_POSITION = (
     | ardupilotmega.EKF_CONST_POS_MODE
 )
 _STICKS_US = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
-"""The sticks of the simulated transmitter at rest."""
+"""RC channels 1 to 8 of the simulated transmitter with its sticks at rest, us."""
 
 
 class ArduPilotSystemTelemetry(SystemTelemetry):
@@ -64,11 +64,11 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def heartbeat(self) -> Message:
         """Return HEARTBEAT; during the boot the guided bit is set (recorded: 89)."""
         state = self._state
-        controlled = state.position_controlled or not self._boot.initialised
+        position_controlled = state.position_controlled or not self._boot.initialised
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR,
             dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
-            base_mode(armed=state.armed, position_controlled=controlled),
+            base_mode(armed=state.armed, position_controlled=position_controlled),
             MODE_NUMBERS[state.mode],
             self.system_status(),
             3,
@@ -84,7 +84,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         return int(dialect.MAV_STATE_STANDBY if state.landed else dialect.MAV_STATE_ACTIVE)
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS."""
+        """Return SYS_STATUS, with the bits of running controllers and, while armed, of logging."""
         state = self._state
         controllers = _HEIGHT_CONTROL if state.height_controlled else 0
         controllers |= _POSITION_CONTROL if state.position_controlled else 0
@@ -120,12 +120,12 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     def rc_channels(self) -> Message:
         """Return RC_CHANNELS: the sticks at rest."""
         channels = [*_STICKS_US, *(0,) * 10]
-        return dialect.MAVLink_rc_channels_message(self._state.shown_us // 1000, 16, *channels, 255)
+        return dialect.MAVLink_rc_channels_message(self._state.stamp_us // 1000, 16, *channels, 255)
 
     def home_position(self) -> Message | None:
         """Return HOME_POSITION, without attitude (recorded); None before home is set."""
         return self._home_position((nan, nan, nan, nan)) if self._boot.origin_set else None
 
     def gps_global_origin(self) -> Message | None:
-        """Return GPS_GLOBAL_ORIGIN; None before it is set."""
+        """Return GPS_GLOBAL_ORIGIN; None before the origin is set."""
         return super().gps_global_origin() if self._boot.origin_set else None

@@ -1,4 +1,4 @@
-"""ArduCopter's texts. It has no numbered events, and announces only those listed here."""
+"""ArduCopter's texts. The autopilot sends no EVENT, and announces only the events listed here."""
 
 from collections.abc import Iterable
 
@@ -40,17 +40,17 @@ class ArduPilotAnnouncer:
         self._long_texts = 0
 
     def __call__(self, kind: EventKind, detail: str) -> None:
-        """Announce an event if ArduCopter has a text for it."""
+        """Announce an event, with a detail in its text, if ArduCopter has a text for it."""
         event = ARDUPILOT_EVENTS.get(kind)
         if event is not None:
             self.say(event.text.format(detail), event.severity)
 
     def say(self, text: str, severity: int) -> None:
-        """Send a text; only one that needs several messages has an id (recorded)."""
+        """Send a text; STATUSTEXT.id is 0 unless the text needs several messages (recorded)."""
         text_id = 0
         if len(text.encode()) > TEXT_BYTES:
             self._long_texts += 1
             text_id = self._long_texts
         for link in self._links:
-            if link.heard:
+            if link.client_heard:
                 link.send_text(text, severity, text_id)

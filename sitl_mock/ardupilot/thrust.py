@@ -28,8 +28,8 @@ def specific_thrust(thrust: float) -> float:
     """Return the specific thrust of a normalised thrust, m/s^2."""
     for (low, low_g), (high, high_g) in pairwise(_CURVE):
         if thrust <= high:
-            share = max(0.0, thrust - low) / (high - low)
-            return GRAVITY * (low_g + share * (high_g - low_g))
+            fraction = max(0.0, thrust - low) / (high - low)
+            return GRAVITY * (low_g + fraction * (high_g - low_g))
     return GRAVITY * _CURVE[-1][1]
 
 
@@ -38,8 +38,8 @@ def angle_boosted(thrust: float, cos_tilt: float) -> float:
 
     Near 90 degrees of tilt and beyond, the thrust decreases to zero.
     """
-    upright = max(0.0, min(1.0, 10.0 * cos_tilt))
-    return thrust * upright / max(0.1, min(1.0, cos_tilt))
+    upright_factor = max(0.0, min(1.0, 10.0 * cos_tilt))
+    return thrust * upright_factor / max(0.1, min(1.0, cos_tilt))
 
 
 def thrust_of_setpoint(thrust: float) -> float:
@@ -55,5 +55,5 @@ def climb_rate_of_setpoint(thrust: float, fastest_up: float, fastest_down: float
         fastest_up: climb rate at 1, m/s.
         fastest_down: sink rate at 0, m/s.
     """
-    share = 0.0 if isnan(thrust) else 2.0 * max(0.0, min(1.0, thrust)) - 1.0
-    return share * (fastest_up if share > 0.0 else fastest_down)
+    rate_fraction = 0.0 if isnan(thrust) else 2.0 * max(0.0, min(1.0, thrust)) - 1.0
+    return rate_fraction * (fastest_up if rate_fraction > 0.0 else fastest_down)

@@ -1,4 +1,4 @@
-"""PX4's attitude controller: quaternion error with a reduced yaw weight to body rates (pure)."""
+"""PX4's attitude controller: body rates from the quaternion error, with a reduced yaw weight."""
 
 from math import acos, asin, copysign, cos, isnan, sin, sqrt
 from typing import NamedTuple
@@ -6,8 +6,8 @@ from typing import NamedTuple
 from sitl_mock.physics.quaternion import Quaternion, Vector, multiply, normalise
 
 _OPPOSITE_MARGIN = 1e-5
-"""Two axes count as opposite if the cosine of the angle between them is below -1 plus this. Then no
-arc between them is the shortest."""
+"""Two axes count as opposite (no arc between them is the shortest) if the cosine of their angle is
+less than this margin above -1."""
 
 
 class AttitudeGains(NamedTuple):
@@ -39,7 +39,7 @@ def attitude_rates(
 
     As PX4's AttitudeControl: the rotation of the thrust axis along the shortest arc has priority.
     The angle of the remaining rotation about this axis is multiplied by ``yaw_weight``, and the yaw
-    gain is divided by it.
+    gain is divided by ``yaw_weight``.
 
     Args:
         q: present attitude.
@@ -73,8 +73,8 @@ def attitude_rates(
 def is_usable(q: Quaternion) -> bool:
     """Whether a quaternion has no NaN, and a length between 0.001 and 1000."""
     w, x, y, z = q
-    square = w * w + x * x + y * y + z * z
-    return not isnan(square) and 1e-6 < square < 1e6
+    squared_length = w * w + x * x + y * y + z * z
+    return not isnan(squared_length) and 1e-6 < squared_length < 1e6
 
 
 def _shortest_arc(q: Quaternion, target: Quaternion) -> Quaternion:

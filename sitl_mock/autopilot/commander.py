@@ -17,11 +17,11 @@ FAILED = int(dialect.MAV_RESULT_FAILED)
 
 
 class Commander(Protocol):
-    """Decides ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
+    """Sets ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
 
     refusal: str | None
-    """Reason with which a fault refuses arming, None without such a fault."""
-    pilot: bool
+    """Reason of an active `RefuseArming` fault, None without one."""
+    pilot_simulated: bool
     """Whether a fault simulates a pilot at the sticks."""
 
     @property
@@ -41,7 +41,7 @@ class Commander(Protocol):
         """Change the mode, and return a MAV_RESULT."""
 
     def take_over(self, mode: Mode) -> None:
-        """Let the pilot take over in a mode (fault injection)."""
+        """Enter a mode as a pilot who takes over would (fault injection)."""
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
         """Record the heartbeat of another system or component, to notice when it is lost."""
@@ -57,7 +57,7 @@ class ModeControl(Protocol):
     """Computes the actuator command of each period from mode, estimate and setpoints."""
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift the held position and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""

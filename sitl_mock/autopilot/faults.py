@@ -28,13 +28,13 @@ from sitl_mock.physics.vehicle import Vehicle
 
 
 @dataclass
-class _Entry:
-    """A fault, and whether it is active or over. ``injected_us``: vehicle time of its injection."""
+class _ScheduledFault:
+    """A fault, its state, and the vehicle time at which it was injected, us."""
 
     fault: LinkFault | VehicleFault
     injected_us: int
     active: bool = False
-    over: bool = False
+    has_ended: bool = False
 
 
 class FaultSchedule:
@@ -44,22 +44,22 @@ class FaultSchedule:
         faults: faults of the configuration.
 
     Attributes:
-        link: the link faults that are active now.
+        link_faults: the link faults that are active now.
     """
 
     def __init__(self, faults: tuple[LinkFault | VehicleFault, ...]) -> None:
-        self._entries = [_Entry(fault, 0) for fault in faults]
-        self.link: tuple[LinkFault, ...] = ()
+        self._entries = [_ScheduledFault(fault, 0) for fault in faults]
+        self.link_faults: tuple[LinkFault, ...] = ()
 
     def add(self, fault: LinkFault | VehicleFault, now_us: int) -> None:
         """Add a fault; without a start it begins at the next update."""
-        self._entries.append(_Entry(fault, now_us))
+        self._entries.append(_ScheduledFault(fault, now_us))
 
     def clear(self) -> list[VehicleFault]:
         """Remove all faults; return the vehicle faults that were active."""
         active = [e.fault for e in self._entries if e.active and not isinstance(e.fault, LinkFault)]
         self._entries = []
-        self.link = ()
+        self.link_faults = ()
         return active
 
     def update(
@@ -73,8 +73,8 @@ class FaultSchedule:
         """
         if not self._entries:
             return [], []
-        began: list[VehicleFault] = []
-        ended: list[VehicleFault] = []
+        begun_faults: list[VehicleFault] = []
+        ended_faults: list[VehicleFault] = []
         changed = False
         for entry in self._entries:
             active = self._is_active(entry, now_us, offboard_us)
@@ -82,18 +82,18 @@ class FaultSchedule:
                 continue
             changed = True
             entry.active = active
-            entry.over = not active
+            entry.has_ended = not active
             if not isinstance(entry.fault, LinkFault):
-                (began if active else ended).append(entry.fault)
+                (begun_faults if active else ended_faults).append(entry.fault)
         if changed:
-            self._entries = [entry for entry in self._entries if not entry.over]
-            self.link = tuple(
+            self._entries = [entry for entry in self._entries if not entry.has_ended]
+            self.link_faults = tuple(
                 e.fault for e in self._entries if e.active and isinstance(e.fault, LinkFault)
             )
-        return began, ended
+        return begun_faults, ended_faults
 
     @staticmethod
-    def _is_active(entry: _Entry, now_us: int, offboard_us: int | None) -> bool:
+    def _is_active(entry: _ScheduledFault, now_us: int, offboard_us: int | None) -> bool:
         fault = entry.fault
         if fault.after_offboard_s is not None:
             if offboard_us is None:
@@ -113,10 +113,10 @@ class FaultEffects:
 
     Args:
         state: the autopilot's state.
-        vehicle: receives faults of estimate and battery.
-        commander: receives faults of arming and mode.
+        vehicle: changed by faults of the estimate and the battery.
+        commander: changed by faults of arming and mode.
         control: its held position and heading follow an estimator reset.
-        links: receive faults of messages.
+        links: changed by faults of messages.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class FaultEffects:
         links: list[Link],
     ) -> None:
         self.offboard_us: int | None = None
-        """Vehicle time when setpoints first controlled the vehicle, us."""
+        """Vehicle time when setpoints first controlled the vehicle, us; None: not yet."""
         self.clock_frozen = False
         self._state = state
         self._vehicle = vehicle
@@ -138,38 +138,38 @@ class FaultEffects:
         self._telemetry_stops: list[StopTelemetry] = []
         self._nan_fields: list[NanField] = []
         self._gps_lost_us = 0
-        self._slipped_s = 0.0
+        self._lost_s = 0.0
 
-    def apply(self, began: list[VehicleFault], ended: list[VehicleFault]) -> None:
+    def apply(self, begun_faults: list[VehicleFault], ended_faults: list[VehicleFault]) -> None:
         """Apply the faults that began, and undo those that ended, as far as they can be undone."""
-        for fault in began:
+        for fault in begun_faults:
             self._begin(fault)
-        for fault in ended:
+        for fault in ended_faults:
             self._end(fault)
 
     def take_slip(self) -> float:
-        """Return the wall time that the clock has lost by `SlipClock` since the last call, s."""
-        slipped, self._slipped_s = self._slipped_s, 0.0
-        return slipped
+        """Return the wall time lost to `SlipClock` faults since the last call, s."""
+        lost_s, self._lost_s = self._lost_s, 0.0
+        return lost_s
 
-    def silenced(self, message_id: int) -> bool:
-        """Whether a fault stops this message now."""
+    def is_stopped(self, message_id: int) -> bool:
+        """Whether a `StopTelemetry` fault stops a message now."""
         if not self._telemetry_stops:
             return False
-        kind = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
-        name = kind.msgname
+        message_class = dialect.mavlink_map.get(message_id) or ardupilotmega.mavlink_map[message_id]
+        name = message_class.msgname
         return any(not fault.messages or name in fault.messages for fault in self._telemetry_stops)
 
-    def watch_position(self, converged_us: float, timeout_us: float) -> None:
+    def update_position_valid(self, position_valid_from_us: float, timeout_us: float) -> None:
         """Update ``position_valid`` of the autopilot's state.
 
         Args:
-            converged_us: vehicle time from which on the position is valid.
-            timeout_us: time for which it stays valid without GPS.
+            position_valid_from_us: vehicle time from which on the position is valid.
+            timeout_us: time for which the position stays valid without GPS.
         """
         state = self._state
         lost = not state.gps_ok and state.time_us - self._gps_lost_us >= timeout_us
-        state.position_valid = state.time_us >= converged_us and not lost
+        state.position_valid = state.time_us >= position_valid_from_us and not lost
 
     def _begin(self, fault: VehicleFault) -> None:
         match fault:
@@ -178,7 +178,7 @@ class FaultEffects:
             case FreezeClock():
                 self.clock_frozen = True
             case SlipClock():
-                self._slipped_s += fault.slip_ms * 1e-3
+                self._lost_s += fault.slip_ms * 1e-3
             case NanField():
                 self._nan_fields.append(fault)
                 self._set_link_hooks()
@@ -206,7 +206,7 @@ class FaultEffects:
                 self._nan_fields.remove(fault)
                 self._set_link_hooks()
             case PilotTakeover():
-                self._commander.pilot = False
+                self._commander.pilot_simulated = False
             case RefuseArming():
                 self._commander.refusal = None
             case GpsLoss():

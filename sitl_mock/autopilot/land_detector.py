@@ -1,4 +1,4 @@
-"""Land detector: contact with low thrust for some time is a landing; disarmed, contact suffices.
+"""Land detector: a landing is contact with low thrust for some time, or contact while disarmed.
 
 Without contact, or with more thrust, the vehicle counts as taken off at once.
 """
@@ -9,18 +9,18 @@ from sitl_mock.autopilot.events import Announce, EventKind
 from sitl_mock.autopilot.state import Landed, Mode, State
 
 LOW_THRUST_SHARE = 0.3
-"""Thrust below this share of the hover thrust is low."""
+"""Share of the hover thrust below which the thrust counts as low."""
 
 
 class LandDetector:
-    """Updates ``contact``, ``landed``, ``landed_state`` and ``flown`` of the state.
+    """Updates ``contact``, ``landed``, ``landed_state`` and ``took_off`` of the state.
 
     Args:
         state: the autopilot's state.
         announce: announces take-off and landing.
         hover_thrust: returns the thrust command that hovers, 0..1.
         landed_after_us: contact with low thrust for this time is a landing.
-        climbing: returns whether a take-off is under way and has not reached its height.
+        is_climbing: returns whether a take-off is under way and has not reached its height.
     """
 
     def __init__(
@@ -30,13 +30,13 @@ class LandDetector:
         *,
         hover_thrust: Callable[[], float],
         landed_after_us: int,
-        climbing: Callable[[], bool],
+        is_climbing: Callable[[], bool],
     ) -> None:
         self._state = state
         self._announce = announce
         self._hover_thrust = hover_thrust
         self._landed_after_us = landed_after_us
-        self._climbing = climbing
+        self._is_climbing = is_climbing
         self._resting_since_us = 0
 
     def step(self, *, contact: bool) -> None:
@@ -55,7 +55,7 @@ class LandDetector:
         if not contact or self._thrust_is_high():
             self._resting_since_us = state.time_us
             state.landed = False
-            state.flown = state.flown or not contact
+            state.took_off = state.took_off or not contact
         elif not state.armed or state.time_us - self._resting_since_us >= self._landed_after_us:
             state.landed = True
 
@@ -69,7 +69,7 @@ class LandDetector:
         state = self._state
         if state.landed:
             return Landed.ON_GROUND
-        if self._climbing():
+        if self._is_climbing():
             return Landed.TAKEOFF
         if state.mode is Mode.LAND:
             return Landed.LANDING

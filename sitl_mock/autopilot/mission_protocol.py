@@ -13,8 +13,8 @@ from sitl_mock.link.link import Link
 
 _ACCEPTED = dialect.MAV_MISSION_ACCEPTED
 _PLAN_TYPES = range(3)
-"""Mission, fence and rally points."""
-_MOST_ITEMS = 1000
+"""MAV_MISSION_TYPE of mission, fence and rally points."""
+_MAX_ITEMS = 1000
 """Largest number of items in a plan."""
 
 
@@ -22,8 +22,8 @@ class _Upload(NamedTuple):
     """A plan that is being uploaded: its sender, and its items so far."""
 
     mission_type: int
-    size: int
-    client: tuple[int, int]
+    item_count: int
+    sender: tuple[int, int]
     items: list[Message]
 
 
@@ -31,7 +31,7 @@ class MissionProtocol:
     """Keeps one plan of each type, and returns it unchanged."""
 
     def __init__(self) -> None:
-        self.plans: dict[int, list[Message]] = {kind: [] for kind in _PLAN_TYPES}
+        self.plans: dict[int, list[Message]] = {mission_type: [] for mission_type in _PLAN_TYPES}
         self._upload: _Upload | None = None
         self.handlers: dict[str, Callable[[Message, Link], None]] = {
             "MISSION_REQUEST_LIST": self._send_count,
@@ -61,7 +61,7 @@ class MissionProtocol:
     def _begin_upload(self, message: Message, link: Link) -> None:
         if message.mission_type not in self.plans:
             _acknowledge(message, link, dialect.MAV_MISSION_UNSUPPORTED)
-        elif message.count > _MOST_ITEMS:
+        elif message.count > _MAX_ITEMS:
             _acknowledge(message, link, dialect.MAV_MISSION_NO_SPACE)
         elif message.count == 0:
             self.plans[message.mission_type] = []
@@ -72,14 +72,14 @@ class MissionProtocol:
 
     def _take_item(self, message: Message, link: Link) -> None:
         upload = self._upload
-        if upload is None or upload.client != _sender(message):
+        if upload is None or upload.sender != _sender(message):
             _acknowledge(message, link, dialect.MAV_MISSION_ERROR)
             return
         if message.seq != len(upload.items):
             self._request_item(link, upload)
             return
         upload.items.append(message)
-        if len(upload.items) < upload.size:
+        if len(upload.items) < upload.item_count:
             self._request_item(link, upload)
             return
         self.plans[upload.mission_type], self._upload = upload.items, None
@@ -87,14 +87,14 @@ class MissionProtocol:
 
     @staticmethod
     def _request_item(link: Link, upload: _Upload) -> None:
-        number, kind = len(upload.items), upload.mission_type
-        link.send(dialect.MAVLink_mission_request_int_message(*upload.client, number, kind))
+        number, mission_type = len(upload.items), upload.mission_type
+        link.send(dialect.MAVLink_mission_request_int_message(*upload.sender, number, mission_type))
 
     def _clear(self, message: Message, link: Link) -> None:
         clears_all = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
         cleared = _PLAN_TYPES if clears_all else self.plans.keys() & {message.mission_type}
-        for kind in cleared:
-            self.plans[kind] = []
+        for mission_type in cleared:
+            self.plans[mission_type] = []
         result = _ACCEPTED if cleared else dialect.MAV_MISSION_UNSUPPORTED
         _acknowledge(message, link, result)
 

@@ -34,7 +34,7 @@ class MotionTelemetry:
         state: the autopilot's state.
         vehicle: the vehicle, for rotors, reset counter and ArduPilot's shaped attitude target.
         origin: origin of the local frame.
-        slips: how far the time stamp of LOCAL_POSITION_NED is behind the true time.
+        slips: lag of the time stamp of LOCAL_POSITION_NED behind the true time.
     """
 
     def __init__(self, state: State, vehicle: Vehicle, origin: Geodetic, slips: StampSlips) -> None:
@@ -44,7 +44,7 @@ class MotionTelemetry:
         self._slips = slips
 
     airspeed = nan
-    """Airspeed in VFR_HUD; there is no airspeed sensor."""
+    """Airspeed in VFR_HUD, m/s; NaN because there is no airspeed sensor."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -65,7 +65,7 @@ class MotionTelemetry:
 
     @property
     def _boot_ms(self) -> int:
-        return self._state.shown_us // 1000
+        return self._state.stamp_us // 1000
 
     @property
     def _altitude(self) -> float:
@@ -73,7 +73,7 @@ class MotionTelemetry:
         return self._origin.altitude_m - self._state.estimate.position_ned[2]
 
     def attitude(self) -> Message:
-        """Return ATTITUDE."""
+        """Return ATTITUDE, with the estimated attitude and body rates."""
         estimate = self._state.estimate
         roll, pitch, heading = euler(estimate.q)
         return dialect.MAVLink_attitude_message(
@@ -81,25 +81,25 @@ class MotionTelemetry:
         )
 
     def attitude_quaternion(self) -> Message:
-        """Return ATTITUDE_QUATERNION."""
+        """Return ATTITUDE_QUATERNION, with the estimated attitude and body rates."""
         estimate = self._state.estimate
         return dialect.MAVLink_attitude_quaternion_message(
             self._boot_ms, *estimate.q, *estimate.body_rates
         )
 
     def local_position_ned(self) -> Message | None:
-        """Return LOCAL_POSITION_NED."""
+        """Return LOCAL_POSITION_NED, None without a valid position."""
         if not self._state.position_valid:
             return None
         estimate = self._state.estimate
         return dialect.MAVLink_local_position_ned_message(
-            self._boot_ms - self._slips.at(self._state.shown_us),
+            self._boot_ms - self._slips.lag_ms(self._state.stamp_us),
             *estimate.position_ned,
             *estimate.velocity_ned,
         )
 
     def global_position_int(self) -> Message | None:
-        """Return GLOBAL_POSITION_INT."""
+        """Return GLOBAL_POSITION_INT, None without a valid position."""
         state = self._state
         if not state.position_valid:
             return None
@@ -119,7 +119,7 @@ class MotionTelemetry:
         """Return ODOMETRY; velocity is in the local frame, as PX4 sends it."""
         estimate = self._state.estimate
         return dialect.MAVLink_odometry_message(
-            self._state.shown_us,
+            self._state.stamp_us,
             dialect.MAV_FRAME_LOCAL_NED,
             dialect.MAV_FRAME_LOCAL_NED,
             *estimate.position_ned,
@@ -141,7 +141,7 @@ class MotionTelemetry:
         )
 
     def position_target_local_ned(self) -> Message | None:
-        """Return POSITION_TARGET_LOCAL_NED while a position controller runs."""
+        """Return POSITION_TARGET_LOCAL_NED, None unless a position controller runs."""
         target = self._state.position_target
         if not target.active:
             return None
@@ -157,10 +157,10 @@ class MotionTelemetry:
         )
 
     def highres_imu(self) -> Message:
-        """Return HIGHRES_IMU."""
+        """Return HIGHRES_IMU; the magnetic field is that of a level vehicle heading north."""
         estimate = self._state.estimate
         return dialect.MAVLink_highres_imu_message(
-            self._state.shown_us,
+            self._state.stamp_us,
             *estimate.specific_force_frd,
             *estimate.body_rates,
             *MAGNETIC_FIELD_NED,
@@ -172,11 +172,11 @@ class MotionTelemetry:
         )
 
     def pressure_hpa(self) -> float:
-        """Return the air pressure at the estimated height (ICAO standard atmosphere)."""
+        """Return the air pressure at the estimated altitude, hPa (ICAO standard atmosphere)."""
         return float(_SEA_LEVEL_HPA * (1.0 - 2.25577e-5 * self._altitude) ** 5.25588)
 
     def vfr_hud(self) -> Message:
-        """Return VFR_HUD."""
+        """Return VFR_HUD; the groundspeed is horizontal."""
         state = self._state
         vx, vy, vz = state.estimate.velocity_ned
         thrust = state.attitude_target.thrust
@@ -186,11 +186,11 @@ class MotionTelemetry:
         )
 
     def altitude(self) -> Message:
-        """Return ALTITUDE."""
+        """Return ALTITUDE; altitude_terrain is always 0."""
         state = self._state
         up, altitude = -state.estimate.position_ned[2], self._altitude
         return dialect.MAVLink_altitude_message(
-            state.shown_us, altitude, altitude, up, up + state.home_ned[2], 0.0, up
+            state.stamp_us, altitude, altitude, up, up + state.home_ned[2], 0.0, up
         )
 
     def servo_output_raw(self) -> Message:
@@ -199,12 +199,12 @@ class MotionTelemetry:
         outputs = [900] * 16
         if state.armed:
             throttles = self._vehicle.truth.throttles
-            outputs[: len(throttles)] = [1000 + round(1000 * share) for share in throttles]
-        return dialect.MAVLink_servo_output_raw_message(state.shown_us & 0xFFFFFFFF, 0, *outputs)
+            outputs[: len(throttles)] = [1000 + round(1000 * throttle) for throttle in throttles]
+        return dialect.MAVLink_servo_output_raw_message(state.stamp_us & 0xFFFFFFFF, 0, *outputs)
 
     def vibration(self) -> Message:
         """Return VIBRATION; the simulated airframe does not vibrate."""
-        return dialect.MAVLink_vibration_message(self._state.shown_us, 0.0, 0.01, 0.11, 0, 0, 0)
+        return dialect.MAVLink_vibration_message(self._state.stamp_us, 0.0, 0.01, 0.11, 0, 0, 0)
 
     def _heading_deg(self) -> float:
         return degrees(yaw(self._state.estimate.q)) % 360.0

@@ -17,7 +17,7 @@ from sitl_mock.link.link import Link
 HASH_NAME = "_HASH_CHECK"
 _NO_INDEX = -1
 _NO_INDEX_UNSIGNED = 65535
-_SENT_PER_SLOT = 4
+_PARAMETERS_PER_SLOT = 4
 """Number of parameters of a list that are sent in one slot."""
 
 
@@ -32,13 +32,13 @@ class ParameterProtocol:
     def __init__(self, parameters: ParameterTable, encoding: Encoding) -> None:
         self._parameters = parameters
         self._encoding = encoding
-        self._listing: dict[str, tuple[Link, int]] = {}
+        self._running_lists: dict[str, tuple[Link, int]] = {}
 
     def request_list(self, _: Message, link: Link) -> None:
         """PARAM_REQUEST_LIST: send every parameter, a few each slot; PX4 sends its hash first."""
-        if self._encoding.hashed:
+        if self._encoding.has_hash:
             self._send_hash(link)
-        self._listing[link.name] = (link, 0)
+        self._running_lists[link.name] = (link, 0)
 
     def request_read(self, message: Message, link: Link) -> None:
         """PARAM_REQUEST_READ: send one parameter, by index or, with index -1, by name.
@@ -48,7 +48,7 @@ class ParameterProtocol:
         index = message.param_index
         if index == _NO_INDEX:
             name = message.param_id
-            if name == HASH_NAME and self._encoding.hashed:
+            if name == HASH_NAME and self._encoding.has_hash:
                 self._send_hash(link)
             elif name in self._parameters:
                 self._send_alone(name, link)
@@ -66,7 +66,7 @@ class ParameterProtocol:
         PX4's hash cannot be set; such a message is ignored.
         """
         name = message.param_id
-        if name == HASH_NAME and self._encoding.hashed:
+        if name == HASH_NAME and self._encoding.has_hash:
             return
         if name not in self._parameters:
             self._refuse(message, link, dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST)
@@ -87,29 +87,31 @@ class ParameterProtocol:
 
     def step(self) -> None:
         """Send the next few parameters of every requested list."""
-        if not self._listing:
+        if not self._running_lists:
             return
-        for key, (link, index) in list(self._listing.items()):
-            end = min(index + _SENT_PER_SLOT, len(self._parameters))
+        for key, (link, index) in list(self._running_lists.items()):
+            end = min(index + _PARAMETERS_PER_SLOT, len(self._parameters))
             for position in range(index, end):
                 self._send(self._parameters.name_of(position), position, link)
             if end == len(self._parameters):
-                del self._listing[key]
+                del self._running_lists[key]
             else:
-                self._listing[key] = (link, end)
+                self._running_lists[key] = (link, end)
 
     def _send_alone(self, name: str, link: Link) -> None:
         """Send a parameter that is not part of a list."""
-        indexed = self._encoding.indexed
-        self._send(name, self._parameters.index_of(name) if indexed else _NO_INDEX_UNSIGNED, link)
+        sends_index = self._encoding.sends_index
+        self._send(
+            name, self._parameters.index_of(name) if sends_index else _NO_INDEX_UNSIGNED, link
+        )
 
     def _send(self, name: str, index: int, link: Link) -> None:
-        value, kind = self._encoding.to_wire(name, self._parameters[name])
+        value, param_type = self._encoding.to_wire(name, self._parameters[name])
         link.send(
             dialect.MAVLink_param_value_message(
                 name.encode(),
                 value,
-                kind,
+                param_type,
                 len(self._parameters),
                 index,
             )

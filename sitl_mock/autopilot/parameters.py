@@ -30,15 +30,15 @@ class ParameterRefusedError(Exception):
 class Encoding(Protocol):
     """How an autopilot encodes parameters in messages."""
 
-    hashed: bool
+    has_hash: bool
     """Whether the list begins with a hash of all values."""
-    indexed: bool
-    """Whether the answer to a read by name, or to a set, has the index."""
+    sends_index: bool
+    """Whether the answer to a read by name, or to a set, contains the parameter's index."""
 
     def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
         """Return (param_value, param_type)."""
 
-    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+    def from_wire(self, name: str, value: float, param_type: int) -> int | float:
         """Return the value carried by a PARAM_SET.
 
         Raises:
@@ -49,8 +49,8 @@ class Encoding(Protocol):
 class BytewiseEncoding:
     """PX4's encoding: the float field carries the bytes of an integer."""
 
-    hashed = True
-    indexed = True
+    has_hash = True
+    sends_index = True
 
     def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
         """Return (param_value, param_type)."""
@@ -58,19 +58,19 @@ class BytewiseEncoding:
             return float(struct.unpack("<f", struct.pack("<i", value))[0]), INT32
         return value, REAL32
 
-    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+    def from_wire(self, name: str, value: float, param_type: int) -> int | float:
         """Return the value carried by a PARAM_SET.
 
         Raises:
             ParameterRefusedError: a type that PX4 does not have, or a value that is not finite.
         """
-        if kind == INT32:
+        if param_type == INT32:
             return int(struct.unpack("<i", struct.pack("<f", value))[0])
-        if kind == REAL32:
+        if param_type == REAL32:
             if not math.isfinite(value):
                 raise ParameterRefusedError("the value is not finite")
             return value
-        raise ParameterRefusedError(f"parameter type {kind} is neither INT32 nor REAL32")
+        raise ParameterRefusedError(f"parameter type {param_type} is neither INT32 nor REAL32")
 
 
 class FloatEncoding:
@@ -80,8 +80,8 @@ class FloatEncoding:
         types: MAV_PARAM_TYPE by name.
     """
 
-    hashed = False
-    indexed = False
+    has_hash = False
+    sends_index = False
 
     def __init__(self, types: Mapping[str, int]) -> None:
         self._types = types
@@ -90,7 +90,7 @@ class FloatEncoding:
         """Return (param_value, param_type)."""
         return float(value), self._types[name]
 
-    def from_wire(self, name: str, value: float, kind: int) -> int | float:
+    def from_wire(self, name: str, value: float, param_type: int) -> int | float:
         """Return the value carried by a PARAM_SET; its type field is ignored.
 
         Raises:
@@ -116,16 +116,16 @@ class ParameterTable:
     def __init__(self, defaults: Iterable[Parameter], overrides: dict[str, float]) -> None:
         self._values = dict(sorted(defaults))
         self._names = list(self._values)
-        self._index = {name: index for index, name in enumerate(self._names)}
+        self._index_by_name = {name: index for index, name in enumerate(self._names)}
         for name, value in overrides.items():
-            whole = isinstance(self._values[name], int) and float(value).is_integer()
-            self.set(name, int(value) if whole else float(value))
+            is_integer = isinstance(self._values[name], int) and float(value).is_integer()
+            self.set(name, int(value) if is_integer else float(value))
 
     def __len__(self) -> int:
         return len(self._names)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._index
+        return name in self._index_by_name
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -145,7 +145,7 @@ class ParameterTable:
 
     def index_of(self, name: str) -> int:
         """Return a parameter's index."""
-        return self._index[name]
+        return self._index_by_name[name]
 
     def set(self, name: str, value: int | float) -> None:
         """Change a value.
@@ -156,8 +156,8 @@ class ParameterTable:
                 into 32 bits.
         """
         if type(value) is not type(self._values[name]):
-            kind = "an integer" if isinstance(self._values[name], int) else "a float"
-            raise ParameterRefusedError(f"{name} is {kind}")
+            type_name = "an integer" if isinstance(self._values[name], int) else "a float"
+            raise ParameterRefusedError(f"{name} must be {type_name}")
         layout = "<f" if isinstance(value, float) else "<i"
         try:
             self._values[name] = struct.unpack(layout, struct.pack(layout, value))[0]
@@ -169,6 +169,6 @@ class ParameterTable:
         """Return PX4's ``_HASH_CHECK``: the CRC-32 over all names and values, in index order."""
         crc = 0xFFFFFFFF  # zlib inverts before and after; PX4 does not
         for name, value in self._values.items():
-            kind = "<i" if isinstance(value, int) else "<f"
-            crc = zlib.crc32(name.encode() + struct.pack(kind, value), crc)
+            layout = "<i" if isinstance(value, int) else "<f"
+            crc = zlib.crc32(name.encode() + struct.pack(layout, value), crc)
         return crc ^ 0xFFFFFFFF

@@ -1,7 +1,7 @@
 """The interface of a simulated autopilot: everything in which PX4 and ArduPilot differ.
 
-A personality has its own numbers and texts. It builds its behaviour (`Rules`) from the parts that
-every vehicle has (`VehicleParts`).
+A personality has its own numbers and texts. It builds its `Behaviour` from the parts that every
+vehicle has (`VehicleParts`).
 """
 
 from collections.abc import Callable, Collection
@@ -46,10 +46,10 @@ class VehicleParts(NamedTuple):
     """Vehicle time at which the boot ends (`mock.prearm_delay_s`), us; before it, arming is refused
     in modes that need a position, on PX4 in all modes."""
     slips: StampSlips
-    """How far the time stamp of LOCAL_POSITION_NED is behind the true time."""
+    """Lag of the time stamp of LOCAL_POSITION_NED behind the true time."""
 
 
-class Rules(NamedTuple):
+class Behaviour(NamedTuple):
     """The behaviour of an autopilot, built for one vehicle."""
 
     control: ModeControl
@@ -61,14 +61,14 @@ class Rules(NamedTuple):
     """Message id -> builder."""
     handlers: dict[str, Callable[[Message, Link], None]]
     """Message name -> handler, for messages that only this autopilot handles."""
-    converged_us: float
+    position_valid_from_us: float
     """Vehicle time at which the position becomes valid, us."""
     position_timeout_us: Callable[[], float]
     """Time for which the position stays valid without GPS, us."""
 
 
 class Personality(Protocol):
-    """One autopilot."""
+    """A simulated autopilot, such as PX4: its numbers, and how to build its `Behaviour`."""
 
     boot_mode: Mode
     system_id_parameter: str
@@ -92,5 +92,5 @@ class Personality(Protocol):
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Return the mode of a custom_mode, None if there is no such mode."""
 
-    def rules(self, parts: VehicleParts) -> Rules:
+    def behaviour(self, parts: VehicleParts) -> Behaviour:
         """Build the behaviour for one vehicle."""

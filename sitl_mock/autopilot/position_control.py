@@ -11,7 +11,7 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, along_heading, norm
 from sitl_mock.physics.rigid_body import GRAVITY
 
 _LARGEST_TILT = radians(80.0)
-"""Upper bound of the tilt limit."""
+"""Upper bound of the tilt limit, rad."""
 
 
 class PositionDemand(NamedTuple):
@@ -38,7 +38,7 @@ def setpoint_demand(
     Args:
         setpoint: the setpoint. If it has no yaw, its yaw rate changes ``yaw``.
         q: present attitude, for a setpoint relative to the heading (``in_body_heading``).
-        yaw: yaw of the demand before this one, rad.
+        yaw: yaw of the previous demand, rad.
         speeds: limits of the speed: horizontal, up, down, m/s.
         dt: the period, s.
     """
@@ -62,7 +62,7 @@ class PositionOutput(NamedTuple):
 
 
 class PositionGains(NamedTuple):
-    """Gains and limits; thrusts are normalised, 0..1."""
+    """Gains (1/s, integrals 1/s^2), tilt limit (rad) and normalised thrusts (0..1)."""
 
     horizontal_position: float  # velocity per position error, 1/s
     vertical_position: float
@@ -129,7 +129,7 @@ class PositionController:
 
 
 def _velocity_setpoint(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
-    """Return the velocity setpoint, NED; NaN = none."""
+    """Return the velocity setpoint, m/s NED; NaN = none."""
     factors = (gains.horizontal_position, gains.horizontal_position, gains.vertical_position)
     velocity_setpoint = []
     for axis in range(3):

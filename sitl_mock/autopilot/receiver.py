@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.autopilot.commander import DENIED
 from sitl_mock.autopilot.commands import Command
 from sitl_mock.autopilot.mission_protocol import MissionProtocol
-from sitl_mock.autopilot.personality import Personality, Rules
+from sitl_mock.autopilot.personality import Behaviour, Personality
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
@@ -32,18 +32,18 @@ class Receiver:
 
     Args:
         state: the autopilot's state.
-        rules: the autopilot's behaviour.
+        behaviour: the autopilot's behaviour.
         personality: decodes custom modes, and defines which components the autopilot answers for.
         system_id: system id of this vehicle.
     """
 
     def __init__(
-        self, state: State, rules: Rules, personality: Personality, system_id: int
+        self, state: State, behaviour: Behaviour, personality: Personality, system_id: int
     ) -> None:
-        self.clock_ns: Callable[[], int] = lambda: state.shown_us * 1000
+        self.clock_ns: Callable[[], int] = lambda: state.stamp_us * 1000
         """Clock that answers TIMESYNC: vehicle time, ns."""
-        self._commander = commander = rules.commander
-        self._commands = rules.commands
+        self._commander = commander = behaviour.commander
+        self._commands = behaviour.commands
         self._personality = personality
         self._system_id = system_id
         self._handlers: dict[str, Callable[[Message, Link], None]] = {
@@ -55,11 +55,11 @@ class Receiver:
             "SET_MODE": self._set_mode,
             "TIMESYNC": self._timesync,
             "PING": self._ping,
-            "PARAM_REQUEST_LIST": rules.parameter_protocol.request_list,
-            "PARAM_REQUEST_READ": rules.parameter_protocol.request_read,
-            "PARAM_SET": rules.parameter_protocol.set,
+            "PARAM_REQUEST_LIST": behaviour.parameter_protocol.request_list,
+            "PARAM_REQUEST_READ": behaviour.parameter_protocol.request_read,
+            "PARAM_SET": behaviour.parameter_protocol.set,
             **MissionProtocol().handlers,
-            **rules.handlers,
+            **behaviour.handlers,
         }
 
     def handle(self, message: Message, link: Link) -> None:
@@ -70,12 +70,12 @@ class Receiver:
         """
         if not link.accepts(message):
             return
-        link.heard = True
+        link.client_heard = True
         handler = self._handlers.get(message.get_type())
-        if handler is not None and self._for_us(message):
+        if handler is not None and self._is_for_us(message):
             handler(message, link)
 
-    def _for_us(self, message: Message) -> bool:
+    def _is_for_us(self, message: Message) -> bool:
         system = getattr(message, "target_system", _BROADCAST)
         component = getattr(message, "target_component", _BROADCAST)
         return system in (_BROADCAST, self._system_id) and (
@@ -111,8 +111,8 @@ class Receiver:
         self._run(Command(message.command, parameters), message, link)
 
     def _set_mode(self, message: Message, link: Link) -> None:
-        custom = message.custom_mode
-        mode = self._personality.mode_of(custom)
+        custom_mode = message.custom_mode
+        mode = self._personality.mode_of(custom_mode)
         valid = mode and message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         result = self._commander.request_mode(mode) if mode and valid else DENIED
         self._acknowledge(dialect.MAV_CMD_DO_SET_MODE, result, message, link)

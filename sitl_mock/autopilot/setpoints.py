@@ -31,8 +31,8 @@ class AttitudeSetpoint(NamedTuple):
     """Attitude and/or rates with thrust, from SET_ATTITUDE_TARGET.
 
     ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = none given, NaN = hold the
-    rate; ``yaw_rate`` is the feed-forward of attitude control; thrust 0..1 (ArduPilot: or the
-    climb rate, with 0.5 = none), NaN = none.
+    rate; ``yaw_rate`` (rad/s) is the feed-forward of attitude control; ``thrust`` 0..1, NaN = none
+    (with ArduPilot it may mean a climb rate, 0.5 = zero).
     """
 
     q: Quaternion | None
@@ -62,7 +62,7 @@ def position_setpoint(message: Message) -> PositionSetpoint | None:
     """Decode a SET_POSITION_TARGET_LOCAL_NED; None if it controls nothing or is not supported.
 
     Supported are MAV_FRAME_LOCAL_NED, and MAV_FRAME_BODY_NED/_FRD for velocity and acceleration.
-    Forces are not.
+    Forces are not supported.
     """
     mask = message.type_mask
     in_body = message.coordinate_frame in _BODY_FRAMES
@@ -98,21 +98,21 @@ class OffboardStream:
 
     Attributes:
         setpoint: the setpoint; None before the first.
-        received: number of setpoints accepted so far.
-        last_us: vehicle time at which the latest was received, us; None before the first.
-        fresh: whether it arrived since the last call of `take_fresh`.
+        setpoint_count: number of setpoints accepted so far.
+        last_us: vehicle time at which the setpoint was received, us; None before the first.
+        fresh: whether a setpoint arrived since the last call of `take_fresh`.
     """
 
     def __init__(self) -> None:
         self.setpoint: Setpoint | None = None
-        self.received = 0
+        self.setpoint_count = 0
         self.last_us: int | None = None
         self.fresh = False
 
     def accept(self, setpoint: Setpoint, now_us: int) -> None:
         """Accept a setpoint that was received at `now_us`; it replaces the one before."""
         self.setpoint = setpoint
-        self.received += 1
+        self.setpoint_count += 1
         self.last_us = now_us
         self.fresh = True
 

@@ -5,7 +5,7 @@ from random import Random
 
 
 class StampSlips:
-    """How far a time stamp is behind the true time: 0 or 1 ms, which changes at random times.
+    """Lag of a time stamp behind the true time: 0 or 1 ms, changing at random times.
 
     Args:
         rate_hz: mean number of changes (slips) per second; 0 = none.
@@ -18,8 +18,8 @@ class StampSlips:
         self._slipped = False
         self._next_us = self._next_slip_us(0.0)
 
-    def at(self, now_us: int) -> int:
-        """Return how far the stamp is behind `now_us`, 0 or 1 ms. Times must not decrease."""
+    def lag_ms(self, now_us: int) -> int:
+        """Return the time stamp's lag behind ``now_us`` (which must not decrease), 0 or 1 ms."""
         if now_us >= self._next_us:
             self._slipped = not self._slipped
             self._next_us = self._next_slip_us(now_us)

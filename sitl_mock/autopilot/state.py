@@ -72,26 +72,26 @@ class State:
 
     estimate: Estimate
     time_us: int = 0
-    shown_us: int = 0
+    stamp_us: int = 0
     """Time in telemetry; it differs from ``time_us`` only while a fault freezes the clock."""
     armed: bool = False
     armed_at_us: int = 0
     mode: Mode = Mode.LOITER
     intended_mode: Mode = Mode.LOITER
-    after_disarming: Mode = Mode.LOITER
+    mode_after_disarming: Mode = Mode.LOITER
     """The mode that PX4 enters when it disarms."""
     status_us: int = 0
-    """When PX4 last published its status (mode and arming)."""
+    """Vehicle time at which PX4 last published its status (mode and arming), us."""
     failsafe: bool = False
     prearm_problem: str | None = "system is booting"
-    """Why arming is refused, None if it is not."""
+    """Reason for which arming is refused, None if it is allowed."""
     contact: bool = True
-    """The vehicle touches the ground."""
+    """Whether the vehicle touches the ground."""
     landed: bool = True
-    """The land detector's result."""
+    """Whether the land detector reports landed."""
     landed_state: Landed = Landed.ON_GROUND
-    flown: bool = False
-    """It took off since arming."""
+    took_off: bool = False
+    """Whether the vehicle has left the ground since arming."""
     position_valid: bool = True
     gps_ok: bool = True
     battery_remaining: float = 1.0
@@ -103,11 +103,11 @@ class State:
     attitude_target: AttitudeTargetEcho = field(default_factory=AttitudeTargetEcho)
     position_target: PositionTargetEcho = field(default_factory=PositionTargetEcho)
     height_controlled: bool = False
-    """ArduPilot's height controller runs."""
+    """Whether ArduPilot's height controller runs."""
     position_controlled: bool = False
-    """ArduPilot's horizontal position controller runs."""
+    """Whether ArduPilot's horizontal position controller runs."""
     aborted: bool = False
-    """ArduPilot's process has ended, so it sends nothing more."""
+    """Whether ArduPilot's process has ended; it then sends nothing more."""
 
     @property
     def time_s(self) -> float:

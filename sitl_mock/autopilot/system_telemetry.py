@@ -17,7 +17,7 @@ UNIX_AT_BOOT_US = 1_795_236_148_441_838
 _PREARM_CHECK = dialect.MAV_SYS_STATUS_PREARM_CHECK
 _GPS_SENSOR = dialect.MAV_SYS_STATUS_SENSOR_GPS
 NO_VALUE = 65535
-"""An unsigned 16-bit field without a value."""
+"""Content of an unsigned 16-bit field that has no value."""
 
 
 class SystemTelemetry:
@@ -51,7 +51,7 @@ class SystemTelemetry:
         }
 
     def extended_sys_state(self) -> Message:
-        """Return EXTENDED_SYS_STATE."""
+        """Return EXTENDED_SYS_STATE, with the land detector's state."""
         return dialect.MAVLink_extended_sys_state_message(0, int(self._state.landed_state))
 
     def _sys_status(self, present: int, enabled: int, healthy: int, load: int) -> Message:
@@ -75,13 +75,18 @@ class SystemTelemetry:
             *(0,) * 6,
         )
 
-    def _battery_status(self, function: int, kind: int, used_mah: int, used_hj: int) -> Message:
-        """Return BATTERY_STATUS; as in both autopilots, cell 1 has the voltage of the pack."""
+    def _battery_status(
+        self, function: int, battery_type: int, used_mah: int, used_hj: int
+    ) -> Message:
+        """Return BATTERY_STATUS; as in both autopilots, cell 1 has the voltage of the pack.
+
+        ``used_mah`` is the used charge, mAh; ``used_hj`` the used energy, hJ.
+        """
         battery = self._vehicle.battery
         return dialect.MAVLink_battery_status_message(
             0,
             function,
-            kind,
+            battery_type,
             32767,
             [round(battery.voltage_v * 1e3)] + [NO_VALUE] * 9,
             clip(battery.current_a * 1e2, 15),
@@ -100,7 +105,7 @@ class SystemTelemetry:
         position = to_geodetic(self._origin, state.estimate.position_ned).as_integers()
         vx, vy, _ = state.estimate.velocity_ned
         return dialect.MAVLink_gps_raw_int_message(
-            state.shown_us,
+            state.stamp_us,
             fix,
             *position,
             *dilutions,
@@ -112,7 +117,7 @@ class SystemTelemetry:
         )
 
     def home_position(self) -> Message | None:
-        """Return HOME_POSITION."""
+        """Return HOME_POSITION, with the attitude when home was set."""
         return self._home_position(self._state.home_q)
 
     def _home_position(self, q: Quaternion) -> Message:
@@ -128,24 +133,24 @@ class SystemTelemetry:
         )
 
     def gps_global_origin(self) -> Message | None:
-        """Return GPS_GLOBAL_ORIGIN."""
+        """Return GPS_GLOBAL_ORIGIN, the origin of the local frame."""
         return dialect.MAVLink_gps_global_origin_message(*self._origin.as_integers(), 0)
 
     def system_time(self) -> Message:
-        """Return SYSTEM_TIME."""
-        shown = self._state.shown_us
-        return dialect.MAVLink_system_time_message(UNIX_AT_BOOT_US + shown, shown // 1000)
+        """Return SYSTEM_TIME: Unix time and time since boot."""
+        stamp_us = self._state.stamp_us
+        return dialect.MAVLink_system_time_message(UNIX_AT_BOOT_US + stamp_us, stamp_us // 1000)
 
     def timesync(self) -> Message:
         """Return a TIMESYNC request with the vehicle's clock, ns."""
-        return dialect.MAVLink_timesync_message(0, self._state.shown_us * 1000)
+        return dialect.MAVLink_timesync_message(0, self._state.stamp_us * 1000)
 
     def mission_current(self) -> Message:
         """Return MISSION_CURRENT: there is no mission."""
         return dialect.MAVLink_mission_current_message(0, NO_VALUE, 1, 2)
 
     def autopilot_version(self) -> Message:
-        """Return AUTOPILOT_VERSION."""
+        """Return AUTOPILOT_VERSION, with the autopilot's `Identity`."""
         identity = self._identity
         return dialect.MAVLink_autopilot_version_message(
             identity.capabilities,

@@ -48,11 +48,11 @@ class AirframeConfig(Section):
     rotational_drag_n_m_s: NonNegative = 0.025
     """Aerodynamic damping torque in N m per rad/s, equal about all axes."""
     thrust_slope_m_s2: Positive = 19.55
-    """Slope of the linear part: specific thrust (T/m) per throttle."""
+    """Slope of the thrust curve's linear part: specific thrust (thrust / mass) per throttle."""
     thrust_offset_m_s2: NonNegative = 0.22
-    """Specific thrust of the linear part, extrapolated to throttle 0."""
+    """Specific thrust at throttle 0 if the linear part of the thrust curve is extrapolated."""
     thrust_linear_from: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.15
-    """From this throttle on, slope and offset give the thrust; below it, a straight line from 0."""
+    """Throttle from which the thrust curve is its linear part; below, a straight line from 0."""
     rotor_lag_ms: Positive = 50.0
     """Time constant of each rotor's thrust (first order)."""
     rotor_arm_m: Positive = 0.2
@@ -60,9 +60,9 @@ class AirframeConfig(Section):
     rotor_drag_ratio_m: Positive = 0.02
     """Reaction torque about body z per thrust of a rotor, N m per N."""
     crash_tilt_deg: Annotated[float, Field(gt=0.0, le=180.0)] = 45.0
-    """A touchdown at more tilt than this is a crash."""
+    """Tilt above which a touchdown is a crash."""
     crash_speed_m_s: Positive = 5.0
-    """A touchdown at more sink speed than this is a crash."""
+    """Sink speed above which a touchdown is a crash."""
     ground_levelling_ms: Positive = 50.0
     """Time constant with which the vehicle levels on the ground."""
 
@@ -87,7 +87,7 @@ class WindConfig(Section):
 
 
 class BatteryConfig(Section):
-    """A lithium-polymer battery whose voltage sags; the thrust falls with it."""
+    """A lithium-polymer battery; when its voltage sags, the thrust falls."""
 
     cells: Annotated[int, Field(ge=1, le=14)] = 4
     capacity_ah: Positive = 5.0
@@ -104,4 +104,4 @@ class BatteryConfig(Section):
     hover_current_a: NonNegative = 10.0
     """Current of the rotors in a hover; it grows with thrust to the power 1.5."""
     thrust_exponent: NonNegative = 2.0
-    """Thrust grows with (voltage / voltage of the full battery in a hover) to this power."""
+    """Exponent with which thrust grows with (voltage / voltage of the full battery in a hover)."""

@@ -12,7 +12,7 @@ _EXAMPLES = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 @dataclass(frozen=True)
 class Udp:
-    """UDP; the key ``port`` sets the ports."""
+    """UDP; the key ``mock.port`` sets the ports of vehicle and companion."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def parse_endpoint(text: str) -> EndpointAddress:
 
 
 def _is_host(text: str) -> bool:
-    """Whether the resolver accepts this name: no label is empty or longer than 63 characters."""
+    """Whether the resolver accepts a host name: no label is empty or longer than 63 characters."""
     try:
         text.encode("idna")
     except UnicodeError:
@@ -66,7 +66,7 @@ def for_vehicle(text: str, index: int) -> str:
     """Return the endpoint of the vehicle with this index, which counts from 0.
 
     The index is added to a TCP port. From index 1 on, a serial path gets the suffix ``-2``, ``-3``
-    ... Other texts are the same for all vehicles; `MockSettings.for_vehicle` sets the UDP ports.
+    ... Other texts stay as they are; `MockSettings.for_vehicle` sets the UDP ports.
 
     Raises:
         ConfigError: the TCP port would be above 65535.

@@ -7,13 +7,13 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, suggestion
 
-_MESSAGES = {kind.msgname: kind for kind in dialect.mavlink_map.values()}
+_MESSAGE_CLASSES = {each.msgname: each for each in dialect.mavlink_map.values()}
 Direction = Literal["to_companion", "from_companion", "both"]
 
 
 def _known_message(name: str) -> str:
-    if name not in _MESSAGES:
-        raise ValueError(f"unknown message {name}{suggestion(name, _MESSAGES)}")
+    if name not in _MESSAGE_CLASSES:
+        raise ValueError(f"unknown message {name}{suggestion(name, _MESSAGE_CLASSES)}")
     return name
 
 
@@ -21,14 +21,15 @@ MessageName = Annotated[str, AfterValidator(_known_message)]
 """The name of a MAVLink message, e.g. ATTITUDE_QUATERNION."""
 
 
-class Timed(Section):
-    """Start and duration of a fault, in vehicle time; without a start it begins at once."""
+class TimedFault(Section):
+    """Start and duration of a fault, in vehicle time; without a start the fault begins at once."""
 
     at_s: NonNegative | None = None
-    """Vehicle time at which the fault begins; a fault that is injected later begins at once."""
+    """Vehicle time at which the fault begins; if this time is over, the fault begins at once."""
     after_offboard_s: NonNegative | None = None
-    """Time from the first control by setpoints to the fault. On PX4 that is the first time armed in
-    OFFBOARD; on ArduPilot the first time in the air in GUIDED under SET_ATTITUDE_TARGET."""
+    """Time from the moment when setpoints first control the vehicle to the fault. The moment is on
+    PX4 the first time armed in OFFBOARD, on ArduPilot the first time in the air in GUIDED under
+    SET_ATTITUDE_TARGET."""
     duration_s: Positive | None = None
     """Duration of the fault; without it, the fault does not end."""
 
@@ -39,7 +40,7 @@ class Timed(Section):
         return self
 
 
-class LinkFault(Timed):
+class LinkFault(TimedFault):
     """Datagrams of the companion link are dropped, delayed, duplicated, reordered or corrupted.
 
     ``reorder`` holds a datagram back until the next one has passed. ``corrupt`` changes one byte.
@@ -56,7 +57,7 @@ class LinkFault(Timed):
     """For ``delay``: delay of the datagram in vehicle time."""
 
 
-class StopTelemetry(Timed):
+class StopTelemetry(TimedFault):
     """Telemetry streams stop; answers are still sent."""
 
     kind: Literal["stop_telemetry"]
@@ -64,13 +65,13 @@ class StopTelemetry(Timed):
     """Names of the messages to stop; empty = all."""
 
 
-class FreezeClock(Timed):
+class FreezeClock(TimedFault):
     """Telemetry continues with a constant timestamp."""
 
     kind: Literal["freeze_clock"]
 
 
-class SlipClock(Timed):
+class SlipClock(TimedFault):
     """The simulation stalls, and the vehicle clock does not catch up; no effect in lockstep."""
 
     kind: Literal["slip_clock"]
@@ -78,7 +79,7 @@ class SlipClock(Timed):
     """Time that the clock loses; ArduPilot's simulator on a busy computer: 10 to 16 ms."""
 
 
-class NanField(Timed):
+class NanField(TimedFault):
     """One float field of one message is NaN, on every link of the vehicle."""
 
     kind: Literal["nan_field"]
@@ -87,48 +88,48 @@ class NanField(Timed):
 
     @model_validator(mode="after")
     def _float_field(self) -> Self:
-        kind = _MESSAGES[self.message]
-        types = dict(zip(kind.fieldnames, kind.fieldtypes, strict=True))
-        floats = [name for name in types if types[name] in ("float", "double")]
-        if self.field not in floats:
-            known = ", ".join(floats) or "none"
+        message_class = _MESSAGE_CLASSES[self.message]
+        field_types = dict(zip(message_class.fieldnames, message_class.fieldtypes, strict=True))
+        float_fields = [name for name in field_types if field_types[name] in ("float", "double")]
+        if self.field not in float_fields:
+            known = ", ".join(float_fields) or "none"
             raise ValueError(
                 f"{self.message} has no float field {self.field!r}; its float fields: {known}"
             )
         return self
 
 
-class PilotTakeover(Timed):
+class PilotTakeover(TimedFault):
     """The pilot takes over and changes the mode."""
 
     kind: Literal["pilot_takeover"]
     mode: Literal["POSCTL", "ALTCTL", "STABILIZED", "MANUAL"] = "POSCTL"
-    """PX4's mode names; ArduCopter enters LOITER, ALT_HOLD, STABILIZE, STABILIZE."""
+    """Mode of the pilot, by PX4's name; ArduCopter enters LOITER, ALT_HOLD or (twice) STABILIZE."""
 
 
-class EstimatorReset(Timed):
-    """The estimate jumps, and the reset counter increments, which only PX4 sends (in ODOMETRY)."""
+class EstimatorReset(TimedFault):
+    """The estimate jumps, and the reset counter (only PX4 sends it, in ODOMETRY) increments."""
 
     kind: Literal["estimator_reset"]
     yaw_deg: Finite = 0.0
     position_ned_m: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
 
 
-class RefuseArming(Timed):
+class RefuseArming(TimedFault):
     """Arming is refused with a reason."""
 
     kind: Literal["refuse_arming"]
     reason: str = "system power unavailable"
 
 
-class LowBattery(Timed):
+class LowBattery(TimedFault):
     """The battery charge drops to a value."""
 
     kind: Literal["low_battery"]
     remaining: Fraction = 0.06
 
 
-class GpsLoss(Timed):
+class GpsLoss(TimedFault):
     """GPS loses its fix; the position becomes invalid after EKF2_NOAID_TOUT (ArduPilot: 10 s)."""
 
     kind: Literal["gps_loss"]

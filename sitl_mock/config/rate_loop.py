@@ -12,10 +12,10 @@ class AxisShaping(Section):
     """Shaping of one axis's rate setpoint before the controller (ArduPilot)."""
 
     acceleration_limit_rad_s2: Positive
-    """Limit on the change of the shaped rate."""
+    """Largest angular acceleration of the shaped rate."""
     attitude_gain_1_s: NonNegative = 4.5
-    """Body rate per angle between attitude and attitude target, for small angles. For larger ones
-    the rate is that which half the acceleration limit brings to zero at the target."""
+    """Body rate per angle between attitude and attitude target. At large angles the rate is lower,
+    so that braking at half the acceleration limit ends at the target."""
     delay_ms: NonNegative = 0.0
     """Delay from the arrival of a rate setpoint to its shaping."""
 
@@ -26,17 +26,17 @@ class AxisGains(Section):
     proportional_n_m_s: NonNegative
     """Torque per rate error, N m per rad/s."""
     integral_n_m: NonNegative = 0.0
-    """Torque gained per second and rate error, N m per rad."""
+    """Torque per integrated rate error, N m per rad."""
     feed_forward_n_m_s: Finite = 0.0
     """Torque per rate setpoint, N m per rad/s."""
     damping_n_m_s2: NonNegative = 0.0
     """Torque against the angular acceleration, N m per rad/s^2 (PX4's D term)."""
     integral_limit_n_m: NonNegative = 0.3
-    """Limit on the torque of the integral."""
+    """Largest torque of the integral term."""
     torque_filter_ms: NonNegative = 0.0
     """Time constant of the low pass on this axis's torque (PX4's MC_YAW_TQ_CUTOFF); 0 = none."""
     setpoint_delay_ms: NonNegative = 4.0
-    """Delay from the arrival of a rate setpoint, or from its shaping, to the controller."""
+    """Delay from the arrival of a rate setpoint, or from its shaping if any, to the controller."""
     shaping: AxisShaping | None = None
     """Shaping before the controller; give it for all three axes or for none."""
 

@@ -14,7 +14,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 _MOST_NAMES_LISTED = 20
 """Largest number of known names that a message lists."""
-_MUST = {
+_REQUIREMENTS = {
     "greater_than_equal": "must be at least {ge:.12g}",
     "greater_than": "must be more than {gt:.12g}",
     "less_than_equal": "must be at most {le:.12g}",
@@ -70,70 +70,70 @@ class ConfigError(Exception):
 def suggestion(word: str, known: Iterable[str]) -> str:
     """Return ``; did you mean ...?`` with the known name that is most like ``word``.
 
-    If none is like it: ``; known are ...`` with all names, or nothing if they are more than 20.
+    If none is similar: ``; known are ...`` with all names; with more than 20 names, no text.
     """
     names = list(known)
-    near = _nearest(word, names)
-    if near:
-        return f"; did you mean {near}?"
+    nearest = _nearest(word, names)
+    if nearest:
+        return f"; did you mean {nearest}?"
     return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_NAMES_LISTED else ""
 
 
 def _nearest(word: str, names: list[str]) -> str | None:
     """Return the name that is most like a mistyped word; None if none is similar enough."""
-    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
-    return near[0] if near else None
+    nearest = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    return nearest[0] if nearest else None
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
     """Return the first validation error as one sentence: the key, and what is wrong with it."""
     detail = error.errors()[0]
     path = [str(part) for part in detail["loc"]]
-    where = ".".join(["mock", *path])
+    full_key = ".".join(["mock", *path])
     if detail["type"] == "extra_forbidden":
         owner = _model_at(model, path[:-1])
         sibling_keys = owner.model_fields if owner else ()
-        other_paths = [other for other in _valid_paths(path[-1], model) if other != where]
+        other_paths = [other for other in _valid_paths(path[-1], model) if other != full_key]
         if other_paths and not any(key.startswith(f"{path[-1]}_") for key in sibling_keys):
-            return f"{where} is in the wrong section; write {' or '.join(other_paths)}"
+            return f"{full_key} is in the wrong section; write {' or '.join(other_paths)}"
         hint = suggestion(path[-1], sibling_keys) if owner else ""
-        return f"unknown key {where}{hint}"
+        return f"unknown key {full_key}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
-        return f"{where} must be a number: {_number_advice(str(detail['input']))}"
-    if fault := wrong_member(detail, model):
-        return f"{where}{fault}"
-    return f"{where}{wrong_value(error)} (got {detail['input']!r:.60})"
+        return f"{full_key} must be a number: {_number_advice(str(detail['input']))}"
+    if member_error := describe_wrong_member(detail, model):
+        return f"{full_key}{member_error}"
+    return f"{full_key}{describe_wrong_value(error)} (got {detail['input']!r:.60})"
 
 
-def wrong_value(error: ValidationError) -> str:
-    """Return what is wrong with the value of the first error, to be put after its path."""
+def describe_wrong_value(error: ValidationError) -> str:
+    """Return what is wrong with the first wrong value, to be put after the path of its key."""
     details = error.errors()
-    kind, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
-    if kind == "missing" and isinstance(details[0]["input"], list | tuple):
+    error_type, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
+    if error_type == "missing" and isinstance(details[0]["input"], list | tuple):
         count = len(details[0]["input"])
         missing = [each for each in details if each["loc"][:-1] == path[:-1]]
         return f" is missing: the list has {count} values and needs {count + len(missing)}"
-    if kind == "missing":
+    if error_type == "missing":
         return " is missing"
-    if kind == "literal_error":
+    if error_type == "literal_error":
         return f" must be {context['expected'].replace(chr(39), '')}"
-    if kind in _MUST:
-        return f" {_MUST[kind].format(**context)}"
+    if error_type in _REQUIREMENTS:
+        return f" {_REQUIREMENTS[error_type].format(**context)}"
     message = details[0]["msg"].removeprefix("Value error, ")
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
     return f": {message}"
 
 
-def wrong_member(detail: Any, annotation: Any) -> str:
-    """Return the message about a value, as of `faults`, that is no mapping or has no known kind.
+def describe_wrong_member(detail: Any, annotation: Any) -> str:
+    """Return why a value such as a fault is wrong: it is no mapping, or its ``kind`` is unknown.
 
     Args:
         detail: error reported by pydantic.
-        annotation: the union of the kinds of faults, or a section that has it in a key.
+        annotation: the union of the possible models, or a section with a key of this type.
 
     Returns:
-        The message to put after the path of the fault; empty if the error is another one.
+        the text to put after the path of the value; empty for other errors.
     """
     if detail["type"] == "model_attributes_type":
         return f" must be a mapping of keys to values (got {detail['input']!r:.60})"
@@ -142,13 +142,13 @@ def wrong_member(detail: Any, annotation: Any) -> str:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         annotation = annotation.model_fields[detail["loc"][0]].annotation
     kinds = [kind for each in _models_of(annotation) for kind in _kinds(each)]
-    listed = f"kinds are {', '.join(kinds)}"
+    known_kinds = f"kinds are {', '.join(kinds)}"
     if detail["type"] == "union_tag_not_found":
-        return f" needs a kind; {listed}"
+        return f" needs a kind; {known_kinds}"
     tag = detail["ctx"]["tag"]
-    near = _nearest(tag, kinds)
-    hint = f"did you mean {near}?; " if near else ""
-    return f": there is no kind {tag!r:.40}; {hint}{listed}"
+    nearest = _nearest(tag, kinds)
+    hint = f"did you mean {nearest}?; " if nearest else ""
+    return f": there is no kind {tag!r:.40}; {hint}{known_kinds}"
 
 
 def error_path(error: ValidationError) -> list[str]:
@@ -157,17 +157,17 @@ def error_path(error: ValidationError) -> list[str]:
 
 
 def _number_advice(text: str) -> str:
-    """Return the advice on a text that stands for a number: drop the unit, or write digits."""
+    """Return advice for a text in place of a number: drop the unit, or write digits."""
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         return f"write digits, not {text!r:.60}"
     number, unit = match[1].replace(",", "."), match[2].strip()
-    without_unit = f" without {unit!r:.20}, because the key's name has the unit" if unit else ""
+    without_unit = f" without {unit!r:.20}" if unit else ""
     return f"write {number}{without_unit} (got {text!r:.60})"
 
 
 def _valid_paths(key: str, model: type[BaseModel]) -> list[str]:
-    """Return the paths at which this key is valid: at the top of ``mock``, or in its sections."""
+    """Return the paths at which a key is valid: at the top of ``mock``, or in its sections."""
     paths = [f"mock.{key}"] if key in model.model_fields else []
     for section, field in model.model_fields.items():
         sections = [

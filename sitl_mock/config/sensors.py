@@ -7,47 +7,47 @@ from pydantic import Field, field_validator
 from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
 
 InnovationGains = tuple[NonNegative, NonNegative]
-"""Gains of one state: per position innovation, per velocity innovation."""
+"""Gains of one state of the filter: per position innovation, per velocity innovation."""
 
 
 class EkfConfig(Section):
     """Errors of the navigation filter, and the gains with which satellite fixes correct them.
 
     The filter integrates an acceleration that is wrong because its attitude is wrong. Delayed
-    satellite fixes correct it. Noise is given as standard deviation; the defaults are PX4's.
+    fixes correct the errors. Noise is given as standard deviation; the defaults are PX4's.
     """
 
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Delay of the filter's fusion time against now; it is at least ``position_delay_ms``."""
+    """Age of the motion that the filter fuses with a fix; at least ``position_delay_ms``."""
     position_late_ms: Finite = 0.0
-    """Mean delay of a fix's position beyond the fusion time, which the filter does not know."""
+    """Mean delay of a fix's position beyond ``fix_delay_ms``; the filter does not correct it."""
     velocity_late_ms: Finite = 0.0
-    """The same for a fix's velocity."""
+    """Mean delay of a fix's velocity beyond ``fix_delay_ms``; the filter does not correct it."""
     fix_slip_ms: NonNegative = 0.0
-    """Peak-to-peak amplitude of a sawtooth in both delays: they fall steadily, and then jump back.
-    The moment of the first jump is random."""
+    """Peak-to-peak amplitude of a sawtooth in ``position_late_ms`` and ``velocity_late_ms``. Each
+    falls steadily, then jumps back. The time of the first jump is random."""
     fix_slip_time_s: Positive = 14.0
-    """Period of the sawtooth."""
+    """Period of the sawtooth of ``fix_slip_ms``."""
     position_noise_m: NonNegative = 0.0246
     """Standard deviation of the noise of a fix's horizontal position, on each axis."""
     velocity_noise_m_s: NonNegative = 0.0238
     """Standard deviation of the noise of a fix's horizontal velocity, on each axis."""
     noise_time_s: Positive = 0.25
-    """Correlation time of the noise of position and velocity."""
+    """Correlation time of the noise of a fix's position and velocity."""
     tilt_noise_deg: NonNegative = 0.028
     """Standard deviation of the random walk of roll and pitch in 1 s; the fixes limit it."""
     tilt_bias_deg: tuple[Finite, Finite] = (0.0, 0.0)
     """Constant error of the attitude, as a rotation about north and east. The estimated bias of the
     accelerometer hides it in level flight; a horizontal acceleration causes a climb rate error."""
     yaw_error_deg: NonNegative = 0.3
-    """Error of the heading; it rotates the integrated acceleration."""
+    """Standard deviation of the heading error, which rotates the integrated acceleration."""
     yaw_time_s: Positive = 15.0
     """Correlation time of the heading error."""
     turn_yaw_ms: Finite = -4.0
-    """Heading error in a turn, from delayed fixes, as minus this times the turn rate of the course.
-    The heading takes seconds to reach this error, fewer at a larger acceleration."""
+    """Heading error in a turn per turn rate of the course, sign reversed; delayed fixes cause it.
+    The error builds up over seconds, faster at a larger acceleration."""
     compass_error_deg: Finite = 0.0
     """Heading error that the compass causes without acceleration; an acceleration reduces it."""
     yaw_rate_bias_deg_s: Finite = 0.0
@@ -57,26 +57,26 @@ class EkfConfig(Section):
     acceleration_scale: Annotated[float, Field(ge=-0.5, le=0.5)] = 0.002
     """Scale error of the integrated acceleration."""
     vertical_share: NonNegative = 0.75
-    """Ratio of vertical to horizontal noise."""
+    """Ratio of vertical to horizontal noise, of the fixes and of the integrated acceleration."""
     height_offset_m: Finite = 0.0
     """Constant error of the height: true minus estimated."""
     height_sag_s4_per_m: Finite = 0.0009
-    """Error of the height (true minus estimated) per squared horizontal acceleration; it lags by
-    seconds."""
+    """Error of the height (true minus estimated) per squared horizontal acceleration. The error
+    follows the acceleration over seconds."""
     sink_per_acceleration_ms: Finite = 4.0
-    """Error of the vertical velocity per horizontal acceleration: the velocity says that the
-    vehicle sinks while its position stays. It lags by seconds."""
+    """Error of the vertical velocity (estimated minus true, down) per horizontal acceleration. The
+    error follows the acceleration over seconds; the position has no such error."""
     height_noise_m: NonNegative = 0.036
-    """Standard deviation of the slow noise of the height, as of a barometer; the height follows it
-    within 2 s."""
+    """Standard deviation of the slow noise that the estimated height follows within 2 s, as of a
+    barometer."""
     height_noise_time_s: Positive = 6.0
     """Correlation time of the slow noise of the height."""
     position_gains: InnovationGains = (0.0774, 0.0494)
-    """Gains of the position, m per m and m per m/s."""
+    """Gains of the position for an innovation of position and velocity, m per m and m per m/s."""
     velocity_gains: InnovationGains = (0.0316, 0.0411)
-    """Gains of the velocity, m/s per m and m/s per m/s."""
+    """Gains of the velocity for an innovation of position and velocity, 1/s and m/s per m/s."""
     acceleration_gains: InnovationGains = (0.0056, 0.0102)
-    """Gains of the acceleration error, m/s^2 per m and m/s^2 per m/s."""
+    """Gains of the acceleration error for an innovation of position and velocity, 1/s^2 and 1/s."""
     predictor_ms: Positive = 250.0
     """Time constant with which the output predictor applies a correction of position or speed."""
     heading_predictor_ms: Positive = 250.0
@@ -147,8 +147,8 @@ class SensorConfig(Section):
     """Age of the estimated position and velocity."""
     stamp_slips_hz: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
     """How often per second the time stamp of LOCAL_POSITION_NED slips by 1 ms against its position,
-    back or forth. ArduPilot takes the time, in whole ms, when it writes the message; its default
-    is 1.6."""
+    back or forth. ArduPilot takes the time, in whole ms, when it writes the message; the
+    default for ArduPilot is 1.6."""
 
     @field_validator("ekf", mode="before")
     @classmethod

@@ -13,9 +13,9 @@ from sitl_mock.config.section import Finite, NonNegative, Positive, Section
 from sitl_mock.config.sensors import SensorConfig
 
 PORT_OFFSET = 40
-"""The vehicle binds ``port`` plus this for the companion link, as PX4's simulation does."""
+"""Offset from ``port`` to the UDP port that the vehicle itself binds, as in PX4's simulation."""
 GCS_PORT_OFFSET = 4020
-"""The vehicle binds ``gcs_port`` plus this for the ground station link (18570 for 14550)."""
+"""Offset from ``gcs_port`` to the UDP port that the vehicle itself binds (18570 for 14550)."""
 Port = Annotated[int, Field(ge=0, le=65535)]
 
 
@@ -25,7 +25,7 @@ class HomeConfig(Section):
     latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0)] = 47.3977433
     longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] = 8.5455942
     altitude_m: Finite = 489.4
-    """Above mean sea level."""
+    """Altitude of home above mean sea level."""
     heading_deg: Finite = 0.0
 
 
@@ -38,23 +38,22 @@ class LockstepConfig(Section):
     """Join the frames of a step, the beacon last, into datagrams of at most 1400 bytes; PX4 sends
     one datagram for each frame."""
     patience_s: Positive = 2.0
-    """After this wall time without an answer the vehicle continues in real time, until an answer to
-    the latest beacon arrives. Before the first beacon is answered, the time counts from the first
-    bytes of a client."""
+    """Wall time without an answer after which the vehicle continues in real time until the latest
+    beacon is answered. Before the first beacon is answered, the time counts from the first bytes
+    of a client."""
 
 
 class SigningConfig(Section):
     """MAVLink 2 signing on every link of the vehicle."""
 
     passphrase_file: Path
-    """The first line is the passphrase. The key is its SHA-256, as in ground stations. A relative
-    path is relative to the file that names it."""
+    """File whose first line is the passphrase; the passphrase's SHA-256 is the key, as in ground
+    stations. A relative path is relative to the configuration file."""
     accept_unsigned: bool | None = None
-    """Accept unsigned frames; frames with a wrong signature are never accepted. Null: as the
-    autopilot does: ArduPilot accepts them on the companion link (its SERIAL0), PX4 on no link.
-    """
+    """Whether unsigned frames are accepted; frames with a wrong signature never are. Null:
+    yes on ArduPilot's companion link (its SERIAL0), no on its other link and on PX4's links."""
     link_id: Annotated[int, Field(ge=0, le=254)] = 0
-    """Link id of the companion link in signatures; the ground station link has the next."""
+    """Link id of the companion link in signatures; the ground station link has the next id."""
 
 
 class VehicleSettings(Section):
@@ -69,7 +68,7 @@ class VehicleSettings(Section):
     """The companion link: udp (see ``port``); tcpin://HOST:PORT, for one client, boots when the
     client connects; serial:///PATH, a pseudo-terminal with a symbolic link at PATH."""
     gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
-    """0 = no ground station link."""
+    """UDP port of the ground station; 0 = no ground station link."""
     control_port: Port = 0
     """UDP port of the JSON control channel on 127.0.0.1; 0 = none."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
@@ -93,7 +92,7 @@ class VehicleSettings(Section):
     to 6.5 s; ArduPilot 41.6 s, which is its default."""
     lockstep: LockstepConfig = LockstepConfig()
     signing: SigningConfig | None = None
-    """Null: frames are not signed, and signatures are not checked."""
+    """Signing of all links; null: frames are not signed, and signatures are not checked."""
     home: HomeConfig = HomeConfig()
     parameters: dict[str, Finite] = Field(default_factory=dict)
     """Autopilot parameters that differ from their defaults."""

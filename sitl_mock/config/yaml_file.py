@@ -125,7 +125,7 @@ def load_yaml(path: Path) -> Document:
 
 
 def explain_yaml(error: Exception) -> str:
-    """Return the fault of a file that cannot be read as YAML, on one line."""
+    """Return why a file cannot be read as YAML, on one line."""
     mark = getattr(error, "problem_mark", None)
     if mark is not None and "'\\t'" in str(getattr(error, "problem", "")):
         return (

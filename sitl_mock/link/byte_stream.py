@@ -27,7 +27,7 @@ class ByteStream:
         self._descriptor = descriptor
         self._frames: deque[bytes] = deque()
         self._partial_frame = b""
-        self._unsent = b""
+        self._unsent_bytes = b""
 
     def receive(self) -> bytes | None:
         """Return the next complete frame, None if there is none yet."""
@@ -40,12 +40,12 @@ class ByteStream:
 
         They are also dropped while an earlier batch is not completely written.
         """
-        if self._unsent:
-            self._unsent = self._unsent[self._write(self._unsent) :]
-        if not self._unsent:
+        if self._unsent_bytes:
+            self._unsent_bytes = self._unsent_bytes[self._write(self._unsent_bytes) :]
+        if not self._unsent_bytes:
             data = b"".join(frames)
             written = self._write(data)
-            self._unsent = data[written:] if written else b""
+            self._unsent_bytes = data[written:] if written else b""
 
     def _read(self) -> None:
         try:

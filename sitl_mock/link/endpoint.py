@@ -9,15 +9,15 @@ MAX_BUNDLE = 1400
 class Endpoint(Protocol):
     """Sends and receives bytes without blocking. Frames that cannot be sent at once are dropped.
 
-    Only a byte stream keeps the rest of a batch when the kernel takes a part of it.
+    If the kernel takes only a part of a batch, a byte stream keeps the rest.
     """
 
     @property
-    def where(self) -> str:
-        """Address, for the user."""
+    def address(self) -> str:
+        """Address of the endpoint, as text for the user."""
 
     @property
-    def heard(self) -> bool:
+    def has_received(self) -> bool:
         """Whether anything was received yet."""
 
     @property
@@ -25,13 +25,13 @@ class Endpoint(Protocol):
         """Whether a client is connected; True where that cannot be known."""
 
     @property
-    def readable(self) -> list[int]:
+    def descriptors(self) -> list[int]:
         """File descriptors for select."""
 
     def receive(self) -> tuple[bytes, bool] | None:
         """Return the next datagram (of a byte stream: the next frame), None if there is none.
 
-        The flag says whether it came from the client to which we send.
+        The flag: whether the bytes came from the client to which the endpoint sends.
         """
 
     def send(self, datagrams: list[bytes]) -> None:

@@ -23,13 +23,14 @@ class Layout(NamedTuple):
 
 
 EVENT = Layout(410, 160, struct.Struct("<IIHBBB40s"))
-"""id, event_time_boot_ms, sequence, destination component and system, log_levels, arguments."""
+"""Fields: id, event_time_boot_ms, sequence, destination component and system, log_levels,
+arguments."""
 CURRENT_EVENT_SEQUENCE = Layout(411, 106, struct.Struct("<HB"))
-"""sequence, flags."""
+"""Fields: sequence, flags."""
 REQUEST_EVENT = Layout(412, 33, struct.Struct("<HHBB"))
-"""first_sequence, last_sequence, target system and component."""
+"""Fields: first_sequence, last_sequence, target system and component."""
 RESPONSE_EVENT_ERROR = Layout(413, 77, struct.Struct("<HHBBB"))
-"""sequence, sequence_oldest_available, target system and component, reason."""
+"""Fields: sequence, sequence_oldest_available, target system and component, reason."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +60,9 @@ class EventRequest:
         return self.frame[6]
 
 
-def event_request(unknown: Any) -> EventRequest | None:
+def event_request(message: Any) -> EventRequest | None:
     """Decode a message unknown to pymavlink; None if it is not a valid REQUEST_EVENT."""
-    frame = bytes(unknown.get_msgbuf())
+    frame = bytes(message.get_msgbuf())
     if frame[0] != 0xFD or int.from_bytes(frame[7:10], "little") != REQUEST_EVENT.message_id:
         return None
     end = _HEADER_BYTES + frame[1]

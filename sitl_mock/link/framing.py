@@ -45,8 +45,10 @@ def decode(datagram: bytes) -> list[Message]:
             start += 1
             continue
         frame = datagram[start : start + length]
-        known = dialect.mavlink_map.get(_message_id(frame)) if frame[0] == _MAGIC_V2 else None
-        valid, message = _decode_other(frame) if known is None else _decode_known(frame, known)
+        known_class = dialect.mavlink_map.get(_message_id(frame)) if frame[0] == _MAGIC_V2 else None
+        valid, message = (
+            _decode_other(frame) if known_class is None else _decode_known(frame, known_class)
+        )
         start += length if valid else 1
         if message is not None:
             messages.append(message)
@@ -57,13 +59,13 @@ def _message_id(frame: bytes) -> int:
     return frame[7] | frame[8] << 8 | frame[9] << 16
 
 
-def _decode_known(frame: bytes, kind: Any) -> tuple[bool, Message | None]:
+def _decode_known(frame: bytes, message_class: Any) -> tuple[bool, Message | None]:
     """Decode a MAVLink 2 frame of a message class; return whether it is valid, and the message."""
     end = _PAYLOAD_OFFSET + frame[1]
     received_crc = frame[end] | frame[end + 1] << 8
-    if crc16.mcrf4xx(frame[1:end] + bytes((kind.crc_extra,))) != received_crc:
+    if crc16.mcrf4xx(frame[1:end] + bytes((message_class.crc_extra,))) != received_crc:
         return False, None
-    message = unpack(kind, frame[_PAYLOAD_OFFSET:end])
+    message = unpack(message_class, frame[_PAYLOAD_OFFSET:end])
     message._msgbuf = bytearray(frame)
     header = message.get_header()
     header.mlen, header.incompat_flags, header.compat_flags = frame[1:4]
@@ -132,8 +134,8 @@ class Framer:
 
     def frame(self, message: Message) -> bytes:
         """Return the message's frame."""
-        kind = type(message)  # a message may have a field named `id`
-        return self.frame_raw(kind.id, kind.crc_extra, pack(message))
+        message_class = type(message)  # a message may have a field named `id`
+        return self.frame_raw(message_class.id, message_class.crc_extra, pack(message))
 
     def frame_raw(self, message_id: int, crc_extra: int, payload: bytes) -> bytes:
         """Return the frame of a message given as payload; trailing zeros are truncated."""

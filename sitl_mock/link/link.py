@@ -42,7 +42,7 @@ class Link:
         signing: signs and verifies frames; None = no signing.
 
     Attributes:
-        heard: whether an accepted message of a client arrived.
+        client_heard: whether an accepted message of a client arrived.
         gcs_heard: whether a heartbeat of a ground station arrived.
         tamper: changes each message before it is packed (faults); None = no change.
     """
@@ -55,7 +55,7 @@ class Link:
         self.streams = streams
         self.outbox: list[bytes] = []
         self.gcs_heard = False
-        self.heard = False
+        self.client_heard = False
         self.tamper: Callable[[Message], None] | None = None
         self._framer = framer
 

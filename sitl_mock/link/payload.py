@@ -67,17 +67,20 @@ def _arguments(message_class: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]
     starts = (0, *accumulate(lengths))
     if sum(lengths) == len(lengths) > 1 and not _text_fields(message_class):
         return itemgetter(*message_class.orders)
-    picks = [
+    value_selectors = [
         starts[order] if lengths[order] == 1 else slice(starts[order], starts[order + 1])
         for order in message_class.orders
     ]
     texts = [message_class.fieldnames.index(name) for name in _text_fields(message_class)]
 
     def arguments(values: tuple[Any, ...]) -> Iterable[Any]:
-        picked = [list(values[pick]) if isinstance(pick, slice) else values[pick] for pick in picks]
+        selected_values = [
+            list(values[selector]) if isinstance(selector, slice) else values[selector]
+            for selector in value_selectors
+        ]
         for index in texts:
-            picked[index] = picked[index].rstrip(b"\0")
-        return picked
+            selected_values[index] = selected_values[index].rstrip(b"\0")
+        return selected_values
 
     return arguments
 

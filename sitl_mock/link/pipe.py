@@ -18,33 +18,35 @@ class DatagramPipe:
     def __init__(self, direction: str, seed: int) -> None:
         self._direction = direction
         self._random = random.Random(seed)
-        self._delayed: list[tuple[float, int, bytes]] = []
+        self._delayed_datagrams: list[tuple[float, int, bytes]] = []
         self._order = count()
-        self._held_back: bytes | None = None
+        self._held_back_datagram: bytes | None = None
 
     def is_clear(self, faults: tuple[LinkFault, ...]) -> bool:
         """Whether no fault is active and no datagram is held back."""
-        return not faults and not self._delayed and self._held_back is None
+        return not faults and not self._delayed_datagrams and self._held_back_datagram is None
 
     def push(
         self, datagrams: list[bytes], faults: tuple[LinkFault, ...], now_us: int
     ) -> list[bytes]:
         """Accept datagrams; return those to deliver now, delayed ones first."""
         active = [fault for fault in faults if fault.direction in (self._direction, "both")]
-        out = []
-        while self._delayed and self._delayed[0][0] <= now_us:
-            out.append(heapq.heappop(self._delayed)[2])
+        to_deliver = []
+        while self._delayed_datagrams and self._delayed_datagrams[0][0] <= now_us:
+            to_deliver.append(heapq.heappop(self._delayed_datagrams)[2])
         for datagram in datagrams:
             survivors = [datagram]
             for fault in active:
                 survivors = [
-                    passed for one in survivors for passed in self._apply(one, fault, now_us)
+                    passed
+                    for survivor in survivors
+                    for passed in self._apply(survivor, fault, now_us)
                 ]
-            if survivors and self._held_back is not None:
-                survivors.append(self._held_back)
-                self._held_back = None
-            out.extend(survivors)
-        return out
+            if survivors and self._held_back_datagram is not None:
+                survivors.append(self._held_back_datagram)
+                self._held_back_datagram = None
+            to_deliver.extend(survivors)
+        return to_deliver
 
     def _apply(self, datagram: bytes, fault: LinkFault, now_us: int) -> list[bytes]:
         """Apply one fault to one datagram; return the datagrams to deliver now."""
@@ -57,9 +59,9 @@ class DatagramPipe:
                 return [self._corrupted(datagram)]
             case "delay":
                 due = now_us + fault.delay_ms * 1e3
-                heapq.heappush(self._delayed, (due, next(self._order), datagram))
-            case "reorder" if self._held_back is None:
-                self._held_back = datagram
+                heapq.heappush(self._delayed_datagrams, (due, next(self._order), datagram))
+            case "reorder" if self._held_back_datagram is None:
+                self._held_back_datagram = datagram
             case "reorder":
                 return [datagram]
             case "drop":

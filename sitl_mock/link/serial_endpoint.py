@@ -33,8 +33,8 @@ class SerialEndpoint:
         self._poll.register(self._master, 0)
         self._stream = ByteStream(self._master)
         self._path = path
-        self.where = self._device if path is None else f"{self._device} ({path})"
-        self.heard = False
+        self.address = self._device if path is None else f"{self._device} ({path})"
+        self.has_received = False
         if path is not None:
             self._create_link(path)
 
@@ -44,8 +44,8 @@ class SerialEndpoint:
         return True
 
     @property
-    def readable(self) -> list[int]:
-        """Our end; none while the other end is closed, because select would always report it."""
+    def descriptors(self) -> list[int]:
+        """File descriptor for select; none while the other end is closed: select would not wait."""
         return [self._master] if self._other_end_open() else []
 
     def receive(self) -> tuple[bytes, bool] | None:
@@ -55,7 +55,7 @@ class SerialEndpoint:
         frame = self._stream.receive()
         if frame is None:
             return None
-        self.heard = True
+        self.has_received = True
         return frame, True
 
     def send(self, datagrams: list[bytes]) -> None:
@@ -70,7 +70,7 @@ class SerialEndpoint:
             self._path.unlink(missing_ok=True)
 
     def _other_end_open(self) -> bool:
-        """Whether the other end is open; a hang-up clears the stream."""
+        """Whether the other end is open; if it was closed, drop unfinished frames."""
         hung_up = any(event & select.POLLHUP for _, event in self._poll.poll(0))
         if hung_up or not self._stream.open:
             self._stream = ByteStream(self._master)

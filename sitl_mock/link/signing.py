@@ -12,7 +12,7 @@ from sitl_mock.config.settings import SigningConfig
 from sitl_mock.link.framing import SIGNED, Message
 
 _EPOCH_UNIX_S = 1420070400
-"""Signature timestamps count 10 us since 2015-01-01 UTC."""
+"""Unix time at which signature timestamps (units of 10 us) begin, s: 2015-01-01 UTC."""
 _TICKS_PER_S = 100_000
 _FLAGS_OFFSET = 2
 _MAGIC_V2 = 0xFD
@@ -96,13 +96,13 @@ class Signing:
     def sign(self, frame: bytes) -> bytes:
         """Return a frame of `Framer(signed=True)` with its signature."""
         self._update_timestamp()
-        carrier = dialect.MAVLink_message(0, "")
-        carrier._msgbuf = bytearray(frame)
-        carrier.sign_packet(self._mav)
-        return bytes(carrier.get_msgbuf())
+        packet = dialect.MAVLink_message(0, "")
+        packet._msgbuf = bytearray(frame)
+        packet.sign_packet(self._mav)
+        return bytes(packet.get_msgbuf())
 
     def accepts(self, message: Message) -> bool:
-        """Whether a received message is accepted; counts it."""
+        """Whether a received message is accepted; also count it in the attributes."""
         frame = bytearray(message.get_msgbuf())
         if frame[0] != _MAGIC_V2 or not frame[_FLAGS_OFFSET] & SIGNED:
             self.unsigned += 1

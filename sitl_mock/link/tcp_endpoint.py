@@ -28,8 +28,8 @@ class TcpEndpoint:
         self._listener.setblocking(False)
         self._client: socket.socket | None = None
         self._stream: ByteStream | None = None
-        self.where = f"TCP {host}:{port}"
-        self.heard = False
+        self.address = f"TCP {host}:{port}"
+        self.has_received = False
 
     @property
     def connected(self) -> bool:
@@ -38,8 +38,8 @@ class TcpEndpoint:
         return self._stream is not None
 
     @property
-    def readable(self) -> list[int]:
-        """The listening socket and the client's connection."""
+    def descriptors(self) -> list[int]:
+        """File descriptors of the listening socket and of the client's connection."""
         descriptors = [self._listener.fileno()]
         if self._client is not None:
             descriptors.append(self._client.fileno())
@@ -54,7 +54,7 @@ class TcpEndpoint:
         self._release_client()
         if frame is None:
             return None
-        self.heard = True
+        self.has_received = True
         return frame, True
 
     def send(self, datagrams: list[bytes]) -> None:
@@ -71,15 +71,15 @@ class TcpEndpoint:
 
     def _accept(self) -> None:
         try:
-            caller, _ = self._listener.accept()
+            connection, _ = self._listener.accept()
         except OSError:
             return
         if self._client is not None:
-            caller.close()
+            connection.close()
             return
-        caller.setblocking(False)
-        caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._client, self._stream = caller, ByteStream(caller.fileno())
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._client, self._stream = connection, ByteStream(connection.fileno())
 
     def _release_client(self) -> None:
         """Close the connection of a client that has disconnected."""

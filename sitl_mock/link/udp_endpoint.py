@@ -20,26 +20,26 @@ def bound_socket(port: int, option: str) -> socket.socket:
     Raises:
         ConfigError: there is no such port, or it cannot be bound, for example because it is in use.
     """
-    bound = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    udp_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
-        bound.bind((HOST, port))
+        udp_socket.bind((HOST, port))
     except OverflowError as error:
-        bound.close()
+        udp_socket.close()
         raise ConfigError(f"there is no UDP port {port}; choose a smaller {option}") from error
     except OSError as error:
-        bound.close()
+        udp_socket.close()
         raise ConfigError(
             f"UDP port {port} on {HOST} cannot be used ({error.strerror}): is another mock running?"
             f" Choose a different {option}"
         ) from error
-    bound.setblocking(False)
-    return bound
+    udp_socket.setblocking(False)
+    return udp_socket
 
 
 class UdpEndpoint:
     """Sends to ``remote_port`` on this machine until it receives, then to the first sender only.
 
-    It receives from other senders, but does not send to them.
+    The first sender is the partner. The endpoint receives from others, but does not send to them.
 
     Args:
         local_port: port to bind.
@@ -52,8 +52,8 @@ class UdpEndpoint:
 
     def __init__(self, local_port: int, remote_port: int, option: str) -> None:
         self.socket = bound_socket(local_port, option)
-        self.where = f"UDP {HOST}:{local_port}"
-        self.heard = False
+        self.address = f"UDP {HOST}:{local_port}"
+        self.has_received = False
         self._partner = (HOST, remote_port)
 
     @property
@@ -62,8 +62,8 @@ class UdpEndpoint:
         return True
 
     @property
-    def readable(self) -> list[int]:
-        """The socket."""
+    def descriptors(self) -> list[int]:
+        """File descriptor of the socket."""
         return [self.socket.fileno()]
 
     def receive(self) -> tuple[bytes, bool] | None:
@@ -72,8 +72,8 @@ class UdpEndpoint:
             datagram, sender = self.socket.recvfrom(MAX_DATAGRAM)
         except OSError:
             return None
-        if not self.heard:
-            self.heard = True
+        if not self.has_received:
+            self.has_received = True
             self._partner = sender
         return datagram, sender == self._partner
 

@@ -5,12 +5,12 @@ from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.px4.health import HealthReport
-from sitl_mock.px4.modes import PILOTED
+from sitl_mock.px4.modes import PILOTED_MODES
 
-NOT_ARMABLE = frozenset({Mode.RTL, Mode.LAND})
-"""PX4 cannot be armed in these modes, and does not return to them when it disarms."""
+UNARMABLE_MODES = frozenset({Mode.RTL, Mode.LAND})
+"""Modes in which PX4 cannot be armed, and to which it does not return when it disarms."""
 PREFLIGHT_MARGIN_US = 1_000_000
-"""A vehicle that was armed and does not take off disarms after COM_DISARM_PRFLT plus this, us
+"""Delay beyond COM_DISARM_PRFLT after which an armed vehicle that has not taken off disarms, us
 (measured: 11 s for 10 s)."""
 
 
@@ -48,13 +48,15 @@ class ArmingChecks:
         """Whether offboard setpoints arrive, as `OffboardStream.alive` judges."""
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
-    def find_problem(self, *, gcs_alive: bool, pilot: bool, refusal: str | None) -> str | None:
-        """Store in the state why arming is refused now, None if it is allowed; return the same.
+    def find_problem(
+        self, *, gcs_alive: bool, pilot_present: bool, refusal: str | None
+    ) -> str | None:
+        """Store in the state and return why arming is refused now; None if it is allowed.
 
         Args:
             gcs_alive: whether a ground station is connected.
-            pilot: whether a pilot holds the sticks.
-            refusal: the reason that a fault gives, None without such a fault.
+            pilot_present: whether a pilot holds the sticks.
+            refusal: reason of an active `RefuseArming` fault, None without one.
         """
         state = self._state
         problems = (
@@ -65,18 +67,18 @@ class ArmingChecks:
             (state.battery_warning >= BatteryWarning.CRITICAL, "battery too low"),
             (self._gcs_required and not gcs_alive, "no connection to the ground station"),
             (state.mode is Mode.OFFBOARD and not self.offboard_alive, "no offboard signal"),
-            (state.mode in PILOTED and not pilot, "no manual control input"),
-            (state.mode in NOT_ARMABLE, "mode is not suitable for arming"),
+            (state.mode in PILOTED_MODES and not pilot_present, "no manual control input"),
+            (state.mode in UNARMABLE_MODES, "mode is not suitable for arming"),
         )
         first_problem = next((problem for present, problem in problems if present), None)
         state.prearm_problem = first_problem
         return first_problem
 
-    def report(self, *, gcs_alive: bool, pilot: bool) -> None:
+    def report(self, *, gcs_alive: bool, pilot_present: bool) -> None:
         """Send the health report if it changed and is due: see `HealthReport.step`."""
         self._health.step(
             offboard_alive=self.offboard_alive,
-            pilot=pilot,
+            pilot_present=pilot_present,
             gcs_alive=gcs_alive,
             gcs_required=self._gcs_required,
         )
@@ -103,14 +105,14 @@ class AutoDisarm:
         """Start counting the time on the ground, because the vehicle was armed."""
         self._landed_since_us = self._state.time_us
 
-    def due(self) -> EventKind | None:
+    def disarm_reason(self) -> EventKind | None:
         """Return why the vehicle disarms now, None if it does not."""
         state, parameters = self._state, self._parameters
         if not state.landed:
             self._landed_since_us = state.time_us
             return None
         waited = state.time_us - self._landed_since_us
-        if state.flown:
+        if state.took_off:
             limit = parameters["COM_DISARM_LAND"]
             return EventKind.DISARMED_BY_LANDING if 0 < limit * 1e6 <= waited else None
         limit = parameters["COM_DISARM_PRFLT"]

@@ -10,16 +10,16 @@ from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 from sitl_mock.physics.quaternion import Vector
-from sitl_mock.px4.arming import NOT_ARMABLE, ArmingChecks, AutoDisarm
+from sitl_mock.px4.arming import UNARMABLE_MODES, ArmingChecks, AutoDisarm
 from sitl_mock.px4.failsafe import Failsafe
 from sitl_mock.px4.failsafe_actions import AnnounceEvent
 from sitl_mock.px4.mode_control import Px4ModeControl
-from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
+from sitl_mock.px4.modes import PILOTED_MODES, POSITION_MODES, custom_mode
 from sitl_mock.px4.setpoints import decode_setpoint
 from sitl_mock.px4.sticks import Sticks
 
 STATUS_PERIOD_US = 500_000
-"""Period of the vehicle status; it is also published at every change (measured)."""
+"""Period at which the vehicle status is published, us; also at every change (measured)."""
 
 
 class Px4Commander:
@@ -27,7 +27,7 @@ class Px4Commander:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         control: begins each mode that is entered.
         stream: the offboard setpoints.
         announce: sends texts and events.
@@ -44,7 +44,7 @@ class Px4Commander:
         checks: ArmingChecks,
     ) -> None:
         self.refusal: str | None = None
-        self.pilot = False
+        self.pilot_simulated = False
         self.failsafe = Failsafe(
             state, parameters, stream, announce, self._enter_mode, self._stop_motors
         )
@@ -72,7 +72,7 @@ class Px4Commander:
         state.armed = True
         state.armed_at_us = state.time_us
         self._auto_disarm.begin()
-        state.flown = False
+        state.took_off = False
         state.home_ned = state.estimate.position_ned
         state.home_q = state.estimate.q
         state.home_set_at_us = state.time_us
@@ -105,8 +105,8 @@ class Px4Commander:
         """
         state = self._state
         if state.armed and not self._can_run(mode):
-            requested = struct.pack("<I", custom_mode(mode))
-            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), requested)
+            packed_mode = struct.pack("<I", custom_mode(mode))
+            self._announce(EventKind.MODE_DENIED, mode.name.capitalize(), packed_mode)
             return TEMPORARILY_REJECTED
         self._set_intended(mode)
         self.failsafe.clear()
@@ -116,20 +116,20 @@ class Px4Commander:
         return ACCEPTED
 
     def land(self) -> int:
-        """Land here; return a MAV_RESULT. PX4 sends a text for this command, not for the mode."""
+        """Execute NAV_LAND, and return a MAV_RESULT. A mode request for LAND is not announced."""
         result = self.request_mode(Mode.LAND)
         if result == ACCEPTED:
             self._announce(EventKind.LANDING_COMMANDED, "")
         return result
 
     def take_over(self, mode: Mode) -> None:
-        """Let the pilot take over in a mode (fault injection)."""
-        self.pilot = True
+        """Enter a mode as a pilot who takes over would (fault injection)."""
+        self.pilot_simulated = True
         self._announce(EventKind.PILOT_TOOK_OVER, "")
         self.request_mode(mode)
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
-        """Record a heartbeat, by whose MAV_TYPE a ground station or a companion is present."""
+        """Record the heartbeat of a ground station or a companion, told apart by MAV_TYPE."""
         self.failsafe.receive_heartbeat(heartbeat.type)
 
     def manual_control(self, message: Message, _: Link) -> None:
@@ -160,15 +160,15 @@ class Px4Commander:
         if state.armed and crashed:
             self._stop_motors(EventKind.DISARMED_AFTER_CRASH)
         self._update_prearm_problem()
-        self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present)
+        self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot_present=self._pilot_present)
         self._detect_stick_override()
-        self.failsafe.step(pilot=self._pilot_present)
+        self.failsafe.step(pilot_present=self._pilot_present)
         if state.armed:
-            if state.mode is Mode.TAKEOFF and state.flown and self._control.takeoff_reached:
+            if state.mode is Mode.TAKEOFF and state.took_off and self._control.takeoff_reached:
                 if state.intended_mode is Mode.TAKEOFF:
                     self._set_intended(Mode.LOITER)
                 self._enter_mode(Mode.LOITER)
-            kind = self._auto_disarm.due()
+            kind = self._auto_disarm.disarm_reason()
             if kind is not None:
                 self._stop_motors(kind)
         self._publish_status()
@@ -176,20 +176,22 @@ class Px4Commander:
     @property
     def _pilot_present(self) -> bool:
         """Whether a pilot holds the sticks, by fault injection or by MANUAL_CONTROL."""
-        return self.pilot or self._sticks.present(self._state.time_us)
+        return self.pilot_simulated or self._sticks.present(self._state.time_us)
 
     def _update_prearm_problem(self) -> str | None:
         return self._checks.find_problem(
-            gcs_alive=self.failsafe.gcs_alive, pilot=self._pilot_present, refusal=self.refusal
+            gcs_alive=self.failsafe.gcs_alive,
+            pilot_present=self._pilot_present,
+            refusal=self.refusal,
         )
 
     def _detect_stick_override(self) -> None:
         """Switch to POSCTL if a pilot moves the sticks in the air in an automatic mode."""
         state = self._state
-        in_automatic_flight = state.armed and not state.landed and state.mode not in PILOTED
+        in_automatic_flight = state.armed and not state.landed and state.mode not in PILOTED_MODES
         if not in_automatic_flight or self.failsafe.holds_before_acting:
             return
-        if self._sticks.override(state.time_us):
+        if self._sticks.are_overriding(state.time_us):
             self._announce(EventKind.PILOT_TOOK_OVER, "")
             self.request_mode(Mode.POSCTL)
 
@@ -197,7 +199,7 @@ class Px4Commander:
         state = self._state
         state.armed = False
         # Measured: a landing from OFFBOARD, by command or by failsafe, ends in OFFBOARD.
-        state.intended_mode = state.after_disarming
+        state.intended_mode = state.mode_after_disarming
         self.failsafe.clear()
         self._enter_mode(state.intended_mode)
         self._announce(kind, "")
@@ -205,11 +207,11 @@ class Px4Commander:
     def _set_intended(self, mode: Mode) -> None:
         """Set the mode that the user intends.
 
-        Disarming returns to the last intended mode that can be armed, but not TAKEOFF (measured).
+        Disarming returns to the last intended mode that can be armed, except TAKEOFF (measured).
         """
         self._state.intended_mode = mode
-        if mode not in NOT_ARMABLE and mode is not Mode.TAKEOFF:
-            self._state.after_disarming = mode
+        if mode not in UNARMABLE_MODES and mode is not Mode.TAKEOFF:
+            self._state.mode_after_disarming = mode
 
     def _publish_status(self) -> None:
         """Publish the status when it changed, else twice a second."""
@@ -221,9 +223,9 @@ class Px4Commander:
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:
             return self._checks.offboard_alive
-        if mode in PILOTED and not self._pilot_present:
+        if mode in PILOTED_MODES and not self._pilot_present:
             return False
-        return self._state.position_valid or mode not in NEEDS_POSITION
+        return self._state.position_valid or mode not in POSITION_MODES
 
     def _enter_mode(self, mode: Mode, *, hold: Vector | None = None) -> None:
         """Enter a mode at the present estimate; the intended mode stays."""
@@ -237,6 +239,6 @@ class Px4Commander:
             return self._requested_takeoff_z
         altitude = self._parameters["MIS_TAKEOFF_ALT"]
         if self._state.armed:
-            packed = struct.pack("<f", altitude)
-            self._announce(EventKind.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed)
+            packed_altitude = struct.pack("<f", altitude)
+            self._announce(EventKind.DEFAULT_TAKEOFF_ALTITUDE, f"{altitude:.1f}", packed_altitude)
         return self._state.home_ned[2] - altitude

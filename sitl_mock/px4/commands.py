@@ -17,9 +17,9 @@ from sitl_mock.px4.modes import MODES_BY_COMMAND
 _PROTOCOL_VERSION_ID = 300
 _PROTOCOL_VERSION_CRC = 217
 _PROTOCOL_VERSION = bytes((200, 0, 100, 0, 200, 0)) + bytes(16)
-"""Payload: version 200, smallest 100, largest 200, no hashes."""
+"""Payload of PROTOCOL_VERSION: version 200, smallest 100, largest 200, no hashes."""
 _CHANGE_MODE = 1
-"""Flag in param2 of DO_REPOSITION."""
+"""Flag in param2 of DO_REPOSITION: change to LOITER if in another mode."""
 
 
 class Px4Commands(Commands):
@@ -64,12 +64,12 @@ class Px4Commands(Commands):
         return super().send(message_id, link)
 
     def _set_mode(self, command: Command, _: Link) -> int:
-        base, main, sub = command.parameters[:3]
-        if not all(map(isfinite, (base, main, sub))):
+        base_mode, main_mode, sub_mode = command.parameters[:3]
+        if not all(map(isfinite, (base_mode, main_mode, sub_mode))):
             return DENIED
-        if not int(base) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        if not int(base_mode) & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
             return TEMPORARILY_REJECTED
-        mode = MODES_BY_COMMAND.get((int(main), int(sub)))
+        mode = MODES_BY_COMMAND.get((int(main_mode), int(sub_mode)))
         return TEMPORARILY_REJECTED if mode is None else self._px4_commander.request_mode(mode)
 
     def _takeoff(self, command: Command, _: Link) -> int:
@@ -85,7 +85,7 @@ class Px4Commands(Commands):
         return self._px4_commander.request_mode(Mode.LOITER, hold=self._position(command))
 
     def _position(self, command: Command) -> Vector:
-        """Return the local position in parameters 5 to 7; NaN keeps the present value."""
+        """Return the position in parameters 5 to 7, m NED; NaN keeps the present value."""
         latitude, longitude, altitude = command.parameters[4:]
         north, east, down = self._state.estimate.position_ned
         if isfinite(latitude) and isfinite(longitude):
@@ -111,5 +111,5 @@ class Px4Commands(Commands):
         message_id, interval_us = command.parameters[:2]
         if not (isfinite(message_id) and isfinite(interval_us)):
             return ACCEPTED
-        refused = link.streams.set_interval(int(message_id), interval_us, self._state.time_us)
-        return ACCEPTED if refused is None else FAILED
+        refusal = link.streams.set_interval(int(message_id), interval_us, self._state.time_us)
+        return ACCEPTED if refusal is None else FAILED

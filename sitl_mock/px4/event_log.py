@@ -19,7 +19,7 @@ from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 from sitl_mock.px4.events import PX4_EVENTS
 
-_KEPT_EVENTS = 20
+_MAX_KEPT_EVENTS = 20
 """Number of events that can be requested again."""
 _SEQUENCE_PERIOD_US = 3_000_000
 """Period of CURRENT_EVENT_SEQUENCE."""
@@ -47,7 +47,7 @@ class EventLog:
     def __init__(self, state: State, links: list[Link]) -> None:
         self._state = state
         self._links = links
-        self._sent: deque[_SentEvent] = deque(maxlen=_KEPT_EVENTS)
+        self._sent_events: deque[_SentEvent] = deque(maxlen=_MAX_KEPT_EVENTS)
         self._latest_sequence = 0
         self._sequence_sent_us = 0
 
@@ -62,22 +62,22 @@ class EventLog:
             internal: MAV_SEVERITY for the vehicle's log; None = the same.
             arguments: packed arguments.
         """
-        first = not self._sent
+        is_first = not self._sent_events
         self._latest_sequence = (self._latest_sequence + 1) & 0xFFFF
-        if first:
+        if is_first:
             self._send_sequence(_SEQUENCE_RESET)
         levels = (severity if internal is None else internal) << 4 | severity
         payload = EVENT.payload.pack(
-            event_id, self._state.shown_us // 1000, self._latest_sequence, 0, 0, levels, arguments
+            event_id, self._state.stamp_us // 1000, self._latest_sequence, 0, 0, levels, arguments
         )
-        self._sent.append(_SentEvent(self._latest_sequence, payload))
+        self._sent_events.append(_SentEvent(self._latest_sequence, payload))
         for link in self._links:
             _send(link, EVENT, payload)
 
     def step(self) -> None:
         """Send the latest sequence number periodically, so that receivers notice lost events."""
         if self._state.time_us - self._sequence_sent_us >= _SEQUENCE_PERIOD_US:
-            self._send_sequence(0 if self._sent else _SEQUENCE_RESET)
+            self._send_sequence(0 if self._sent_events else _SEQUENCE_RESET)
 
     def answer_request(self, request: Message, link: Link) -> None:
         """Answer a REQUEST_EVENT: resend each event, or refuse it with a reason.
@@ -86,19 +86,19 @@ class EventLog:
         """
         first, last = request.first_sequence, request.last_sequence
         count = (last - first & 0xFFFF) + 1
-        if count > _KEPT_EVENTS:
+        if count > _MAX_KEPT_EVENTS:
             self._refuse(first, request, link)
-            first = last - _KEPT_EVENTS + 1
-        kept = {sent.sequence: sent.payload for sent in self._sent}
-        for number in range(first, first + min(count, _KEPT_EVENTS)):
+            first = last - _MAX_KEPT_EVENTS + 1
+        payloads = {sent.sequence: sent.payload for sent in self._sent_events}
+        for number in range(first, first + min(count, _MAX_KEPT_EVENTS)):
             sequence = number & 0xFFFF
-            if sequence in kept:
-                _send(link, EVENT, kept[sequence])
+            if sequence in payloads:
+                _send(link, EVENT, payloads[sequence])
             else:
                 self._refuse(sequence, request, link)
 
     def _refuse(self, sequence: int, request: Message, link: Link) -> None:
-        other_sequences = (sent.sequence for sent in self._sent if sent.sequence != sequence)
+        other_sequences = (sent.sequence for sent in self._sent_events if sent.sequence != sequence)
         oldest = min(
             other_sequences,
             key=lambda other: other - sequence & 0xFFFF,

@@ -17,18 +17,18 @@ from sitl_mock.px4.failsafe_actions import (
     Cause,
     FailsafeActions,
 )
-from sitl_mock.px4.modes import NEEDS_POSITION, PILOTED, custom_mode
+from sitl_mock.px4.modes import PILOTED_MODES, POSITION_MODES, custom_mode
 
 _NO_MANUAL_CONTROL = 4
 """Value of COM_RC_IN_MODE: no manual control."""
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
-"""Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT."""
+"""Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT: no failsafe in automatic modes, in OFFBOARD."""
 _GCS_MARGIN_US = 2_000_000
-"""The loss of the ground station is detected this long after COM_DL_LOSS_T (measured)."""
+"""Delay beyond COM_DL_LOSS_T after which the ground station counts as lost, us (measured)."""
 _ACTED_ALREADY = -1
 """Value that replaces the time of a loss once its failsafe has acted, so that it acts only once."""
 _COMPANION_MARGIN_US = 1_500_000
-"""The loss of the companion is announced this long after COM_OBC_LOSS_T (measured)."""
+"""Delay beyond COM_OBC_LOSS_T after which the companion counts as lost, us (measured)."""
 _WARNINGS = {
     BatteryWarning.LOW: EventKind.BATTERY_LOW,
     BatteryWarning.CRITICAL: EventKind.BATTERY_CRITICAL,
@@ -42,7 +42,7 @@ class Failsafe:
 
     Args:
         state: the autopilot's state.
-        parameters: its parameters.
+        parameters: the autopilot's parameters.
         stream: the offboard setpoints.
         announce: sends texts and events.
         enter: enters a mode and leaves the intended mode as it is.
@@ -83,7 +83,7 @@ class Failsafe:
             self._pilot_lost_us = _ACTED_ALREADY
 
     def receive_heartbeat(self, heartbeat_type: int) -> None:
-        """Record a heartbeat of a MAV_TYPE."""
+        """Record a heartbeat, whose MAV_TYPE is ``heartbeat_type``."""
         now = self._state.time_us
         if heartbeat_type == dialect.MAV_TYPE_GCS:
             self._gcs_heartbeat_us = now
@@ -98,12 +98,12 @@ class Failsafe:
         limit = self._parameters["COM_DL_LOSS_T"] * 1e6 + _GCS_MARGIN_US
         return self._state.time_us - self._gcs_heartbeat_us <= limit
 
-    def step(self, *, pilot: bool) -> None:
-        """Check every failsafe once; ``pilot``: a pilot holds the sticks."""
+    def step(self, *, pilot_present: bool) -> None:
+        """Check every failsafe once; ``pilot_present``: a pilot holds the sticks."""
         self._watch_companion()
         self._watch_battery()
         self._watch_gcs()
-        self._watch_pilot(pilot=pilot)
+        self._watch_pilot(pilot_present=pilot_present)
         if self._state.armed:
             self._watch_position()
             self._watch_offboard()
@@ -111,7 +111,7 @@ class Failsafe:
 
     @property
     def holds_before_acting(self) -> bool:
-        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end this."""
+        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; moved sticks do not end the wait."""
         return self._actions.holds_before_acting
 
     def _is_exempt(self, parameter: str) -> bool:
@@ -122,23 +122,29 @@ class Failsafe:
             return bool(bits & _EXCEPT_OFFBOARD)
         return mode in _AUTO_MODES and bool(bits & _EXCEPT_AUTO)
 
-    def _watch_pilot(self, *, pilot: bool) -> None:
+    def _watch_pilot(self, *, pilot_present: bool) -> None:
         """Detect the loss of sticks that were present, or that the mode needs."""
         state = self._state
-        if pilot:
+        if pilot_present:
             self._pilot_lost_us = None
         elif self._pilot_present:
             self._announce(EventKind.PILOT_LOST, "")
-        self._pilot_present = pilot
+        self._pilot_present = pilot_present
         # A pilot who was not present at arming is optional until he appears.
-        self._pilot_optional = not pilot and (self._pilot_optional or not state.armed)
-        expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
-        optional = not expected or self._pilot_optional or self._is_exempt("COM_RCL_EXCEPT")
-        if pilot or not state.armed or (optional and state.intended_mode not in PILOTED):
+        self._pilot_optional = not pilot_present and (self._pilot_optional or not state.armed)
+        sticks_expected = int(self._parameters["COM_RC_IN_MODE"]) != _NO_MANUAL_CONTROL
+        sticks_optional = (
+            not sticks_expected or self._pilot_optional or self._is_exempt("COM_RCL_EXCEPT")
+        )
+        if (
+            pilot_present
+            or not state.armed
+            or (sticks_optional and state.intended_mode not in PILOTED_MODES)
+        ):
             return
         if self._pilot_lost_us is None:
             self._pilot_lost_us = state.time_us
-        if self._pilot_lost_us != _ACTED_ALREADY or state.mode in PILOTED:
+        if self._pilot_lost_us != _ACTED_ALREADY or state.mode in PILOTED_MODES:
             self._actions.act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
 
     def _watch_offboard(self) -> None:
@@ -148,7 +154,7 @@ class Failsafe:
         alive = self._stream.alive(state.time_us, self._parameters["COM_OF_LOSS_T"])
         if state.mode is Mode.OFFBOARD and not alive:
             action = OFFBOARD_ACTIONS.get(int(self._parameters["COM_OBL_RC_ACT"]), POSITION)
-            if action.mode in PILOTED and not self._pilot_present:
+            if action.mode in PILOTED_MODES and not self._pilot_present:
                 action = RETURN
             self._actions.act(Cause.OFFBOARD_LOST, action)
         elif alive and self._actions.cause is Cause.OFFBOARD_LOST:
@@ -177,8 +183,8 @@ class Failsafe:
         if self._gcs_lost_us is None:
             self._gcs_lost_us = state.time_us
             self._announce(EventKind.GCS_LOST, "")
-        ignored = state.intended_mode is Mode.LAND or self._is_exempt("COM_DLL_EXCEPT")
-        if state.armed and not ignored and self._gcs_lost_us != _ACTED_ALREADY:
+        loss_ignored = state.intended_mode is Mode.LAND or self._is_exempt("COM_DLL_EXCEPT")
+        if state.armed and not loss_ignored and self._gcs_lost_us != _ACTED_ALREADY:
             self._actions.act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
 
     def _watch_companion(self) -> None:
@@ -192,7 +198,7 @@ class Failsafe:
 
     def _watch_position(self) -> None:
         state = self._state
-        if not state.position_valid and state.mode in NEEDS_POSITION:
+        if not state.position_valid and state.mode in POSITION_MODES:
             self._actions.act(Cause.POSITION_LOST, LAND)
 
     def _watch_battery(self) -> None:
@@ -205,9 +211,9 @@ class Failsafe:
             warning = BatteryWarning.LOW
         else:
             warning = BatteryWarning.OK
-        worse = warning > state.battery_warning
+        is_worse = warning > state.battery_warning
         state.battery_warning = warning
-        if not worse:
+        if not is_worse:
             return
         self._announce(_WARNINGS[warning], "")
         action = int(parameters["COM_LOW_BAT_ACT"])

@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
-from sitl_mock.px4.modes import NEEDS_POSITION, custom_mode
+from sitl_mock.px4.modes import POSITION_MODES, custom_mode
 
 _ENTER_HOLD_LAYOUT = struct.Struct("<IBHB")
 _ENTER_LAYOUT = struct.Struct("<IBB")
@@ -36,7 +36,7 @@ OFFBOARD_ACTIONS = {
     6: TERMINATE,
     7: DISARM,
 }
-"""COM_OBL_RC_ACT -> action; without a pilot RETURN replaces those that need one (measured)."""
+"""COM_OBL_RC_ACT -> action; without a pilot, RETURN replaces actions that need one (measured)."""
 LINK_ACTIONS = {1: HOLD, 2: RETURN, 3: LAND, 5: TERMINATE, 6: DISARM}
 """NAV_DLL_ACT and NAV_RCL_ACT -> action."""
 
@@ -44,7 +44,7 @@ LINK_ACTIONS = {1: HOLD, 2: RETURN, 3: LAND, 5: TERMINATE, 6: DISARM}
 class Cause(Enum):
     """Cause of a failsafe: its severity, and its number in PX4's events (0 = none).
 
-    A cause does not replace one of higher severity.
+    A new cause does not replace an active one of higher severity.
     """
 
     OFFBOARD_LOST = (1, 0)
@@ -55,12 +55,12 @@ class Cause(Enum):
 
     @property
     def severity(self) -> int:
-        """Severity; higher is worse."""
+        """Severity of the cause; higher is worse."""
         return self.value[0]
 
     @property
     def number(self) -> int:
-        """Its number in PX4's events."""
+        """Number of the cause in PX4's events; 0 = none."""
         return self.value[1]
 
 
@@ -99,40 +99,40 @@ class FailsafeActions:
         self._announce = announce
         self._enter = enter
         self._stop = stop
-        self._announced: tuple[Cause, Action] | None = None
+        self._announced_action: tuple[Cause, Action] | None = None
         self.cause: Cause | None = None
         """Cause of the active failsafe, None if none is active."""
 
     def clear(self) -> None:
         """End the active failsafe."""
-        self.cause = self._announced = None
+        self.cause = self._announced_action = None
         self._state.failsafe = False
 
     @property
     def holds_before_acting(self) -> bool:
-        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; sticks do not end this."""
+        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; moved sticks do not end the wait."""
         return (
-            self._announced is not None
-            and self._announced[1] is HOLD
+            self._announced_action is not None
+            and self._announced_action[1] is HOLD
             and self.cause in _DELAYED_CAUSES
         )
 
-    def act(self, cause: Cause, action: Action, then: Action | None = None) -> None:
+    def act(self, cause: Cause, action: Action, next_action: Action | None = None) -> None:
         """Execute an action unless a more severe cause is active; announce it if it is new.
 
         Args:
             cause: cause of the failsafe.
             action: action to execute now.
-            then: action after COM_FAIL_ACT_T, None if ``action`` is the last.
+            next_action: action after COM_FAIL_ACT_T, None if ``action`` is the last.
         """
         if self.cause is not None and self.cause.severity > cause.severity:
             return
         state = self._state
-        if not state.position_valid and action.mode in NEEDS_POSITION:
+        if not state.position_valid and action.mode in POSITION_MODES:
             action = LAND
-        if self._announced != (cause, action):
-            self._announce_action(cause, action, then)
-        self.cause, self._announced = cause, (cause, action)
+        if self._announced_action != (cause, action):
+            self._announce_action(cause, action, next_action)
+        self.cause, self._announced_action = cause, (cause, action)
         state.failsafe = True
         mode = action.mode
         if mode is None:
@@ -143,21 +143,23 @@ class FailsafeActions:
         if state.mode is not mode:
             self._enter(mode)
 
-    def _announce_action(self, cause: Cause, action: Action, then: Action | None) -> None:
-        intended = custom_mode(self._state.intended_mode)
-        if then is not None:
+    def _announce_action(self, cause: Cause, action: Action, next_action: Action | None) -> None:
+        intended_mode = custom_mode(self._state.intended_mode)
+        if next_action is not None:
             delay = round(self._parameters["COM_FAIL_ACT_T"])
-            arguments = _ENTER_HOLD_LAYOUT.pack(intended, then.number, delay, cause.number)
+            arguments = _ENTER_HOLD_LAYOUT.pack(
+                intended_mode, next_action.number, delay, cause.number
+            )
             self._announce(EventKind.FAILSAFE_HOLD, str(delay), arguments)
         elif cause.number:
-            arguments = _ENTER_LAYOUT.pack(intended, action.number, cause.number)
+            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, cause.number)
             self._announce(EventKind.FAILSAFE, "", arguments)
         else:
-            arguments = _ENTER_LAYOUT.pack(intended, action.number, 0)
+            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, 0)
             self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
 
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
-        """Execute the action of a parameter; before a return or landing hold for COM_FAIL_ACT_T.
+        """Execute the action that a parameter selects; before RTL or LAND, hold for COM_FAIL_ACT_T.
 
         Args:
             cause: cause of the failsafe.
@@ -171,4 +173,4 @@ class FailsafeActions:
         if delay_over or action in (HOLD, DISARM, TERMINATE):
             self.act(cause, action)
         else:
-            self.act(cause, HOLD, then=action)
+            self.act(cause, HOLD, next_action=action)

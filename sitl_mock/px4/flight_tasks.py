@@ -10,9 +10,9 @@ from sitl_mock.physics.quaternion import Vector, yaw
 from sitl_mock.physics.rigid_body import GRAVITY
 
 CRAWL_HEIGHT_M = 0.65
-"""Below this height LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
+"""Height below which LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
-"""The held point lies ahead of the position by the velocity times this, s."""
+"""Distance from the vehicle to the held point per speed, s."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
 """Acceleration demand of a vehicle that stays level without holding its horizontal position."""
 
@@ -59,7 +59,7 @@ class FlightTasks:
             self._begin_return()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift the held position and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         x, y, z = self._hold
         dx, dy, dz = position_step
         self._hold = (x + dx, y + dy, z + dz)
@@ -68,7 +68,7 @@ class FlightTasks:
 
     @property
     def takeoff_reached(self) -> bool:
-        """Whether TAKEOFF is almost at its height."""
+        """Whether TAKEOFF is less than 0.3 m below the height at which it ends."""
         return self._state.estimate.position_ned[2] - self._takeoff_z < 0.3
 
     @property
@@ -111,10 +111,14 @@ class FlightTasks:
             self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6
         )
         ramp = (state.time_us - ramp_begin_us) / (1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1))
-        lowest = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
-        climb = lowest + (speed - lowest) * max(0.0, min(1.0, ramp))
+        lowest_rate = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
+        climb_rate = lowest_rate + (speed - lowest_rate) * max(0.0, min(1.0, ramp))
         return PositionDemand(
-            NAN_VECTOR, (nan, nan, -climb), LEVEL_DEMAND_ACCELERATION, self.yaw, max_down_speed=3.0
+            NAN_VECTOR,
+            (nan, nan, -climb_rate),
+            LEVEL_DEMAND_ACCELERATION,
+            self.yaw,
+            max_down_speed=3.0,
         )
 
     def _land(self) -> PositionDemand:
@@ -127,17 +131,17 @@ class FlightTasks:
     def _descent_speed(self) -> float:
         parameters = self._parameters
         height = self._state.home_ned[2] - self._state.estimate.position_ned[2]
-        slow, fast = parameters["MPC_LAND_SPEED"], parameters["MPC_Z_V_AUTO_DN"]
-        low, high = parameters["MPC_LAND_ALT2"], parameters["MPC_LAND_ALT1"]
+        land_speed, max_speed = parameters["MPC_LAND_SPEED"], parameters["MPC_Z_V_AUTO_DN"]
+        slow_height, fast_height = parameters["MPC_LAND_ALT2"], parameters["MPC_LAND_ALT1"]
         if height < CRAWL_HEIGHT_M:
-            return min(slow, parameters["MPC_LAND_CRWL"])
-        share = max(0.0, min(1.0, (height - low) / max(high - low, 0.1)))
-        return slow + (fast - slow) * share
+            return min(land_speed, parameters["MPC_LAND_CRWL"])
+        fraction = max(0.0, min(1.0, (height - slow_height) / max(fast_height - slow_height, 0.1)))
+        return land_speed + (max_speed - land_speed) * fraction
 
     def _begin_return(self) -> None:
         """Choose the return height: by the cone around home, at most RTL_RETURN_ALT.
 
-        It is at least the present height; within NAV_ACC_RAD of home it is the present one.
+        The return height is at least the present one; within NAV_ACC_RAD of home they are equal.
         """
         parameters, state = self._parameters, self._state
         home = state.home_ned
@@ -146,9 +150,10 @@ class FlightTasks:
         acceptance_radius = parameters["NAV_ACC_RAD"]
         height = home[2] - z
         if distance > acceptance_radius:
-            cone = radians(max(1.0, min(89.0, parameters["RTL_CONE_ANG"])))
+            cone_angle = radians(max(1.0, min(89.0, parameters["RTL_CONE_ANG"])))
             return_height = min(
-                max(distance / tan(cone), 2.0 * acceptance_radius), parameters["RTL_RETURN_ALT"]
+                max(distance / tan(cone_angle), 2.0 * acceptance_radius),
+                parameters["RTL_RETURN_ALT"],
             )
             height = max(height, return_height)
         self._hold = (x, y, home[2] - height)

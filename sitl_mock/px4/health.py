@@ -1,7 +1,7 @@
 """PX4's health report: events with the failing checks, and the modes that can be armed.
 
-The bytes of the events are those that a PX4 sent. An event's id is a hash of its name; where a
-name in PX4's source has this hash, it stands here.
+The bytes of the events are those that a PX4 sent. An event's id is a hash of its name; the names
+here are those in PX4's source that have this hash.
 """
 
 import struct
@@ -70,25 +70,25 @@ class HealthReport:
         self._state = state
         self._events = events
         self._ready_us = ready_us
-        self._reported: tuple[tuple[_Check, ...], int] | None = None
-        self._reported_us = 0
+        self._last_report: tuple[tuple[_Check, ...], int] | None = None
+        self._last_report_us = 0
 
     def step(
-        self, *, offboard_alive: bool, pilot: bool, gcs_alive: bool, gcs_required: bool
+        self, *, offboard_alive: bool, pilot_present: bool, gcs_alive: bool, gcs_required: bool
     ) -> None:
         """Send a report if it changed and is due; also step the events (`EventLog.step`).
 
         Args:
             offboard_alive: whether offboard setpoints arrive.
-            pilot: whether a pilot holds the sticks.
+            pilot_present: whether a pilot holds the sticks.
             gcs_alive: whether a ground station is connected.
             gcs_required: whether arming needs a ground station.
         """
         state = self._state
         self._events.step()
-        if state.time_us - self._reported_us < _PERIOD_US:
+        if state.time_us - self._last_report_us < _PERIOD_US:
             return
-        gcs = None if gcs_alive else _GCS_REQUIRED if gcs_required else _NO_GCS
+        gcs_check = None if gcs_alive else _GCS_REQUIRED if gcs_required else _NO_GCS
         candidates = (
             _HEADING if state.time_us < self._ready_us // 2 else None,
             None if offboard_alive else _OFFBOARD,
@@ -96,33 +96,35 @@ class HealthReport:
             None if self._position_ready else _LOCAL_POSITION,
             None if self._position_ready else _GLOBAL_POSITION,
             _MISSION,
-            None if pilot else _NO_PILOT,
-            gcs,
+            None if pilot_present else _NO_PILOT,
+            gcs_check,
         )
-        failing = tuple(check for check in candidates if check is not None)
-        gps = state.gps_ok and state.position_valid
+        failing_checks = tuple(check for check in candidates if check is not None)
+        gps_present = state.gps_ok and state.position_valid
         present = (
-            _SENSORS_PRESENT | (_GPS_PRESENT if gps else 0) | (_GCS_PRESENT if gcs_alive else 0)
+            _SENSORS_PRESENT
+            | (_GPS_PRESENT if gps_present else 0)
+            | (_GCS_PRESENT if gcs_alive else 0)
         )
-        if (failing, present) != self._reported:
-            self._reported = (failing, present)
-            self._reported_us = state.time_us
-            self._send(failing, present)
+        if (failing_checks, present) != self._last_report:
+            self._last_report = (failing_checks, present)
+            self._last_report_us = state.time_us
+            self._send(failing_checks, present)
 
     @property
     def _position_ready(self) -> bool:
         return self._state.position_valid and self._state.time_us >= self._ready_us
 
-    def _send(self, failing: tuple[_Check, ...], present: int) -> None:
-        errors = [check for check in failing if check.severity <= _ERROR]
-        warnings = [check for check in failing if check.severity == _WARNING]
+    def _send(self, failing_checks: tuple[_Check, ...], present: int) -> None:
+        errors = [check for check in failing_checks if check.severity <= _ERROR]
+        warnings = [check for check in failing_checks if check.severity == _WARNING]
         modes = _ARMABLE_MODES
         for check in errors:
             modes &= ~check.modes
         summary = _SUMMARY_LAYOUT.pack(0, _components(errors), _components(warnings), modes, modes)
         send = self._events.send
         send(event_id("commander_arming_check_summary"), _PROTOCOL, arguments=summary)
-        for check in failing:
+        for check in failing_checks:
             send(
                 check.event_id,
                 check.severity,

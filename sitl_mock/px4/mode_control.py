@@ -14,13 +14,13 @@ from sitl_mock.autopilot.state import NAN_VECTOR, Mode, PositionTargetEcho, Stat
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, yaw
 from sitl_mock.physics.vehicle import STILL, ActuatorCommand
 from sitl_mock.px4.flight_tasks import FlightTasks
-from sitl_mock.px4.modes import PILOTED
+from sitl_mock.px4.modes import PILOTED_MODES
 
-ATTITUDE_FAILS_US = 140_000
-"""Unusable quaternions, such as NaN, for longer than this, us, make PX4's attitude control fail
-until a restart."""
+ATTITUDE_FAILURE_DELAY_US = 140_000
+"""Time of unusable quaternions, such as NaN, after which PX4's attitude control fails until a
+restart, us."""
 TOUCHDOWN_THRUST_RATE = 0.4
-"""After contact in LAND the normalised thrust decreases by this per second."""
+"""Decrease of the normalised thrust after contact in LAND, 1/s."""
 DISARMED_ACCELERATION: Vector = (0.0, 0.0, 100.0)
 """Acceleration setpoint of PX4's own modes while disarmed, m/s^2 (recorded)."""
 
@@ -29,7 +29,7 @@ class Px4ModeControl:
     """The `ModeControl` of PX4.
 
     Args:
-        state: the autopilot's state; the echoes of the targets are written here.
+        state: the autopilot's state; its command and targets are written here.
         parameters: gains, limits and speeds.
         stream: the offboard setpoints.
     """
@@ -52,21 +52,21 @@ class Px4ModeControl:
         self._position.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
-        """Shift the held position and heading with an estimator reset (rad, m NED)."""
+        """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         self._tasks.shift(yaw_step, position_step)
 
     @property
     def takeoff_reached(self) -> bool:
-        """Whether TAKEOFF is almost at its height."""
+        """Whether TAKEOFF is less than 0.3 m below the height at which it ends."""
         return self._tasks.takeoff_reached
 
     def command(self, dt: float) -> ActuatorCommand:
-        """Return the command for the next ``dt`` s."""
+        """Return the actuator command for the next ``dt`` s."""
         state = self._state
         state.position_target.active = False
         fresh = self._stream.take_fresh()
         if not state.armed:
-            if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED:
+            if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED_MODES:
                 yaw_now = yaw(state.estimate.q)
                 state.position_target = PositionTargetEcho(
                     True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
@@ -78,8 +78,8 @@ class Px4ModeControl:
             self._position.reset()
             command = self._rate_command((0.0, 0.0, 0.0), 0.0)
         elif state.mode in (Mode.MANUAL, Mode.STABILIZED):
-            hover = float(self._parameters["MPC_THR_HOVER"])
-            command = self._attitude_command(from_yaw(self._tasks.yaw), 0.0, hover)
+            hover_thrust = float(self._parameters["MPC_THR_HOVER"])
+            command = self._attitude_command(from_yaw(self._tasks.yaw), 0.0, hover_thrust)
         else:
             if state.mode is Mode.TAKEOFF and state.contact:
                 self._position.reset()
@@ -128,7 +128,7 @@ class Px4ModeControl:
             self._unusable_since_us = None
         elif self._unusable_since_us is None:
             self._unusable_since_us = now
-        elif now - self._unusable_since_us > ATTITUDE_FAILS_US:
+        elif now - self._unusable_since_us > ATTITUDE_FAILURE_DELAY_US:
             self._attitude_failed = True
         if self._attitude_failed or self._unusable_since_us is not None:
             return self._rate_command(NAN_VECTOR, thrust)

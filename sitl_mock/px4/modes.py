@@ -34,10 +34,10 @@ _STANDARD_MODES = {
     Mode.TAKEOFF: dialect.MAV_STANDARD_MODE_TAKEOFF,
 }
 
-PILOTED = frozenset({Mode.MANUAL, Mode.ALTCTL, Mode.POSCTL, Mode.STABILIZED})
+PILOTED_MODES = frozenset({Mode.MANUAL, Mode.ALTCTL, Mode.POSCTL, Mode.STABILIZED})
 """Modes that need a pilot's sticks."""
 
-NEEDS_POSITION = frozenset({Mode.POSCTL, Mode.LOITER, Mode.TAKEOFF, Mode.RTL})
+POSITION_MODES = frozenset({Mode.POSCTL, Mode.LOITER, Mode.TAKEOFF, Mode.RTL})
 """Modes that need a horizontal position."""
 
 MODES_BY_COMMAND: dict[tuple[int, int], Mode] = {
@@ -60,7 +60,7 @@ def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
     Args:
         mode: the flight mode.
         armed: whether the motors may turn.
-        attitude_controlled: whether OFFBOARD has setpoints above body rates.
+        attitude_controlled: whether OFFBOARD follows an attitude or a position, not body rates.
     """
     flags = _CUSTOM | (_ARMED if armed else 0)
     if mode is Mode.OFFBOARD:

@@ -10,7 +10,7 @@ from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import BytewiseEncoding
-from sitl_mock.autopilot.personality import Identity, Rules, VehicleParts
+from sitl_mock.autopilot.personality import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import StreamSchedule
@@ -25,10 +25,10 @@ from sitl_mock.px4.parameters import PX4_PARAMETERS
 from sitl_mock.px4.streams import SLOT_US, Px4Streams
 from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
 
-CONVERGED_SHARE = 0.7
-"""The position becomes valid at this share of ``prearm_delay_s`` (recorded: after 3.2 s)."""
+POSITION_VALID_SHARE = 0.7
+"""Share of ``prearm_delay_s`` after which the position becomes valid (recorded: 3.2 s)."""
 LANDED_AFTER_US = 1_100_000
-"""Contact with low thrust for this time, us, is a landing (measured: 1.1 s)."""
+"""Time of ground contact with low thrust after which the vehicle has landed, us (measured)."""
 
 _COMPANION_RATES: dict[int, float] = {
     dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
@@ -107,15 +107,15 @@ class Px4:
         rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
         if lockstep and link == "companion":
             del rates[dialect.MAVLINK_MSG_ID_SYSTEM_TIME]  # in lockstep this message is the beacon
-        exact = lockstep if settings.exact_rates is None else settings.exact_rates
-        skips_slots = settings.inner_loop_hz == 250 and not exact
+        exact_rates = lockstep if settings.exact_rates is None else settings.exact_rates
+        skips_slots = settings.inner_loop_hz == 250 and not exact_rates
         return Px4Streams(rates, random=Random(f"{settings.seed}/{link}") if skips_slots else None)
 
     def mode_of(self, custom_mode: int) -> Mode | None:
         """Return the mode of a custom_mode (see `modes.custom_mode`), None if there is none."""
         return MODES_BY_COMMAND.get((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
 
-    def rules(self, parts: VehicleParts) -> Rules:
+    def behaviour(self, parts: VehicleParts) -> Behaviour:
         """Build PX4's behaviour for one vehicle."""
         state, parameters, vehicle = parts.state, parts.parameters, parts.vehicle
         events = EventLog(state, parts.links)
@@ -130,7 +130,7 @@ class Px4:
                 state, parts.origin, self.identity, vehicle, parts.stream
             ).builders(),
         }
-        return Rules(
+        return Behaviour(
             control,
             commander,
             Px4Commands(state, commander, builders, parts.origin),
@@ -140,13 +140,13 @@ class Px4:
                 announce,
                 hover_thrust=lambda: parameters["MPC_THR_HOVER"],
                 landed_after_us=LANDED_AFTER_US,
-                climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
+                is_climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
             ),
             builders,
             handlers={
                 "MANUAL_CONTROL": commander.manual_control,
                 "REQUEST_EVENT": events.answer_request,
             },
-            converged_us=CONVERGED_SHARE * parts.ready_us,
+            position_valid_from_us=POSITION_VALID_SHARE * parts.ready_us,
             position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],
         )

@@ -33,9 +33,9 @@ class Sticks:
         axes = tuple(float(axis) / _FULL_TRAVEL for axis in (message.x, message.y, message.r))
         if self.present(now_us) and self._last_us is not None and now_us > self._last_us:
             dt = (now_us - self._last_us) / 1e6
-            share = 1.0 - exp(-dt / _FILTER_S)
+            filter_gain = 1.0 - exp(-dt / _FILTER_S)
             self._speeds = tuple(
-                speed + share * ((new - old) / dt - speed)
+                speed + filter_gain * ((new - old) / dt - speed)
                 for speed, new, old in zip(self._speeds, axes, self._axes, strict=True)
             )
         else:
@@ -47,7 +47,7 @@ class Sticks:
         limit = self._parameters["COM_RC_LOSS_T"] * 1e6
         return self._last_us is not None and now_us - self._last_us <= limit
 
-    def override(self, now_us: int) -> bool:
+    def are_overriding(self, now_us: int) -> bool:
         """Whether a stick moves faster than MAN_OVERRIDE_SPD (half travels/s; negative: never).
 
         As in PX4, a low pass of 0.1 s filters the speed.

@@ -31,9 +31,9 @@ class _Stream:
         self.interval_us = interval_us
         self.due_us = due_us
         self.sent_us: int | None = None
-        """The latest slot in which the message was sent, us."""
+        """Vehicle time of the latest slot in which the message was sent, us."""
         self.status_us = -1
-        """``status_us`` of `Px4Streams.due` when the message was last sent."""
+        """Vehicle time of the latest status published before the message was last sent, us."""
 
 
 class Px4Streams:
@@ -41,8 +41,8 @@ class Px4Streams:
 
     Args:
         rates: message id -> Hz, the rates at boot.
-        random: draws the slots that a stream at the full slot rate misses, and lets positions
-            wait for a new value; None = no slot is missed.
+        random: draws the slots that a stream at the full slot rate misses; positions then also
+            wait for a new value. None = no slot is missed.
     """
 
     def __init__(self, rates: Mapping[int, float], *, random: Random | None) -> None:
@@ -100,7 +100,7 @@ class Px4Streams:
         return due
 
     def _misses_slot(self, stream: _Stream, slot_us: int) -> bool:
-        """Whether a due message misses this slot."""
+        """Whether a due message misses the slot at ``slot_us``."""
         if self._random is None:
             return False
         if slot_us % VALUE_PERIOD_US.get(stream.message_id, 1):

@@ -60,7 +60,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         }
 
     def heartbeat(self) -> Message:
-        """Return HEARTBEAT."""
+        """Return HEARTBEAT, with the mode that is active (a failsafe may have chosen it)."""
         state = self._state
         return dialect.MAVLink_heartbeat_message(
             dialect.MAV_TYPE_QUADROTOR,
@@ -89,7 +89,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         return setpoint is not None
 
     def current_mode(self) -> Message:
-        """Return CURRENT_MODE, with the mode that the user intends."""
+        """Return CURRENT_MODE, with the active mode and the mode that the user intends."""
         state = self._state
         return dialect.MAVLink_current_mode_message(
             standard_mode(state.mode),
@@ -98,19 +98,19 @@ class Px4SystemTelemetry(SystemTelemetry):
         )
 
     def sys_status(self) -> Message:
-        """Return SYS_STATUS."""
+        """Return SYS_STATUS with the recorded sensors."""
         return self._sys_status(_SENSORS_PRESENT, _SENSORS_ENABLED, _SENSORS_HEALTHY, 100)
 
     def battery_status(self) -> Message:
-        """Return BATTERY_STATUS, without the used energy."""
+        """Return BATTERY_STATUS, with 0 mAh used and no used energy."""
         return self._battery_status(
             dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, 0, -1
         )
 
     def gps_raw_int(self) -> Message:
-        """Return GPS_RAW_INT."""
+        """Return GPS_RAW_INT: a 3D fix, or no fix without GPS."""
         state = self._state
-        time_us = state.shown_us
+        time_us = state.stamp_us
         if not state.gps_ok:
             return dialect.MAVLink_gps_raw_int_message(
                 time_us, 0, 0, 0, 0, NO_VALUE, NO_VALUE, NO_VALUE, NO_VALUE, 0
@@ -123,13 +123,13 @@ class Px4SystemTelemetry(SystemTelemetry):
         if not state.position_valid:
             ratios = (nan, nan, 0.004, 0.05, nan, nan, 14.0, 1.25)
             return dialect.MAVLink_estimator_status_message(
-                state.shown_us, _ESTIMATOR_NO_POSITION, *ratios
+                state.stamp_us, _ESTIMATOR_NO_POSITION, *ratios
             )
         flags = _ESTIMATOR_ON_GROUND if state.landed else _ESTIMATOR_IN_AIR
         ratios = (0.015, 0.008, 0.004, 0.08, 0.001, nan, 0.295, 0.275)
-        return dialect.MAVLink_estimator_status_message(state.shown_us, flags, *ratios)
+        return dialect.MAVLink_estimator_status_message(state.stamp_us, flags, *ratios)
 
     def ping(self) -> Message:
-        """Return a PING request."""
+        """Return a PING request, with a new sequence number."""
         self._next_ping += 1
-        return dialect.MAVLink_ping_message(self._state.shown_us, self._next_ping - 1, 0, 0)
+        return dialect.MAVLink_ping_message(self._state.stamp_us, self._next_ping - 1, 0, 0)

@@ -156,7 +156,6 @@ FAULTS = {"gone": {"inject": [{"kind": "gps_los"}]}}
         ({"samples": 6, "sampling": "sobol"}, ("4 or 8",)),
         ({"sweep": {"fault": ["lost"]}}, ("'lost'", "known: none")),
         ({"faults": FAULTS}, ("faults.gone", "gps_los")),
-        ({"sweep": {"guidance.kind": ["nmpc"]}}, ("nmpc", "virtual clock")),
         ({"sweep": {"flight.trajectory": ["no.yaml"]}}, ("no.yaml",)),
         ({"name": "../x"}, ("`name`",)),
         (

@@ -69,6 +69,19 @@ def test_equal_cases_are_equal_flights_to_the_bit(campaign, tmp_path):
     assert table.to_pylist() == [row, other]
 
 
+def test_the_virtual_clock_waits_for_the_solver(tmp_path):
+    pytest.importorskip("casadi")
+    line = CONFIGS / "trajectories" / "line.yaml"
+    told = {"flight.maneuvers": ["trajectory"], "flight.trajectory": str(line)}
+    (case,) = load(tmp_path, set={**QUICK, **told, "guidance.kind": "nmpc"}).cases()
+    row, again = flight.fly_case(case), flight.fly_case(case, tmp_path / "recorded")
+    assert row == again
+    assert row["ok"], row["result"]
+    predicted = json.loads((tmp_path / "recorded" / "summary.json").read_text())["nmpc"]
+    assert predicted["troubles"] == {}
+    assert predicted["flown"] > 100
+
+
 def test_a_fault_begins_in_its_phase_and_its_ending_is_judged(tmp_path):
     (case,) = load(tmp_path, set=QUICK).cases()
     low = ({"kind": "low_battery", "remaining": 0.15},)

@@ -102,14 +102,14 @@ def test_a_doublets_rates_go_to_the_loop_and_hold_gives_it_a_target():
 def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     bench = Bench()
     bench.fly(IN_FIRST_DOUBLET, tilt=29.0)
-    assert bench.guidance_loop.hold.given_up is None
+    assert bench.guidance_loop.hold.give_up_reason is None
     command = bench.fly(IN_FIRST_DOUBLET + 0.02, tilt=31.0)
     assert command.body_rates is None
     assert (
-        bench.guidance_loop.hold.given_up
+        bench.guidance_loop.hold.give_up_reason
         == "identify was given up at 31° of tilt, more than limits.max_tilt_deg = 30"
     )
-    assert bench.guidance_loop.flown.pose.position_ned == pytest.approx(HERE, abs=0.01)
+    assert bench.guidance_loop.flown_source.pose.position_ned == pytest.approx(HERE, abs=0.01)
     assert bench.fly(IN_FIRST_DOUBLET + 0.04).body_rates is None
     assert not bench.guidance_loop.finished
 
@@ -128,8 +128,8 @@ def test_a_vehicle_that_never_comes_back_from_open_loop_is_off_its_course():
     """A doublet pushes it away, and the hold that follows does not bring it nearer."""
     bench, away = Bench(), (9.0, 4.0, -5.0)
     bench.fly(IN_FIRST_DOUBLET, position=away)
-    bench.guidance_loop.flown.clear()
-    bench.guidance_loop.flown.pose = Pose(HERE, 0.0)
+    bench.guidance_loop.flown_source.clear()
+    bench.guidance_loop.flown_source.pose = Pose(HERE, 0.0)
     held_from = IN_FIRST_DOUBLET + 0.02
     for step in range(24):
         bench.fly(held_from + 0.4 * step, position=away)
@@ -177,13 +177,13 @@ def test_an_old_attitude_does_not_replace_a_newer_one():
     old = AttitudeSample(0, reading.vehicle_time, bench.now, 0, tilted, still, *reading[1:])
     bench.guidance_loop.note_attitude(old)
     bench.guidance_loop.step()
-    assert bench.guidance_loop.hold.given_up is None
+    assert bench.guidance_loop.hold.give_up_reason is None
 
 
 def test_position_hold_may_tilt_as_it_must():
     bench = Bench()
     bench.fly(IN_HOLD, tilt=31.0)
-    assert bench.guidance_loop.hold.given_up is None
+    assert bench.guidance_loop.hold.give_up_reason is None
 
 
 @pytest.mark.parametrize(
@@ -222,35 +222,39 @@ def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
 def test_what_a_phase_tells_guidance():
     bench, elsewhere = Bench(), (0.0, 4.0, -5.0)
     guidance = bench.guidance_loop
-    assert (guidance.bound_to_hold, guidance.hold.given_up) == (False, None)
-    source = guidance.flown.source
+    assert (guidance.bound_to_hold, guidance.hold.give_up_reason) == (False, None)
+    source = guidance.flown_source.source
     bench.fly(IN_HOLD, elsewhere)
     assert guidance.motion_now().position_ned == pytest.approx(elsewhere, abs=0.01)
     guidance.hold_reference()
-    assert guidance.flown.source is None
-    assert guidance.flown.pose.position_ned == pytest.approx(HERE)
+    assert guidance.flown_source.source is None
+    assert guidance.flown_source.pose.position_ned == pytest.approx(HERE)
     guidance.stand_by()
-    assert guidance.flown.pose is None
+    assert guidance.flown_source.pose is None
     guidance.follow(source)  # from where it is, because no pose is held
-    assert guidance.flown.pose.position_ned == pytest.approx(elsewhere, abs=0.01)
-    assert (guidance.flown.source, guidance.flown.begun_at) == (source, bench.now)
+    assert guidance.flown_source.pose.position_ned == pytest.approx(elsewhere, abs=0.01)
+    assert (guidance.flown_source.source, guidance.flown_source.begun_at) == (source, bench.now)
     guidance.hold_here()
-    assert guidance.flown.source is None
-    guidance.flown.pose = guidance.flown.pose._replace(position_ned=HERE)
+    assert guidance.flown_source.source is None
+    guidance.flown_source.pose = guidance.flown_source.pose._replace(position_ned=HERE)
     guidance.follow(source)  # from the held pose
-    assert guidance.flown.pose.position_ned == HERE
+    assert guidance.flown_source.pose.position_ned == HERE
     guidance.give_up()
     assert guidance.bound_to_hold is True
     guidance.follow(source)
-    assert guidance.flown.source is None
-    assert guidance.flown.pose.position_ned == pytest.approx(elsewhere, abs=0.01)
+    assert guidance.flown_source.source is None
+    assert guidance.flown_source.pose.position_ned == pytest.approx(elsewhere, abs=0.01)
 
 
 def test_a_guidance_loop_knows_nothing_before_its_first_step():
     guidance = Bench(begun=False).guidance_loop
     with pytest.raises(RuntimeError, match="before any position came"):
         guidance.hold_here()
-    assert (guidance.motion, guidance.tracking_error, guidance.hold.given_up) == (None, None, None)
+    assert (guidance.motion, guidance.tracking_error, guidance.hold.give_up_reason) == (
+        None,
+        None,
+        None,
+    )
     assert guidance.attitude() == (1.0, 0.0, 0.0, 0.0)
 
 

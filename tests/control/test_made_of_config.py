@@ -142,7 +142,7 @@ def test_a_value_moves_by_equal_factors_and_from_zero_by_equal_amounts():
 def test_a_jump_is_in_effect_at_once():
     slew, wanted = Slew(CONFIG), with_gains(gain_per_s=1.0)
     slew.jump(wanted)
-    assert slew.settled is wanted
+    assert slew.settled_config is wanted
     assert slew.step(10.0) is None
     slew.begin(CONFIG, 11.0)
     assert slew.step(11.35).constants.gain == pytest.approx(2.0)
@@ -157,10 +157,10 @@ def test_a_change_that_is_stopped_stays_where_it_is():
     assert radians(20.0) < half_way.max_tilt < radians(30.0)
     slew.stop()
     assert slew.step(11.0) is None
-    assert slew.settled is CONFIG
+    assert slew.settled_config is CONFIG
     slew.begin(wanted, 12.0)
     assert slew.step(12.75).max_tilt == pytest.approx(radians(20.0))
-    assert (slew.settled, slew.step(12.8)) == (wanted, None)
+    assert (slew.settled_config, slew.step(12.8)) == (wanted, None)
 
 
 def test_both_loops_are_made_and_answer_a_sample():
@@ -247,8 +247,7 @@ def test_predictive_control():
     assert made.max_yaw_rate == pytest.approx(radians(50.0))
     assert (made.min_thrust, made.max_thrust) == thrust_limits(CONFIG)
     assert (made.lead, made.deadline) == (0.025, 0.025)
-    link = CONFIG.link.model_copy(update={"lockstep": True})
-    assert predictive_settings(CONFIG.model_copy(update={"link": link})).deadline == 1.0
+    assert predictive_settings(CONFIG, vehicle_waits=True).deadline == 1.0
     slow = CONFIG.vehicle.model_copy(update={"lag_ms": 5.0, "pitch_lag_ms": 5.0})
     with pytest.raises(ConfigError, match=r"^guidance.kind: nmpc does not work .*lag must be"):
         predictive_settings(CONFIG.model_copy(update={"vehicle": slow}))

@@ -100,7 +100,11 @@ def test_a_sample_and_its_setpoint_in_their_columns():
 
 def test_rates_of_guidance_have_no_target_and_no_plan():
     answer = ANSWER._replace(
-        rates=BodyRates(1.0, 1.0, -1.0), thrust=0.1, planner_input=None, planned=None, is_step=False
+        rates=BodyRates(1.0, 1.0, -1.0),
+        thrust=0.1,
+        planner_input=None,
+        planned_tilt=None,
+        is_step=False,
     )
     off = FLAGS._replace(offboard_active=False)
     (row,) = recorded(SampleEntry(SAMPLE, None, off, nan, answer)).rows("/setpoint")

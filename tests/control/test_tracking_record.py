@@ -41,12 +41,12 @@ def test_what_is_flown_has_its_name_and_its_time():
 
 def test_only_a_trajectory_is_followed():
     flown, follow = FlownSource(), Follow(circle(5.0, Laps(2.0)), yaw_rate=1.0)
-    assert flown.following(12.0) is None
+    assert flown.followed_trajectory(12.0) is None
     flown.begin(program(), POSE, 10.0)
-    assert flown.following(12.0) is None
+    assert flown.followed_trajectory(12.0) is None
     flown.begin(ManeuverSource(ManeuverSequence([DOUBLETS, follow])), POSE, 10.0)
-    assert flown.following(12.0) is None
-    assert flown.following(12.5 + DOUBLETS.duration) == (follow, 2.5, POSE)
+    assert flown.followed_trajectory(12.0) is None
+    assert flown.followed_trajectory(12.5 + DOUBLETS.duration) == (follow, 2.5, POSE)
 
 
 def test_a_maneuver_is_told_once_and_its_end_is_marked():

@@ -75,7 +75,7 @@ def test_a_disk_that_hangs_is_not_waited_for(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "fsync", lambda _: answers.wait(10.0))
     began = time.monotonic()
     why = module.write_with_timeout(tmp_path / "summary.json", "{}")
-    assert time.monotonic() - began < 1.0
+    assert time.monotonic() - began < 5.0
     assert why == DISK_HANGS
     answers.set()
 

@@ -11,7 +11,7 @@ import pytest
 from companion.attitude.model_following import ModelFollowingPlanner
 from companion.config import Config
 from companion.config.files import changed, load
-from companion.config.in_flight import changeable, differences
+from companion.config.in_flight import changeable_keys, differences
 from companion.control.retuning import interpolated
 from companion.control.slew import SLEW_TIME
 from companion.flight.changes import ChangeRefusedError, Changes
@@ -130,7 +130,7 @@ def test_a_second_change_counts_together_with_one_that_still_takes_effect():
 
     class Loops:
         @contextmanager
-        def stepped_by(self, _):
+        def before_each_step(self, _):
             yield
 
         def apply(self, _):
@@ -150,10 +150,10 @@ def test_a_second_change_counts_together_with_one_that_still_takes_effect():
 
 
 def test_safety_is_not_changeable():
-    sections = {section for section, _ in changeable()}
+    sections = {section for section, _ in changeable_keys()}
     assert sections == {"planner", "limits", "guidance"}
     fixed = {"fence_radius_m", "fence_ceiling_m", "fence_floor_m", "min_battery_percent"}
-    assert not fixed & {key for _, key in changeable()}
+    assert not fixed & {key for _, key in changeable_keys()}
 
 
 def _constants(planner):

@@ -9,7 +9,7 @@ import pytest
 
 from companion.attitude import BodyRates, Target
 from companion.control.heading_frame import HeadingFrame
-from companion.control.predictive import Following, Predictive
+from companion.control.predictive import FollowedTrajectory, Predictive
 from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.guidance.trajectory import Laps, circle
@@ -66,7 +66,8 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
         def begun():
             assembled = session._assembled
             return (
-                assembled is not None and assembled.context.guidance_loop.flown.begun_at is not None
+                assembled is not None
+                and assembled.context.guidance_loop.flown_source.begun_at is not None
             )
 
         while not begun():  # noqa: ASYNC110
@@ -106,7 +107,7 @@ class FakeSolver:
 
 def bench():
     notes = []
-    predictive = Predictive(FakeSolver, period=0.02, lockstep=False, note=notes.append)
+    predictive = Predictive(FakeSolver, period=0.02, vehicle_waits=False, note=notes.append)
     return predictive, predictive._solver, notes
 
 
@@ -133,7 +134,7 @@ def command(predictive, vehicle, following):
 
 def where(time):
     part = Follow(circle(5.0, Laps(2.0)), yaw_rate=1.0)
-    return Following(part, time, Pose((0.0, 0.0, -5.0), 0.4))
+    return FollowedTrajectory(part, time, Pose((0.0, 0.0, -5.0), 0.4))
 
 
 def test_the_answer_for_now_is_flown_with_its_thrust():

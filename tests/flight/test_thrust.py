@@ -34,7 +34,7 @@ class Learning:
             )
             self.state.position = LocalPosition(self.now, self.now, (0, 0, -5.0), (0, 0, 0))
             self.learning.step(self.now, q, offboard_active=offboard_active, steady=steady)
-        return self.hover_thrust.learned
+        return self.hover_thrust.learned_hover
 
 
 def test_it_is_learned_from_the_autopilots_own_thrust():
@@ -75,7 +75,7 @@ def test_in_control_it_is_learned_from_what_was_sent_while_that_is_steady():
         for _ in range(50):
             bench.hover_thrust.note_thrust(0.4, LEVEL)
             bench.hover(0.02, told=None, offboard_active=True, steady=steady)
-        assert bench.hover_thrust.learned == pytest.approx(learned, rel=0.02)
+        assert bench.hover_thrust.learned_hover == pytest.approx(learned, rel=0.02)
 
 
 def test_the_batterys_voltage_reaches_the_thrust():

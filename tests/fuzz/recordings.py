@@ -19,7 +19,7 @@ from companion.files.yaml_file import ConfigError, load
 from companion.preflight.parameter_fixes import Undo
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import CHANNELS
-from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.writer import McapWriter
 from tests.fuzz.configuration import one_sentence
 from tests.fuzz.target import Case, Target
@@ -160,7 +160,9 @@ def _record(rows: list[list[float]], gain: str) -> bytes:
         for number, row in enumerate(rows):
             for channel in CHANNELS:
                 values = (row * len(channel.numbers))[: len(channel.numbers)]
-                data = channel.packing.pack(CDR, *values, *(number % 2,) * len(channel.codes))
+                data = channel.packing.pack(
+                    CDR_HEADER, *values, *(number % 2,) * len(channel.codes)
+                )
                 writer.message(channel.topic, number, data)
         writer.close()
         return path.read_bytes()

@@ -17,11 +17,11 @@ SPEEDS = st.floats(-10.0, 10.0)
 @given(st.tuples(SPEEDS, SPEEDS, SPEEDS), st.floats(0.2, 8.0))
 def test_it_is_smooth_and_ends_where_the_vehicle_is_at_rest(velocity, duration):
     braking, h = Braking(BEGUN, VehicleMotion(HERE, velocity), HEADING, duration), 1e-5
-    assert braking.at(braking.ends + 5.0).position_ned == pytest.approx(braking.stop)
-    assert braking.at(braking.ends + 5.0).velocity_ned == pytest.approx((0.0,) * 3)
+    assert braking.at(braking.end_time + 5.0).position_ned == pytest.approx(braking.stop)
+    assert braking.at(braking.end_time + 5.0).velocity_ned == pytest.approx((0.0,) * 3)
     assert braking.stop[2] == HERE[2], "the height at which it began is held"
     assert braking.at(BEGUN)[:2] == (HERE, (*velocity[:2], 0.0))
-    for time in np.linspace(BEGUN + 0.01, braking.ends - 0.01, 7):
+    for time in np.linspace(BEGUN + 0.01, braking.end_time - 0.01, 7):
         before, now, after = (braking.at(time + k * h) for k in (-1.0, 0.0, 1.0))
         moved = np.subtract(after.position_ned, before.position_ned) / (2.0 * h)
         assert moved == pytest.approx(now.velocity_ned, abs=1e-4)

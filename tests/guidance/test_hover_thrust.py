@@ -55,10 +55,10 @@ class Vehicle:
 def test_a_configured_hover_thrust_that_is_far_off_is_put_right_at_once(true_hover):
     thrust = HoverThrust(SETTINGS)
     vehicle = Vehicle(thrust, true_hover).fly(0.8)
-    assert thrust.learned == pytest.approx(true_hover, rel=0.05)
+    assert thrust.learned_hover == pytest.approx(true_hover, rel=0.05)
     assert abs(vehicle.height_lost) < 0.5
     vehicle.fly(4.0)
-    assert thrust.learned == pytest.approx(true_hover, rel=0.01)
+    assert thrust.learned_hover == pytest.approx(true_hover, rel=0.01)
 
 
 def test_more_noise_is_believed_less():
@@ -66,7 +66,7 @@ def test_more_noise_is_believed_less():
     for noise in (0.02, 0.2):
         thrust = HoverThrust(SETTINGS)
         vehicle = Vehicle(thrust, noise=noise).fly(6.0)
-        estimates[noise] = [vehicle.fly(0.1).thrust.learned for _ in range(100)]
+        estimates[noise] = [vehicle.fly(0.1).thrust.learned_hover for _ in range(100)]
     spread = {noise: max(found) - min(found) for noise, found in estimates.items()}
     assert spread[0.02] < 0.01
     # Ten times the noise: as a fixed gain would have it, the spread would be ten times as large.
@@ -80,7 +80,7 @@ def test_a_slow_change_is_followed_with_the_time_constant():
     for _ in range(1000):
         vehicle.hover += rate * 0.01
         vehicle.fly(0.012)
-    behind = (vehicle.hover - thrust.learned) / (rate * 0.01 / 0.012)
+    behind = (vehicle.hover - thrust.learned_hover) / (rate * 0.01 / 0.012)
     assert 0.5 * SETTINGS.correction_time < behind < 1.5 * SETTINGS.correction_time
 
 
@@ -89,29 +89,29 @@ def test_a_load_that_is_dropped_is_refused_first_and_learned_soon():
     vehicle = Vehicle(thrust, 0.6).fly(8.0)
     vehicle.hover = 0.4
     vehicle.fly(0.12)
-    assert thrust.learned == pytest.approx(0.6, rel=0.02)
+    assert thrust.learned_hover == pytest.approx(0.6, rel=0.02)
     vehicle.fly(0.9)
-    assert thrust.learned == pytest.approx(0.4, rel=0.05)
+    assert thrust.learned_hover == pytest.approx(0.4, rel=0.05)
 
 
 def test_a_bump_is_not_learned_from():
     thrust = HoverThrust(SETTINGS)
     vehicle = Vehicle(thrust).fly(8.0)
     vehicle.fly(0.1, push=6.0)
-    assert thrust.learned == pytest.approx(0.5, rel=0.02)
+    assert thrust.learned_hover == pytest.approx(0.5, rel=0.02)
 
 
 def test_neither_free_fall_nor_garbage_is_ever_learned_from():
     thrust = HoverThrust(SETTINGS)
     vehicle = Vehicle(thrust).fly(8.0)
-    before = thrust.learned
+    before = thrust.learned_hover
     for k in range(100):
         thrust.note_thrust(0.5, LEVEL)
         thrust.observe(vehicle.time + 0.05 * k, 0.49 * k)
     for k, velocity in enumerate([math.nan, math.inf, 1e30, -1e30] * 50):
         thrust.note_thrust(0.5, LEVEL)
         thrust.observe(vehicle.time + 6.0 + 0.05 * k, velocity)
-    assert thrust.learned == before
+    assert thrust.learned_hover == before
 
 
 @pytest.mark.parametrize(("sent", "bound"), [(0.95, 0.9), (0.25, 0.5 / 1.8)])
@@ -120,7 +120,7 @@ def test_a_thrust_that_was_never_flown_by_leads_no_further_than_the_limit(sent, 
     for k in range(500):
         thrust.note_thrust(sent, LEVEL)
         thrust.observe(0.02 * k, 0.0)
-    assert thrust.learned == pytest.approx(bound)
+    assert thrust.learned_hover == pytest.approx(bound)
 
 
 def test_after_a_lie_the_truth_is_learned():
@@ -129,11 +129,11 @@ def test_after_a_lie_the_truth_is_learned():
     for k in range(500):
         thrust.note_thrust(0.8, LEVEL)
         thrust.observe(0.02 * k, 0.0)
-    assert thrust.learned == pytest.approx(0.8, rel=0.02)
+    assert thrust.learned_hover == pytest.approx(0.8, rel=0.02)
     vehicle = Vehicle(thrust)
     vehicle.time = 10.0
     vehicle.fly(1.0)
-    assert thrust.learned == pytest.approx(0.5, rel=0.06)
+    assert thrust.learned_hover == pytest.approx(0.5, rel=0.06)
 
 
 def test_nothing_is_learned_across_a_pause_a_gap_or_the_ground():
@@ -147,25 +147,25 @@ def test_nothing_is_learned_across_a_pause_a_gap_or_the_ground():
     thrust.observe(1.0, 0.0)
     thrust.note_thrust(0.9, LEVEL)
     thrust.observe(9.0, 0.0)
-    assert thrust.learned == 0.5
+    assert thrust.learned_hover == 0.5
     thrust.note_thrust(0.9, LEVEL)
     thrust.observe(9.2, 0.0)  # the same without any of them
-    assert thrust.learned > 0.6
+    assert thrust.learned_hover > 0.6
 
 
 def test_a_thrust_that_nobody_noted_is_not_learned_from():
     thrust = HoverThrust(SETTINGS)
     for k in range(100):
         thrust.observe(0.1 * k, 1.0 * k)
-    assert thrust.learned == 0.5
+    assert thrust.learned_hover == 0.5
 
 
 def test_known_drag_is_not_taken_for_thrust():
     wrong, right = HoverThrust(SETTINGS), HoverThrust(replace(SETTINGS, drag=1.0))
     for thrust in (wrong, right):
         Vehicle(thrust, drag=1.0).fly(4.0, command=lambda vehicle: -2.0 - vehicle.velocity)
-    assert right.learned == pytest.approx(0.5, rel=0.02)
-    assert wrong.learned > 0.53
+    assert right.learned_hover == pytest.approx(0.5, rel=0.02)
+    assert wrong.learned_hover > 0.53
 
 
 def test_drag_that_is_not_known_makes_a_climb_doubtful():
@@ -174,7 +174,7 @@ def test_drag_that_is_not_known_makes_a_climb_doubtful():
     vehicle.fly(2.5, command=lambda v: 2.0 * (-2.0 - v.velocity))
     assert vehicle.velocity < -1.5
     # Taken at its word, the drag of 0.8 m/s² would have moved it by 6 % in this time.
-    assert thrust.learned == pytest.approx(0.5, rel=0.04)
+    assert thrust.learned_hover == pytest.approx(0.5, rel=0.04)
 
 
 def test_tilt_is_divided_out_by_us_or_by_the_autopilot():
@@ -184,7 +184,7 @@ def test_tilt_is_divided_out_by_us_or_by_the_autopilot():
         vehicle = Vehicle(thrust, q=(w, x, 0.0, 0.0))
         vehicle.divides_by_cos = compensated
         assert abs(vehicle.fly(5.0).velocity) < 0.05
-        assert thrust.learned == pytest.approx(0.5, rel=0.01)
+        assert thrust.learned_hover == pytest.approx(0.5, rel=0.01)
         signal = thrust.normalised(0.0, vehicle.q, STILL)
         assert signal == pytest.approx(0.5 if compensated else 0.5 / math.cos(0.6), rel=0.01)
 
@@ -201,7 +201,7 @@ def test_through_a_curved_thrust_the_motion_is_as_wanted():
     for known, error in ((0.6, 0.02), (0.0, 0.25)):
         thrust = HoverThrust(replace(SETTINGS, curve_factor=known))
         vehicle = Vehicle(thrust, hover=0.4, curve=0.6, noise=0.005).fly(5.0)
-        assert thrust.learned == pytest.approx(0.4, rel=0.02)
+        assert thrust.learned_hover == pytest.approx(0.4, rel=0.02)
         signal = thrust.normalised(-4.0, LEVEL, STILL)
         off = abs(vehicle.specific(signal) - GRAVITY - 4.0) / 4.0
         assert off < error if known else off > error
@@ -213,7 +213,7 @@ def test_the_battery_is_made_up_for_at_once():
     for k in range(20):
         thrust.note_voltage(2.0 + k, 14.4)
     assert thrust.normalised(0.0, LEVEL, STILL) == pytest.approx(0.5 / 0.81, rel=1e-3)
-    assert thrust.learned == 0.5
+    assert thrust.learned_hover == 0.5
     assert thrust.largest_specific_thrust == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
     thrust.on_ground()
     assert thrust.normalised(0.0, LEVEL, STILL) == 0.5
@@ -225,7 +225,7 @@ def test_a_sag_that_the_voltage_tells_is_not_learned_a_second_time():
         thrust.note_voltage(0.1 * k, 16.0 - 0.02 * k)
         thrust.note_thrust(0.5 * (16.0 / (16.0 - 0.02 * k)) ** 2, LEVEL)
         thrust.observe(0.1 * k, 0.0)
-    assert thrust.learned == pytest.approx(0.5, rel=0.01)
+    assert thrust.learned_hover == pytest.approx(0.5, rel=0.01)
 
 
 def test_what_is_given_out_stays_in_its_bounds():

@@ -21,17 +21,17 @@ def flown(velocity=NOTHING, thrust=LEVEL, turn=NOTHING):
 
 def test_a_vehicle_that_hovers_is_carried_no_farther_than_feedback_had_turned_it():
     there = reach(flown(), PX4._replace(hold_time=0.0))
-    assert there.away < 0.1
+    assert there.largest_distance < 0.1
     assert max(there.up, there.down) < 0.1
     assert hypot(*there.place) == 0.0
-    assert reach(flown(), PX4).away < 2.0
+    assert reach(flown(), PX4).largest_distance < 2.0
 
 
 def test_level_at_a_speed_it_goes_on_for_the_time_and_then_brakes_as_the_fence_reckons():
     """A fraction over, for feedback."""
     there = reach(flown(velocity=(5.0, 0.0, 0.0)), PX4)
     assert there.place == pytest.approx((5.0 * 1.1 + FENCE.stop(NOTHING, (5.0, 0.0, 0.0))[0], 0.0))
-    assert there.away == pytest.approx(there.place[0] + there.spread)
+    assert there.largest_distance == pytest.approx(there.place[0] + there.spread)
     assert 0.0 < there.spread < 5.0
 
 

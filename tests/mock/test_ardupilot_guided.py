@@ -59,9 +59,9 @@ def test_a_flight_from_the_ground_to_the_ground_with_its_times_and_flags():
     assert rig.base_mode() == 209
     assert rig.messages("HEARTBEAT")[-1].custom_mode == GUIDED
     assert rig.switch(BRAKE) == ACCEPTED
-    counted = rig.simulation.stream.received
+    counted = rig.simulation.stream.setpoint_count
     rig.run(2.0)
-    assert rig.simulation.stream.received == counted  # in BRAKE nobody listens to setpoints
+    assert rig.simulation.stream.setpoint_count == counted  # in BRAKE nobody listens to setpoints
     assert hypot(*rig.truth.velocity_ned) < 0.35
     assert rig.base_mode() == 217
     rig.each_tick = None

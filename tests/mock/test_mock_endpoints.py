@@ -35,7 +35,7 @@ def soon(condition):
 @pytest.fixture
 def tcp():
     endpoint = TcpEndpoint(HOST, free_port())
-    endpoint.port = int(endpoint.where.rpartition(":")[2])
+    endpoint.port = int(endpoint.address.rpartition(":")[2])
     yield endpoint
     endpoint.close()
 
@@ -111,7 +111,7 @@ def test_a_serial_line_has_a_name_loses_what_nobody_hears_and_survives_a_hang_up
     endpoint = SerialEndpoint(link)
     frames = pings(3)
     try:
-        assert endpoint.readable == []
+        assert endpoint.descriptors == []
         endpoint.send([frames[0]])
         for _ in range(2):
             device = os.open(link, os.O_RDWR | os.O_NOCTTY)

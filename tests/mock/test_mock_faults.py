@@ -86,16 +86,16 @@ def test_schedule_by_time_and_duration():
 def test_schedule_after_offboard_and_at_once():
     schedule = FaultSchedule((fault("drop", after_offboard_s=0.5),))
     schedule.update(9_000_000, None)
-    assert schedule.link == ()
+    assert schedule.link_faults == ()
     schedule.update(9_000_000, 8_600_000)
-    assert schedule.link == ()
+    assert schedule.link_faults == ()
     schedule.update(9_100_000, 8_600_000)
-    assert len(schedule.link) == 1
+    assert len(schedule.link_faults) == 1
     schedule.add(fault("delay", duration_s=1.0), 9_100_000)
     schedule.update(9_104_000, 8_600_000)
-    assert len(schedule.link) == 2
+    assert len(schedule.link_faults) == 2
     schedule.clear()
-    assert schedule.link == ()
+    assert schedule.link_faults == ()
 
 
 @pytest.mark.parametrize(
@@ -237,7 +237,7 @@ def test_clear_undoes_what_can_be_undone():
     rig.simulation.clear_faults()
     rig.run(1.0)
     assert rig.state.gps_ok
-    assert rig.state.shown_us == rig.state.time_us
+    assert rig.state.stamp_us == rig.state.time_us
     assert rig.arm() == ACCEPTED
 
 

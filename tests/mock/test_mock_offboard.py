@@ -198,17 +198,17 @@ IGNORED_SETPOINTS = {
 def test_setpoints_that_count(setpoint):
     rig = Rig()
     rig.rates(**setpoint)
-    assert rig.simulation.stream.received == 1
+    assert rig.simulation.stream.setpoint_count == 1
 
 
 @pytest.mark.parametrize("setpoint", IGNORED_SETPOINTS.values(), ids=IGNORED_SETPOINTS)
 def test_setpoints_that_do_not_count_lose_offboard(setpoint):
     rig = Rig()
     rig.fly_offboard()
-    counted = rig.simulation.stream.received
+    counted = rig.simulation.stream.setpoint_count
     rig.each_tick = lambda: rig.rates(**setpoint)
     rig.run(1.2)
-    assert rig.simulation.stream.received == counted
+    assert rig.simulation.stream.setpoint_count == counted
     assert rig.state.failsafe
 
 
@@ -220,7 +220,7 @@ def test_any_source_and_a_version_1_frame_are_accepted():
     )
     for each in decode(bytes(message.pack(mav, force_mavlink1=True))):
         rig.simulation.handle(each, rig.simulation.companion)
-    assert rig.simulation.stream.received == 1
+    assert rig.simulation.stream.setpoint_count == 1
 
 
 @pytest.mark.parametrize("held", [nan, inf, -inf])
@@ -319,7 +319,7 @@ def test_short_nan_quaternion_is_survived():
 def test_without_forwarding_no_setpoint_counts():
     rig = Rig(parameters={"MAV_FWDEXTSP": 0})
     rig.rates()
-    assert rig.simulation.stream.received == 0
+    assert rig.simulation.stream.setpoint_count == 0
 
 
 def test_land_command_from_offboard():

@@ -13,7 +13,7 @@ MISTAKES = {
     "wind: {speed: 3}": ("mock.wind.speed", "did you mean speed_m_s?"),
     "lockstep: {enable: true}": ("mock.lockstep.enable", "did you mean enabled?"),
     "parameters: {COM_OBL_RC_AC: 3}": ("COM_OBL_RC_AC", "did you mean COM_OBL_RC_ACT?"),
-    "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT is an integer",),
+    "parameters: {COM_OBL_RC_ACT: 3.5}": ("COM_OBL_RC_ACT must be an integer",),
     "parameters: {MPC_XY_VEL_MAX: 1.0e+300}": (
         "1e+300 does not fit into the 32 bits of MPC_XY_VEL_MAX",
     ),
@@ -107,6 +107,13 @@ def test_each_vehicle_has_its_own_ports_and_luck():
     third = settings.for_vehicle(2)
     assert (third.port, third.gcs_port, third.control_port, third.seed) == (14542, 14552, 9002, 9)
     assert MockSettings(gcs_port=0).for_vehicle(2).gcs_port == 0
+
+
+def test_check_reads_the_passphrase(tmp_path, capsys):
+    path = tmp_path / "mock.yaml"
+    path.write_text("mock: {signing: {passphrase_file: none.txt}}\n")
+    assert main(["--config", str(path), "--check"]) == 2
+    assert "mock.signing.passphrase_file: " in capsys.readouterr().err
 
 
 def test_check_says_so(capsys):

@@ -17,7 +17,7 @@ FROZEN_GUIDANCE = """
 from companion.control.guidance_loop import GuidanceLoop
 flown = GuidanceLoop.step
 def freezing(guide):
-    if guide.flown.begun_at is None or guide._clock() < guide.flown.begun_at + 5.0:
+    if guide.flown_source.begun_at is None or guide._clock() < guide.flown_source.begun_at + 5.0:
         flown(guide)
 GuidanceLoop.step = freezing
 """

@@ -88,7 +88,7 @@ def words(figures, called=DEMO):
 
 def test_a_good_flight_is_called_good_with_its_figures_and_limits():
     told, text = words(GOOD)
-    assert (told.good, told.flown) == (True, True)
+    assert (told.good, told.completed) == (True, True)
     assert told.headline == (
         "The flight was good: hover, steps and circle, all within their limits."
     )
@@ -119,7 +119,7 @@ BEYOND = {
 def test_each_figure_beyond_its_limit_is_told_first_with_what_to_do(what):
     path, value, remedy = BEYOND[what]
     told, _ = words(changed(path, value))
-    assert (told.good, told.flown) == (False, True)
+    assert (told.good, told.completed) == (False, True)
     assert "not good" in told.headline
     assert "1 of 11 figures beyond their limits" in told.headline
     assert told.lines[0].startswith(f"! {what}: ")
@@ -234,7 +234,7 @@ def test_a_full_disk_is_not_blamed_on_the_configuration():
 
 def test_a_flight_that_ended_early_says_when_why_and_what_to_do():
     told, text = words({**GOOD, **ENDED})
-    assert (told.good, told.flown) == (False, False)
+    assert (told.good, told.completed) == (False, False)
     assert told.headline == "The flight ended early: the vehicle is 9.1 m away."
     assert "when: at 33.9 s, in phase `maneuvers`, 7.2 s into circle" in text
     assert "vehicle now: disarmed, in mode AUTO.LOITER" in text

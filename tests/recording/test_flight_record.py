@@ -37,7 +37,7 @@ def write(folder):
     for row in range(ROWS):
         for channel in CHANNELS:
             numbers = [row + 0.125 * k for k in range(len(channel.numbers))]
-            data = channel.packing.pack(cdr.CDR, *numbers, *([row % 2] * len(channel.codes)))
+            data = channel.packing.pack(cdr.CDR_HEADER, *numbers, *([row % 2] * len(channel.codes)))
             writer.message(channel.topic, row * 4_000_000, data)
         if row == ROWS // 2:
             writer.flush()
@@ -170,17 +170,17 @@ def write_one(folder, topic, data):
 
 def row(channel, number, code):
     numbers, codes = [number] * len(channel.numbers), [code] * len(channel.codes)
-    return channel.packing.pack(cdr.CDR, *numbers, *codes)
+    return channel.packing.pack(cdr.CDR_HEADER, *numbers, *codes)
 
 
 @pytest.mark.parametrize(
     ("topic", "data", "read"),
     [
-        ("/phase", cdr.CDR, lambda record: record.phases),
+        ("/phase", cdr.CDR_HEADER, lambda record: record.phases),
         ("/maneuver", bytes(300), lambda record: record.maneuvers),
         ("/alarm", b"", lambda record: record.alarms),
         ("/log", b"", lambda record: record.events),
-        ("/sample", cdr.CDR + bytes(3), lambda record: record.rows("sample")),
+        ("/sample", cdr.CDR_HEADER + bytes(3), lambda record: record.rows("sample")),
         ("/action", row(ACTION, 1.0, 200), lambda record: list(recorded_inputs(record))),
         ("/setpoint", row(SETPOINT, np.nan, 0), derived_summary),
         ("/resources", row(RESOURCES, np.nan, 0), summary_of),
@@ -228,7 +228,9 @@ def test_a_killed_flight_says_since_when_it_flew(tmp_path, phase):
     writer.message("/phase", 2_000_000_000, cdr.fields_message((2.0,), (phase, "the height")))
     for time, standing in ((1.5, 0), (2.5, 1), (3.0, 0), (9.0, 0)):
         codes = [standing if code.name == "standing" else 0 for code in INPUT.codes]
-        data = INPUT.packing.pack(cdr.CDR, time, *[np.nan] * (len(INPUT.numbers) - 1), *codes)
+        data = INPUT.packing.pack(
+            cdr.CDR_HEADER, time, *[np.nan] * (len(INPUT.numbers) - 1), *codes
+        )
         writer.message(INPUT.topic, round(time * 1e9), data)
     writer.flush()
     writer.close(complete=False)

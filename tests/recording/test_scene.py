@@ -26,7 +26,7 @@ SCENE = (
         "world",
         cubes=[Cube(POSE, (1.0, 2.0, 3.0), GREEN)],
         cylinders=[Cylinder(POSE, (4.0, 5.0, 6.0), RED)] * 2,
-        lines=[Line(POINTS, GREEN), Line((), RED), Line(POINTS[:2], RED, pairs=True)],
+        lines=[Line(POINTS, GREEN), Line((), RED), Line(POINTS[:2], RED, separate_pairs=True)],
     ),
 )
 

@@ -20,8 +20,8 @@ def small_chunks(monkeypatch):
     monkeypatch.setattr(room, "_CHUNK_ROWS", 8)
 
 
-def noted(count, spool, kept=0):
-    series = Series(COLUMNS, spool, kept)
+def noted(count, spool, rows_in_memory=0):
+    series = Series(COLUMNS, spool, rows_in_memory)
     for number in range(count):
         series.add([float(number), float(number * number)])
     return series
@@ -40,7 +40,7 @@ def test_every_row_comes_back_in_order(tmp_path, count, kept):
 
 
 def test_the_newest_rows_are_had_without_the_disk(tmp_path, monkeypatch):
-    series = noted(100, Spool(tmp_path), kept=16)
+    series = noted(100, Spool(tmp_path), rows_in_memory=16)
 
     def refuse(*_):
         raise AssertionError("the disk was asked")
@@ -54,7 +54,7 @@ def test_the_newest_rows_are_had_without_the_disk(tmp_path, monkeypatch):
 def test_memory_does_not_grow_with_the_flight(tmp_path, monkeypatch):
     monkeypatch.setattr(room, "_CHUNK_ROWS", 256)
     spool = Spool(tmp_path)
-    series = Series(COLUMNS, spool, kept=512)
+    series = Series(COLUMNS, spool, rows_in_memory=512)
     tracemalloc.start()
     try:
         sizes = []

@@ -88,9 +88,9 @@ def trace_in_wind():
 def test_the_tilt_that_balances_the_wind_is_no_part_of_a_step():
     response = measure_response(trace_in_wind().response_rows(), gain=5.0)
     assert response.step_size == pytest.approx(0.25, abs=0.03)
-    assert response.asked_tilt == pytest.approx(math.asin(math.hypot(0.55, 0.3)))
+    assert response.target_tilt == pytest.approx(math.asin(math.hypot(0.55, 0.3)))
     calm = measure_response(trace_of(0.3).response_rows(), gain=5.0)
-    assert (calm.step_size, calm.asked_tilt) == pytest.approx((0.2, math.asin(0.2)))
+    assert (calm.step_size, calm.target_tilt) == pytest.approx((0.2, math.asin(0.2)))
 
 
 def test_an_axis_that_no_step_moved_has_no_time_constant():

@@ -13,7 +13,7 @@ from companion.cli.main import main
 from companion.extras import MissingExtraError
 from companion.recording.flight_record import RecordError
 from companion.recording.mcap_file.channels import MOTION
-from companion.recording.mcap_file.fields import CDR
+from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.loop_channels import SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import _REQUIRED_KEYS
@@ -38,7 +38,7 @@ FLIGHT = FlightData(
         *(Span(3.0, 5.0, "takeoff"), Span(5.0, 8.2, "maneuvers")),
     ),
     maneuvers=(Span(5.0, 6.0, "hover"), Span(6.0, 8.2, "steps")),
-    end=EndMark(8.2, "the vehicle is 9.1 m away, which costs $100"),
+    early_end=EndMark(8.2, "the vehicle is 9.1 m away, which costs $100"),
 )
 WHOLE = {
     **dict.fromkeys(_REQUIRED_KEYS),
@@ -57,10 +57,10 @@ def record(folder, *, steps=False, motion=False, gain="5.0", largest=2.0, summar
         for channel, codes in ((SAMPLE, {}), (SETPOINT, {"is_step": 1})):
             columns = (*channel.numbers, *channel.codes)
             row = [{**numbers, **codes}.get(column.name, 0) for column in columns]
-            writer.message(channel.topic, k, channel.packing.pack(CDR, *row))
+            writer.message(channel.topic, k, channel.packing.pack(CDR_HEADER, *row))
     for k in range(100 * motion):
         row = (0.1 * k, nan, 0.05 * k, 1.0, largest, nan)
-        writer.message("/motion", k, MOTION.packing.pack(CDR, *row))
+        writer.message("/motion", k, MOTION.packing.pack(CDR_HEADER, *row))
     writer.close()
     (folder / "summary.json").write_text(json.dumps(summary))
 
@@ -165,7 +165,7 @@ def test_a_reason_that_is_too_long_is_cut():
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     axes = list(Figure().subplots(len(PANEL_HEIGHTS), sharex=True))
-    draw_history(axes, replace(FLIGHT, end=EndMark(8.2, "x" * 500)))
+    draw_history(axes, replace(FLIGHT, early_end=EndMark(8.2, "x" * 500)))
     title = axes[0].get_title()
     assert title.startswith("ended at 8.2 s: xxx")
     assert title.endswith("xxx…")

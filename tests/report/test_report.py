@@ -203,7 +203,7 @@ def test_each_limit_is_drawn_where_it_is_crossed(folder, monitor, reason, curve,
     found = early_end({"early_end": end, "result": reason}, record, config)
     assert (found.limit.curve, found.limit.key) == (curve, key)
     assert bool(found.limit.outline) == (curve == "track")
-    flight = dataclasses.replace(recorded(folder), end=found)
+    flight = dataclasses.replace(recorded(folder), early_end=found)
     drawn = [t["name"] for p in (*motion_plots([flight]), *control_plots(flight)) for t in p.traces]
     assert f"limit: {key}" in drawn
     assert (

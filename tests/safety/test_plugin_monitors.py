@@ -47,6 +47,12 @@ def blocking(config):
 def silent(config):
     return made(config, lambda snapshot, raised: None, stream=Stream.STOPS)
 
+def slow(config):
+    return made(config, lambda snapshot, raised: wait())
+
+def wait():
+    pass
+
 def raising(config):
     return made(config, lambda snapshot, raised: snapshot.motion.height + 1.0)
 
@@ -65,8 +71,8 @@ def unmade(config):
 def nothing(config):
     return None
 """
-NAMES = ("sinking", "high", "leaving", "blocking", "silent", "raising", "counting", "wordless",
-         "releasing", "unmade", "nothing")  # fmt: skip
+NAMES = ("sinking", "high", "leaving", "blocking", "silent", "slow", "raising", "counting",
+         "wordless", "releasing", "unmade", "nothing")  # fmt: skip
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
@@ -142,6 +148,22 @@ def test_a_judge_that_raises_is_asked_once_and_stops_no_other_monitor():
     assert {"high (its fault)", "disarmed"} <= set(ladder.raised)
     ladder.step(rolled._replace(now=10.5))
     assert "tilt" in ladder.raised
+
+
+def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("companion.safety.plugin_monitors.perf_counter", lambda: clock[0])
+    ladder = SafetyLadder(monitors(configured("slow")), 3.0)
+    notes = []
+    ladder.note = notes.append
+    sys.modules["my_monitors"].wait = lambda: clock.__setitem__(0, clock[0] + taken)
+    for step in range(60):  # of 20 ms; every fifth answer is quick at first
+        taken = 0.001 if step < 30 and step % 5 == 0 else 0.015
+        ladder.step(Snapshot(10.0 + 0.02 * step))
+        assert ("slow (its time)" in ladder.raised) is (step >= 51)
+    assert notes[-1] == (
+        "safety: slow (its time): it takes 15 ms to judge, and delays the setpoints → warn"
+    )
 
 
 def test_it_can_only_choose_among_the_actions():

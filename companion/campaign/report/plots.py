@@ -8,7 +8,15 @@ import numpy as np
 from companion.campaign.report.results import RATES, THRUST, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
 from companion.campaign.report.statistics import choices, levels, median, pareto_front, share_of
-from companion.report.plots import IDEAL, MEASURED, NEAREST, REFERENCE, Plot, axes, numbers
+from companion.report.plots import (
+    IDEAL_COLOUR,
+    MEASURED_COLOUR,
+    NEAREST_COLOUR,
+    REFERENCE_COLOUR,
+    Plot,
+    axes,
+    numbers,
+)
 
 _MOST_FACTORS = 6
 """Largest number of factors with a plot of their own."""
@@ -43,7 +51,7 @@ def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
                 "array": [_percent(share.high - share.share) for share in shares],
                 "arrayminus": [_percent(share.share - share.low) for share in shares],
             },
-            "marker": {"color": MEASURED, "size": 8},
+            "marker": {"color": MEASURED_COLOUR, "size": 8},
             "text": [f"{share.case_count} of {share.total}" for share in shares],
             "hovertemplate": "%{x}: %{y:.1f} % (%{text})<extra></extra>",
         }
@@ -62,7 +70,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
     """The first-order Sobol indices of each outcome as bars, a bar for each factor."""
     traces = []
     for (outcome, found), colour in zip(
-        influences.items(), (MEASURED, NEAREST, REFERENCE), strict=False
+        influences.items(), (MEASURED_COLOUR, NEAREST_COLOUR, REFERENCE_COLOUR), strict=False
     ):
         traces.append(
             {
@@ -110,11 +118,11 @@ def pareto(results: Results) -> Iterator[Plot]:
     for name, part in (("on the front", front), ("others", ~front)):
         marker: dict[str, Any] = {"size": 11 if part is front else 6}
         if part is front:
-            marker["line"] = {"color": REFERENCE, "width": 2}
+            marker["line"] = {"color": REFERENCE_COLOUR, "width": 2}
         if thrust:
             marker |= _colour_scale(goals[part, 2], goals[:, 2], shown=part is front)
         else:
-            marker["color"] = MEASURED if part is front else IDEAL
+            marker["color"] = MEASURED_COLOUR if part is front else IDEAL_COLOUR
         if part.any():
             shown = [titles[k] for k in np.flatnonzero(part)]
             traces.append(_points(name, goals[part], shown, marker))
@@ -170,7 +178,10 @@ def distributions(results: Results) -> Iterator[Plot]:
             continue
         edges = np.linspace(low, high, _BINS + 1)
         traces = []
-        for good, title, colour in ((True, "good", MEASURED), (False, "not good", REFERENCE)):
+        for good, title, colour in (
+            (True, "good", MEASURED_COLOUR),
+            (False, "not good", REFERENCE_COLOUR),
+        ):
             selected = values[is_finite & (results.good == good)]
             counts, _ = np.histogram(np.clip(selected, low, high), edges)
             traces.append(

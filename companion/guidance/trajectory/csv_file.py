@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from companion.files.bounded_file import FileRefusedError, read_text
-from companion.guidance.trajectory.csv_header import columns_of, rows_of, shown, without_unit
+from companion.guidance.trajectory.csv_header import columns_of, excerpt, rows_of, without_unit
 from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 
@@ -107,30 +107,30 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST_SAMPLES + 2))
-    fewest = f"{name}: needs a header and at least {FEWEST_SAMPLES} samples"
+    too_few = f"{name}: needs a header and at least {FEWEST_SAMPLES} samples"
     if not rows:
-        raise TrajectoryError(fewest)
+        raise TrajectoryError(too_few)
     if len(rows) > _MOST_SAMPLES + 1:
         raise TrajectoryError(f"{name}: has more than {_MOST_SAMPLES} samples; leave some out")
     with_units = [column.strip().lower() for column in rows[0][1]]
     header = [without_unit(column) for column in with_units]
     groups = columns_of(header, with_units, name)
     if len(rows) <= FEWEST_SAMPLES:
-        raise TrajectoryError(fewest)
+        raise TrajectoryError(too_few)
     _require_no_more_values(rows, name)
     data = {group: _numbers(rows[1:], header, names, name) for group, names in groups.items()}
     times = data["time"][:, 0]
-    lines_of = [line for line, _ in rows[1:]]
-    _require_steps(times, lines_of, name)
+    line_numbers = [line for line, _ in rows[1:]]
+    _require_steps(times, line_numbers, name)
     for group, values in data.items():
-        counted = values - values[0] if group == "position" else values
-        _require_range(group, counted, groups[group], lines_of, name)
-    known = [data[group] for group in ("velocity", "acceleration") if group in data]
+        checked = values - values[0] if group == "position" else values
+        _require_range(group, checked, groups[group], line_numbers, name)
+    derivatives = [data[group] for group in ("velocity", "acceleration") if group in data]
     used = {column for names in groups.values() for column in names}
     return Table(
         times - times[0],
         data["position"],
-        tuple(known),
+        tuple(derivatives),
         _yaw(data, name),
         frames[0] if frames else None,
         tuple(column for column in header if column and column not in used),
@@ -138,22 +138,22 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
 
 
 def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str) -> None:
-    """Refuse rows with more values than the header has names, as decimal commas make them.
+    """Refuse rows with more values than the header has names; decimal commas make such rows.
 
-    Some published files have more values than names in the header. They are accepted if all rows
-    have equally many values and decimals have points.
+    Some published files have them, too; they are accepted if all rows have equally many values and
+    decimals have points.
 
     Raises:
         TrajectoryError: a row has too many values; the message names its line.
     """
     columns = len(rows[0][1])
-    more = next(((line, len(row)) for line, row in rows[1:] if any(row[columns:])), None)
-    if more is None:
+    long_row = next(((line, len(row)) for line, row in rows[1:] if any(row[columns:])), None)
+    if long_row is None:
         return
-    as_many = len({len(row) for _, row in rows[1:]}) == 1
-    if as_many and any("." in cell for _, row in rows[1:] for cell in row):
+    equally_long = len({len(row) for _, row in rows[1:]}) == 1
+    if equally_long and any("." in cell for _, row in rows[1:] for cell in row):
         return
-    line, values = more
+    line, values = long_row
     raise TrajectoryError(
         f"{name}, line {line}: {values} values for {columns} columns; "
         "write decimals with a point, and as many values as the header has names"
@@ -179,18 +179,18 @@ def _numbers(
             # Python would read 1_0 as 10.
             if not isfinite(number) or "_" in text:
                 raise TrajectoryError(
-                    f"{name}, line {line}: {names[i]} is {shown(text)!r}, not a number"
+                    f"{name}, line {line}: {names[i]} is {excerpt(text)!r}, not a number"
                 )
             numbers[k, i] = number
     return numbers
 
 
-def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
+def _require_steps(times: Floats, line_numbers: Sequence[int], name: str) -> None:
     """Check each step in time (`_SHORTEST_STEP` to `_LONGEST_STEP`) and the duration."""
     steps = np.diff(times)
     wrong = np.flatnonzero(~((steps >= 0.999 * _SHORTEST_STEP) & (steps <= _LONGEST_STEP)))
     if wrong.size:
-        step, line = float(steps[wrong[0]]), lines[int(wrong[0]) + 1]
+        step, line = float(steps[wrong[0]]), line_numbers[int(wrong[0]) + 1]
         if step <= 0.0:
             raise TrajectoryError(
                 f"{name}, line {line}: time does not increase; leave this sample out"
@@ -204,27 +204,28 @@ def _require_steps(times: Floats, lines: Sequence[int], name: str) -> None:
 
 
 def _require_range(
-    group: str, values: Floats, names: tuple[str, ...], lines: Sequence[int], name: str
+    group: str, values: Floats, names: tuple[str, ...], line_numbers: Sequence[int], name: str
 ) -> None:
     """Check that a quantity is within its range, and that a quaternion has the length 1.
 
     Raises:
         TrajectoryError: a value is out of range; the message names the line.
     """
-    most, unit = _LARGEST_VALUES[group]
-    outside = np.argwhere(~(np.abs(values) <= most))
+    limit, unit = _LARGEST_VALUES[group]
+    outside = np.argwhere(~(np.abs(values) <= limit))
     if outside.size:
         k, i = (int(index) for index in outside[0])
+        line, value = line_numbers[k], values[k, i]
         raise TrajectoryError(
-            f"{name}, line {lines[k]}: {names[i]} is {values[k, i]:.3g}, more than {most:g} {unit}"
+            f"{name}, line {line}: {names[i]} is {value:.3g}, more than {limit:g} {unit}"
         )
     if group == "quaternion":
         lengths = np.linalg.norm(values, axis=1)
-        bad = np.flatnonzero(np.abs(lengths - 1.0) > _LENGTH_ERROR)
-        if bad.size:
+        wrong = np.flatnonzero(np.abs(lengths - 1.0) > _LENGTH_ERROR)
+        if wrong.size:
             raise TrajectoryError(
-                f"{name}, line {lines[int(bad[0])]}: the quaternion has the length "
-                f"{lengths[bad[0]]:.3g}, not 1; give unit quaternions, or leave their columns out"
+                f"{name}, line {line_numbers[int(wrong[0])]}: the quaternion has the length "
+                f"{lengths[wrong[0]]:.3g}, not 1; give unit quaternions, or leave their columns out"
             )
 
 

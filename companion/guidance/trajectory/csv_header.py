@@ -30,7 +30,7 @@ _OTHER_UNIT = re.compile(r"(.*?)(?:_| ?[\[(])(deg|°|ms|us|ns|cm|mm|ft)[\])]?")
 """A column name followed by a unit that is refused."""
 _FRAME = re.compile(r"#\s*frame\s*[:=]\s*(\S+)\s*")
 
-_MOST_SHOWN = 60
+_LONGEST_EXCERPT = 60
 """Largest number of characters that a message quotes from the file."""
 
 
@@ -90,7 +90,7 @@ def columns_of(header: list[str], with_units: list[str], name: str) -> dict[str,
 
 def _require_header(with_units: list[str], name: str) -> None:
     """Check that the first line names columns, separated by commas, in units that are read."""
-    columns = shown(",".join(with_units))
+    columns = excerpt(",".join(with_units))
     if len(with_units) == 1 and (found := re.search("[;\t]", with_units[0])):
         separator = "semicolons" if found[0] == ";" else "tabs"
         raise TrajectoryError(f"{name}: its columns are separated by {separator}; use commas")
@@ -118,16 +118,16 @@ def _is_number(text: str) -> bool:
 def _missing(group: str, header: list[str]) -> str:
     """The message that columns of a quantity are missing, with those that were found."""
     spellings = _SPELLINGS[group]
-    known = " or ".join(",".join(names) for names in spellings)
+    expected = " or ".join(",".join(names) for names in spellings)
     nearest = max(spellings, key=lambda names: sum(column in header for column in names))
-    lacks = [column for column in nearest if column not in header]
-    if len(lacks) < len(nearest):
-        fault = f"the column {' and '.join(lacks)} of the {group} is missing"
+    missing = [column for column in nearest if column not in header]
+    if len(missing) < len(nearest):
+        fault = f"the column {' and '.join(missing)} of the {group} is missing"
     else:
         fault = f"the header names no {group}"
-    return f"{fault}; expected {known}, found {shown(','.join(header))}"
+    return f"{fault}; expected {expected}, found {excerpt(','.join(header))}"
 
 
-def shown(text: str) -> str:
+def excerpt(text: str) -> str:
     """Text of the file, shortened for a message."""
-    return text if len(text) <= _MOST_SHOWN else text[:_MOST_SHOWN] + "…"
+    return text if len(text) <= _LONGEST_EXCERPT else text[:_LONGEST_EXCERPT] + "…"

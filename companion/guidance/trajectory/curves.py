@@ -1,6 +1,6 @@
-"""Curves in space over a phase, with three exact derivatives.
+"""Curves in space with three exact derivatives; the curve parameter is called the phase.
 
-Each begins at (0, 0, 0). Angles are radians, lengths metres, the frame is NED.
+Each curve begins at (0, 0, 0). Angles are radians, lengths metres, the frame is NED.
 """
 
 from dataclasses import dataclass
@@ -44,10 +44,10 @@ _CHECKS_PER_LAP = 720
 
 
 def require_checkable(needed: float) -> None:
-    """Check that a trajectory can be checked with a bounded number of samples.
+    """Refuse a trajectory that needs more than `MOST_CHECKS` checks.
 
     Raises:
-        TrajectoryError: the trajectory needs more than MOST_CHECKS samples.
+        TrajectoryError: `needed`, the number of checks, is larger.
     """
     if not needed <= MOST_CHECKS:
         raise TrajectoryError(
@@ -100,18 +100,18 @@ class Straight:
         return PhaseSampling(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:
-        """The point `phase` metres along."""
+        """The point at the distance `phase` (m) from the start."""
         north, east, down = self.direction
-        none = (0.0, 0.0, 0.0)
-        return CurvePoint((phase * north, phase * east, phase * down), self.direction, none, none)
+        zero = (0.0, 0.0, 0.0)
+        return CurvePoint((phase * north, phase * east, phase * down), self.direction, zero, zero)
 
 
 @dataclass(frozen=True, slots=True)
 class Helix:
-    """Laps about a centre `radius` north of the start; leaves eastwards; phase 2π per lap.
+    """Laps about a centre north of the start, first eastwards; the phase grows by 2π in each lap.
 
     Attributes:
-        radius: m.
+        radius: distance of the centre from the start, m.
         rise: climb in each lap, m; 0 makes a circle.
     """
 
@@ -136,7 +136,7 @@ class Helix:
 
 @dataclass(frozen=True, slots=True)
 class GeronoEight:
-    """Lemniscate of Gerono, (A sin φ, A sin φ cos φ): along north-south, from its middle.
+    """Lemniscate of Gerono, (A sin φ, A sin φ cos φ) north and east; it begins in the middle.
 
     Attributes:
         half_width: A, m.
@@ -165,7 +165,7 @@ class GeronoEight:
 
 @dataclass(frozen=True, slots=True)
 class BernoulliEight:
-    """Lemniscate of Bernoulli, (A sin φ, A sin φ cos φ)/(1 + cos² φ): along north-south.
+    """Lemniscate of Bernoulli, (A sin φ, A sin φ cos φ)/(1 + cos² φ) north and east.
 
     Attributes:
         half_width: A, m.
@@ -186,14 +186,14 @@ class BernoulliEight:
         """The point at the angle `phase`."""
         a = self.half_width
         s, c, s2, c2 = sin(phase), cos(phase), sin(2.0 * phase), cos(2.0 * phase)
-        below = (0.5 * (3.0 + c2), -s2, -2.0 * c2, 4.0 * s2)
-        n = _quotient((a * s, a * c, -a * s, -a * c), below)
-        e = _quotient((0.5 * a * s2, a * c2, -2.0 * a * s2, -4.0 * a * c2), below)
+        denominator = (0.5 * (3.0 + c2), -s2, -2.0 * c2, 4.0 * s2)
+        n = _quotient((a * s, a * c, -a * s, -a * c), denominator)
+        e = _quotient((0.5 * a * s2, a * c2, -2.0 * a * s2, -4.0 * a * c2), denominator)
         return CurvePoint(*((n[k], e[k], 0.0) for k in range(4)))
 
 
 @dataclass(frozen=True, slots=True)
-class Turned:
+class RotatedFigure:
     """A figure rotated about the vertical through its start.
 
     Attributes:
@@ -223,11 +223,12 @@ _Jet = tuple[float, float, float, float]
 """A value and its first three derivatives."""
 
 
-def _quotient(above: _Jet, below: _Jet) -> _Jet:
-    """Derivatives of a quotient q = above/below, by Leibniz' rule for above = q·below."""
-    d0, d1, d2, d3 = below
-    q0 = above[0] / d0
-    q1 = (above[1] - q0 * d1) / d0
-    q2 = (above[2] - 2.0 * q1 * d1 - q0 * d2) / d0
-    q3 = (above[3] - 3.0 * q2 * d1 - 3.0 * q1 * d2 - q0 * d3) / d0
+def _quotient(numerator: _Jet, denominator: _Jet) -> _Jet:
+    """Value and derivatives of a quotient q, by Leibniz' rule for numerator = q·denominator."""
+    n0, n1, n2, n3 = numerator
+    d0, d1, d2, d3 = denominator
+    q0 = n0 / d0
+    q1 = (n1 - q0 * d1) / d0
+    q2 = (n2 - 2.0 * q1 * d1 - q0 * d2) / d0
+    q3 = (n3 - 3.0 * q2 * d1 - 3.0 * q1 * d2 - q0 * d3) / d0
     return q0, q1, q2, q3

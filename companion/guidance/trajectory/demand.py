@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A motion at (m,) times; vectors are (m, 3), NED, relative to its start; SI units, radians."""
+    """A motion at (m,) times; vectors are (m, 3), NED, from where it starts; SI units, radians."""
 
     times: Floats
     position: Floats
@@ -45,12 +45,12 @@ class Motion:
         )
 
     def slowed(self, factor: "float | Floats") -> "Motion":
-        """The motion, slower by `factor`: one number for all times, or (m,)."""
+        """The motion, slower by `factor`: one number for all times, or one for each, (m,)."""
         return self.retimed(self.times * factor, Progress(0.0, 1.0 / factor))  # type: ignore[arg-type]
 
 
 def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:
-    """The motion at some times; by default at the check times.
+    """Sample a trajectory at `times` (s); None: at its check times.
 
     Raises:
         TrajectoryError: the trajectory is too long to be checked.
@@ -97,8 +97,8 @@ class Demand:
 
     The rotors must produce the specific thrust f = a + d − g, where d is the deceleration by drag.
     The body's vertical axis points along f. It turns with the part of ḟ = jerk + ḋ that is
-    perpendicular to f. Differential flatness, as in Faessler, Franchi & Scaramuzza, RA-L 2018, for
-    drag that is the same along all axes.
+    perpendicular to f. This is differential flatness as in Faessler, Franchi & Scaramuzza, RA-L
+    2018, for drag that is the same along all axes.
 
     Attributes:
         tilt: angle between f and the vertical, rad.
@@ -117,17 +117,17 @@ def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
     Args:
         motion: motion in still air.
         drag: drag of the vehicle.
-        gravity: m/s².
+        gravity: gravity, m/s².
     """
     velocity, acceleration = _columns(motion.velocity), _columns(motion.acceleration)
-    slowed = np.stack(drag.deceleration(velocity), axis=1)
-    force = motion.acceleration + slowed - np.array([0.0, 0.0, gravity])
-    growth = motion.jerk + np.stack(drag.deceleration_rate(velocity, acceleration), axis=1)
+    deceleration = np.stack(drag.deceleration(velocity), axis=1)
+    force = motion.acceleration + deceleration - np.array([0.0, 0.0, gravity])
+    force_rate = motion.jerk + np.stack(drag.deceleration_rate(velocity, acceleration), axis=1)
     thrust = np.linalg.norm(force, axis=1)
     tilt = np.arctan2(np.hypot(force[:, 0], force[:, 1]), -force[:, 2])
     # Without thrust there is no axis that could turn; the thrust limit then refuses the motion.
-    across = np.linalg.norm(np.cross(force, growth), axis=1)
-    tilt_rate = np.divide(across, thrust**2, out=np.zeros_like(across), where=thrust > 0.0)
+    cross = np.linalg.norm(np.cross(force, force_rate), axis=1)
+    tilt_rate = np.divide(cross, thrust**2, out=np.zeros_like(cross), where=thrust > 0.0)
     return Demand(tilt, tilt_rate, thrust)
 
 

@@ -17,9 +17,9 @@ class Slowed:
 
     Attributes:
         trajectory: the original trajectory.
-        law: the time of the original trajectory as a function of the time of this one.
-        moments: times of the original trajectory at which to check it, s. If empty, its own check
-            times are used, which is enough if it is slowed down evenly.
+        law: the time of the original trajectory as a function of the time of the slowed one.
+        moments: times of the original trajectory at which to check, s. Empty: its own check times,
+            which are enough if it is slowed down evenly.
     """
 
     trajectory: Trajectory
@@ -33,7 +33,7 @@ class Slowed:
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration of the slowed trajectory, s."""
         return self.law.duration
 
     @property
@@ -42,7 +42,7 @@ class Slowed:
         return self.trajectory.holds_heading
 
     def check_times(self) -> list[float]:
-        """Check times, s.
+        """Times at which to check the slowed trajectory against limits, s.
 
         Raises:
             TrajectoryError: the trajectory is too long to be checked.
@@ -58,8 +58,8 @@ class Slowed:
         velocity, acceleration, jerk = derivatives(
             progress, sample.velocity, sample.acceleration, sample.jerk
         )
-        turn = sample.heading_rate * progress.first
-        return Sample(sample.position, velocity, acceleration, jerk, sample.heading, turn)
+        heading_rate = sample.heading_rate * progress.first
+        return Sample(sample.position, velocity, acceleration, jerk, sample.heading, heading_rate)
 
 
 def evenly_slowed(trajectory: Trajectory, factor: float) -> Slowed:
@@ -81,7 +81,7 @@ class TurnedFirst:
     """A trajectory that begins with a turn on the spot.
 
     Attributes:
-        trajectory: flown after the turn.
+        trajectory: the trajectory after the turn.
         begin: heading at the beginning of the turn, rad.
         sign: +1 to turn clockwise seen from above, −1 anticlockwise.
         turn: the time law of the angle turned.
@@ -104,7 +104,7 @@ class TurnedFirst:
 
     @property
     def holds_heading(self) -> bool:
-        """False: it turns to the heading of the trajectory."""
+        """False, because the vehicle turns to the heading of the trajectory."""
         return False
 
     def check_times(self) -> list[float]:
@@ -135,10 +135,10 @@ def turned_first(trajectory: Trajectory, heading: float, yaw_rate: float) -> Tra
     """
     if trajectory.holds_heading:
         return trajectory
-    own = trajectory.at(0.0).heading
-    angle = remainder(own - heading, tau)
+    first_heading = trajectory.at(0.0).heading
+    angle = remainder(first_heading - heading, tau)
     if angle == 0.0:
         return trajectory
     ramp = abs(angle) / yaw_rate
     turn = Cruise(abs(angle), yaw_rate, ramp, ramp)
-    return TurnedFirst(trajectory, own - angle, 1.0 if angle > 0.0 else -1.0, turn)
+    return TurnedFirst(trajectory, first_heading - angle, 1.0 if angle > 0.0 else -1.0, turn)

@@ -8,8 +8,8 @@ from companion.guidance.trajectory.curves import (
     Figure,
     GeronoEight,
     Helix,
+    RotatedFigure,
     Straight,
-    Turned,
 )
 from companion.guidance.trajectory.sample import SMALLEST_DISTANCE, Sample, TrajectoryError, Vector
 from companion.guidance.trajectory.time_laws import (
@@ -37,7 +37,7 @@ class Hover:
     """A hover at the start.
 
     Attributes:
-        duration: how long it lasts, s.
+        duration: duration of the hover, s.
         heading: heading of the vehicle, rad; None: the heading at the start is kept.
 
     Raises:
@@ -124,7 +124,7 @@ def circle(radius: float, laps: Laps) -> TimedCurve:
 
 
 def steady_circle(radius: float, speed: float, laps: float, longest: float) -> TimedCurve:
-    """Laps of a circle north of the start. The vehicle leaves eastwards and holds its heading.
+    """Laps of a circle north of the start; the vehicle leaves eastwards and holds its heading.
 
     The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s², or more if the
     laps are too short for that.
@@ -153,7 +153,7 @@ def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
 
 
 def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Gerono that reaches `half_width` metres to both sides along `laps.direction`.
+    """A lemniscate of Gerono, `half_width` metres to both sides along `laps.direction`.
 
     Its phase advances at a steady rate, as is usual in the literature, so the vehicle is fastest in
     the middle.
@@ -165,7 +165,9 @@ def gerono_eight(half_width: float, laps: Laps) -> TimedCurve:
 
 
 def bernoulli_eight(half_width: float, laps: Laps) -> TimedCurve:
-    """A lemniscate of Bernoulli. Its phase advances steadily, so it is fastest at the tips.
+    """A lemniscate of Bernoulli, `half_width` metres to both sides along `laps.direction`.
+
+    Its phase advances at a steady rate, so the vehicle is fastest at the tips.
 
     Raises:
         TrajectoryError: see `gerono_eight`.
@@ -187,7 +189,7 @@ def _flown_laps(
     length, rate = tau * laps.laps, laps.speed / curve.path_per_phase
     ramp = min(SEPTIC_SLOPE * laps.speed / laps.acceleration, _LONGEST_RAMP_SHARE * length / rate)
     if laps.direction:
-        curve = Turned(curve, laps.direction)
+        curve = RotatedFigure(curve, laps.direction)
         tangent = replace(tangent, middle=tangent.middle + laps.direction)
     heading = tangent if laps.face_path else HeldHeading()
     return TimedCurve(name, curve, Cruise(length, rate, ramp, ramp), heading)

@@ -107,7 +107,7 @@ class SampleOptions(NamedTuple):
         heading: source of the heading.
         cutoff: cutoff frequency, Hz. Faster changes are smoothed away as noise.
         acceleration: largest acceleration along the path, m/s², of the ramp that is added where the
-            samples begin or end in motion. Samples that last too short a time may need more.
+            samples begin or end in motion. Samples of short duration may need more.
     """
 
     frame: Frame = Frame.ENU
@@ -134,7 +134,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     _require_short(table, options.cutoff)
     to_ned = _TO_NED[options.frame]
     position = (table.position - table.position[0]) @ to_ned.rotation.T
-    derivatives = tuple(known @ to_ned.rotation.T for known in table.derivatives)
+    derivatives = tuple(values @ to_ned.rotation.T for values in table.derivatives)
     spline = smoothed(table.times, position, options.cutoff, derivatives)
     _require_derivatives(spline, table.times, derivatives)
     speeds = [_speed(spline, end) for end in (spline.begin, spline.end)]
@@ -142,9 +142,9 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     spline = smoothed(table.times, position, options.cutoff, derivatives, resting)
     rise_time, fall_time = [
         0.0
-        if rests
+        if is_resting
         else min(SEPTIC_SLOPE * speed / options.acceleration, _LONGEST_RAMP_SHARE * spline.end)
-        for rests, speed in zip(resting, speeds, strict=True)
+        for is_resting, speed in zip(resting, speeds, strict=True)
     ]
     law = Cruise(spline.end, 1.0, rise_time, fall_time)
     heading = _heading(spline, table, options, resting)
@@ -172,13 +172,13 @@ def _require_options(table: Table, options: SampleOptions) -> None:
 
 def _require_short(table: Table, cutoff: float) -> None:
     """Check that the table is short enough to be fitted within bounded time."""
-    lasts = float(table.times[-1])
-    require_duration(lasts)
-    if lasts * 2.0 * cutoff > _MOST_PIECES:
-        most = _MOST_PIECES / (2.0 * cutoff)
+    duration = float(table.times[-1])
+    require_duration(duration)
+    if duration * 2.0 * cutoff > _MOST_PIECES:
+        longest = _MOST_PIECES / (2.0 * cutoff)
         raise TrajectoryError(
-            f"it lasts {lasts:.4g} s, and {most:.4g} s is the longest with cutoff_hz {cutoff:g}; "
-            "lower that, or fly a part of it"
+            f"it lasts {duration:.4g} s, and {longest:.4g} s is the longest with cutoff_hz "
+            f"{cutoff:g}; lower that, or fly a part of it"
         )
 
 
@@ -191,16 +191,17 @@ def _require_derivatives(
 ) -> None:
     """Check that velocity and acceleration are the derivatives of the position."""
     motion = spline.along(times)
-    for order, (known, quantity) in enumerate(
+    for order, (given, quantity) in enumerate(
         zip(derivatives, _DERIVATIVE_QUANTITIES, strict=False), 1
     ):
-        missed = np.linalg.norm(motion[:, :, order] - known, axis=1)
-        size = np.linalg.norm(known, axis=1)
-        if _root_mean_square(missed) > quantity.share * _root_mean_square(size) + quantity.floor:
-            worst = int(np.argmax(missed))
+        errors = np.linalg.norm(motion[:, :, order] - given, axis=1)
+        sizes = np.linalg.norm(given, axis=1)
+        tolerance = quantity.share * _root_mean_square(sizes) + quantity.floor
+        if _root_mean_square(errors) > tolerance:
+            worst = int(np.argmax(errors))
             raise TrajectoryError(
                 f"the {quantity.name} is not the derivative of the positions: at "
-                f"{times[worst]:.2f} s it is off by {missed[worst]:.1f} {quantity.unit}. Is it in "
+                f"{times[worst]:.2f} s it is off by {errors[worst]:.1f} {quantity.unit}. Is it in "
                 f"another frame, or with gravity? Leave out the columns of the {quantity.name}, "
                 "and it is computed"
             )

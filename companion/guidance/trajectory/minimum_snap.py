@@ -41,8 +41,8 @@ class Observations:
     """Values that the spline approximates.
 
     Attributes:
-        times: (m,), s.
-        values: (m, n).
+        times: (m,), time of each observation, s.
+        values: (m, n), observed values of n series.
         weights: (m,), weights of the squared differences.
         derivative: which derivative was observed; 0 is the value.
     """
@@ -73,10 +73,10 @@ def minimum_snap(
     observations: tuple[Observations, ...] = (),
     stiffness: float = 1.0,
 ) -> SepticSpline:
-    """Minimise stiffness·∫ snap² dt + Σ weight·residual².
+    """The spline that minimises stiffness·∫ snap² dt + Σ weight·residual².
 
     Args:
-        knots: (k,), increasing, s.
+        knots: (k,), times of the knots, increasing, s.
         fixed: states that the spline meets exactly.
         observations: values that the spline approximates, at times between the knots.
         stiffness: weight of the integral.
@@ -136,12 +136,12 @@ def _add_observations(
 
 def _cheapest_states(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
     """The states (k, 4, n) of smallest cost that equal `states` where `mask` is true."""
-    met = np.where(mask[:, :, None], states, 0.0)
+    fixed = np.where(mask[:, :, None], states, 0.0)
     diagonal, upper, right = equations
-    right = right - diagonal @ met
-    right[:-1] -= upper @ met[1:]
-    right[1:] -= upper.transpose(0, 2, 1) @ met[:-1]
-    right[mask] = met[mask]
+    right = right - diagonal @ fixed
+    right[:-1] -= upper @ fixed[1:]
+    right[1:] -= upper.transpose(0, 2, 1) @ fixed[:-1]
+    right[mask] = fixed[mask]
     free = ~mask
     diagonal = diagonal * (free[:, :, None] & free[:, None, :]) + mask[:, :, None] * np.eye(
         STATE_SIZE

@@ -1,4 +1,4 @@
-"""Trajectories of a user's class: checked before the flight, and in flight an error is named."""
+"""Trajectories of a user's class: checked before the flight, watched for exceptions in flight."""
 
 from collections.abc import Sequence
 from itertools import chain, pairwise
@@ -17,11 +17,11 @@ _SMALLEST_SPEED = 0.01  # m/s
 _COMPARED_TIMES = 24
 """Number of times at which derivatives are compared."""
 _GOLDEN_RATIO = 0.6180339887498949
-"""Its multiples modulo 1 are spread evenly, and miss the round times at which pieces are joined."""
+"""Multiples of this modulo 1 are spread evenly, and miss the round times at which pieces join."""
 _STEP = 1e-3
 """Half the span of a difference quotient, s."""
 _ALLOWED_ERROR, _ALLOWED_SHARE = 0.1, 0.02
-"""Largest error of a derivative: the first, m/s or m/s², plus the second times the derivative."""
+"""Largest error of a derivative d: `_ALLOWED_ERROR` (m/s or m/s²) + `_ALLOWED_SHARE`·d."""
 
 
 def require_trajectory(trajectory: Trajectory) -> None:
@@ -61,7 +61,7 @@ def _sample(trajectory: Trajectory, time: float) -> Sample:
     """
     sample = trajectory.at(time)
     try:
-        plain = _plain(sample)
+        plain = _as_floats(sample)
     except (TypeError, ValueError):
         raise TypeError(f"at({time:g}) returned {sample!r}, which is no Sample") from None
     if not _is_finite(plain):
@@ -69,24 +69,24 @@ def _sample(trajectory: Trajectory, time: float) -> Sample:
     return plain
 
 
-def _plain(sample: Sample) -> Sample:
+def _as_floats(sample: Sample) -> Sample:
     """The sample as plain floats.
 
     Raises:
-        TypeError, ValueError: it does not hold what a `Sample` holds.
+        TypeError, ValueError: `sample` does not hold what a `Sample` holds.
     """
-    made = Sample(*sample)
+    sample = Sample(*sample)
     return Sample(
-        _plain_vector(made.position),
-        _plain_vector(made.velocity),
-        _plain_vector(made.acceleration),
-        _plain_vector(made.jerk),
-        float(made.heading),
-        float(made.heading_rate),
+        _float_vector(sample.position),
+        _float_vector(sample.velocity),
+        _float_vector(sample.acceleration),
+        _float_vector(sample.jerk),
+        float(sample.heading),
+        float(sample.heading_rate),
     )
 
 
-def _plain_vector(vector: Vector) -> Vector:
+def _float_vector(vector: Vector) -> Vector:
     north, east, down = vector
     return float(north), float(east), float(down)
 
@@ -102,10 +102,10 @@ def _require_rest(begin: Sample, end: Sample) -> None:
         raise TrajectoryError(
             f"it begins {offset:.2f} m from (0, 0, 0); positions count from where the vehicle is"
         )
-    for sample, does in ((begin, "begins"), (end, "ends")):
+    for sample, verb in ((begin, "begins"), (end, "ends")):
         speed = float(np.linalg.norm(sample.velocity))
         if speed > _SMALLEST_SPEED:
-            raise TrajectoryError(f"it {does} at {speed:.2f} m/s; it must begin and end at rest")
+            raise TrajectoryError(f"it {verb} at {speed:.2f} m/s; it must begin and end at rest")
 
 
 def _require_times(times: Sequence[float], duration: float) -> None:
@@ -118,8 +118,8 @@ def _require_times(times: Sequence[float], duration: float) -> None:
         and abs(times[-1] - duration) <= tolerance
     ):
         raise TrajectoryError(
-            f"its check_times() must ascend from 0 to its duration, {duration:g} s, as times at "
-            "which limits and fence are checked"
+            f"its check_times() must ascend from 0 to its duration, {duration:g} s: limits and "
+            "fence are checked at these times"
         )
 
 
@@ -128,23 +128,23 @@ def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str,
         time = max(trajectory.duration * (k * _GOLDEN_RATIO % 1.0), _STEP)
         before, now, after = (_sample(trajectory, time + by) for by in (-_STEP, 0.0, _STEP))
         change = np.subtract(getattr(after, quantity), getattr(before, quantity)) / (2.0 * _STEP)
-        told = np.asarray(getattr(now, derivative), dtype=float)
+        reported = np.asarray(getattr(now, derivative), dtype=float)
         size = float(np.linalg.norm(change))
-        if np.linalg.norm(change - told) > _ALLOWED_ERROR + _ALLOWED_SHARE * size:
+        if np.linalg.norm(change - reported) > _ALLOWED_ERROR + _ALLOWED_SHARE * size:
             raise TrajectoryError(
                 f"at {time:.2f} s its {quantity} changes by {size:.2f} {unit}, but its {derivative}"
-                f" is {np.linalg.norm(told):.2f} {unit}: they must fit in size and direction"
+                f" is {np.linalg.norm(reported):.2f} {unit}: they must fit in size and direction"
             )
 
 
 def checked_trajectory(trajectory: Trajectory) -> "UserTrajectory":
-    """The trajectory as it is flown; raises as `require_trajectory`, and what its code raises."""
+    """Check a user's trajectory and wrap it for flight; raises as `require_trajectory`."""
     require_trajectory(trajectory)
     return UserTrajectory(trajectory)
 
 
 class UserTrajectory:
-    """A trajectory of a user's program. What its code raises becomes a `UserCodeError`.
+    """A trajectory of a user's program; an exception of its code becomes a `UserCodeError`.
 
     Args:
         trajectory: the user's trajectory, or one of ours that may wrap the user's.
@@ -161,7 +161,7 @@ class UserTrajectory:
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration, s."""
         with naming_user_code(_ROLE, self.trajectory):
             return float(self.trajectory.duration)
 
@@ -178,7 +178,7 @@ class UserTrajectory:
             UserCodeError: the trajectory raised, or returned something else than finite numbers.
         """
         with naming_user_code(_ROLE, self.trajectory):
-            sample = _plain(self.trajectory.at(time))
+            sample = _as_floats(self.trajectory.at(time))
             if not _is_finite(sample):
                 raise ValueError(
                     f"at({time:g}) returned {sample}, with a number that is not finite"

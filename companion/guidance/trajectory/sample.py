@@ -31,13 +31,13 @@ class Sample(NamedTuple):
     """The wanted state of the vehicle at one instant, relative to the start of the trajectory.
 
     Attributes:
-        position: m; (0, 0, 0) at the start.
-        velocity: m/s.
-        acceleration: m/s².
-        jerk: m/s³.
+        position: position, m; (0, 0, 0) at the start.
+        velocity: velocity, m/s.
+        acceleration: acceleration, m/s².
+        jerk: jerk, m/s³.
         heading: tilt-yaw heading, rad, not wrapped. It counts from north, but from the vehicle's
             heading at the start if `Trajectory.holds_heading` is true.
-        heading_rate: rad/s.
+        heading_rate: derivative of the heading, rad/s.
     """
 
     position: Vector
@@ -58,7 +58,7 @@ class Trajectory(Protocol):
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration, s."""
         ...
 
     @property

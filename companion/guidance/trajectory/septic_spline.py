@@ -15,7 +15,7 @@ _POLYNOMIAL_DEGREE = 2 * STATE_SIZE - 1
 
 
 def derivative_rows(fractions: Floats, derivative: int) -> Floats:
-    """Derivatives of 1, u, … u⁷, (n, 8), at the fractions u, (n,), of a piece."""
+    """Derivatives (n, 8) of the order `derivative` of 1, u, … u⁷ at fractions u (n,) of a piece."""
     rows = np.zeros((fractions.size, _POLYNOMIAL_DEGREE + 1))
     for power in range(derivative, _POLYNOMIAL_DEGREE + 1):
         factor = np.prod(np.arange(power - derivative + 1, power + 1))
@@ -41,7 +41,7 @@ class SepticSpline:
         """Join the states.
 
         Args:
-            knots: (k,), increasing, s.
+            knots: (k,), times of the knots, increasing, s.
             states: (k, 4, n): value, first, second and third derivative of n series at each knot.
         """
         spans = np.diff(knots)

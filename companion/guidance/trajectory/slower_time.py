@@ -30,15 +30,15 @@ class _Piece(NamedTuple):
         return self.a + u * (self.b + u * (self.c + u * self.d))
 
     def slope(self, u: Number) -> Number:
-        """dw/du."""
+        """Derivative dw/du."""
         return self.b + u * (2.0 * self.c + u * 3.0 * self.d)
 
-    def bend(self, u: Number) -> Number:
-        """d²w/du²."""
+    def curvature(self, u: Number) -> Number:
+        """Second derivative d²w/du²."""
         return 2.0 * self.c + 6.0 * self.d * u
 
-    def area(self, u: Number) -> Number:
-        """∫ w du from 0 to u: stretched time / original duration of the piece."""
+    def integral(self, u: Number) -> Number:
+        """∫ w du from 0 to u: stretched time up to u, in original durations of the piece."""
         return u * (self.a + u * (self.b / 2.0 + u * (self.c / 3.0 + u * self.d / 4.0)))
 
 
@@ -71,8 +71,8 @@ class SlowerTime:
     _ends: tuple[float, ...] = field(init=False, repr=False, compare=False, default=())
 
     def __post_init__(self) -> None:
-        areas = np.array([float(np.asarray(piece.area(1.0))) for piece in self._pieces()])
-        ends = np.concatenate(([0.0], np.cumsum(areas * self._piece_duration)))
+        integrals = np.array([float(np.asarray(piece.integral(1.0))) for piece in self._pieces()])
+        ends = np.concatenate(([0.0], np.cumsum(integrals * self._piece_duration)))
         object.__setattr__(self, "_ends", tuple(ends.tolist()))
 
     def _pieces(self) -> list[_Piece]:
@@ -99,10 +99,10 @@ class SlowerTime:
             return self._progress(_spline_piece(*self.coefficients[last:]), 1.0, last)
         index = min(bisect_right(self._ends, time) - 1, last)
         piece = _spline_piece(*self.coefficients[index : index + 4])
-        area = (time - self._ends[index]) / self._piece_duration
-        u = area / float(piece.area(1.0))
+        integral = (time - self._ends[index]) / self._piece_duration
+        u = integral / float(piece.integral(1.0))
         for _ in range(_MOST_NEWTON_STEPS):
-            step = (float(piece.area(u)) - area) / float(piece.factor(u))
+            step = (float(piece.integral(u)) - integral) / float(piece.factor(u))
             u = min(max(u - step, 0.0), 1.0)
             if abs(step) < _NEWTON_TOLERANCE:
                 break
@@ -115,7 +115,7 @@ class SlowerTime:
         c = np.array(self.coefficients)
         piece = _spline_piece(c[index], c[index + 1], c[index + 2], c[index + 3])
         u = moments / self._piece_duration - index
-        times = np.array(self._ends)[index] + self._piece_duration * np.asarray(piece.area(u))
+        times = np.array(self._ends)[index] + self._piece_duration * np.asarray(piece.integral(u))
         return times, self._progress(piece, u, index)
 
     def _progress(self, piece: _Piece, u: Number, index: Number) -> Progress:
@@ -124,12 +124,13 @@ class SlowerTime:
         With r = 1/w: ṙ = −w'/w³ and r̈ = −w''/w⁴ + 3w'²/w⁵.
         """
         width = self._piece_duration
-        w, slope, bend = piece.factor(u), piece.slope(u) / width, piece.bend(u) / (width * width)
+        w, slope = piece.factor(u), piece.slope(u) / width
+        curvature = piece.curvature(u) / (width * width)
         rate = 1.0 / w
         cube = rate * rate * rate
         return Progress(
             width * (index + u),
             rate,
             -slope * cube,
-            cube * rate * (3.0 * slope * slope * rate - bend),
+            cube * rate * (3.0 * slope * slope * rate - curvature),
         )

@@ -42,7 +42,7 @@ _EVEN_MOMENTS = 8000
 """Largest number of evenly spaced moments."""
 _SHORTEST_STEP = 0.006
 """Shortest step between evenly spaced moments, s."""
-_MOMENTS_A_PIECE = 8.0
+_MOMENTS_PER_PIECE = 8.0
 """Smallest number of moments in each piece of the stretch factor; fewer could miss an extreme."""
 _LONG_GAP_FACTOR = 3.0
 """A gap between check times is filled if it is this many times as long as the median gap."""
@@ -51,7 +51,7 @@ _WORTHWHILE_SHARE = 0.98
 _NOTICEABLE_FACTOR = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
-"""A moment is near the slowest if its factor minus 1 is at least this share of the largest."""
+"""Moments are near the slowest if their factor − 1 is at least this share of the largest one."""
 _FILL_STEP_GAPS = 2.0
 """Time between the moments that fill a gap, in median gaps."""
 
@@ -60,10 +60,10 @@ class SlowedPart(NamedTuple):
     """A part of a trajectory that is flown more slowly.
 
     Attributes:
-        begin, end: time in the slowed trajectory, s.
+        begin, end: times in the slowed trajectory, s.
         factor: the largest factor by which the speed is divided.
-        time: when the factor is largest, or, slowed evenly, when the limit was broken most, s.
-        limit: configuration key of the limit that requires it; empty if none was found.
+        time: time of the largest factor, s; if slowed evenly, that of the worst violation.
+        limit: configuration key of the limit that requires this factor; empty: none was found.
     """
 
     begin: float
@@ -101,53 +101,53 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         broken = broken_limits(motion, envelope)
         if not broken:
             return SlowDown(trajectory)
-        whole = _slowed_evenly(trajectory, motion, broken, envelope)
-        even = SlowDown(evenly_slowed(trajectory, whole.factor), (whole,), even=True)
+        part = _slowed_evenly(trajectory, motion, broken, envelope)
+        even = SlowDown(evenly_slowed(trajectory, part.factor), (part,), even=True)
         moments = _denser_times(motion.times)
         if moments.size > _MOST_MOMENTS:
             return even._replace(reason="it is too long to be slowed down in parts")
-        fine = sampled(trajectory, moments.tolist())
-        if broken_limits(fine.slowed(whole.factor), envelope):  # a finer look found more
+        dense_motion = sampled(trajectory, moments.tolist())
+        if broken_limits(dense_motion.slowed(part.factor), envelope):
             return even._replace(reason="a finer check found more limits exceeded")
-        best = _best_law(fine, trajectory.duration, envelope)
-        if best is None or best.duration > _WORTHWHILE_SHARE * even.trajectory.duration:
+        law = _best_law(dense_motion, trajectory.duration, envelope)
+        if law is None or law.duration > _WORTHWHILE_SHARE * even.trajectory.duration:
             return even._replace(reason="slowing down in parts would not be quicker")
-        slower = Slowed(trajectory, best, tuple(moments.tolist()))
-        return SlowDown(slower, tuple(_parts(fine, best, envelope)))
+        slowed = Slowed(trajectory, law, tuple(moments.tolist()))
+        return SlowDown(slowed, tuple(_parts(dense_motion, law, envelope)))
 
 
 def _slowed_evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> SlowedPart:
     """The whole trajectory, slowed by the least factor that is enough; an error if none is."""
-    for one in broken:
-        if not one.slowing_helps:
-            raise TrajectoryError(f"{trajectory.name}: {one}; {one.remedy}")
-    too_fast, slow, last = 1.0, 2.0, broken[0]
-    while found := broken_limits(motion.slowed(slow), envelope):
-        too_fast, slow, last = slow, 2.0 * slow, found[0]
-        if slow > _LARGEST_FACTOR:
+    for violation in broken:
+        if not violation.slowing_helps:
+            raise TrajectoryError(f"{trajectory.name}: {violation}; {violation.remedy}")
+    too_small, factor, last = 1.0, 2.0, broken[0]
+    while found := broken_limits(motion.slowed(factor), envelope):
+        too_small, factor, last = factor, 2.0 * factor, found[0]
+        if factor > _LARGEST_FACTOR:
             raise TrajectoryError(
                 f"{trajectory.name}: however slowly it is flown, {found[0]}; {found[0].remedy}"
             )
-    while slow - too_fast > _FACTOR_PRECISION * too_fast:
-        middle = 0.5 * (too_fast + slow)
+    while factor - too_small > _FACTOR_PRECISION * too_small:
+        middle = 0.5 * (too_small + factor)
         if found := broken_limits(motion.slowed(middle), envelope):
-            too_fast, last = middle, found[0]
+            too_small, last = middle, found[0]
         else:
-            slow = middle
-    end = trajectory.duration * slow
-    return SlowedPart(0.0, end, slow, last.time * slow / too_fast, last.limit)
+            factor = middle
+    end = trajectory.duration * factor
+    return SlowedPart(0.0, end, factor, last.time * factor / too_small, last.limit)
 
 
 def _denser_times(times: Floats) -> Floats:
-    """The check times, evenly spaced times, and more in gaps such as laps without check times."""
+    """Check times, evenly spaced times, and times that fill long gaps (laps without checks)."""
     gaps = np.diff(times)
-    usual = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
+    median_gap = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     length = float(times[-1])
     parts = [times, np.linspace(0.0, length, int(length / _moment_step(length)) + 2)]
-    for k in np.flatnonzero(gaps > _LONG_GAP_FACTOR * usual):
-        count = min(int(gaps[k] / (_FILL_STEP_GAPS * usual)), _MOST_MOMENTS)
+    for k in np.flatnonzero(gaps > _LONG_GAP_FACTOR * median_gap):
+        count = min(int(gaps[k] / (_FILL_STEP_GAPS * median_gap)), _MOST_MOMENTS)
         parts.append(np.linspace(times[k], times[k + 1], count + 1))
     return np.unique(np.concatenate(parts))
 
@@ -160,8 +160,8 @@ def _moment_step(length: float) -> float:
 def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime | None:
     """The stretch factor among `_WIDTHS` with the shortest flight; None: none keeps the limits."""
     needed = _needed_factors(motion, envelope)
-    least = _MOMENTS_A_PIECE * _moment_step(length)
-    widths = [w for w in _WIDTHS if w >= least and length / w >= _FEWEST_PIECES]
+    shortest = _MOMENTS_PER_PIECE * _moment_step(length)
+    widths = [w for w in _WIDTHS if w >= shortest and length / w >= _FEWEST_PIECES]
     laws = [_law_of_width(motion, needed, length, width, envelope) for width in widths]
     return min((law for law in laws if law), key=lambda law: law.duration, default=None)
 
@@ -179,23 +179,20 @@ def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
 
 def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
     """The largest relative excess over any limit but the fence at each moment, (m,)."""
-    nothing = np.full_like(motion.times, -1.0)
-    over: Floats = np.max([nothing, *excess(motion, envelope).values()], axis=0)
+    without_limits = np.full_like(motion.times, -1.0)
+    over: Floats = np.max([without_limits, *excess(motion, envelope).values()], axis=0)
     return over
 
 
 def _law_of_width(
     motion: Motion, needed: Floats, length: float, width: float, envelope: Envelope
 ) -> SlowerTime | None:
-    """The stretch factor with pieces of `width` s that keeps all limits; None if none is found.
-
-    `needed` is the needed factor of each moment, (m,); `length` the original duration, s.
-    """
+    """The stretch factor, at least `needed` (m,), with pieces of `width` s; None: not found."""
     count = int(np.ceil(length / width))
     piece = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
-    most = np.ones(count)
-    np.maximum.at(most, piece, needed)
-    coefficients = _largest_of_four(most, 1.0)
+    needed_by_piece = np.ones(count)
+    np.maximum.at(needed_by_piece, piece, needed)
+    coefficients = _largest_of_four(needed_by_piece, 1.0)
     for _ in range(_MOST_ROUNDS):
         law = SlowerTime(length, tuple(coefficients.tolist()))
         if law.duration > LONGEST or coefficients.max() > _LARGEST_FACTOR:
@@ -207,16 +204,19 @@ def _law_of_width(
             over = np.where(outside, np.maximum(over, _LARGEST_RAISE), over)
         if not (over > 0.0).any():
             return law
-        raised = np.zeros(count)
-        np.maximum.at(raised, piece, np.where(over > 0.0, over, 0.0))
-        raised = np.where(raised > 0.0, np.clip(0.5 * raised, _LEAST_RAISE, _LARGEST_RAISE), 0.0)
-        coefficients *= 1.0 + _largest_of_four(raised, 0.0)
+        raises = np.zeros(count)
+        np.maximum.at(raises, piece, np.where(over > 0.0, over, 0.0))
+        raises = np.where(raises > 0.0, np.clip(0.5 * raises, _LEAST_RAISE, _LARGEST_RAISE), 0.0)
+        coefficients *= 1.0 + _largest_of_four(raises, 0.0)
     return None
 
 
-def _largest_of_four(values: Floats, beyond: float) -> Floats:
-    """Largest value among the four pieces (n,) that each coefficient (n + 3,) affects."""
-    padded = np.concatenate(([beyond] * 3, values, [beyond] * 3))
+def _largest_of_four(values: Floats, outside: float) -> Floats:
+    """For each coefficient (n + 3,), the largest value (n,) of its four pieces.
+
+    Pieces beyond the ends have the value `outside`.
+    """
+    padded = np.concatenate(([outside] * 3, values, [outside] * 3))
     largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
     return largest
 
@@ -241,7 +241,7 @@ def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[Slow
 
 
 def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """The limit that `moments` exceed most at the original speed; if none, that of the fence."""
+    """Limit that `moments` exceed most at the original speed; if none, the fence's broken limit."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:

@@ -35,7 +35,7 @@ class SplineCurve:
     """A spline of north, east and down, in m.
 
     Attributes:
-        spline: three times continuously differentiable.
+        spline: the spline, three times continuously differentiable.
         checks_per_piece: smallest number of check points in each piece; an extreme between two of
             them is missed by less than 0.3 %.
         longest_step: largest phase between two check points, s; a heading may need a short one.
@@ -53,10 +53,11 @@ class SplineCurve:
         """
         knots = self.spline.knots
         spans = np.diff(knots)
-        evenly = np.linspace(0.0, 1.0, 17)
-        velocity = self.spline.along((knots[:-1, None] + spans[:, None] * evenly).ravel())[:, :, 1]
-        fastest = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
-        counts = np.ceil(np.maximum(spans * fastest * 1.05 / PATH_STEP, spans / self.longest_step))
+        fractions = np.linspace(0.0, 1.0, 17)
+        times = (knots[:-1, None] + spans[:, None] * fractions).ravel()
+        velocity = self.spline.along(times)[:, :, 1]
+        speeds = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
+        counts = np.ceil(np.maximum(spans * speeds * 1.05 / PATH_STEP, spans / self.longest_step))
         counts = np.maximum(counts, self.checks_per_piece)
         require_checkable(float(counts.sum()))
         grids = [
@@ -81,8 +82,8 @@ class SplineHeading:
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Heading and its derivative at the spline's time `phase`."""
-        ((heading, turn, _, _),) = self.spline.at(phase)
-        return heading, turn
+        ((heading, slope, _, _),) = self.spline.at(phase)
+        return heading, slope
 
 
 def smoothed(
@@ -99,9 +100,9 @@ def smoothed(
     oscillation at half the cutoff by 0.4 %, at a quarter of it by 0.0015 %.
 
     Args:
-        times: (m,), increasing, s.
-        values: (m, n).
-        cutoff: Hz.
+        times: (m,), time of each sample, increasing, s.
+        values: (m, n), samples of n series.
+        cutoff: cutoff frequency, Hz.
         derivatives: the first, second … derivatives of the samples, each (m, n), if known.
         resting: whether the spline is at rest at the first sample, and at the last.
     """
@@ -111,13 +112,13 @@ def smoothed(
     )
     states = np.zeros((knots.size, STATE_SIZE, values.shape[1]))
     mask = np.zeros((knots.size, STATE_SIZE), dtype=bool)
-    for end, rests in zip((0, -1), resting, strict=True):
+    for end, is_resting in zip((0, -1), resting, strict=True):
         states[end, 0] = values[end]
-        mask[end] = True, rests, rests, rests
+        mask[end] = True, is_resting, is_resting, is_resting
     weights = np.gradient(times)
     observations = (
-        Observations(times, known, weights / omega ** (2 * order), order)
-        for order, known in enumerate((values, *derivatives))
+        Observations(times, observed, weights / omega ** (2 * order), order)
+        for order, observed in enumerate((values, *derivatives))
     )
     return minimum_snap(knots, FixedStates(states, mask), tuple(observations), omega**-8.0)
 
@@ -128,7 +129,7 @@ def heading_spline(times: Floats, headings: Floats, resting: tuple[bool, bool]) 
 
 
 def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineHeading:
-    """Heading along a spline of north, east and down, interpolated where it hardly moves.
+    """Direction of flight along a spline of positions, interpolated where it hardly moves.
 
     Args:
         spline: spline of the positions, m.

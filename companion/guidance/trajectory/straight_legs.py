@@ -36,7 +36,7 @@ class Polyline:
         return PhaseSampling(PATH_STEP)
 
     def at(self, phase: float) -> CurvePoint:
-        """The point `phase` metres along."""
+        """The point at the distance `phase` (m) along the lines."""
         leg = _leg_at(phase, self.begins)
         point = self.legs[leg].at(phase - self.begins[leg])
         (n, e, d), (north, east, down) = self.starts[leg], point.position
@@ -86,7 +86,7 @@ def straight_legs(
         acceleration: largest acceleration, m/s².
         jerk: largest jerk, m/s³.
         headings: heading at each point, rad from north, or None for any. The vehicle turns during
-            the legs, the short way round. Empty: it holds its heading.
+            the legs, the short way round. Empty: the vehicle holds its heading.
 
     Raises:
         TrajectoryError: there are no points, two consecutive points are equal, a limit is not
@@ -105,7 +105,7 @@ def straight_legs(
 
 
 def _leg_at(value: float, begins: Sequence[float]) -> int:
-    """Index of the leg at a phase or time; the first one before 0, the last one past the end."""
+    """Index of the leg at a phase or time; of the first leg before 0, of the last past the end."""
     return max(bisect_right(begins, value) - 1, 0)
 
 

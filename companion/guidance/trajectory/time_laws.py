@@ -16,7 +16,7 @@ class Progress(NamedTuple):
 
     Attributes:
         phase: phase in the curve's unit (rad, m or s).
-        first, second, third: its derivatives by time, in that unit per s, s², s³.
+        first, second, third: derivatives of the phase by time, in its unit per s, s², s³.
     """
 
     phase: float
@@ -37,8 +37,8 @@ def derivatives(
     Args:
         progress: progress along the curve.
         first: derivative of the curve by its phase.
-        second: its second derivative.
-        third: its third derivative.
+        second: second derivative of the curve by its phase.
+        third: third derivative of the curve by its phase.
     """
     _, r, s, t = progress
     return (
@@ -61,8 +61,8 @@ class Piece(NamedTuple):
     """A part of a time law in which its derivatives are smooth.
 
     Attributes:
-        begin, end: s.
-        steady: whether its rate is constant.
+        begin, end: times, s.
+        steady: whether the rate of the phase is constant.
     """
 
     begin: float
@@ -79,7 +79,7 @@ class TimeLaw(Protocol):
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration, s."""
         ...
 
     def at(self, time: float) -> Progress:
@@ -88,11 +88,11 @@ class TimeLaw(Protocol):
 
 
 Ramp = Callable[[float, float, float], Progress]
-"""A rate that rises from 0 to a steady one: (steady rate per s, duration in s, time in s)."""
+"""(steady rate, 1/s; duration, s; time, s) → progress while the rate rises from 0."""
 
 
 def septic_ramp(rate: float, duration: float, time: float) -> Progress:
-    """A rate that rises as 35u⁴ − 84u⁵ + 70u⁶ − 20u⁷, u = time/duration: snap is continuous."""
+    """Progress at `rate`·(35u⁴ − 84u⁵ + 70u⁶ − 20u⁷), u = time/duration; snap is continuous."""
     u = time / duration
     v = 1.0 - u
     u3 = u * u * u
@@ -105,14 +105,14 @@ def septic_ramp(rate: float, duration: float, time: float) -> Progress:
 
 
 def cosine_ramp(rate: float, duration: float, time: float) -> Progress:
-    """A rate that rises as a raised cosine: the jerk jumps where the ramp begins and ends."""
-    turn = pi / duration
-    phase = turn * time
+    """Progress with a raised cosine as rate: the jerk jumps where the ramp begins and ends."""
+    omega = pi / duration
+    phase = omega * time
     return Progress(
-        0.5 * rate * (time - sin(phase) / turn),
+        0.5 * rate * (time - sin(phase) / omega),
         0.5 * rate * (1.0 - cos(phase)),
-        0.5 * rate * turn * sin(phase),
-        0.5 * rate * turn * turn * cos(phase),
+        0.5 * rate * omega * sin(phase),
+        0.5 * rate * omega * omega * cos(phase),
     )
 
 
@@ -120,15 +120,15 @@ def cosine_ramp(rate: float, duration: float, time: float) -> Progress:
 class Cruise:
     """A steady rate with a ramp at each end.
 
-    With both ramps 0 the rate is steady from the start, for curves that rest at their ends.
+    Without ramps the rate is steady from the start, for curves that are at rest at their ends.
 
     Attributes:
         length: phase at the end; the phase begins at 0.
         rate: steady rate of the phase, per s.
         rise_time: time in which the rate rises, s.
         fall_time: time in which the rate falls, s.
-        ramp: how the rate rises and, mirrored, falls: (rate, duration of the ramp in s, time in s)
-            → progress. The mean rate of a ramp is half the steady rate.
+        ramp: how the rate rises and, mirrored, falls. The mean rate of a ramp must be half the
+            steady rate.
     """
 
     length: float
@@ -144,24 +144,24 @@ class Cruise:
 
     def pieces(self) -> list[Piece]:
         """Three parts: speeding up, steady, slowing down."""
-        brake = self.duration - self.fall_time
+        fall_begin = self.duration - self.fall_time
         return [
             Piece(0.0, self.rise_time, False),
-            Piece(self.rise_time, brake, True),
-            Piece(brake, self.duration, False),
+            Piece(self.rise_time, fall_begin, True),
+            Piece(fall_begin, self.duration, False),
         ]
 
     def at(self, time: float) -> Progress:
         """Progress at `time`."""
-        left = self.duration - time
+        remaining = self.duration - time
         if time < 0.0:
             return Progress(0.0)
-        if left < 0.0:
+        if remaining < 0.0:
             return Progress(self.length)
         if time < self.rise_time:
             return self.ramp(self.rate, self.rise_time, time)
-        if left < self.fall_time:
-            phase, first, second, third = self.ramp(self.rate, self.fall_time, left)
+        if remaining < self.fall_time:
+            phase, first, second, third = self.ramp(self.rate, self.fall_time, remaining)
             return Progress(self.length - phase, first, -second, third)
         return Progress(self.rate * (time - 0.5 * self.rise_time), self.rate)
 
@@ -193,18 +193,18 @@ class LimitedJerk:
             raise TrajectoryError("length, speed, acceleration and jerk of a line must be positive")
         jerk_time = min(acceleration / jerk, sqrt(speed / jerk))
         ramp = jerk_time + speed / (jerk * jerk_time)
-        cruising = length / speed - ramp
-        if cruising < 0.0:
-            cruising = 0.0
+        cruise_time = length / speed - ramp
+        if cruise_time < 0.0:
+            cruise_time = 0.0
             jerk_time = min(acceleration / jerk, (length / (2.0 * jerk)) ** (1.0 / 3.0))
             ramp = jerk_time / 2.0 + sqrt(jerk_time**2 / 4.0 + length / (jerk * jerk_time))
-        steady = max(ramp - 2.0 * jerk_time, 0.0)
+        steady_time = max(ramp - 2.0 * jerk_time, 0.0)
         self._length = length
-        faster = ((jerk_time, jerk), (steady, 0.0), (jerk_time, -jerk))
-        slower = ((jerk_time, -jerk), (steady, 0.0), (jerk_time, jerk))
-        self._pieces = _joined_pieces((*faster, (cruising, 0.0), *slower))
+        rise = ((jerk_time, jerk), (steady_time, 0.0), (jerk_time, -jerk))
+        fall = ((jerk_time, -jerk), (steady_time, 0.0), (jerk_time, jerk))
+        self._pieces = _joined_pieces((*rise, (cruise_time, 0.0), *fall))
         self._ends = [start for start, _, _ in self._pieces[1:]]
-        self.duration = 2.0 * ramp + cruising
+        self.duration = 2.0 * ramp + cruise_time
 
     def pieces(self) -> list[Piece]:
         """The seven pieces of constant jerk."""

@@ -92,12 +92,13 @@ def _check_times_in(
         rate = law.at(piece.begin).first
         ends = np.array([piece.begin, piece.end])
         return np.concatenate((ends, piece.begin + (phases - begin) / rate))
-    table = np.linspace(piece.begin, piece.end, _TABLE_ROWS)
-    reached = np.array([law.at(time).phase for time in table.tolist()])
-    evenly = np.linspace(piece.begin, piece.end, _CHECKS_PER_PIECE + 1)
+    table_times = np.linspace(piece.begin, piece.end, _TABLE_ROWS)
+    table_phases = np.array([law.at(time).phase for time in table_times.tolist()])
+    even_times = np.linspace(piece.begin, piece.end, _CHECKS_PER_PIECE + 1)
     # The jerk may jump at the end, and belongs to the next part there.
-    before = np.nextafter(piece.end, piece.begin)
-    return np.concatenate((evenly, [before], np.interp(phases, reached, table)))
+    before_end = np.nextafter(piece.end, piece.begin)
+    phase_times = np.interp(phases, table_phases, table_times)
+    return np.concatenate((even_times, [before_end], phase_times))
 
 
 class Heading(Protocol):
@@ -121,7 +122,7 @@ class FixedHeading:
     """Keeps a given heading.
 
     Attributes:
-        heading: rad from north.
+        heading: heading, rad from north.
     """
 
     heading: float
@@ -147,9 +148,9 @@ class TangentHeading:
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Heading of the tangent, and its derivative by the phase."""
         (north, east, _), (north2, east2, _) = point.first, point.second
-        turn = (north * east2 - east * north2) / (north * north + east * east)
+        slope = (north * east2 - east * north2) / (north * north + east * east)
         middle = self.middle + self.winding * phase
-        return middle + remainder(atan2(east, north) - middle, tau), turn
+        return middle + remainder(atan2(east, north) - middle, tau), slope
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +173,7 @@ class TimedCurve:
 
     @property
     def duration(self) -> float:
-        """How long it lasts, s."""
+        """Duration, s."""
         return self.law.duration
 
     @property
@@ -193,5 +194,5 @@ class TimedCurve:
         progress = self.law.at(time)
         point = self.curve.at(progress.phase)
         velocity, acceleration, jerk = derivatives(progress, *point[1:])
-        heading, turn = self.heading.at(progress.phase, point)
-        return Sample(point.position, velocity, acceleration, jerk, heading, turn * progress.first)
+        heading, slope = self.heading.at(progress.phase, point)
+        return Sample(point.position, velocity, acceleration, jerk, heading, slope * progress.first)

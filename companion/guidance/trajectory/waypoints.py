@@ -25,11 +25,11 @@ from companion.guidance.trajectory.timed_curve import (
 )
 
 _SAMPLES_PER_SEGMENT = 200
-"""Samples of each segment, to find its largest speed and acceleration."""
+"""Number of samples of a segment from which its largest speed and acceleration are found."""
 _DETOUR_SAMPLES = 20
-"""Samples of each segment, to find its distance from a straight line."""
+"""Number of samples of a segment from which its distance from a straight line is found."""
 _SMALLEST_SQUARE = 1e-12
-"""Smallest squared length of a segment, m²: points may coincide."""
+"""Lower bound of the squared length of a segment, m², so that equal points cause no 0/0."""
 
 
 def waypoints(
@@ -147,8 +147,8 @@ def _stretch_factor(
     A minimum-snap spline over knots stretched in time has the same path.
     """
     motion = _sampled(spline, knots)
-    fastest, strongest = np.linalg.norm(motion[:, :, 1:3], axis=1).max(axis=0)
-    return max(float(fastest) / speed, float(np.sqrt(strongest / acceleration)))
+    max_speed, max_acceleration = np.linalg.norm(motion[:, :, 1:3], axis=1).max(axis=0)
+    return max(float(max_speed) / speed, float(np.sqrt(max_acceleration / acceleration)))
 
 
 def _sampled(spline: SepticSpline, knots: Floats, count: int = _SAMPLES_PER_SEGMENT) -> Floats:
@@ -171,17 +171,17 @@ def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHea
 
 
 def largest_detour(spline: SepticSpline, times: Floats | None = None) -> float:
-    """Largest distance of a spline from the straight lines between its places at some times, m.
+    """Largest distance of a spline from a polyline through some of its points, m.
 
     Args:
         spline: the spline.
-        times: (k,), phases of the spline, increasing; None: its knots.
+        times: (k,), times of these points, increasing, s; None: the knots of the spline.
     """
     points = spline.knots if times is None else times
     path = _sampled(spline, points, _DETOUR_SAMPLES)[:, :, 0]
     lines = np.diff(path[::_DETOUR_SAMPLES], axis=0)[:, None]  # (k, 1, 3)
-    ways = path[:-1].reshape(len(lines), _DETOUR_SAMPLES, 3)
-    ways = ways - ways[:, :1]
+    offsets = path[:-1].reshape(len(lines), _DETOUR_SAMPLES, 3)
+    offsets = offsets - offsets[:, :1]
     squares = np.maximum((lines * lines).sum(axis=2), _SMALLEST_SQUARE)
-    shares = np.clip((ways * lines).sum(axis=2) / squares, 0.0, 1.0)
-    return float(np.linalg.norm(ways - shares[..., None] * lines, axis=2).max())
+    shares = np.clip((offsets * lines).sum(axis=2) / squares, 0.0, 1.0)
+    return float(np.linalg.norm(offsets - shares[..., None] * lines, axis=2).max())

@@ -6,7 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
-from companion.config.in_flight import shown
+from companion.config.in_flight import value_text
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
@@ -37,7 +37,7 @@ class Panel:
             with ui.element("div").classes("live-values"):
                 for key in store.values():
                     name = key.section, key.name
-                    self._shown[name] = shown(key.value)
+                    self._shown[name] = value_text(key.value)
                     self._inputs[name] = ui.input(
                         f"{key.section}.{key.name}", value=self._shown[name]
                     ).props(f'dense suffix="{key.unit}" hint="{_range(key.allowed)}"')
@@ -110,7 +110,7 @@ class Panel:
     def _refresh(self) -> None:
         """Show values changed elsewhere, except in edited fields; enable or disable Undo."""
         for key in self._store.values():
-            name, value = (key.section, key.name), shown(key.value)
+            name, value = (key.section, key.name), value_text(key.value)
             field = self._inputs[name]
             if value != self._shown[name]:
                 if str(field.value or "").strip() == self._shown[name] or field.value is None:

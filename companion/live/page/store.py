@@ -4,7 +4,7 @@ from collections import deque
 from typing import Any
 
 from companion.config import Config
-from companion.config.in_flight import changeable, differences
+from companion.config.in_flight import changeable_keys, differences
 from companion.config.reference import ConfigKey, keys
 from companion.files.bounded_yaml import dump_value
 from companion.live.channel import Message
@@ -69,7 +69,7 @@ class Store:
 
     def values(self) -> list[ConfigKey]:
         """The keys that may change in flight, with their present values."""
-        return [key for key in keys(self.config) if (key.section, key.name) in changeable()]
+        return [key for key in keys(self.config) if (key.section, key.name) in changeable_keys()]
 
     def fence(self) -> dict[str, Any]:
         """The fence and the tilt limit in force, for the drawings."""

@@ -1,8 +1,8 @@
 """Messages of `flight.mcap` for the live stream: several in one datagram.
 
 A datagram is a sequence of messages. Each consists of the index of its channel in `TOPICS` (uint8),
-its time in ns since 1970 (uint64; in vehicle time: since the vehicle's boot), its length (uint32),
-and its bytes.
+its time in ns since 1970 (uint64; if the flight runs in vehicle time: since the vehicle's boot),
+its length (uint32), and its bytes.
 """
 
 import struct
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from companion.recording.mcap_file.channels import TOPICS
 
-_HEAD = struct.Struct("<BQI")
+_HEADER = struct.Struct("<BQI")
 _TOPIC_NUMBERS = {topic: number for number, topic in enumerate(TOPICS)}
 _FULL_BATCH = 32_000
 """Length above which a batch is sent, bytes; well below the buffer of a socket."""
@@ -23,12 +23,12 @@ SendBatch = Callable[[bytes], None]
 class StreamedMessage(NamedTuple):
     """A message of the live stream."""
 
-    number: int
-    """Index of its channel in `TOPICS`."""
+    channel_index: int
+    """Index in `TOPICS` of the message's channel."""
     time_ns: int
-    """Time since 1970, ns; in vehicle time since the vehicle's boot."""
+    """Time since 1970, ns; if the flight runs in vehicle time, since the vehicle's boot."""
     data: bytes
-    """Payload, as in the file."""
+    """Payload of the message, as in `flight.mcap`."""
 
 
 class Batch:
@@ -40,7 +40,7 @@ class Batch:
 
     def add(self, topic: str, time_ns: int, data: bytes) -> None:
         """Add a message; send the batch if it is full."""
-        self._collected += _HEAD.pack(_TOPIC_NUMBERS[topic], time_ns, len(data))
+        self._collected += _HEADER.pack(_TOPIC_NUMBERS[topic], time_ns, len(data))
         self._collected += data
         if len(self._collected) > _FULL_BATCH:
             self.send()
@@ -56,6 +56,6 @@ def messages_of(datagram: bytes) -> Iterator[StreamedMessage]:
     """The messages of a datagram, in order."""
     at = 0
     while at < len(datagram):
-        number, time_ns, length = _HEAD.unpack_from(datagram, at)
-        at += _HEAD.size + length
+        number, time_ns, length = _HEADER.unpack_from(datagram, at)
+        at += _HEADER.size + length
         yield StreamedMessage(number, time_ns, datagram[at - length : at])

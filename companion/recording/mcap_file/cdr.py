@@ -5,7 +5,7 @@ Foxglove, Lichtblick and PlotJuggler recognise these types by name and draw them
 
 import struct
 
-from companion.recording.mcap_file.fields import CDR, PACKAGE, MessageType
+from companion.recording.mcap_file.fields import CDR_HEADER, PACKAGE, MessageType
 
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<iI")
@@ -67,23 +67,23 @@ LOG = message_type(
 )
 PHASE = message_type(
     f"{PACKAGE}/Phase",
-    "# A phase of the flight began.\n# When, on our clock, s.\nfloat64 time_s\nstring name\n"
-    "# The condition that ends it.\nstring waits_for\n",
+    "# A phase of the flight began.\n# Time on our clock, s.\nfloat64 time_s\nstring name\n"
+    "# The condition that ends the phase.\nstring waits_for\n",
 )
 MANEUVER = message_type(
     f"{PACKAGE}/Maneuver",
-    "# A maneuver began; an empty name: the last one ended.\n# When, on our clock, s.\n"
-    "float64 time_s\n# The same on the vehicle's clock, s.\nfloat64 vehicle_time_s\nstring name\n",
+    "# A maneuver began; an empty name: the last one ended.\n# Time on our clock, s.\n"
+    "float64 time_s\n# Time on the vehicle's clock, s.\nfloat64 vehicle_time_s\nstring name\n",
 )
 ALARM = message_type(
     f"{PACKAGE}/Alarm",
-    "# A safety monitor raised its alarm, or its alarm is over.\n# When, on our clock, s.\n"
+    "# A safety monitor raised its alarm, or its alarm is over.\n# Time on our clock, s.\n"
     "float64 time_s\n# 1: raised, 0: over.\nfloat64 raised\nstring monitor\nstring reason\n"
     "# What the flight does about it.\nstring action\n",
 )
 CHANGE = message_type(
     f"{PACKAGE}/Change",
-    "# Values of the configuration begin to change in flight.\n# When, on our clock, s.\n"
+    "# Values of the configuration begin to change in flight.\n# Time on our clock, s.\n"
     "float64 time_s\n# 1: at once, 0: slewed.\nfloat64 at_once\n"
     "# The new values as JSON, by section and key.\nstring values\n",
 )
@@ -95,7 +95,7 @@ class CdrMessage:
     """A growing CDR message. Values are aligned to their size, counted after the header."""
 
     def __init__(self) -> None:
-        self._bytes = bytearray(CDR)
+        self._bytes = bytearray(CDR_HEADER)
 
     def bytes(self) -> bytes:
         """The message so far."""
@@ -103,9 +103,9 @@ class CdrMessage:
 
     def align(self, size: int) -> None:
         """Pad to a multiple of `size` bytes."""
-        self._bytes += bytes(-(len(self._bytes) - len(CDR)) % size)
+        self._bytes += bytes(-(len(self._bytes) - len(CDR_HEADER)) % size)
 
-    def flag(self, value: int) -> None:
+    def uint8(self, value: int) -> None:
         """Add a uint8."""
         self._bytes.append(value)
 
@@ -147,21 +147,21 @@ def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ..
         ValueError: the message does not have this form.
     """
     try:
-        found = struct.unpack_from(f"<{numbers}d", message, 4)
+        values = struct.unpack_from(f"<{numbers}d", message, 4)
         at, strings = 4 + 8 * numbers, []
         for _ in range(texts):
             text, at = _string(message, at)
             strings.append(text)
     except struct.error as error:
         raise ValueError(f"a message is too short: {error}") from error
-    return found, strings
+    return values, strings
 
 
 def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
     """Encode a message of type LOG at a time in ns since 1970."""
     message = CdrMessage()
     message.time(time_ns)
-    message.flag(level)
+    message.uint8(level)
     for each in (text, name, ""):  # the last one: no source file
         message.text(each)
     message.count(0)  # no line of it
@@ -194,11 +194,11 @@ class PoseEncoder:
         for frame in frames:
             message.text(frame)
         message.align(8)
-        self._names = message.bytes()[len(CDR) + _STAMP.size :]
+        self._names = message.bytes()[len(CDR_HEADER) + _STAMP.size :]
 
     def message(self, time_ns: int, pose: Pose) -> bytes:
         """The message for `pose` at a time in ns since 1970."""
-        return CDR + _stamp(time_ns) + self._names + _POSE.pack(*pose)
+        return CDR_HEADER + _stamp(time_ns) + self._names + _POSE.pack(*pose)
 
 
 def _stamp(time_ns: int) -> bytes:

@@ -22,7 +22,7 @@ THRUST = Channel(
     "/thrust",
     "The thrust estimator, ten times a second.",
     (
-        Field("time_s", "When, on our clock, s."),
+        Field("time_s", "Time on our clock, s."),
         Field("hover_thrust", "Learned thrust at hover at the battery's initial voltage, 0..1."),
         Field("smallest_m_s2", "Smallest specific thrust that is sent, m/s²."),
         Field("largest_m_s2", "Largest specific thrust that is sent, m/s²."),
@@ -35,7 +35,7 @@ MOTION = Channel(
     "/motion",
     "The motion in all phases, ten times a second.",
     (
-        Field("time_s", "When, since the flight began, s."),
+        Field("time_s", "Time since the flight began, s."),
         VEHICLE_TIME,
         Field("height_m", "Height above home, m."),
         Field("speed_m_s", "Speed, m/s."),
@@ -47,7 +47,7 @@ RESOURCES = Channel(
     "/resources",
     "What the flight takes from the computer, and the counters of the link, once a second.",
     (
-        Field("time_s", "When, on our clock, s."),
+        Field("time_s", "Time on our clock, s."),
         Field("processor_share", "Processor load of the program; 1: one core fully used."),
         Field("memory_mb", "Largest memory so far, MB."),
         Field("recording_waiting", "Entries of this file that wait to be written."),

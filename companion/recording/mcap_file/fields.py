@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-CDR = b"\x00\x01\x00\x00"
+CDR_HEADER = b"\x00\x01\x00\x00"
 """Header of a little-endian CDR message."""
 PACKAGE = "companion_msgs/msg"
 

@@ -7,10 +7,10 @@ class Phase(NamedTuple):
     """A phase of the flight."""
 
     time: float
-    """Its beginning, s since the flight began."""
+    """Beginning of the phase, s since the flight began."""
     name: str
     waits_for: str
-    """The condition that ends it."""
+    """Condition that ends the phase."""
 
 
 class Event(NamedTuple):
@@ -42,7 +42,7 @@ class AlarmChange(NamedTuple):
 
 
 class ValuesChange(NamedTuple):
-    """A change of values of the configuration begins."""
+    """A change of configuration values in flight, at its beginning."""
 
     time: float
     """Time on our clock, s."""

@@ -118,7 +118,7 @@ GUIDANCE = Channel(
     "/guidance",
     "One step of guidance with a fresh position, unless idle: reference, estimate, wind, drag.",
     (
-        Field("time_s", "When, on our clock, s."),
+        Field("time_s", "Time on our clock, s."),
         VEHICLE_TIME,
         *_vector("reference", "m", "Position of the reference"),
         *_vector("reference", "m_s", "Velocity of the reference"),
@@ -127,7 +127,7 @@ GUIDANCE = Channel(
         *_vector("estimated", "m_s", "Estimated velocity now"),
         Field("error_m", "Distance from the reference, m. NaN: no reference, or open loop."),
         Field("wind_north_m_s2", "Acceleration by wind and bias, north, m/s²."),
-        Field("wind_east_m_s2", "The same, east, m/s²."),
+        Field("wind_east_m_s2", "Acceleration by wind and bias, east, m/s²."),
         Field("drag_per_s", "Linear drag per mass, as learned so far, 1/s."),
         Field("quadratic_drag_per_m", "Quadratic drag per mass, as learned so far, 1/m."),
     ),
@@ -171,7 +171,7 @@ INPUT = Channel(
     (
         Field("time_s", "When the step began, on our clock, s."),
         Field("position_received_s", "When the newest position arrived, on our clock, s."),
-        Field("position_vehicle_time_s", "Its stamp on the vehicle's clock, s."),
+        Field("position_vehicle_time_s", "Time stamp of this position on the vehicle's clock, s."),
         *_vector("position", "m", "LOCAL_POSITION_NED, position"),
         *_vector("velocity", "m_s", "LOCAL_POSITION_NED, velocity"),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
@@ -201,10 +201,10 @@ ACTION = Channel(
     "/action",
     "A call by which a phase controls guidance or the control loop; for `companion replay`.",
     (
-        Field("time_s", "When, on our clock, s."),
+        Field("time_s", "Time on our clock, s."),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
-        Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior` only."),
-        Field("quadratic_drag_per_m", "Quadratic drag of that flight, 1/m; of `drag_prior` only."),
+        Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior`."),
+        Field("quadratic_drag_per_m", "Quadratic drag of an earlier flight, 1/m; of `drag_prior`."),
     ),
     (CodeField("action", "The name of the call.", ACTIONS),),
 )

@@ -48,7 +48,7 @@ class Line(NamedTuple):
     points: Sequence[tuple[float, float, float]]
     """(x, y, z) of each point, m."""
     color: Color
-    pairs: bool = False
+    separate_pairs: bool = False
     """True: each pair of points is a separate line. False: all points form one line."""
 
 
@@ -58,7 +58,7 @@ class Entity(NamedTuple):
     name: str
     frame: str
     follows: bool = False
-    """Whether they move with the frame until they are replaced."""
+    """Whether the shapes move with `frame` until they are replaced."""
     arrows: Sequence[Arrow] = ()
     cubes: Sequence[Cube] = ()
     cylinders: Sequence[Cylinder] = ()
@@ -89,9 +89,9 @@ def _entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
         message.doubles(*one.pose, *one.size, *scales, *one.color)
 
     def line(one: Line) -> None:
-        message.flag(_LINE_LIST if one.pairs else _LINE_STRIP)
+        message.uint8(_LINE_LIST if one.separate_pairs else _LINE_STRIP)
         message.doubles(*AT_ORIGIN, _THICKNESS)
-        message.flag(_IN_PIXELS)
+        message.uint8(_IN_PIXELS)
         message.count(len(one.points))
         if one.points:
             message.doubles(*(value for point in one.points for value in point))
@@ -103,7 +103,7 @@ def _entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
     message.text(entity.frame)
     message.text(entity.name)
     message.time(0)  # lifetime: until it is replaced
-    message.flag(entity.follows)
+    message.uint8(entity.follows)
     message.count(0)  # metadata
     _each(message, entity.arrows, arrow)
     _each(message, entity.cubes, box)

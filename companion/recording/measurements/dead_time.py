@@ -15,9 +15,9 @@ class AxisDeadTime(NamedTuple):
     """Dead time of one axis: from a sample to the first effect of its setpoint, s."""
 
     measured: float | None = None
-    """None: the flight had too little undisturbed rotation, or the lag is unknown."""
+    """Measured dead time, s; None: too little undisturbed rotation, or the lag is unknown."""
     configured: float | None = None
-    """None: not configured."""
+    """Configured dead time, s; None: not configured."""
 
     @property
     def is_wrong(self) -> bool:
@@ -27,8 +27,8 @@ class AxisDeadTime(NamedTuple):
         """
         if self.measured is None or self.configured is None:
             return False
-        apart = abs(self.measured - self.configured)
-        return apart > max(_TOLERATED_SHARE * self.configured, _TOLERATED_DIFFERENCE)
+        difference = abs(self.measured - self.configured)
+        return difference > max(_TOLERATED_SHARE * self.configured, _TOLERATED_DIFFERENCE)
 
 
 class SampleAge(NamedTuple):
@@ -51,7 +51,7 @@ class DeadTimes:
     )
     """Dead time by axis: roll, pitch, yaw."""
     sample_age: SampleAge = field(default_factory=SampleAge)
-    """Age of samples; NaN without TIMESYNC."""
+    """Age of samples at arrival; NaN without TIMESYNC."""
     lag_known: bool = False
     """Whether the lag is configured, which the measurement needs."""
 

@@ -55,7 +55,7 @@ class FlightFacts:
     """Whether the vehicle is armed at the end; None: unknown."""
     mode: str | None = None
     """Mode of the vehicle at the end; None: unknown."""
-    unheard: float | None = None
+    silence: float | None = None
     """How long the vehicle was silent at the end, s, so that `armed` and `mode` may have changed
     since; None: it was heard."""
     battery: tuple[float | None, float | None] = (None, None)
@@ -92,7 +92,7 @@ class FlightFacts:
             "at_the_end": {
                 "armed": self.armed,
                 "mode": self.mode,
-                "unheard_s": _rounded(self.unheard),
+                "unheard_s": _rounded(self.silence),
             },
             "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
             "advice": list(self.advice),

@@ -1,4 +1,4 @@
-"""Tracking figures, separately for each maneuver, as their errors cannot be compared."""
+"""Tracking figures of each maneuver; errors of different maneuvers cannot be compared."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -14,9 +14,9 @@ from companion.recording.trace import ManeuverMark
 Floats = NDArray[np.float64]
 
 SETTLING_TIME = 2.0
-"""Time left out at the beginning of a maneuver, s: the vehicle still settles from the last one."""
+"""Time left out at the beginning of a maneuver, s: the previous one still has an effect then."""
 _LARGEST_SHARE = 0.25
-"""Largest share of a maneuver that is left out."""
+"""Largest share of a maneuver's duration that is left out at its beginning."""
 _AT_REST = 0.05
 """A reference that is never faster than this is at rest, m/s."""
 
@@ -33,11 +33,11 @@ class ManeuverFigures:
     begin: float
     """Beginning of the maneuver, s since the flight began."""
     duration: float
-    """Its duration, s."""
+    """Duration of the maneuver, s."""
     open_loop: bool
-    """Whether a part of it is open loop."""
+    """Whether a part of the maneuver is open loop."""
     settling_time: float
-    """Time at the beginning left out of RMS and largest errors, s."""
+    """Time at the beginning of the maneuver that RMS and largest errors leave out, s."""
     level_rms: float
     """RMS of the horizontal error, m."""
     level_max: float
@@ -49,7 +49,7 @@ class ManeuverFigures:
     height_mean: float
     """Mean height error, m, positive above the reference."""
     settling_max: float
-    """Largest distance from the reference in that time, m."""
+    """Largest distance from the reference during `settling_time`, m."""
     drift: float
     """Largest horizontal distance from where the maneuver began, m."""
     speed: float
@@ -112,8 +112,8 @@ def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
 def in_maneuvers(vehicle_times: Floats, marks: Sequence[ManeuverMark]) -> NDArray[np.bool_]:
     """Whether each vehicle time (N,), s, lies in a maneuver; not if it is NaN."""
     begins = np.array([mark.vehicle_time for mark in marks])
-    flown = np.array([False, *(mark.name is not None for mark in marks)])
-    inside = flown[np.searchsorted(begins, vehicle_times, side="right")]
+    in_maneuver = np.array([False, *(mark.name is not None for mark in marks)])
+    inside = in_maneuver[np.searchsorted(begins, vehicle_times, side="right")]
     return np.asarray(inside & ~np.isnan(vehicle_times))
 
 
@@ -153,25 +153,25 @@ def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     time, reference, position = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
     duration = float(time[-1] - time[0])
     open_loop, settling_time = _is_open_loop(rows), _settling_time(rows)
-    early = time < time[0] + settling_time
+    is_settling = time < time[0] + settling_time
     error = position - reference
     level, height = np.hypot(error[:, 0], error[:, 1]), -error[:, 2]
-    held = ~np.isnan(height)  # another program may command the thrust
-    held_late = height[~early & held]
-    away = position[:, :2] - position[0, :2]
+    height_known = ~np.isnan(height)  # another program may command the thrust
+    settled_height = height[~is_settling & height_known]
+    offset = position[:, :2] - position[0, :2]
     return ManeuverFigures(
         name,
         begin,
         duration,
         open_loop,
         settling_time,
-        level_rms=nan if open_loop else rms(level[~early]),
-        level_max=nan if open_loop else largest(level[~early]),
-        height_rms=rms(held_late),
-        height_max=largest(np.abs(held_late)),
-        height_mean=float(held_late.mean()) if len(held_late) else nan,
-        settling_max=largest(np.hypot(level, height)[early & held]),
-        drift=float(np.hypot(away[:, 0], away[:, 1]).max()),
+        level_rms=nan if open_loop else rms(level[~is_settling]),
+        level_max=nan if open_loop else largest(level[~is_settling]),
+        height_rms=rms(settled_height),
+        height_max=largest(np.abs(settled_height)),
+        height_mean=float(settled_height.mean()) if len(settled_height) else nan,
+        settling_max=largest(np.hypot(level, height)[is_settling & height_known]),
+        drift=float(np.hypot(offset[:, 0], offset[:, 1]).max()),
         speed=_largest_speed(time, reference),
     )
 

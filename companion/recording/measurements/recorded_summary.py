@@ -36,7 +36,7 @@ _REQUIRED_KEYS = frozenset(
 )
 """Keys that `summary.json` of this version must have; without them it is not used."""
 _FIRST_UNANSWERED_CODE = 2
-"""Index in `UNANSWERED_CODES` after "answered" and "control_off"."""
+"""First index in `UNANSWERED_CODES` of a reason: "answered" and "control_off" come before."""
 
 
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
@@ -132,14 +132,14 @@ def _flight_trace(record: FlightRecord) -> FlightTrace:
 
 def tracking_rows(guidance: NDArray[np.void]) -> NDArray[np.float64]:
     """(N, 7), rows of `FlightTrace.tracking` from those of the channel "guidance"."""
-    flown = guidance[guidance["offboard_active"] == 1]
-    columns = [flown["vehicle_time_s"]]
-    for axis, held in zip(
+    controlled = guidance[guidance["offboard_active"] == 1]
+    columns = [controlled["vehicle_time_s"]]
+    for axis, held_quantity in zip(
         ("north", "east", "down"), ("position", "position", "height"), strict=True
     ):
-        reference = flown[f"reference_{axis}_m"]
-        columns.append(np.where(flown[f"holds_{held}"] == 1, reference, np.nan))
-    columns += [flown[f"estimated_{axis}_m"] for axis in ("north", "east", "down")]
+        reference = controlled[f"reference_{axis}_m"]
+        columns.append(np.where(controlled[f"holds_{held_quantity}"] == 1, reference, np.nan))
+    columns += [controlled[f"estimated_{axis}_m"] for axis in ("north", "east", "down")]
     return np.column_stack(columns)
 
 
@@ -155,13 +155,13 @@ def _sample_indices(
 
 def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
     sample, setpoint = record.rows("sample"), record.rows("setpoint")
-    taken = sample[sample["unanswered"] != UNANSWERED_CODES.index("control_off")]
-    found = np.bincount(taken["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
-    counts = zip(UNANSWERED_CODES, found, strict=True)
+    controlled = sample[sample["unanswered"] != UNANSWERED_CODES.index("control_off")]
+    code_counts = np.bincount(controlled["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
+    counts = zip(UNANSWERED_CODES, code_counts, strict=True)
     unanswered = dict(list(counts)[_FIRST_UNANSWERED_CODE:])
     refused = sum(unanswered[name] for name in _REFUSALS)
     return LoopCounts(
-        samples=len(taken),
+        samples=len(controlled),
         setpoints=len(setpoint),
         missed_deadlines=int((setpoint["latency_us"] > 1e6 * deadline).sum()),
         stale=sum(unanswered.values()) - refused,
@@ -172,7 +172,7 @@ def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
 
 
 def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> EarlyEnd:
-    """The end of the record, in the phase that ran."""
+    """The end of the record as an early end of the flight, in the phase that ran."""
     end = record.duration
     since = None if takeoff is None else end - takeoff
     latest = record.maneuvers[-1] if record.maneuvers else None
@@ -182,22 +182,22 @@ def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> Early
 
 
 def _takeoff_time(record: FlightRecord) -> float | None:
-    """See `FlightFacts.takeoff`; a takeover in the air has no phase of take-off."""
-    read = record.rows("guidance_input")
+    """Time of take-off or takeover, s since the flight began: see `FlightFacts.takeoff`."""
+    steps = record.rows("guidance_input")
     flying = ("takeoff", "offboard")
-    begun = next((each.time for each in record.phases if each.name in flying), None)
-    if begun is None:
+    takeoff_begin = next((each.time for each in record.phases if each.name in flying), None)
+    if takeoff_begin is None:
         return None
-    times = record.since_start(read["time_s"])
-    left = times[(times >= begun) & (read["standing"] == 0)]
-    return float(left[0]) if len(left) else None
+    times = record.since_start(steps["time_s"])
+    airborne = times[(times >= takeoff_begin) & (steps["standing"] == 0)]
+    return float(airborne[0]) if len(airborne) else None
 
 
 def _setpoint_rate(record: FlightRecord) -> float:
     """Rate of setpoints in vehicle time from the first maneuver on, Hz."""
-    begun = [mark.vehicle_time for mark in record.maneuvers if mark.name is not None]
+    begins = [mark.vehicle_time for mark in record.maneuvers if mark.name is not None]
     times = record.rows("setpoint")["vehicle_time_s"]
-    times = times[times >= begun[0]] if begun else times[:0]
+    times = times[times >= begins[0]] if begins else times[:0]
     span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
     return (len(times) - 1) / span if span > 0.0 else 0.0
 

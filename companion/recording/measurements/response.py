@@ -29,24 +29,25 @@ class StepResponse:
     """The response to all steps; coefficients are accelerations per specific thrust."""
 
     time_constant_north_s: float
-    """Time constant of the first-order model that fits a_N best (least squares), s; NaN: no step
-    goes north or south."""
+    """Time constant of the first-order model that fits the north coefficient best (least squares),
+    s; NaN: no step goes north or south."""
     time_constant_east_s: float
-    """The same for a_E, east or west."""
+    """Time constant of the first-order model that fits the east coefficient best, s; NaN: no step
+    goes east or west."""
     step_size: float
     """Largest commanded change of the coefficients, relative to those at the beginning of the run;
     in wind the vehicle is not level there."""
-    asked_tilt: float
+    target_tilt: float
     """Largest tilt of a target, rad, before the tilt limit of the planner."""
     cross_axis_max: float
     """Straightness: largest distance of the coefficients from the straight line of a step, which
     leads to its target."""
     model_deviation_max: float
-    """Largest distance from the ideal model ċ = p·(c_d − c)."""
+    """Largest distance of the coefficients c from the ideal model ċ = p·(c_d − c)."""
     second_order: SecondOrderModel
     """The second-order model with a dead time that fits best."""
     second_order_deviation_max: float
-    """Largest distance from that model."""
+    """Largest distance of the coefficients from the model `second_order`."""
 
 
 def measure_response(rows: Floats, gain: float) -> StepResponse | None:
@@ -62,7 +63,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
         step_size=max(run.size for run in runs),
-        asked_tilt=asin(min(1.0, max(largest_norm(run.target) for run in runs))),
+        target_tilt=asin(min(1.0, max(largest_norm(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(
             largest_norm(run.measured - first_order(run, 1.0 / gain)) for run in runs
@@ -87,7 +88,7 @@ def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
             {"north": response.time_constant_north_s, "east": response.time_constant_east_s}
         ),
         "step_size": response.step_size,
-        "asked_tilt_deg": degrees(response.asked_tilt),
+        "asked_tilt_deg": degrees(response.target_tilt),
         "cross_axis_max": response.cross_axis_max,
         "model_deviation_max": response.model_deviation_max,
         "second_order": {
@@ -100,7 +101,7 @@ def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
 
 
 def first_order(run: StepRun, time_constant: float) -> Floats:
-    """(n, 2), exact response of τ·ċ = c_d − c from the first sample, each target held."""
+    """(n, 2), exact response of τ·ċ = c_d − c to the targets c_d of `run`, from its first row."""
     return _first_order(run.steps(), time_constant)
 
 
@@ -111,8 +112,8 @@ def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
     for step in steps:
         start = target + (start - target) * np.exp(-(step.time[0] - since) / time_constant)
         since, target = step.time[0], step.target[0]
-        left = np.exp(-(step.time - since) / time_constant)
-        parts.append(target + np.outer(left, start - target))
+        decay = np.exp(-(step.time - since) / time_constant)
+        parts.append(target + np.outer(decay, start - target))
     return np.concatenate(parts)
 
 
@@ -128,16 +129,16 @@ def _largest_deviation(step: StepRun) -> float:
 
 def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     """The time constant in s that fits one axis best, searched from `start`; NaN without a step."""
-    stepped = [
+    axis_runs = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs
         if np.abs(run.changes[:, axis]).max() > _MIN_SHARE * run.size
     ]
-    if not stepped:
+    if not axis_runs:
         return nan
 
-    steps = [run.steps() for run in stepped]
-    measured = np.concatenate([run.measured for run in stepped])
+    steps = [run.steps() for run in axis_runs]
+    measured = np.concatenate([run.measured for run in axis_runs])
 
     def residuals(unknown: Floats) -> tuple[Floats, Floats]:
         tau = float(np.exp(unknown[0]))

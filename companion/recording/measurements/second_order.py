@@ -14,8 +14,8 @@ Floats = NDArray[np.float64]
 
 _LONGEST_GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
-_TOO_FEW = 10
-"""Runs with this number of rows or fewer are left out."""
+_MAX_ROWS_OF_SHORT_RUN = 10
+"""Largest number of rows of a run that is too short to measure."""
 
 
 _COMPASS = (
@@ -77,7 +77,7 @@ def step_runs(rows: Floats) -> list[StepRun]:
     return [
         StepRun(part[:, 0], np.array([coefficients(tuple(row[1:5])) for row in part]), part[:, 5:7])
         for part in parts
-        if len(part) > _TOO_FEW
+        if len(part) > _MAX_ROWS_OF_SHORT_RUN
     ]
 
 
@@ -97,36 +97,36 @@ class SecondOrderModel:
     """Second-order model with dead time: c̈ = ω²·(c_d(t − dead time) − c) − 2ζω·ċ."""
 
     frequency: float
-    """ω, rad/s."""
+    """Natural frequency ω, rad/s."""
     damping: float
-    """ζ."""
+    """Damping ratio ζ."""
     dead_time: float
     """Time from the sample at which the target changed to the first effect, s."""
 
     def path(self, run: StepRun) -> Floats:
         """(n, 2) coefficients of the model at the rows of `run`.
 
-        It starts with the measured coefficients and speed, and keeps this speed until the first
-        target has an effect.
+        The path starts with the measured coefficients and speed, and keeps this speed until the
+        first target has an effect.
         """
         return self.path_at_rows(RunData.of(run))
 
     def path_at_rows(self, data: "RunData") -> Floats:
         """(m, 2), coefficients of the model at the times in `data`; see `path`."""
-        time, effects = data.time, data.changes + self.dead_time
+        time, effects = data.time, data.change_times + self.dead_time
         latest = np.searchsorted(effects, time, side="right") - 1
-        acted = np.maximum(time - effects[np.maximum(latest, 0)], 0.0)
-        moves = self._transitions(acted)[:, 0]
-        between = self._transitions(np.diff(effects))
+        elapsed = np.maximum(time - effects[np.maximum(latest, 0)], 0.0)
+        to_rows = self._transitions(elapsed)[:, 0]
+        to_next = self._transitions(np.diff(effects))
         first, speed = data.start
         out: Floats = first + np.outer(time, speed)
         state = np.array([first + self.dead_time * speed, speed])
         for number, target in enumerate(data.targets):
             goal = np.array([target, (0.0, 0.0)])
             rows = latest == number
-            out[rows] = moves[rows] @ (state - goal) + target
-            if number < len(between):
-                state = between[number] @ (state - goal) + goal
+            out[rows] = to_rows[rows] @ (state - goal) + target
+            if number < len(to_next):
+                state = to_next[number] @ (state - goal) + goal
         return out
 
     def _transitions(self, seconds: Floats) -> Floats:
@@ -147,8 +147,8 @@ class RunData(NamedTuple):
     """(m,), times of the rows since the first row of the run, s."""
     start: Floats
     """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
-    changes: Floats
-    """(s,), when each target came into force, on the same clock; the first one is 0."""
+    change_times: Floats
+    """(s,), time of each change of the target since the first row of the run, s; the first is 0."""
     targets: Floats
     """(s, 2), coefficients of each target."""
 
@@ -164,7 +164,7 @@ class RunData(NamedTuple):
 
 
 def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
-    """Least squares over ω, ζ and dead time."""
+    """The second-order model that fits the runs best: least squares over ω, ζ and dead time."""
     thinning = 1 + sum(run.time.size for run in runs) // _FITTED_ROWS
     thinned = [RunData.of(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])

@@ -53,7 +53,7 @@ class LoopCounts:
     unanswered: dict[str, int] = field(default_factory=dict)
     """Unanswered samples, by reason."""
     rate_hz: float = 0.0
-    """Rate of setpoints in vehicle time during the maneuvers, Hz."""
+    """Rate of setpoints during the maneuvers, Hz."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,18 +61,18 @@ class PredictiveFigures:
     """Counts and times of predictive control."""
 
     flown_answers: int
-    """Answers that were flown."""
-    troubles: dict[str, int]
-    """Answers that were not flown, by reason."""
+    """Number of answers of the solver that guidance used."""
+    replaced_answers: dict[str, int]
+    """Number of answers of the solver that guidance did not use, by reason."""
     computing_seconds: tuple[float, ...]
-    """Computing time of each flown answer in the solver's process."""
+    """Computing time in the solver's process of each answer that was used, s."""
 
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON, in milliseconds."""
         seconds, flown = self.computing_seconds, self.flown_answers
         p50, p99 = np.percentile(seconds, (50, 99)) if seconds else (math.nan, math.nan)
         times = {"p50": 1e3 * float(p50), "p99": 1e3 * float(p99)}
-        return {"flown": flown, "troubles": self.troubles, "solve_ms": without_nan(times)}
+        return {"flown": flown, "troubles": self.replaced_answers, "solve_ms": without_nan(times)}
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class Summary:
     """The summary of a finished flight."""
 
     result: str
-    """"ok", or the reason why it ended early."""
+    """"ok", or the reason why the flight ended early."""
     phase: str
     """The phase that failed, else the last one."""
     planner: str
@@ -96,7 +96,7 @@ class Summary:
     """The flight's folder."""
     dead_times: DeadTimes = field(default_factory=DeadTimes)
     predictive: PredictiveFigures | None = None
-    """Counts of predictive control; None: it did not fly."""
+    """Figures of predictive control; None: predictive control did not fly."""
     realtime: dict[str, str] = field(default_factory=dict)
     """Each real-time request to the operating system: "granted", or the reason why not."""
     facts: FlightFacts = field(default_factory=FlightFacts)
@@ -179,9 +179,10 @@ class Summary:
 
 
 def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
-    """Position error of the rows with a whole reference, height error of those with a height, m.
+    """RMS and largest position error, and RMS height error, m.
 
-    `rows` are the (N, 7) rows of `FlightTrace.tracking`. NaN: there are no such rows.
+    `rows` are the (N, 7) rows of `FlightTrace.tracking`; those without a reference position or
+    height do not count. NaN: no row counts.
     """
     error = rows[:, 4:7] - rows[:, 1:4]
     distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)

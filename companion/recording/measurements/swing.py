@@ -33,7 +33,7 @@ _IN_MOTION = _Rule(4.0, 1.0, 2, 1.25)
 SHORTEST_PART = _SHORT_HOVER.shortest_part
 """Shortest part of a flight in which a swing can be measured, s."""
 _LONGEST_SAMPLE_PERIOD = 0.05
-"""Longest time between samples, s."""
+"""Longest time between samples from which a swing is measured, s."""
 _PEAK_SHARE = 0.9
 """The first peak of at least this share of the highest one gives the period, because multiples of
 the period also have peaks."""
@@ -47,7 +47,7 @@ class Swing(NamedTuple):
     period: float = nan
     """Period of the oscillation, s; NaN also if nothing repeats."""
     regularity: float = nan
-    """Autocorrelation at that period: 1 repeats exactly, 0 not at all."""
+    """Autocorrelation at `period`: 1 repeats exactly, 0 not at all."""
 
 
 NOT_MEASURED = Swing()

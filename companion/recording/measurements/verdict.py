@@ -7,29 +7,29 @@ from typing import Any, NamedTuple
 from companion.attitude.planner import MODEL_FOLLOWING
 
 Figures = Mapping[str, Any]
-"""The figures; the result of `Summary.as_dict`."""
+"""Figures of a flight: the result of `Summary.as_dict`."""
 
-HORIZONTAL_RMS, HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
+MAX_HORIZONTAL_RMS, MAX_HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
 """Largest RMS of the horizontal error of a maneuver: with the reference at rest, m; and the
 increase for each m/s of its speed, m."""
-HEIGHT_RMS = 0.15
+MAX_HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
-CONSTANT_HEIGHT_ERROR = 0.7
-"""Above this |mean| / RMS, a height error is mostly constant."""
-SWING_RMS = 3.0
+MIN_CONSTANT_SHARE = 0.7
+"""Smallest |mean| / RMS of a height error that is mostly constant."""
+MAX_SWING_RMS = 3.0
 """Largest RMS of a swing of roll and pitch, °."""
-SWING_REGULARITY = 0.7
+MIN_SWING_REGULARITY = 0.7
 """Smallest autocorrelation of a swing; below it, the motion comes from wind and noise."""
-STRAIGHTNESS = 0.03
-"""Largest distance from a step's line, as a share of the step."""
-MODEL_DEVIATION = 0.20
+MAX_LINE_DISTANCE = 0.03
+"""Largest distance from the straight line of a step, as a share of the step."""
+MAX_MODEL_DEVIATION = 0.20
 """Largest distance from the nearest second-order model, as a share of the step."""
-UNANSWERED_SAMPLES = 0.01
+MAX_UNANSWERED_SHARE = 0.01
 """Largest share of attitude samples without an answer."""
-LOST_FRAMES = 0.02
+MAX_LOST_SHARE = 0.02
 """Largest share of the vehicle's frames that may be lost."""
-BATTERY_MARGIN = 0.10
-"""Charge required at the end beyond `limits.min_battery_percent`, 0..1."""
+MIN_BATTERY_MARGIN = 0.10
+"""Smallest charge at the end beyond `limits.min_battery_percent`, 0..1."""
 
 
 LOST_ROWS = "rows of the flight's figures were lost"
@@ -40,16 +40,16 @@ class Check(NamedTuple):
     """One figure and its limit."""
 
     what: str
-    """Subject of the check."""
+    """Subject of the check, such as a maneuver or "latency"."""
     found: str
-    """The figure and its limit, in words."""
+    """Figure that was found, and its limit, in words."""
     good: bool
-    """Whether it is within the limit."""
+    """Whether the figure is within its limit."""
     remedy: str
-    """What to do if it is not within the limit."""
+    """What to do if the figure is beyond its limit."""
     fault: str
-    """What is wrong if it is not within the limit; without figures, so that a campaign can count
-    the flights with this fault."""
+    """What is wrong if the figure is beyond its limit; without numbers, so that a campaign can
+    count the flights with this fault."""
 
 
 def checks(figures: Figures) -> list[Check]:
@@ -77,7 +77,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
         level, height = maneuver["level_rms_m"], maneuver["height_rms_m"]
         if level is not None:
             speed = maneuver["reference_speed_max_m_s"] or 0.0
-            limit = HORIZONTAL_RMS + HORIZONTAL_RMS_PER_SPEED * speed
+            limit = MAX_HORIZONTAL_RMS + MAX_HORIZONTAL_RMS_PER_SPEED * speed
             yield Check(
                 maneuver["name"],
                 f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
@@ -89,8 +89,8 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
         if height is not None:
             yield Check(
                 maneuver["name"],
-                f"{height:.2f} m RMS in height (limit {HEIGHT_RMS:.2f} m)",
-                height <= HEIGHT_RMS,
+                f"{height:.2f} m RMS in height (limit {MAX_HEIGHT_RMS:.2f} m)",
+                height <= MAX_HEIGHT_RMS,
                 _height_remedy(height, maneuver.get("height_mean_m")),
                 f"{maneuver['name']}: too far from its height",
             )
@@ -104,7 +104,7 @@ def _horizontal_remedy(speed: float) -> str:
 
 
 def _height_remedy(rms: float, mean: float | None) -> str:
-    if mean is not None and abs(mean) > CONSTANT_HEIGHT_ERROR * rms:
+    if mean is not None and abs(mean) > MIN_CONSTANT_SHARE * rms:
         return "set thrust.hover_thrust to the thrust at which the vehicle hovers"
     return (
         "the error changes in flight: climb and descend more slowly, set guidance.drag_per_s to "
@@ -116,13 +116,14 @@ def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
     rms = maneuver.get("swing_rms_deg")
     if rms is None:
         return
-    regular = (maneuver["swing_regularity"] or 0.0) >= SWING_REGULARITY
+    regular = (maneuver["swing_regularity"] or 0.0) >= MIN_SWING_REGULARITY
     yield Check(
         maneuver["name"],
-        f"swings by {rms:.1f}° RMS every {maneuver['swing_period_s']:.2g} s (limit {SWING_RMS:g}°)"
+        f"swings by {rms:.1f}° RMS every {maneuver['swing_period_s']:.2g} s "
+        f"(limit {MAX_SWING_RMS:g}°)"
         if regular
         else f"no swing with a period (roll and pitch {rms:.1f}° RMS)",
-        rms <= SWING_RMS or not regular,
+        rms <= MAX_SWING_RMS or not regular,
         "lower planner.gain_per_s or the weights guidance.position_weight_per_s4 and "
         "velocity_weight_per_s2; `companion check-config` names the largest sensible gain",
         f"{maneuver['name']}: it swings",
@@ -134,7 +135,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
     size, across = response["step_size"], response["cross_axis_max"]
     if not size or across is None:
         return
-    limit, deviation_limit = STRAIGHTNESS * size, MODEL_DEVIATION * size
+    limit, deviation_limit = MAX_LINE_DISTANCE * size, MAX_MODEL_DEVIATION * size
     cut = cut_steps(figures)
     yield from cut
     yield Check(
@@ -160,18 +161,18 @@ def _steps(figures: Figures) -> Iterator[Check]:
 
 
 def cut_steps(figures: Figures) -> list[Check]:
-    """A failed check if the tilt limit cut a step by more than `STRAIGHTNESS`; else empty."""
+    """A failed check if the tilt limit cut a step by more than `MAX_LINE_DISTANCE`; else empty."""
     response, limit = figures["response"], figures.get("max_tilt_deg")
-    asked = response.get("asked_tilt_deg")
-    if asked is None or limit is None:  # nothing was measured, or the summary is older
+    target_tilt = response.get("asked_tilt_deg")
+    if target_tilt is None or limit is None:  # nothing was measured, or the summary is older
         return []
     # A coefficient is the sine of a tilt.
-    if sin(radians(asked)) - sin(radians(limit)) <= STRAIGHTNESS * response["step_size"]:
+    if sin(radians(target_tilt)) - sin(radians(limit)) <= MAX_LINE_DISTANCE * response["step_size"]:
         return []
     return [
         Check(
             "tilt of the steps",
-            f"the tilt limit cut a step, which asked for {asked:.1f}° (limits.max_tilt_deg: "
+            f"the tilt limit cut a step, which asked for {target_tilt:.1f}° (limits.max_tilt_deg: "
             f"{limit:g})",
             good=False,
             remedy="lower steps.coefficient or the corners' coefficients, fly in less wind, or "
@@ -200,8 +201,8 @@ def _answers(figures: Figures) -> Iterator[Check]:
     if samples:
         yield Check(
             "attitude samples",
-            f"{unanswered} of {samples} unanswered (limit {100.0 * UNANSWERED_SAMPLES:g} %)",
-            unanswered <= UNANSWERED_SAMPLES * samples,
+            f"{unanswered} of {samples} unanswered (limit {100.0 * MAX_UNANSWERED_SHARE:g} %)",
+            unanswered <= MAX_UNANSWERED_SHARE * samples,
             "the line `unanswered samples` names the reasons",
             "too many samples unanswered",
         )
@@ -209,8 +210,8 @@ def _answers(figures: Figures) -> Iterator[Check]:
     if frames:
         yield Check(
             "link",
-            f"{lost} of {frames + lost} frames lost (limit {100.0 * LOST_FRAMES:g} %)",
-            lost <= LOST_FRAMES * (frames + lost),
+            f"{lost} of {frames + lost} frames lost (limit {100.0 * MAX_LOST_SHARE:g} %)",
+            lost <= MAX_LOST_SHARE * (frames + lost),
             "raise the baud rate, lower the rates of other streams, or improve the radio link",
             "too many frames lost",
         )
@@ -235,7 +236,7 @@ def _battery(figures: Figures) -> Iterator[Check]:
     end = battery["end"]
     if end is None:
         return
-    limit = battery["min"] + BATTERY_MARGIN
+    limit = battery["min"] + MIN_BATTERY_MARGIN
     yield Check(
         "battery",
         f"{100.0 * end:.0f} % at the end (at least {100.0 * limit:.0f} %)",
