@@ -1,4 +1,4 @@
-"""A program that answers samples with `link.backend: mavsdk`, where MAVSDK forwards all frames."""
+"""Answers attitude samples with `link.backend: mavsdk`, where MAVSDK forwards all frames."""
 
 import sys
 
@@ -9,7 +9,7 @@ from companion.mavsdk_link.link import MavsdkLink
 
 
 async def fly(port: int) -> None:
-    """Answer each attitude sample with a setpoint until killed; `port` is a UDP port."""
+    """Answer each attitude sample with a setpoint until killed; `port`: UDP port to listen on."""
     async with MavsdkLink(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
         await answer(link)
 

@@ -1,7 +1,7 @@
 """Clients for `companion bench serve`: they read all forwarded frames, and count the lost ones.
 
-`python -m companion.bench.client_program PORT COUNT` runs until its standard input is closed, and
-then prints the counts as a line of JSON.
+`python -m companion.bench.client_program PORT COUNT` runs COUNT clients until its standard input is
+closed, and then prints how many frames each received and lost, as a line of JSON.
 """
 
 import json
@@ -22,19 +22,19 @@ _AUTOPILOT_IDS = 1, 1
 """System id and component id of the autopilot."""
 
 
-class Counter:
+class FrameCounter:
     """Counts the autopilot's frames on one socket, and the gaps in their sequence numbers.
 
     Attributes:
         received: number of frames received.
-        lost: number of frames lost, by the gaps.
+        lost: number of frames missing in the gaps.
     """
 
     def __init__(self) -> None:
         self.received = self.lost = 0
         self._sequence: int | None = None
 
-    def take(self, datagram: bytes) -> None:
+    def count_frames(self, datagram: bytes) -> None:
         """Count the frames of a datagram; they must be whole, unsigned MAVLink 2 frames."""
         start = 0
         while start + _HEADER_BYTES <= len(datagram) and datagram[start] == _MAGIC:
@@ -42,10 +42,10 @@ class Counter:
                 datagram[start + _SYSTEM_OFFSET],
                 datagram[start + _COMPONENT_OFFSET],
             ) == _AUTOPILOT_IDS:
-                self._count(datagram[start + _SEQUENCE_OFFSET])
+                self._count_frame(datagram[start + _SEQUENCE_OFFSET])
             start += _OVERHEAD_BYTES + datagram[start + _LENGTH_OFFSET]
 
-    def _count(self, sequence: int) -> None:
+    def _count_frame(self, sequence: int) -> None:
         if self._sequence is not None:
             self.lost += (sequence - self._sequence - 1) & 0xFF
         self._sequence = sequence
@@ -53,12 +53,12 @@ class Counter:
 
 
 def main(port: int, count: int) -> None:
-    """Read on `count` sockets until standard input is closed; print the counts."""
+    """Run `count` clients on UDP port `port` until standard input is closed; print their counts."""
     heartbeat = dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
     selector = selectors.DefaultSelector()
     selector.register(sys.stdin, selectors.EVENT_READ, None)
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
-    counters = [Counter() for _ in sockets]
+    counters = [FrameCounter() for _ in sockets]
     senders = [dialect.MAVLink(None, 200 + number, 190) for number in range(count)]
     for client, counter in zip(sockets, counters, strict=True):
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)
@@ -79,7 +79,7 @@ def main(port: int, count: int) -> None:
                 with suppress(BrokenPipeError):  # the benchmark was ended
                     print(json.dumps(counts), flush=True)
                 return
-            key.data.take(key.fileobj.recv(_READ_BYTES))  # type: ignore[union-attr]
+            key.data.count_frames(key.fileobj.recv(_READ_BYTES))  # type: ignore[union-attr]
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ _GUIDANCE_PERIOD_S = 0.02
 
 
 async def fly(port: int) -> None:
-    """Answer each attitude sample with a setpoint until killed; `port` is a UDP port."""
+    """Answer each attitude sample with a setpoint until killed; `port`: UDP port to listen on."""
     async with Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
         await answer(link)
 

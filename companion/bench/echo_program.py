@@ -12,12 +12,12 @@ _TIME_BOOT_MS = slice(10, 14)  # bytes of time_boot_ms, in a sample and in a set
 
 
 def main(port: int) -> None:
-    """Answer each datagram on a UDP port until killed."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
-        opened.bind(("127.0.0.1", port))
+    """Answer each datagram until killed; `port`: UDP port to listen on."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp_socket:
+        udp_socket.bind(("127.0.0.1", port))
         while True:
-            data, sender = opened.recvfrom(2048)
-            opened.sendto(_HEADER + data[_TIME_BOOT_MS] + _PAYLOAD_END, sender)
+            data, sender = udp_socket.recvfrom(2048)
+            udp_socket.sendto(_HEADER + data[_TIME_BOOT_MS] + _PAYLOAD_END, sender)
 
 
 if __name__ == "__main__":

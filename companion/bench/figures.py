@@ -1,4 +1,4 @@
-"""What the latency benchmarks share: rounds, figures of a program, and their table."""
+"""Measures programs in interleaved rounds, and prints their latency and processor time."""
 
 from collections.abc import Mapping
 from math import ceil
@@ -24,15 +24,15 @@ def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> di
     rounds = ceil(seconds / ROUND_S)
     with no_garbage_collection():  # the senders must not pause
         for _ in range(rounds):
-            for measured in senders.values():
-                measured.send_for(rate_hz, seconds / rounds)
+            for measured_sender in senders.values():
+                measured_sender.send_for(rate_hz, seconds / rounds)
                 for sender in senders.values():
                     sender.heartbeat()
     return {key: _figures_of(sender) for key, sender in senders.items()}
 
 
 def print_table(title: str, names: Mapping[str, str], figures: Mapping[str, Any]) -> None:
-    """Print the figures of the programs with these names, both by key."""
+    """Print a row for each program: its title in `names`, its figures in `figures`, by its key."""
     table = Table(title=title)
     for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
         table.add_column(heading, justify="right" if heading else "left")
@@ -55,14 +55,16 @@ def _figures_of(sender: Sender) -> dict[str, Any]:
     """
     ordered = sorted(sender.round_trips_ns)
     if not ordered:
-        raise BenchmarkError(f"{sender.name} answered none of {sender.sent} samples in time")
+        raise BenchmarkError(
+            f"{sender.name} answered none of {sender.sent_samples} samples in time"
+        )
     return {
         "p50_us": _quantile_us(ordered, 0.50),
         "p99_us": _quantile_us(ordered, 0.99),
         "max_us": _quantile_us(ordered, 1.0),
         "cpu_percent": round(100.0 * sender.cpu_ns / sender.wall_ns, 2),
-        "samples": sender.sent,
-        "unanswered": sender.sent - len(ordered),
+        "samples": sender.sent_samples,
+        "unanswered": sender.sent_samples - len(ordered),
     }
 
 

@@ -21,7 +21,7 @@ from companion.testing import MockVehicle, fly
 CONFIG_FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
 """File name of the shipped configuration for each autopilot of the mock vehicle."""
 CLOCKS = {"lockstep": True, "free": False}
-"""Whether a kind of clock is lockstep; with `free`, samples come without waiting, as over UDP."""
+"""Whether the vehicle runs in lockstep, by clock; with `free` it does not wait for setpoints."""
 
 _FLIGHTS = 3  # of which the quickest counts
 _WARM_UP_S = 0.2  # hover of the flight that is not measured
@@ -69,7 +69,7 @@ def _measure(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> d
 
 
 def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
-    """Figures of one flight."""
+    """Fly one hover of `seconds` s; return its figures, as in `run`."""
     path = shipped(CONFIG_FILES[autopilot])
     config = _hover_config(load(path), seconds)
     compiled = can_compile()
@@ -78,13 +78,13 @@ def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
     )
     began = process_time()
     summary = fly(config, vehicle)
-    cpu = process_time() - began
+    cpu_s = process_time() - began
     if summary.result != "ok":
         raise RuntimeError(f"the flight of {autopilot} failed: {summary.result}")
     return {
         "vehicle_s": vehicle.time,
-        "cpu_s": cpu,
-        "times_real_time": vehicle.time / cpu,
+        "cpu_s": cpu_s,
+        "times_real_time": vehicle.time / cpu_s,
         "setpoints": summary.counts.setpoints,
         "compiled": compiled,
     }
@@ -98,13 +98,13 @@ def _hover_config(config: Config, seconds: float) -> Config:
 def _print(figures: dict[str, Any]) -> None:
     table = Table("autopilot", "clock", "flight, s", "processor, s", "times real time")
     for autopilot, clocks in figures.items():
-        for clock, flown in clocks.items():
+        for clock, flight in clocks.items():
             table.add_row(
                 autopilot,
                 clock,
-                f"{flown['vehicle_s']:.1f}",
-                f"{flown['cpu_s']:.2f}",
-                f"{flown['times_real_time']:.1f}",
+                f"{flight['vehicle_s']:.1f}",
+                f"{flight['cpu_s']:.2f}",
+                f"{flight['times_real_time']:.1f}",
             )
     console = Console()
     console.print(table)
@@ -117,10 +117,10 @@ def _print(figures: dict[str, Any]) -> None:
 def _print_shares(figures: dict[str, Any], console: Console) -> None:
     """Print the shares of the processor time, with a column for each autopilot and clock."""
     flights = {
-        f"{autopilot}, {clock}": flown["shares"]
+        f"{autopilot}, {clock}": flight["shares"]
         for autopilot, clocks in figures.items()
-        for clock, flown in clocks.items()
-        if "shares" in flown
+        for clock, flight in clocks.items()
+        if "shares" in flight
     }
     if not flights:
         return

@@ -31,12 +31,13 @@ class _Program(NamedTuple):
     key: str
     """Key of the program in the result."""
     title: str
-    """Name for the user."""
+    """Name to show to users."""
     module: str
     """Module of `companion.bench` that is run."""
     stamp: Stamp = stamp_by_time
+    """Finds the time stamp of the sample in a setpoint."""
     modulus: int = TIME_MODULUS
-    """How its setpoints are matched with samples; see `Sender`."""
+    """Value at which the time stamps in setpoints wrap, ms."""
 
 
 _PROGRAMS = (
@@ -69,7 +70,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     """
     require("mavsdk", "mavsdk", "this benchmark")
     with ExitStack() as stack:
-        senders = {each.key: stack.enter_context(closing(_start(each))) for each in _PROGRAMS}
+        senders = {item.key: stack.enter_context(closing(_start(item))) for item in _PROGRAMS}
         for sender in senders.values():
             sender.wait_ready()
         figures = measure(senders, rate_hz, seconds)
@@ -83,8 +84,8 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(program: _Program) -> Sender:
-    benchmarked = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
-    return Sender(benchmarked, program.stamp, program.modulus)
+    benchmarked_program = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
+    return Sender(benchmarked_program, program.stamp, program.modulus)
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:

@@ -34,7 +34,7 @@ def setpoint(roll_deg_s: float, pitch_deg_s: float, yaw_deg_s: float) -> Attitud
 
 
 async def fly(port: int) -> None:
-    """Answer each attitude sample with a setpoint until killed; `port` is a UDP port."""
+    """Answer each attitude sample with a setpoint until killed; `port`: UDP port to listen on."""
     planner = make_planner(Config())
     target = Target(0.1, 0.0, 0.0)
     configuration = Configuration.create_with_component_type(ComponentType.COMPANION_COMPUTER)

@@ -45,7 +45,7 @@ class _Case(NamedTuple):
 
 
 class _Fleet(NamedTuple):
-    """Attitudes `q` (4, n) and `targets` (4, n) of n vehicles, as `companion.batch` takes them."""
+    """Unit quaternions `q` (4, n) and `targets` (4, n) of n vehicles, as in `companion.batch`."""
 
     q: NDArray[np.float64]
     targets: NDArray[np.float64]
@@ -67,12 +67,12 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
           vehicles; its `baseline` is a copy of the same attitudes and targets.
         - `flight_ratio`, `new_target_ratio`, `batch_ratio`: the same divided by the baseline.
         - `simulated`: `step_ns`, time of a step of one vehicle with `first-order`, by
-          `batch.advance`; `seconds_per_second`, simulated time per computing time, for the
-          number `vehicles` of vehicles and the sample rate `rate_hz`.
+          `batch.advance`; `seconds_per_second`, simulated time per computing time, for
+          `vehicles` vehicles at `rate_hz` samples per second.
     """
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
-    groups = _best(cases, seconds)
+    groups = _shortest_ns(cases, seconds)
     flight, batches = groups["flight"], {str(count): groups[str(count)] for count in BATCHES}
     step = groups["advance"]["first-order"]
     figures = {
@@ -96,7 +96,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 
 
 def _flight_cases() -> list[_Case]:
-    """Cases of a step with the same target as before, as most in flight, and with a new target."""
+    """Cases of a step with an unchanged target, which is usual in flight, and with a new target."""
     vehicle = _fleet(2)
     same, other = (Target(*column) for column in vehicle.targets.T.tolist())
     values: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "same": same, "other": other}
@@ -153,20 +153,20 @@ def _fleet(count: int) -> _Fleet:
     return _Fleet(q, random.uniform(-0.39, 0.39, size=(4, count)))
 
 
-def _best(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
+def _shortest_ns(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
     """The shortest time of a step, ns, by group and key of the cases."""
     runs = []
     for case in cases:
         case.timer.timeit(1)  # compiles
         runs.append(max(1, int(_REPEAT_S / case.timer.timeit(1))))
-    best: dict[str, dict[str, float]] = {case.group: {} for case in cases}
-    end = perf_counter() + seconds
+    shortest: dict[str, dict[str, float]] = {case.group: {} for case in cases}
+    deadline = perf_counter() + seconds
     while True:
         for case, number in zip(cases, runs, strict=True):
             ns = 1e9 * case.timer.timeit(number) / (number * case.steps)
-            best[case.group][case.key] = min(ns, best[case.group].get(case.key, ns))
-        if perf_counter() >= end:
-            return best
+            shortest[case.group][case.key] = min(ns, shortest[case.group].get(case.key, ns))
+        if perf_counter() >= deadline:
+            return shortest
 
 
 def _rounded(group: dict[str, float]) -> dict[str, float]:

@@ -27,19 +27,19 @@ class BenchmarkedProgram:
         self.name = name
         self.port = free_port()
         # A file, not a pipe: nobody reads while the program runs, and a full pipe would block it.
-        self._output = tempfile.TemporaryFile()  # noqa: SIM115  closed by stop()
+        self._error_output = tempfile.TemporaryFile()  # noqa: SIM115  closed by stop()
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, str(self.port), *arguments],
             stdout=subprocess.DEVNULL,
-            stderr=self._output,
+            stderr=self._error_output,
             preexec_fn=end_with_parent,  # noqa: PLW1509  the benchmark has one thread
         )
 
     def check_running(self) -> None:
         """Raise `BenchmarkError`, with the last line of error output, if the program has ended."""
         if self._process.poll() is not None:
-            self._output.seek(0)
-            error_lines = self._output.read().decode(errors="replace").strip().splitlines()
+            self._error_output.seek(0)
+            error_lines = self._error_output.read().decode(errors="replace").strip().splitlines()
             reason = error_lines[-1] if error_lines else "it printed no error"
             raise BenchmarkError(f"{self.name} ended early: {reason}")
 
@@ -52,4 +52,4 @@ class BenchmarkedProgram:
         """Kill the program."""
         self._process.kill()
         self._process.wait()
-        self._output.close()
+        self._error_output.close()

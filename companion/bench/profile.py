@@ -55,7 +55,7 @@ def sampling() -> Iterator[Counter[str]]:
     counts: Counter[str] = Counter()
     parts: dict[str, str | None] = {}
 
-    def take(_signal: int, frame: FrameType | None) -> None:
+    def count_sample(_signal: int, frame: FrameType | None) -> None:
         while frame is not None:
             file = frame.f_code.co_filename
             if file not in parts:
@@ -66,13 +66,13 @@ def sampling() -> Iterator[Counter[str]]:
             frame = frame.f_back
         counts[_OTHER_CODE] += 1
 
-    before = signal.signal(signal.SIGPROF, take)
+    previous_handler = signal.signal(signal.SIGPROF, count_sample)
     signal.setitimer(signal.ITIMER_PROF, SAMPLE_PERIOD_S, SAMPLE_PERIOD_S)
     try:
         yield counts
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
+        signal.signal(signal.SIGPROF, previous_handler)
 
 
 def shares(counts: Counter[str]) -> dict[str, float]:

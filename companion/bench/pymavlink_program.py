@@ -17,12 +17,12 @@ _HOVER_THRUST = 0.5
 
 
 def main(port: int) -> None:
-    """Answer each attitude sample on a UDP port with a setpoint until killed."""
+    """Answer each attitude sample with a setpoint until killed; `port`: UDP port to listen on."""
     law, target, mavlink = planner(Config()), Target(0.1, 0.0, 0.0), dialect.MAVLink(None, 1, 191)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as opened:
-        opened.bind(("127.0.0.1", port))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as udp_socket:
+        udp_socket.bind(("127.0.0.1", port))
         while True:
-            data, sender = opened.recvfrom(2048)
+            data, sender = udp_socket.recvfrom(2048)
             for sample in mavlink.parse_buffer(data) or ():
                 if sample.get_type() != "ATTITUDE_QUATERNION":
                     continue
@@ -36,7 +36,7 @@ def main(port: int) -> None:
                     *rates,
                     _HOVER_THRUST,
                 )
-                opened.sendto(setpoint.pack(mavlink), sender)
+                udp_socket.sendto(setpoint.pack(mavlink), sender)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.bench.process import BenchmarkedProgram, BenchmarkError
 
 Stamp = Callable[[bytes], int]
-"""Function from the bytes of a setpoint to the time stamp of its sample, ms, modulo `modulus`."""
+"""Function from the bytes of a setpoint to the time stamp of its sample, ms, which may wrap."""
 TIME_MODULUS = 2**32
 """Value at which `time_boot_ms` wraps, ms."""
 _SETPOINT_BYTES = 51
@@ -27,7 +27,7 @@ _ATTITUDE = (0.99, 0.05, 0.05, 0.1197)
 
 
 def stamp_by_time(setpoint: bytes) -> int:
-    """`time_boot_ms` of a SET_ATTITUDE_TARGET frame."""
+    """The time stamp (ms) of the sample, in `time_boot_ms` of a SET_ATTITUDE_TARGET frame."""
     stamp: int = struct.unpack_from("<I", setpoint, _TIME_OFFSET)[0]
     return stamp
 
@@ -48,7 +48,7 @@ class Sender:
 
     Attributes:
         round_trips_ns: Times from sample to setpoint, ns.
-        sent: Number of samples sent in measured rounds.
+        sent_samples: Number of samples sent in measured rounds.
         cpu_ns: Processor time of the program in measured rounds, ns.
         wall_ns: Duration of the measured rounds, ns.
     """
@@ -70,12 +70,12 @@ class Sender:
         self._mav = dialect.MAVLink(None, 1, 1)
         self._parser = dialect.MAVLink(None)
         self._parser.robust_parsing = True
-        self._boot = time.perf_counter_ns()
+        self._boot_ns = time.perf_counter_ns()
         self._time_ms = 0
         self._sent_ns: dict[int, int] = {}  # time stamp of a sample -> time of sending
         self._recording = False
         self.round_trips_ns: list[int] = []
-        self.sent = 0
+        self.sent_samples = 0
         self.cpu_ns = 0
         self.wall_ns = 0
 
@@ -103,12 +103,12 @@ class Sender:
         Raises:
             BenchmarkError: The program ended, or did not answer within 30 s.
         """
-        end = time.monotonic() + _READY_TIMEOUT_S
+        deadline = time.monotonic() + _READY_TIMEOUT_S
         heartbeat_due = 0.0
         answered = False
         while not answered:
             self._program.check_running()
-            if time.monotonic() > end:
+            if time.monotonic() > deadline:
                 raise BenchmarkError(
                     f"{self._program.name} did not answer within {_READY_TIMEOUT_S:g} s"
                 )
@@ -129,18 +129,18 @@ class Sender:
         due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
         self._sent_ns.clear()
         self._recording = True
-        cpu, began = self._program.cpu_ns(), time.perf_counter_ns()
+        cpu_begin_ns, began = self._program.cpu_ns(), time.perf_counter_ns()
         count = round(rate_hz * seconds)
         self._send_samples(count, rate_hz, due)
-        self.sent += count
-        self.cpu_ns += self._program.cpu_ns() - cpu
+        self.sent_samples += count
+        self.cpu_ns += self._program.cpu_ns() - cpu_begin_ns
         self.wall_ns += time.perf_counter_ns() - began
         self._recording = False
 
     def reset_measurements(self) -> None:
-        """Reset all measurements."""
+        """Forget the round trips, and set counts and times to 0."""
         self.round_trips_ns.clear()
-        self.sent = self.cpu_ns = self.wall_ns = 0
+        self.sent_samples = self.cpu_ns = self.wall_ns = 0
 
     def _send_samples(self, count: int, rate_hz: float, due: int) -> int:
         period_ns = round(1e9 / rate_hz)
@@ -152,7 +152,9 @@ class Sender:
 
     def _send_sample(self) -> None:
         # The stamp follows real time, and is unique because it identifies the answer.
-        self._time_ms = max(self._time_ms + 1, (time.perf_counter_ns() - self._boot) // 1_000_000)
+        self._time_ms = max(
+            self._time_ms + 1, (time.perf_counter_ns() - self._boot_ns) // 1_000_000
+        )
         frame = self._pack(
             dialect.MAVLink_attitude_quaternion_message(self._time_ms, *_ATTITUDE, 0.01, 0.02, 0.03)
         )

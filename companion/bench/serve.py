@@ -45,9 +45,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         as_json: Print nothing; the caller prints the result.
 
     Returns:
-        For `alone` and `with_clients` the figures as of `companion bench link`; `ratio`: p50 and
-        p99 with clients divided by those without; `clients`: number of frames that each of the
-        three reading clients received and lost.
+        `alone`, `with_clients`: figures like those of a program in `companion bench link`;
+        `ratio`: p50 and p99 with clients divided by those without; `clients`: number of frames
+        that each of the three reading clients received and lost.
 
     Raises:
         BenchmarkError: A program failed.
@@ -58,13 +58,13 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         senders = {key: stack.enter_context(closing(_start(key, ports[key]))) for key in _TITLES}
         for sender in senders.values():
             sender.wait_ready()
-        reading = _start_clients(stack, ports["with_clients"], _CLIENTS)
-        stopped = _start_clients(stack, ports["with_clients"], 1)
+        reading_clients = _start_clients(stack, ports["with_clients"], _CLIENTS)
+        stopped_client = _start_clients(stack, ports["with_clients"], 1)
         senders["with_clients"].send_for(rate_hz, ROUND_S)  # all four connect, and receive
-        stopped.send_signal(signal.SIGSTOP)
+        stopped_client.send_signal(signal.SIGSTOP)
         senders["with_clients"].reset_measurements()
         figures = measure(senders, rate_hz, seconds)
-        figures["clients"] = _read_counts(reading)
+        figures["clients"] = _read_counts(reading_clients)
     alone, with_clients = figures["alone"], figures["with_clients"]
     figures["ratio"] = {
         name: round(with_clients[f"{name}_us"] / alone[f"{name}_us"], 3) for name in ("p50", "p99")
@@ -104,8 +104,8 @@ def _read_counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
 def _show(figures: dict[str, Any], rate_hz: float) -> None:
     title = f"sample out → setpoint in, at {rate_hz:g} Hz, forwarding full telemetry"
     print_table(title, _TITLES, figures)
-    ratio, lost = figures["ratio"], sum(each["lost"] for each in figures["clients"])
-    received = sum(each["received"] for each in figures["clients"])
+    ratio, lost = figures["ratio"], sum(client["lost"] for client in figures["clients"])
+    received = sum(client["received"] for client in figures["clients"])
     Console().print(
         f"with clients: p50 {ratio['p50']:.2f} ×, p99 {ratio['p99']:.2f} ×; "
         f"lost {lost} of {received + lost} forwarded frames",

@@ -29,13 +29,13 @@ class Campaign:
     """A campaign: what to fly, and the files that the flights read."""
 
     file: CampaignFile
-    """Content of the campaign file. The trajectories in its `sweep` are keys of `files`."""
+    """Content of the campaign file. Trajectories in its `sweep` are paths of texts in `files`."""
     base: Config
     """Configuration that the swept keys change; the keys of `set` are already applied. Its
-    `flight.trajectory`, if any, is a key of `files`."""
+    `flight.trajectory`, if any, is the path of a text in `files`."""
     files: Mapping[str, str] = field(default_factory=dict)
     """The text of each file that a flight reads, by its path in the campaign's folder."""
-    name: str = "the campaign"
+    file_path: str = "the campaign"
     """Path of the campaign file, for messages."""
 
     @property
@@ -75,7 +75,7 @@ class Campaign:
             fault = self._fault(planned.values)
         except ConfigError as error:
             case = Case(planned.index, planned.seed, factors, self.base, None, {}, 0.0)
-            raise ConfigError(f"{self.name}: {case.described()}: {error}") from error
+            raise ConfigError(f"{self.file_path}: {case.description()}: {error}") from error
         return Case(
             planned.index,
             planned.seed,
@@ -93,8 +93,8 @@ class Campaign:
         base = self._base_value(key)
         if isinstance(base, bool) or not isinstance(base, int | float):
             raise ConfigError(
-                f"{self.name}: sweep.{name}: times_base needs a number in the base configuration,"
-                f" and {key} is {base!r:.40}"
+                f"{self.file_path}: sweep.{name}: times_base needs a number in the base "
+                f"configuration, and {key} is {base!r:.40}"
             )
         return value * base
 
@@ -115,7 +115,7 @@ class Campaign:
             name,
             scenario.inject,
             phase,
-            float(values.get(FAULT_AFTER, scenario.after(phase))),
+            float(values.get(FAULT_AFTER, scenario.delay(phase))),
             scenario.endings(phase),
         )
 

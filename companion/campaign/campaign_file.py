@@ -11,7 +11,7 @@ from companion.files.yaml_file import PathKey, Section
 
 
 def _require_plain(name: str) -> str:
-    """The name, if it can begin the name of a folder."""
+    """Check that a name can begin the name of a folder, and return it."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
         raise ValueError(
             "must begin with a letter or a digit, and have only these, `-` and `_` after it"
@@ -27,7 +27,7 @@ FaultPhase = Literal["stream", "arm", "takeoff", "offboard", "maneuvers", "hand 
 NO_FAULT = "none"
 """Value of the factor `fault` for a flight without a fault."""
 FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
-"""Factors that choose a fault scenario, the phase in which it begins, and when in this phase."""
+"""Factors: the fault scenario, the phase in which it begins, and its delay in this phase, s."""
 FAULT_FACTORS = (FAULT, FAULT_PHASE, FAULT_AFTER)
 """Factors that are not keys of a configuration."""
 _DEFAULT_AFTER_S = {
@@ -39,7 +39,7 @@ _DEFAULT_AFTER_S = {
     "hand back": 0.02,
     "land": 0.3,
 }
-"""Value of `FaultScenario.after_s` by phase where the scenario does not set one, s."""
+"""Default of `FaultScenario.after_s` in each phase, s."""
 TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
 NOUNS = {"flights": "flights", "batch": "vehicles"}
 """Plural noun for the cases of each kind of campaign."""
@@ -66,12 +66,12 @@ class FaultScenario(Section):
     landed the vehicle and says why. held: the autopilot flies on, by our command or its own
     failsafe. pilot: the pilot has taken over."""
 
-    def after(self, phase: str) -> float:
+    def delay(self, phase: str) -> float:
         """Time from the beginning of a phase to the fault, s."""
         return _DEFAULT_AFTER_S[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
-        """The permitted endings for a phase; empty if the file names none for it."""
+        """The permitted endings in a phase; empty if the campaign file names none."""
         if isinstance(self.ends, dict):
             return {str(name): endings for name, endings in self.ends.items()}.get(phase, ())
         return self.ends
@@ -198,5 +198,5 @@ class CampaignFile(Section):
     def swept_keys(self) -> frozenset[str]:
         """All keys that a factor changes, and the fault factors."""
         return frozenset(
-            key for name, each in self.sweep.items() for key in each.changed_keys(name)
+            key for name, swept in self.sweep.items() for key in swept.changed_keys(name)
         )

@@ -17,7 +17,7 @@ class Fault:
     """Entries as in `mock.faults`."""
     phase: str
     """Phase of the flight in which the faults begin."""
-    after: float
+    after_s: float
     """Time from the beginning of the phase to the faults, s."""
     ends: tuple[str, ...]
     """Permitted endings; see `FaultScenario.ends`."""
@@ -32,10 +32,10 @@ class Case:
     seed: int
     """Seed of noise and gusts."""
     factors: Mapping[str, Value]
-    """Value of each swept key, as the results hold it."""
+    """Value of each factor, by its name, as stored in the results."""
     config: Config
     """Configuration of the program, and in its section `mock` that of the mock vehicle. If a
-    trajectory is flown, `flight.trajectory` is a key of `files`."""
+    trajectory is flown, `flight.trajectory` is the path of a text in `files`."""
     fault: Fault | None
     """Fault scenario; None: no fault."""
     files: Mapping[str, str]
@@ -48,7 +48,7 @@ class Case:
         """The complete section `mock`, the seed of this case included."""
         return self.config.mock or {}
 
-    def described(self) -> str:
+    def description(self) -> str:
         """Number and factors of the case, for messages."""
         factors = ", ".join(f"{key} = {_value_text(value)}" for key, value in self.factors.items())
         return f"case {self.index}" + (f" ({factors})" if factors else "")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 WORKER_DEATHS_TO_GIVE_UP = 3
-"""A unit of work is given up at this number of deaths of workers on which it ran or was queued.
+"""Number of dead workers, on which it ran or was queued, after which a unit of work is given up.
 
 An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`."""
 _CONNECTION_LOST = "the connection to the Dask scheduler is lost"
@@ -66,7 +66,7 @@ def local_workers() -> int:
 
 
 @contextmanager
-def connected(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
+def cluster_client(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
     """Connect to a cluster whose workers have the same versions as this process.
 
     Args:
@@ -138,13 +138,13 @@ def _termination_deferred() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():  # signals are not handled here
         yield
         return
-    received: list[int] = []
-    handler = signal.signal(signal.SIGTERM, lambda number, _: received.append(number))
+    received_signals: list[int] = []
+    handler = signal.signal(signal.SIGTERM, lambda number, _: received_signals.append(number))
     try:
         yield
     finally:
         signal.signal(signal.SIGTERM, handler)
-        if received:
+        if received_signals:
             signal.raise_signal(signal.SIGTERM)
 
 
@@ -189,8 +189,8 @@ def _dask_and_python(process: Mapping[str, Any]) -> dict[str, str]:
 def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterator[EndedUnit]:
     """Run one task for each unit of work; yield each unit when it ends, in any order.
 
-    Dask queues and sends the tasks, and repeats a task whose worker died. Each of `tasks` is a
-    function, which returns `UnitResult`, and its arguments, by the number of its unit.
+    Dask queues and sends the tasks, and repeats a task whose worker died. `tasks` holds, by number
+    of the unit, a function that returns `UnitResult`, followed by its arguments.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -211,7 +211,7 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
 
 
 def _ended_unit(number: int, future: "Future") -> EndedUnit:
-    """Convert a future that has ended into its unit."""
+    """The unit of work of a future that has ended."""
     try:
         if future.status == "finished":
             return EndedUnit(number, future.result())

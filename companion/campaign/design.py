@@ -29,11 +29,13 @@ class PlannedCase:
 
 def number_of_cases(file: CampaignFile) -> int:
     """Number of cases, computed without building them."""
-    distributions = sum(swept.sampled for swept in file.sweep.values())
+    distributions = sum(swept.is_sampled for swept in file.sweep.values())
     repeats = (
         file.samples**distributions if file.sampling == "grid" and distributions else file.samples
     )
-    return repeats * prod(len(swept.grid()) for swept in file.sweep.values() if not swept.sampled)
+    return repeats * prod(
+        len(swept.grid()) for swept in file.sweep.values() if not swept.is_sampled
+    )
 
 
 def few_samples_warning(file: CampaignFile) -> str | None:
@@ -42,7 +44,7 @@ def few_samples_warning(file: CampaignFile) -> str | None:
     names = [
         name
         for name, swept in file.sweep.items()
-        if swept.sampled and samples < (2 if swept.choice is None else len(swept.choice))
+        if swept.is_sampled and samples < (2 if swept.choice is None else len(swept.choice))
     ]
     if not names:
         return None
@@ -58,17 +60,17 @@ def planned_cases(file: CampaignFile) -> Iterator[PlannedCase]:
 
     A campaign that is stopped has therefore flown all points of the grid about equally often.
     """
-    grids = {name: swept.grid() for name, swept in file.sweep.items() if not swept.sampled}
-    distributions = {name: swept for name, swept in file.sweep.items() if swept.sampled}
+    grids = {name: swept.grid() for name, swept in file.sweep.items() if not swept.is_sampled}
+    distributions = {name: swept for name, swept in file.sweep.items() if swept.is_sampled}
     points = [dict(zip(grids, point, strict=True)) for point in product(*grids.values())]
     index = 0
     for sample_number, probabilities in enumerate(_probabilities(file, len(distributions))):
-        drawn = {
+        drawn_values = {
             name: swept.quantile(float(probability))
             for (name, swept), probability in zip(distributions.items(), probabilities, strict=True)
         }
         for point in points:
-            values = {**point, **drawn}
+            values = {**point, **drawn_values}
             seed = seed_of(file.seed, sample_number if file.same_seeds else index)
             yield PlannedCase(index, seed, {name: values[name] for name in file.sweep})
             index += 1
@@ -95,10 +97,10 @@ def _probabilities(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
     if file.sampling == "random":
         return np.random.default_rng(file.seed).random((count, dimensions))
     if file.sampling == "grid":
-        middles = (np.arange(count) + 0.5) / count
-        return np.array(list(product(middles, repeat=dimensions)))
+        midpoints = (np.arange(count) + 0.5) / count
+        return np.array(list(product(midpoints, repeat=dimensions)))
     from scipy.stats import qmc  # noqa: PLC0415  takes half a second to import
 
-    kind = qmc.LatinHypercube if file.sampling == "latin-hypercube" else qmc.Sobol
-    probabilities: NDArray[np.float64] = kind(dimensions, rng=file.seed).random(count)
+    sampler = qmc.LatinHypercube if file.sampling == "latin-hypercube" else qmc.Sobol
+    probabilities: NDArray[np.float64] = sampler(dimensions, rng=file.seed).random(count)
     return probabilities

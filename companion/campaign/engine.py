@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 class Progress:
     """Progress of a campaign."""
 
-    flown: int = 0
+    flown_cases: int = 0
     """Number of cases in the results, including those of earlier runs."""
-    lost: list[str] = field(default_factory=list)
+    given_up_units: list[str] = field(default_factory=list)
     """For each unit of work that was given up, a sentence with its cases and the reason."""
 
 
@@ -50,33 +50,37 @@ def run(
         VersionError: a worker that joined later has other versions.
     """
     units = unit_ranges(description.cases, description.unit)
-    finished = store.finished_units(folder)
-    missing = {number: unit for number, unit in enumerate(units) if number not in finished}
-    progress = Progress(flown=sum(len(units[number]) for number in finished))
-    on_unit(progress)
-    planned = list(campaign.planned_cases()) if missing else []
-    tasks = {
-        number: (fly_planned_cases, campaign, [planned[index] for index in unit], versions())
-        for number, unit in missing.items()
+    finished_units = store.finished_units(folder)
+    missing_units = {
+        number: unit for number, unit in enumerate(units) if number not in finished_units
     }
-    for ended in run_tasks(client, tasks):
-        _store_unit(ended, units[ended.number], campaign, folder, progress)
+    progress = Progress(flown_cases=sum(len(units[number]) for number in finished_units))
+    on_unit(progress)
+    planned_cases = list(campaign.planned_cases()) if missing_units else []
+    tasks = {
+        number: (fly_planned_cases, campaign, [planned_cases[index] for index in unit], versions())
+        for number, unit in missing_units.items()
+    }
+    for ended_unit in run_tasks(client, tasks):
+        _store_unit(ended_unit, units[ended_unit.number], campaign, folder, progress)
         on_unit(progress)
     return progress
 
 
 def _store_unit(
-    ended: EndedUnit, unit: range, campaign: Campaign, folder: Path, progress: Progress
+    ended_unit: EndedUnit, unit: range, campaign: Campaign, folder: Path, progress: Progress
 ) -> None:
     """Store the result of a unit, or note in `progress` that it was given up."""
     first, last = unit[0], unit[-1]
-    if ended.result is None:
-        progress.lost.append(f"unit {ended.number} (cases {first} to {last}): {ended.reason}")
+    if ended_unit.result is None:
+        progress.given_up_units.append(
+            f"unit {ended_unit.number} (cases {first} to {last}): {ended_unit.reason}"
+        )
         return
-    rows, wall_s, worker = ended.result
+    rows, wall_s, worker = ended_unit.result
     timing = {"first": first, "last": last, "wall_s": wall_s, "worker": worker}
-    store.write_unit(folder, campaign.file, ended.number, rows, timing)
-    progress.flown += len(unit)
+    store.write_unit(folder, campaign.file, ended_unit.number, rows, timing)
+    progress.flown_cases += len(unit)
 
 
 def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
@@ -104,8 +108,8 @@ def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: f
         for number, unit in enumerate(units)
     }
     rows: dict[int, list[Row]] = {}
-    for ended in run_tasks(client, tasks):
-        if ended.result is None:
-            raise ClusterError(f"a unit of work was given up: {ended.reason}")
-        rows[ended.number] = ended.result.rows
+    for ended_unit in run_tasks(client, tasks):
+        if ended_unit.result is None:
+            raise ClusterError(f"a unit of work was given up: {ended_unit.reason}")
+        rows[ended_unit.number] = ended_unit.result.rows
     return [row for number in range(len(units)) for row in rows[number]]

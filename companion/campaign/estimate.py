@@ -27,15 +27,17 @@ def case_time(kind: str, cases: Sequence[Case]) -> float:
     """
     if kind == "batch":
         planner = cases[0].config.planner_name
-        timed = [case for case in cases if case.config.planner_name == planner][:_MEASURED_VEHICLES]
-        run_cases(kind, timed)
+        timed_cases = [case for case in cases if case.config.planner_name == planner][
+            :_MEASURED_VEHICLES
+        ]
+        run_cases(kind, timed_cases)
     else:
         indices = sorted({0, len(cases) // 2, len(cases) - 1})[:_MEASURED_FLIGHTS]
-        timed = [cases[index] for index in indices]
-        run_cases(kind, [replace(timed[0], flight_s=1.0)])
+        timed_cases = [cases[index] for index in indices]
+        run_cases(kind, [replace(timed_cases[0], flight_s=1.0)])
     began = perf_counter()
-    run_cases(kind, timed)
-    return (perf_counter() - began) / len(timed)
+    run_cases(kind, timed_cases)
+    return (perf_counter() - began) / len(timed_cases)
 
 
 def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
@@ -45,16 +47,16 @@ def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
         ConfigError: says the number of cases, the time they would take, and which key allows more.
     """
     cases, limits = campaign.number_of_cases, campaign.file.limits
-    most = most_cases(campaign)
+    most_allowed = most_cases(campaign)
     seconds = cases * case_s / workers
-    if cases > most:
-        key, allowed = "limits.max_cases", f"{most}"
+    if cases > most_allowed:
+        key, allowed = "limits.max_cases", f"{most_allowed}"
     elif seconds > 3600.0 * limits.max_hours:
         key, allowed = "limits.max_hours", f"{limits.max_hours:g}"
     else:
         return
     raise ConfigError(
-        f"{campaign.name}: {size_text(campaign, seconds, workers)}, more than {key} allows"
+        f"{campaign.file_path}: {size_text(campaign, seconds, workers)}, more than {key} allows"
         f" ({allowed}): reduce it, raise {key}, or add --yes"
     )
 

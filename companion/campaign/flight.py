@@ -9,7 +9,7 @@ from companion.attitude.kinematics import tilt_angle
 from companion.batch import can_compile
 from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
-from companion.campaign.keys import replaced
+from companion.campaign.keys import replace_unchecked
 from companion.campaign.swept import Value
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
@@ -39,7 +39,7 @@ _PILOT_MODES = (  # of PX4 and ArduPilot
 def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     """Fly one case; equal cases give equal rows, to the bit.
 
-    A fully recorded flight writes its files into `folder`; without one nothing is written.
+    `folder` gets the files of a fully recorded flight; None: no files are written.
 
     Returns:
         One row of the results: `case`, `seed`, the factors, and the outcomes. If the case raises an
@@ -53,7 +53,7 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
             reason = str(error)
         except Exception as error:
             reason = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
-        return row | outcomes.of_error(reason.replace(f"{files_folder}/", ""))
+        return row | outcomes.error_outcomes(reason.replace(f"{files_folder}/", ""))
 
 
 class CaseFlight:
@@ -80,8 +80,8 @@ class CaseFlight:
         """Fly the case; return its outcomes. `folder`: see `fly_case`."""
         vehicle, case = self._vehicle, self._case
         vehicle.after_step.append(self._record_truth)
-        fault = _FaultInjector(vehicle, case.fault)
-        flight = session(self._config, vehicle, folder, fault)
+        injector = _FaultInjector(vehicle, case.fault)
+        flight = session(self._config, vehicle, folder, injector)
 
         def end() -> None:
             self._time_limit_reached = True
@@ -95,7 +95,9 @@ class CaseFlight:
         while vehicle.state()["armed"] and vehicle.time < flight_s + _WATCHED_AFTERWARDS_S:
             vehicle.step()
         truth_afterwards = vehicle.state()
-        return self._outcomes(summary, truth_at_end, truth_afterwards, flight_s, begun=fault.begun)
+        return self._outcomes(
+            summary, truth_at_end, truth_afterwards, flight_s, fault_begun=injector.begun
+        )
 
     def _outcomes(
         self,
@@ -104,38 +106,38 @@ class CaseFlight:
         truth_afterwards: Truth,
         flight_s: float,
         *,
-        begun: bool,
+        fault_begun: bool,
     ) -> dict[str, Value]:
         """The outcomes of the flight.
 
-        The two true states are those when the program ended, `flight_s` s after boot, and when the
-        vehicle disarmed, or `_WATCHED_AFTERWARDS_S` later. `begun`: the phase in which the fault
-        begins was reached.
+        `truth_at_end` is the true state when the program ended, `flight_s` s after boot.
+        `truth_afterwards` is that when the vehicle disarmed, or `_WATCHED_AFTERWARDS_S` after the
+        program's end. `fault_begun`: whether the phase in which the fault begins was reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = truth_afterwards["crashed"], self._case.fault
-        measured = {
+        measured_outcomes = {
             **outcomes.tracking(summary, np.array(self._truth).reshape(-1, 5)),
             **outcomes.response(summary),
             **outcomes.control_effort(setpoints, summary, self._config),
             "flight_s": flight_s,
         }
-        documented = None
-        if fault is not None and begun and fault.ends:
-            documented = not crashed and _ending(truth_at_end, summary.result) in fault.ends
+        as_documented = None
+        if fault is not None and fault_begun and fault.ends:
+            as_documented = not crashed and _ending(truth_at_end, summary.result) in fault.ends
         result = summary.result
         if self._time_limit_reached:
             result = f"ended by limits.flight_s after {self._case.flight_s:g} s of vehicle time"
-        failed = outcomes.failed_checks(figures)
-        good = result == "ok" and not failed and not crashed
+        failed_checks = outcomes.failed_checks(figures)
+        good = result == "ok" and not failed_checks and not crashed
         return {
             "ok": good,
             "result": result.replace(f"{self._files_folder}/", ""),
-            "failed_checks": failed,
+            "failed_checks": failed_checks,
             "phase": summary.phase,
             "crashed": crashed,
-            "as_documented": documented,
-            **outcomes.without_nan(measured),
+            "as_documented": as_documented,
+            **outcomes.without_nan(measured_outcomes),
             "setpoints": len(setpoints),
             "digest": outcomes.digest(setpoints, truth_afterwards),
         }
@@ -171,9 +173,9 @@ class _FaultInjector(SilentObserver):
         if self._fault is None or self.begun or name not in self._phases:
             return
         self.begun = True
-        begin_s = self._vehicle.time + self._fault.after
-        for each in self._fault.inject:
-            self._vehicle.inject({**each, "at_s": begin_s})
+        begin_s = self._vehicle.time + self._fault.after_s
+        for entry in self._fault.inject:
+            self._vehicle.inject({**entry, "at_s": begin_s})
 
 
 def _ending(state: Truth, result: str) -> str:
@@ -190,10 +192,10 @@ def _ending(state: Truth, result: str) -> str:
 def _with_paths_in(config: Config, files_folder: Path) -> Config:
     """The configuration with its trajectory and its `recording.directory` in `files_folder`.
 
-    There, `recording.directory` is empty, so the flight uses no values learned by earlier flights.
+    `recording.directory` is a new folder there, so no values of earlier flights are used.
     """
     path = config.flight.trajectory
-    return replaced(
+    return replace_unchecked(
         config,
         recording={"directory": files_folder / "learned"},
         flight={"trajectory": None if path is None else files_folder / path},

@@ -48,11 +48,11 @@ class Description:
     """Time at which the folder was made, ISO 8601, UTC."""
 
 
-def describe(campaign: Campaign, unit: int, case_s: float | None) -> Description:
-    """The description of a campaign that begins now; see the fields of `Description`."""
+def describe(campaign: Campaign, unit_size: int, case_s: float | None) -> Description:
+    """The description of a campaign that begins now, with `unit_size` cases in a unit of work."""
     file, now = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
     cases = campaign.number_of_cases
-    return Description(file.name, file.kind, file.seed, cases, unit, case_s, versions(), now)
+    return Description(file.name, file.kind, file.seed, cases, unit_size, case_s, versions(), now)
 
 
 def new_path(campaign: Campaign) -> Path:
@@ -70,8 +70,8 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
     try:
         if folder.exists() and any(path.name != _LOCK for path in folder.iterdir()):
             raise ConfigError(
-                f"{folder}: holds files, but no campaign that was begun; name another folder with "
-                "--out, or empty this one"
+                f"{folder}: holds files, but no campaign; name another folder with --out, or empty "
+                "this one"
             )
         (folder / store.RESULTS).mkdir(parents=True, exist_ok=True)
         for name, text in campaign.files.items():
@@ -92,7 +92,7 @@ def read_description(folder: Path) -> Description:
     """Read the description in the folder of a campaign.
 
     Raises:
-        ConfigError: there is none, or it is damaged.
+        ConfigError: there is no description, or it is damaged.
     """
     path = folder / _DESCRIPTION
     try:
@@ -112,16 +112,16 @@ def resume(folder: Path, campaign: Campaign) -> Description:
     """Check that the folder holds this campaign, begun by this version; return its description.
 
     Raises:
-        ConfigError: it holds another campaign, or a file in it is damaged.
-        VersionError: it was begun by another version.
+        ConfigError: the folder holds another campaign, or a file in it is damaged.
+        VersionError: the campaign was begun by another version.
     """
     description = read_description(folder)
     _require_same(folder, campaign)
-    if found := difference(description.versions, versions()):
+    if differences := difference(description.versions, versions()):
         raise VersionError(
-            f"{folder} was begun by another version: this one has {found}. Results of two versions "
-            "must not be mixed: continue with the version that began it, or start again with "
-            "another --out"
+            f"{folder} was begun by another version: this one has {differences}. Results of two "
+            "versions must not be mixed: continue with the version that began it, or start again "
+            "with another --out"
         )
     return description
 
@@ -130,29 +130,33 @@ def _require_same(folder: Path, campaign: Campaign) -> None:
     """Refuse a folder with another campaign; only the limits on the campaign's size may differ."""
     path = folder / CAMPAIGN_FILE_NAME
     try:
-        before = bounded_yaml.parse(read_text(path, _LARGEST_FILE_BYTES))
+        stored_keys = bounded_yaml.parse(read_text(path, _LARGEST_FILE_BYTES))
         # Written and parsed like the file, so that tuples are lists here, too.
-        now = bounded_yaml.parse(bounded_yaml.dump(resolved_keys(campaign)))
+        new_keys = bounded_yaml.parse(bounded_yaml.dump(resolved_keys(campaign)))
     except (FileRefusedError, YamlError) as error:
         raise ConfigError(f"{path}: {error}") from error
-    if not isinstance(before, Mapping):
+    if not isinstance(stored_keys, Mapping):
         raise ConfigError(f"{path}: is damaged")
-    changed = [
-        key for key in now if _without_size_limits(before, key) != _without_size_limits(now, key)
+    changed_keys = [
+        key
+        for key in new_keys
+        if _without_size_limits(stored_keys, key) != _without_size_limits(new_keys, key)
     ]
-    files = [name for name, text in campaign.files.items() if _text_or_none(folder / name) != text]
-    if changed or files:
+    changed_files = [
+        name for name, text in campaign.files.items() if _text_or_none(folder / name) != text
+    ]
+    if changed_keys or changed_files:
         raise ConfigError(
-            f"{folder} holds another campaign: {', '.join((*changed, *files))} differ; name "
-            "another folder with --out"
+            f"{folder} holds another campaign: {', '.join((*changed_keys, *changed_files))} differ;"
+            " name another folder with --out"
         )
 
 
 def _without_size_limits(data: Mapping[str, Any], key: str) -> Any:
-    """The value of a key of a campaign file; of `limits`, without `max_cases` and `max_hours`."""
+    """The value of a key of a campaign file, without `max_cases` and `max_hours` in `limits`."""
     value = data.get(key)
     if key == "limits" and isinstance(value, Mapping):
-        return {name: each for name, each in value.items() if name not in _SIZE_LIMITS}
+        return {name: limit for name, limit in value.items() if name not in _SIZE_LIMITS}
     return value
 
 
@@ -165,7 +169,7 @@ def _text_or_none(path: Path) -> str | None:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def lock(folder: Path) -> Iterator[None]:
     """Lock the folder, so that no other process runs the same campaign.
 
     Raises:

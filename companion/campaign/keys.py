@@ -76,24 +76,24 @@ def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
     Raises:
         ConfigError: a value is refused; the message names the key.
     """
-    mock: dict[str, Any] = {}
+    mock_changes: dict[str, Any] = {}
     # Sections without a change are not checked again, which would take most of the time.
     data = {name: getattr(base, name) for name in Config.model_fields if name != "include"}
     for key, value in changes.items():
         section, _, name = key.partition(".")
         if section == "mock":
-            mock[name] = value
+            mock_changes[name] = value
             continue
         if not isinstance(data[section], dict):
             data[section] = data[section].model_dump()
         data[section][name] = value
     config = validated(data, "the configuration", Config)
-    return config.model_copy(update={"mock": mock_with(base.mock or {}, mock)})
+    return config.model_copy(update={"mock": mock_with(base.mock or {}, mock_changes)})
 
 
-def replaced(config: Config, **sections: dict[str, Any]) -> Config:
+def replace_unchecked(config: Config, **sections: dict[str, Any]) -> Config:
     """The configuration with new values by section and key, which are not checked."""
-    changed = {
+    changed_sections = {
         name: getattr(config, name).model_copy(update=values) for name, values in sections.items()
     }
-    return config.model_copy(update=changed)
+    return config.model_copy(update=changed_sections)

@@ -54,7 +54,7 @@ def check_case(case: Case) -> None:
             its sample rate, or it has a fault.
     """
     if reason := _why_unflyable(case):
-        raise ConfigError(f"{case.described()}: {reason}")
+        raise ConfigError(f"{case.description()}: {reason}")
 
 
 def _why_unflyable(case: Case) -> str | None:
@@ -98,8 +98,8 @@ def _run_case(case: Case) -> dict[str, Value]:
 
 
 def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -> dict[str, Value]:
-    """The outcomes of a case, whose longest target has the horizontal length `longest_target`."""
-    time_constants = [each for each in figures[-2:] if isfinite(each)]  # north and east
+    """The outcomes of a case; `longest_target`: largest √(north² + east²) of its coefficients."""
+    time_constants = [constant for constant in figures[-2:] if isfinite(constant)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
         "model_deviation_max": figures.model_deviation_max,
@@ -107,11 +107,11 @@ def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -
         "rate_rms_rad_s": figures.rate_rms,
         "rate_max_rad_s": figures.rate_max,
     }
-    finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
-    straight = finite and figures.cross_axis_max <= MAX_LINE_DISTANCE * longest_target
-    result = "ok" if straight else "not straight" if finite else "not finite"
+    is_finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
+    is_straight = is_finite and figures.cross_axis_max <= MAX_LINE_DISTANCE * longest_target
+    result = "ok" if is_straight else "not straight" if is_finite else "not finite"
     return {
-        "ok": straight,
+        "ok": is_straight,
         "result": result,
         **{name: value if isfinite(value) else None for name, value in values.items()},
         "digest": _digest(flight),
@@ -148,7 +148,7 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
     Returns:
         (samples, 4): acceleration coefficients north and east, heading (rad), heading rate (rad/s).
     """
-    name = next(each for each in config.flight.maneuvers if each in ACCELERATION_STEPS)
+    name = next(maneuver for maneuver in config.flight.maneuvers if maneuver in ACCELERATION_STEPS)
     amplitude: tuple[float, float]
     if name == "corners":
         corners = config.corners
@@ -162,8 +162,8 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
     targets = np.zeros((pattern.samples, 4))
     targets[:, 2] = heading
     for begin, end, (north, east) in pattern.parts:
-        wanted = Target(north * amplitude[0], east * amplitude[1], heading)
-        targets[begin:end] = limited_target(wanted, longest_target)
+        unlimited_target = Target(north * amplitude[0], east * amplitude[1], heading)
+        targets[begin:end] = limited_target(unlimited_target, longest_target)
     return targets
 
 
@@ -181,10 +181,12 @@ def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
     """The pattern of a maneuver; at amplitude 1, so that cases of all amplitudes share it."""
     pose = Pose((0.0, 0.0, 0.0), 0.0)
     times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
-    commanded = [maneuver.at(float(time), pose).coefficients for time in times]
-    steps = [k for k, coefficients in enumerate(commanded) if coefficients is not None]
+    commanded_coefficients = [maneuver.at(float(time), pose).coefficients for time in times]
+    steps = [k for k, coefficients in enumerate(commanded_coefficients) if coefficients is not None]
     level = Coefficients(0.0, 0.0)
-    targets = [each or level for each in commanded[steps[0] : steps[-1] + 1]]
+    targets = [
+        coefficients or level for coefficients in commanded_coefficients[steps[0] : steps[-1] + 1]
+    ]
     ends = [k for k in range(1, len(targets)) if targets[k] != targets[k - 1]]
     parts = zip((0, *ends), (*ends, len(targets)), strict=True)
     return _Pattern(len(targets), tuple((begin, end, targets[begin]) for begin, end in parts))

@@ -18,7 +18,7 @@ from companion.campaign.campaign_file import (
     CampaignFile,
     FaultPhase,
 )
-from companion.campaign.keys import check_key, replaced, with_keys
+from companion.campaign.keys import check_key, replace_unchecked, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config, trajectory_file
 from companion.config.file_kinds import FileKind, require_kind
@@ -53,7 +53,7 @@ class _CampaignReader:
         self._places = contents.places
         self._file = validated(contents.keys, str(path), CampaignFile, contents.places)
         self._files: dict[str, str] = {}
-        self._collected: dict[Path, Path] = {}
+        self._copied_paths: dict[Path, Path] = {}
 
     def campaign(self) -> Campaign:
         """Check all keys, collect the trajectory files, and return the campaign."""
@@ -67,8 +67,8 @@ class _CampaignReader:
             check_key(key, base, self._at("tune", "search", key))
         self._check_faults()
         changes = dict(file.set)
-        named = file.swept_keys | changes.keys()
-        if TRAJECTORY in named and MANEUVERS not in named:
+        named_keys = file.swept_keys | changes.keys()
+        if TRAJECTORY in named_keys and MANEUVERS not in named_keys:
             changes[MANEUVERS] = ("trajectory",)
         if isinstance(changes.get(TRAJECTORY), str):
             changes[TRAJECTORY] = self._folder / changes[TRAJECTORY]
@@ -76,7 +76,7 @@ class _CampaignReader:
             base = with_keys(base, changes)
         except ConfigError as error:
             raise ConfigError(f"{self._path}: {error}") from error
-        base = self._flyable(base)
+        base = self._flyable_config(base)
         sweep = {name: self._with_files(name, swept) for name, swept in file.sweep.items()}
         file = file.model_copy(update={"sweep": sweep, "set": {}})
         return Campaign(file, base, self._files, str(self._path))
@@ -92,11 +92,11 @@ class _CampaignReader:
             path = config.flight.trajectory
             if path is None:
                 return config
-            return replaced(config, flight={"trajectory": self._folder / path})
+            return replace_unchecked(config, flight={"trajectory": self._folder / path})
         return load_config(self._folder / given_config)
 
-    def _flyable(self, base: Config) -> Config:
-        """The base with `flight.arm: true`, and with the path of its trajectory's copy."""
+    def _flyable_config(self, base: Config) -> Config:
+        """The base configuration with `flight.arm: true` and the path of the copied trajectory."""
         if base.link.backend != "direct":
             raise ConfigError(f"{self._path}: link.backend must be direct in a campaign")
         if base.link.signing_key_file is not None or (base.mock or {}).get("signing"):
@@ -105,51 +105,51 @@ class _CampaignReader:
                 "mock.signing"
             )
         path = base.flight.trajectory
-        copy = None if path is None else self._collect(path)
-        return replaced(base, flight={"arm": True, "trajectory": copy})
+        copy = None if path is None else self._copy_trajectory(path)
+        return replace_unchecked(base, flight={"arm": True, "trajectory": copy})
 
     def _with_files(self, name: str, swept: Swept) -> Swept:
         """The factor, with each path of a trajectory file replaced by that of its copy."""
         if TRAJECTORY not in swept.changed_keys(name):
             return swept
-        listed = swept.values or swept.choice or ()
-        if not (listed and all(isinstance(value, str) for value in listed)):
-            raise ConfigError(f"{self._path}: sweep.{name}: each value must be a file")
-        copies = tuple(str(self._collect(self._folder / value)) for value in listed)
+        listed_values = swept.values or swept.choice or ()
+        if not (listed_values and all(isinstance(value, str) for value in listed_values)):
+            raise ConfigError(f"{self._path}: sweep.{name}: each value must be a path")
+        copies = tuple(str(self._copy_trajectory(self._folder / value)) for value in listed_values)
         return swept.model_copy(update={swept.kind: copies})
 
-    def _collect(self, path: Path) -> Path:
+    def _copy_trajectory(self, path: Path) -> Path:
         """Add a trajectory file, and the CSV table that it names, to the campaign's files.
 
         Returns:
             path of the copy in the campaign's folder.
         """
-        if path in self._collected:
-            return self._collected[path]
+        if path in self._copied_paths:
+            return self._copied_paths[path]
         trajectory_file.read(path)
-        taken = {name.parts[1] for name in self._collected.values()}
-        numbered = (f"{path.stem}-{number}" for number in count(2))
-        stem = next(stem for stem in chain([path.stem], numbered) if stem not in taken)
+        taken_stems = {name.parts[1] for name in self._copied_paths.values()}
+        numbered_stems = (f"{path.stem}-{number}" for number in count(2))
+        stem = next(stem for stem in chain([path.stem], numbered_stems) if stem not in taken_stems)
         with tempfile.TemporaryDirectory(prefix="companion-campaign-") as folder:
             copies = Path(folder) / stem
             name = copy_trajectory(path, copies)
             for copy in sorted(copies.iterdir()):
                 self._files[f"{TRAJECTORIES_FOLDER}/{stem}/{copy.name}"] = copy.read_text("utf-8")
-        collected = Path(TRAJECTORIES_FOLDER, stem, name)
-        self._collected[path] = collected
-        return collected
+        copied_path = Path(TRAJECTORIES_FOLDER, stem, name)
+        self._copied_paths[path] = copied_path
+        return copied_path
 
     def _check_faults(self) -> None:
         file, name = self._file, self._path
-        for scenario, fault_case in file.faults.items():
-            for fault in fault_case.inject:
+        for scenario, scenario_section in file.faults.items():
+            for fault in scenario_section.inject:
                 if fault.keys() & {"at_s", "after_offboard_s"}:
                     raise ConfigError(
                         f"{name}: faults.{scenario}: phase and after_s say when it begins; "
                         "take out at_s and after_offboard_s"
                     )
             try:
-                complete_mock({"faults": fault_case.inject})
+                complete_mock({"faults": scenario_section.inject})
             except ConfigError as error:
                 raise ConfigError(f"{name}: faults.{scenario}: {error}") from error
         self._check_names(FAULT, (NO_FAULT, *file.faults))
@@ -157,22 +157,22 @@ class _CampaignReader:
         for key in (FAULT_PHASE, FAULT_AFTER):
             if key in file.sweep and FAULT not in file.sweep:
                 raise ConfigError(f"{name}: sweep.{key} needs sweep.{FAULT}")
-        after = file.sweep.get(FAULT_AFTER)
-        if after is not None and not after.is_number:
+        after_factor = file.sweep.get(FAULT_AFTER)
+        if after_factor is not None and not after_factor.is_number:
             raise ConfigError(f"{name}: sweep.{FAULT_AFTER}: each value must be a number")
 
-    def _check_names(self, key: str, known: tuple[str, ...]) -> None:
+    def _check_names(self, key: str, known_names: tuple[str, ...]) -> None:
         """Check that a fault factor, if it is swept, lists only known names."""
         swept = self._file.sweep.get(key)
         if swept is None:
             return
-        if not (listed := swept.values or swept.choice):
+        if not (listed_values := swept.values or swept.choice):
             raise ConfigError(f"{self._path}: sweep.{key}: give a list of names")
-        for name in listed:
-            if name not in known:
+        for name in listed_values:
+            if name not in known_names:
                 raise ConfigError(
                     f"{self._path}: sweep.{key}: there is no {name!r:.60}; known: "
-                    f"{', '.join(known)}"
+                    f"{', '.join(known_names)}"
                 )
 
 

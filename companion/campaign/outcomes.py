@@ -35,7 +35,7 @@ OUTCOME_LABELS = {
     "max_tilt_rad": "largest true tilt",
     "flight_s": "flight time",
 }
-"""The outcomes of a flight that are numbers, null where they were not measured, and their texts."""
+"""Label of each outcome of a flight that is a number; an outcome that was not measured is null."""
 _SATURATED_FROM = 0.99
 """A setpoint counts as saturated if its rate or thrust is at least this share of the upper limit,
 or its thrust is at most the lower limit divided by this share."""
@@ -58,26 +58,28 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     parts = settled_parts(rows, summary.trace.maneuvers)
     figures: dict[str, float] = {}
     if len(truth) and parts:
-        settled = np.concatenate(parts)
-        figures["estimated_rms_m"] = tracking_errors(settled)["position_rms_m"]
-        true_position = [np.interp(settled[:, 0], truth[:, 0], each) for each in truth[:, 1:4].T]
-        true = np.column_stack([settled[:, :4], *true_position])
-        figures.update(tracking_errors(true))
-        figures.update(_horizontal_errors(settled, true))
-        in_maneuvers = (truth[:, 0] >= settled[0, 0]) & (truth[:, 0] <= settled[-1, 0])
+        settled_rows = np.concatenate(parts)
+        figures["estimated_rms_m"] = tracking_errors(settled_rows)["position_rms_m"]
+        true_position = [
+            np.interp(settled_rows[:, 0], truth[:, 0], axis) for axis in truth[:, 1:4].T
+        ]
+        true_rows = np.column_stack([settled_rows[:, :4], *true_position])
+        figures.update(tracking_errors(true_rows))
+        figures.update(_horizontal_errors(settled_rows, true_rows))
+        in_maneuvers = (truth[:, 0] >= settled_rows[0, 0]) & (truth[:, 0] <= settled_rows[-1, 0])
         figures["max_tilt_rad"] = float(truth[in_maneuvers, 4].max(initial=0.0))
     return figures
 
 
-def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
-    """RMS horizontal distances of true position, estimated position and reference, in pairs, m.
+def _horizontal_errors(estimated_rows: Floats, true_rows: Floats) -> dict[str, float]:
+    """RMS horizontal distances, m: truth to reference, estimate to reference, estimate to truth.
 
-    `estimated` are (N, 7) rows of `FlightTrace.tracking`; `true` are the same rows with the true
-    position instead of the estimated one.
+    `estimated_rows` are (N, 7) rows of `FlightTrace.tracking`; `true_rows` are the same rows with
+    the true position instead of the estimated one.
     """
-    known = np.isfinite(true[:, 1])
-    true_position, reference = true[known, 4:6], true[known, 1:3]
-    position_estimate = estimated[known, 4:6]
+    has_reference = np.isfinite(true_rows[:, 1])
+    true_position, reference = true_rows[has_reference, 4:6], true_rows[has_reference, 1:3]
+    position_estimate = estimated_rows[has_reference, 4:6]
 
     def rms(offsets: Floats) -> float:
         return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1)))) if len(offsets) else nan
@@ -91,15 +93,17 @@ def _horizontal_errors(estimated: Floats, true: Floats) -> dict[str, float]:
 
 def response(summary: Summary) -> dict[str, float]:
     """Outcomes of the response to acceleration steps; empty if there were none."""
-    measured = summary.response()
-    if measured is None:
+    response_figures = summary.response()
+    if response_figures is None:
         return {}
-    constants = [measured.time_constant_north_s, measured.time_constant_east_s]
-    finite = [value for value in constants if isfinite(value)]
+    constants = [response_figures.time_constant_north_s, response_figures.time_constant_east_s]
+    finite_constants = [value for value in constants if isfinite(value)]
     return {
-        "cross_axis_max": measured.cross_axis_max,
-        "model_deviation_max": measured.model_deviation_max,
-        "time_constant_s": sum(finite) / len(finite) if finite else nan,
+        "cross_axis_max": response_figures.cross_axis_max,
+        "model_deviation_max": response_figures.model_deviation_max,
+        "time_constant_s": sum(finite_constants) / len(finite_constants)
+        if finite_constants
+        else nan,
     }
 
 
@@ -116,12 +120,16 @@ def control_effort(
     begin = marks[0].vehicle_time
     end = next((mark.vehicle_time for mark in marks if mark.name is None), np.inf)
     rows = np.array(
-        [(*each.rates, each.thrust) for each in setpoints if begin <= each.time < end]
+        [
+            (*setpoint.rates, setpoint.thrust)
+            for setpoint in setpoints
+            if begin <= setpoint.time < end
+        ]
     ).reshape(-1, 4)
     if not len(rows):
         return {}
     rates, thrust, limits = np.hypot(rows[:, 0], rows[:, 1]), rows[:, 3], config.limits
-    saturated = (
+    is_saturated = (
         (rates >= _SATURATED_FROM * limits.max_tilt_rate)
         | (thrust >= _SATURATED_FROM * limits.max_thrust)
         | (thrust * _SATURATED_FROM <= limits.min_thrust)
@@ -130,21 +138,23 @@ def control_effort(
         "rate_rms_rad_s": float(np.sqrt(np.mean(rates**2))),
         "rate_max_rad_s": float(rates.max()),
         "thrust_rms": float(np.std(thrust)),
-        "saturated_share": float(np.mean(saturated)),
+        "saturated_share": float(np.mean(is_saturated)),
     }
 
 
 def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
     """SHA-256 of all setpoints that the autopilot received, and of the final true state."""
     sha256 = hashlib.sha256()
-    for each in setpoints:
-        sha256.update(struct.pack("<dq4d", each.time, each.answers, *each.rates, each.thrust))
+    for setpoint in setpoints:
+        sha256.update(
+            struct.pack("<dq4d", setpoint.time, setpoint.answers, *setpoint.rates, setpoint.thrust)
+        )
     motion = (*state["position"], *state["velocity"], *state["q"], *state["rates"])
     sha256.update(struct.pack(f"<{len(motion)}d", *motion))
     return sha256.hexdigest()
 
 
-def of_error(result: str) -> dict[str, Value]:
+def error_outcomes(result: str) -> dict[str, Value]:
     """The outcomes of a case that raised an error; `result` is the text of the error."""
     return {
         "ok": False,
@@ -170,6 +180,6 @@ def failed_checks(figures: Mapping[str, Any]) -> str:
 
 
 def without_nan(values: Mapping[str, float]) -> dict[str, Value]:
-    """All of `OUTCOME_LABELS`; a missing or non-finite value is None."""
+    """A value for each of `OUTCOME_LABELS`; a missing or non-finite value is None."""
     outcomes = {name: values.get(name, nan) for name in OUTCOME_LABELS}
     return {name: value if isfinite(value) else None for name, value in outcomes.items()}

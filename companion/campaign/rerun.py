@@ -23,7 +23,7 @@ class Rerun(NamedTuple):
     row: dict[str, Value]
     """Results of the repeated flight, as one row."""
     folder: Path
-    """Folder of its recording."""
+    """Folder of the recorded flight."""
     identical: bool
     """Whether the row equals the stored row to the bit. A case that has no stored row yet counts as
     identical."""
@@ -50,19 +50,21 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
     recording = flight_folder(campaign_folder / _CASES_FOLDER / f"case-{index:05d}")
     row = fly_case(case, recording)
     verdict = "good" if row["ok"] else f"not good: {row['failed_checks'] or row['result']}"
-    lines = [f"{case.described()}: {verdict}"]
-    if other := difference(description.versions, versions()):
-        lines.append(f"The campaign was flown by another version: this one has {other}.")
-    stored = _stored_row(campaign_folder, campaign, description, index)
-    if stored is None:
+    lines = [f"{case.description()}: {verdict}"]
+    if version_differences := difference(description.versions, versions()):
+        lines.append(
+            f"The campaign was flown by another version: this one has {version_differences}."
+        )
+    stored_row = _stored_row(campaign_folder, campaign, description, index)
+    if stored_row is None:
         return Rerun(row, recording, True, (*lines, "The campaign has not flown this case yet."))
-    changed = [name for name, value in stored.items() if row.get(name) != value]
+    changed_columns = [name for name, value in stored_row.items() if row.get(name) != value]
     lines.append(
-        f"It differs from the campaign's flight in {', '.join(changed)}."
-        if changed
+        f"It differs from the campaign's flight in {', '.join(changed_columns)}."
+        if changed_columns
         else f"It is bit-identical to the campaign's flight: digest {row['digest']}."
     )
-    return Rerun(row, recording, not changed, tuple(lines))
+    return Rerun(row, recording, not changed_columns, tuple(lines))
 
 
 def _stored_row(
@@ -73,5 +75,5 @@ def _stored_row(
     if unit not in store.finished_units(campaign_folder):
         return None
     rows = store.read_unit(campaign_folder, unit).to_pylist()
-    stored: dict[str, Any] | None = next((row for row in rows if row["case"] == index), None)
-    return stored
+    stored_row: dict[str, Any] | None = next((row for row in rows if row["case"] == index), None)
+    return stored_row

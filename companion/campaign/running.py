@@ -25,7 +25,7 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import NOUNS
 from companion.campaign.cluster import (
     ClusterError,
-    connected,
+    cluster_client,
     local_workers,
     number_of_workers,
     require_packages,
@@ -91,27 +91,27 @@ class _Run:
 
     def run(self) -> int:
         """Run the campaign; return the exit code."""
-        begun = folder.holds_campaign(self._folder)
-        if begun:
+        is_continued = folder.holds_campaign(self._folder)
+        if is_continued:
             folder.resume(self._folder, self._campaign)
-        case_s = None if begun else self._check_all_cases()
+        case_s = None if is_continued else self._check_all_cases()
         try:
             with (
                 interruptible(),
-                connected(self._options.scheduler, self._options.workers) as client,
+                cluster_client(self._options.scheduler, self._options.workers) as client,
             ):
                 if not number_of_workers(client):
                     self._console.print("waiting for the cluster's first worker…")
                     wait_for_workers(client)
                 workers = max(1, number_of_workers(client))  # the first may have left already
-                with folder.locked(self._folder):
+                with folder.lock(self._folder):
                     description = self._open_folder(case_s, workers)
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")
                     return self._run_with_progress(client, description)
         except KeyboardInterrupt:
-            return self._stopped("interrupted")
+            return self._report_stop("interrupted")
         except ClusterError as error:
-            return self._stopped(str(error))
+            return self._report_stop(str(error))
 
     def _check_all_cases(self) -> float | None:
         """Check every case; return the wall time that a case takes, s; None: not measured."""
@@ -119,8 +119,8 @@ class _Run:
         workers = self._options.workers or local_workers()
         if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
             # The time of one case is enough to refuse; checking all cases would take long.
-            first = [campaign.case(next(campaign.planned_cases()))]
-            estimate.check_size(campaign, estimate.case_time(kind, first), workers)
+            first_case = [campaign.case(next(campaign.planned_cases()))]
+            estimate.check_size(campaign, estimate.case_time(kind, first_case), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
         if len(cases) <= _UNMEASURED_CASES * workers:
@@ -138,8 +138,8 @@ class _Run:
         if folder.holds_campaign(self._folder):
             return folder.resume(self._folder, self._campaign)
         cases = self._campaign.number_of_cases
-        unit = 1 if case_s is None else size_of_units(cases, case_s, workers)
-        description = folder.describe(self._campaign, unit, case_s)
+        unit_size = 1 if case_s is None else size_of_units(cases, case_s, workers)
+        description = folder.describe(self._campaign, unit_size, case_s)
         folder.make(self._folder, self._campaign, description)
         size = f"{cases} {self._noun}"
         if case_s is not None:
@@ -155,7 +155,7 @@ class _Run:
             task = bar.add_task(self._noun, total=description.cases)
 
             def show(progress: engine.Progress) -> None:
-                bar.update(task, completed=progress.flown)
+                bar.update(task, completed=progress.flown_cases)
 
             progress = engine.run(client, self._campaign, description, self._folder, show)
         return self._report_end(progress, description)
@@ -163,39 +163,39 @@ class _Run:
     def _report_end(self, progress: engine.Progress, description: Description) -> int:
         """Report how the run ended; return the exit code."""
         say = self._console.print
-        for sentence in progress.lost[:_MOST_SHOWN]:
+        for sentence in progress.given_up_units[:_MOST_SHOWN]:
             say(f"not flown: {sentence}")
-        if progress.flown < description.cases:
-            lost = len(progress.lost)
-            return self._stopped(f"{lost} unit{'s were' if lost > 1 else ' was'} given up")
+        if progress.flown_cases < description.cases:
+            count = len(progress.given_up_units)
+            return self._report_stop(f"{count} unit{'s were' if count > 1 else ' was'} given up")
         errors = engine.internal_errors(self._folder, self._campaign.file)
-        for error, times in errors.most_common(_MOST_SHOWN):
-            say(f"{times} of the {self._noun} ended by an {error}")
+        for error, count in errors.most_common(_MOST_SHOWN):
+            say(f"{count} of the {self._noun} ended by an {error}")
         results = Results.read(self._folder)
-        say(f"{results.good.sum()} of {progress.flown} {self._noun} were good.")
-        for reason, times in results.failures().most_common(_MOST_SHOWN):
-            say(f"  {times} not good: {reason}")
-        if results.documented.size:
-            kept, faulty = results.documented.sum(), results.documented.size
-            say(f"{kept} of {faulty} flights with a fault ended as documented.")
+        say(f"{results.good.sum()} of {progress.flown_cases} {self._noun} were good.")
+        for reason, count in results.failures().most_common(_MOST_SHOWN):
+            say(f"  {count} not good: {reason}")
+        if results.as_documented.size:
+            documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
+            say(f"{documented_count} of {faulty_count} flights with a fault ended as documented.")
         say(f"The results are in {self._folder}. Write their report with")
         say(f"  companion campaign report {shlex.quote(str(self._folder))}")
         return FAILED if errors else DONE
 
-    def _stopped(self, why: str) -> int:
+    def _report_stop(self, why: str) -> int:
         """Print why the campaign stopped and how to continue; return the exit code."""
         if not folder.holds_campaign(self._folder):
             self._console.print(f"{why}; no campaign was started")
             return FAILED
         description = folder.read_description(self._folder)
         units = unit_ranges(description.cases, description.unit)
-        kept = sum(len(units[number]) for number in store.finished_units(self._folder))
+        finished_cases = sum(len(units[number]) for number in store.finished_units(self._folder))
         command = f"companion campaign {shlex.quote(str(self._folder))}"
         if self._options.scheduler:
             command += f" --scheduler {self._options.scheduler}"
         self._console.print(
-            f"{why}; the results of {kept} of {description.cases} {self._noun} are kept. Continue "
-            f"with\n  {command}"
+            f"{why}; the results of {finished_cases} of {description.cases} {self._noun} are kept. "
+            f"Continue with\n  {command}"
         )
         return FAILED
 
@@ -219,15 +219,16 @@ def interruptible() -> Iterator[None]:
     """In the context, SIGTERM raises KeyboardInterrupt like Ctrl-C; further signals are ignored."""
 
     def interrupt(number: int, frame: FrameType | None) -> NoReturn:
-        for each in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(each, signal.SIG_IGN)
+        for signal_number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(signal_number, signal.SIG_IGN)
         raise KeyboardInterrupt
 
     previous_handlers = {
-        each: signal.signal(each, interrupt) for each in (signal.SIGINT, signal.SIGTERM)
+        signal_number: signal.signal(signal_number, interrupt)
+        for signal_number in (signal.SIGINT, signal.SIGTERM)
     }
     try:
         yield
     finally:
-        for each, handler in previous_handlers.items():
-            signal.signal(each, handler)
+        for signal_number, handler in previous_handlers.items():
+            signal.signal(signal_number, handler)

@@ -53,7 +53,7 @@ def schema(file: CampaignFile) -> "pa.Schema":
     factors = [(name, _column_type(file, name)) for name in file.sweep]
     columns = [("case", "int64"), ("seed", "int64"), *factors, *_OUTCOMES[file.kind]]
     factor_metadata = {
-        name: {**each.described(), "unit": unit_of(name)} for name, each in file.sweep.items()
+        name: {**swept.description(), "unit": unit_of(name)} for name, swept in file.sweep.items()
     }
     contents = {"name": file.name, "kind": file.kind, "factors": factor_metadata}
     return pa.schema(
@@ -75,12 +75,13 @@ def table(file: CampaignFile, rows: Sequence[Mapping[str, Value]]) -> "pa.Table"
 
     columns = schema(file)
     data = {
-        field.name: [_stored(row.get(field.name), field.type) for row in rows] for field in columns
+        field.name: [_cell_value(row.get(field.name), field.type) for row in rows]
+        for field in columns
     }
     return pa.table(data, schema=columns)
 
 
-def _stored(value: Value, column_type: Any) -> Value:
+def _cell_value(value: Value, column_type: Any) -> Value:
     """A value as stored in a column; in a column of text, any other value becomes JSON text."""
     if str(column_type) == "string" and value is not None and not isinstance(value, str):
         return json.dumps(value)

@@ -28,7 +28,7 @@ class Swept(Section):
     """
 
     values: Annotated[tuple[Any, ...], Field(min_length=1, max_length=_MOST_VALUES)] | None = None
-    """Every one of these values."""
+    """List of values, each of which is flown."""
     range: TwoNumbers | None = None
     """First and last of `count` values at equal distances."""
     count: Annotated[int, Field(ge=2, le=_MOST_VALUES)] | None = None
@@ -42,9 +42,9 @@ class Swept(Section):
     within: TwoNumbers | None = None
     """Bounds of `normal`, which is truncated there."""
     choice: Annotated[tuple[Any, ...], Field(min_length=2, max_length=_MOST_VALUES)] | None = None
-    """One of these values at random, all equally likely."""
+    """List of values, of which one is chosen at random, all equally likely."""
     times_base: bool = False
-    """The values multiply the value of the base configuration, instead of replacing it."""
+    """Whether the values multiply the value of the base configuration, instead of replacing it."""
     keys: Annotated[tuple[KeyName, ...], Field(min_length=1, max_length=20)] | None = None
     """Keys that get the value. null: the key that the factor is named after."""
 
@@ -98,31 +98,31 @@ class Swept(Section):
         return next(kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None)
 
     @property
-    def sampled(self) -> bool:
+    def is_sampled(self) -> bool:
         """Whether the values are sampled; otherwise they form a grid."""
         return self.kind in _DISTRIBUTIONS
 
     @property
     def is_number(self) -> bool:
         """Whether the values are numbers or null."""
-        listed = self.values or self.choice
-        return listed is None or all(
+        listed_values = self.values or self.choice
+        return listed_values is None or all(
             value is None or (isinstance(value, float | int) and not isinstance(value, bool))
-            for value in listed
+            for value in listed_values
         )
 
     @property
     def is_bool(self) -> bool:
         """Whether all values are true or false."""
-        listed = self.values or self.choice
-        return listed is not None and all(isinstance(value, bool) for value in listed)
+        listed_values = self.values or self.choice
+        return listed_values is not None and all(isinstance(value, bool) for value in listed_values)
 
     def changed_keys(self, name: str) -> tuple[str, ...]:
         """The keys that get the value of the factor `name`."""
         return self.keys or (name,)
 
     def grid(self) -> tuple[Any, ...]:
-        """The values of a grid."""
+        """The values of `values` or `range`."""
         if self.range is None:
             return self.values or ()
         (low, high), count = self.range, self.count or 2
@@ -140,12 +140,12 @@ class Swept(Section):
         low, high = self.uniform or (0.0, 1.0)
         return low + (high - low) * probability
 
-    def described(self) -> dict[str, Any]:
+    def description(self) -> dict[str, Any]:
         """Kind and values of the factor, for the metadata of the results."""
         details = {"count": self.count, "within": self.within}
         return {
             "kind": self.kind,
-            "sampled": self.sampled,
+            "sampled": self.is_sampled,
             self.kind: [column_value(value) for value in getattr(self, self.kind)],
             **{key: value for key, value in details.items() if value is not None},
             "times_base": self.times_base,

@@ -17,7 +17,7 @@ LONGEST_UNIT_S = 2.5
 
 It is long compared with the time to send a unit, and so short that a lost unit costs little."""
 _UNITS_PER_WORKER = 4
-"""Number of units for each worker where there are few cases, before rounding.
+"""Number of units for each worker in a campaign with few cases, before rounding.
 
 With several units each, all workers end at about the same time. With many cases `LONGEST_UNIT_S`
 limits the units instead, and there are more of them."""
@@ -35,21 +35,21 @@ class UnitResult(NamedTuple):
 
 
 def fly_planned_cases(
-    campaign: Campaign, planned: Sequence[PlannedCase], expected: Versions
+    campaign: Campaign, planned_cases: Sequence[PlannedCase], client_versions: Versions
 ) -> UnitResult:
-    """Build planned cases, and fly them; `expected` are the versions of the client.
+    """Build planned cases, and fly them.
 
     Raises:
         ConfigError: a case is refused.
         VersionError: the versions of this process differ from the client's.
     """
-    require_equal(expected, versions(), f"the worker {_worker_address()}")
-    return _run_timed(campaign.file.kind, [campaign.case(each) for each in planned])
+    require_equal(client_versions, versions(), f"the worker {_worker_address()}")
+    return _run_timed(campaign.file.kind, [campaign.case(item) for item in planned_cases])
 
 
-def fly_cases(kind: str, cases: Sequence[Case], expected: Versions) -> UnitResult:
+def fly_cases(kind: str, cases: Sequence[Case], client_versions: Versions) -> UnitResult:
     """Fly cases that the client has built; see `fly_planned_cases`."""
-    require_equal(expected, versions(), f"the worker {_worker_address()}")
+    require_equal(client_versions, versions(), f"the worker {_worker_address()}")
     return _run_timed(kind, cases)
 
 
@@ -101,9 +101,9 @@ def size_of_units(cases: int, case_s: float, workers: int) -> int:
 
     0 workers, while the first is awaited, count as 1.
     """
-    by_time = int(LONGEST_UNIT_S / max(case_s, 1e-6))
-    by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
-    return max(1, min(by_time, by_share))
+    size_by_time = int(LONGEST_UNIT_S / max(case_s, 1e-6))
+    size_by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
+    return max(1, min(size_by_time, size_by_share))
 
 
 def unit_ranges(cases: int, size: int) -> list[range]:

@@ -26,12 +26,12 @@ class VersionError(Exception):
 @cache
 def versions() -> Versions:
     """The versions of this process."""
-    own = {
+    program_versions = {
         "companion": _version(_PACKAGE),
         "source": source_digest(),
         "python": platform.python_version(),
     }
-    return own | {name: _version(name) for name in _PACKAGES}
+    return program_versions | {name: _version(name) for name in _PACKAGES}
 
 
 def source_digest() -> str:
@@ -76,11 +76,11 @@ def require_equal(ours: Versions, others: Versions, who: str) -> None:
     Raises:
         VersionError: says what differs.
     """
-    differs = difference(ours, others)
-    if differs:
+    differences = difference(ours, others)
+    if differences:
         raise VersionError(
-            f"{who} has {differs}: results of two versions must not be mixed, so install the same "
-            "version there"
+            f"{who} has {differences}: results of two versions must not be mixed, so install the "
+            "same version there"
         )
 
 

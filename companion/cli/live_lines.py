@@ -27,7 +27,7 @@ def status_lines(status: FlightStatus) -> list[str]:
         f"{'':<9} height {_number(status.height, '.1f', 'm')}   "
         f"speed {_number(status.speed, '.1f', 'm/s')}   "
         f"tilt {_number(None if status.tilt is None else degrees(status.tilt), '.0f', '°')}   "
-        f"tracking error {_number(status.error, '.2f', 'm')}",
+        f"tracking error {_number(status.tracking_error, '.2f', 'm')}",
         f"{'':<9} safety {_safety(status)}  {_setpoints(status)}  battery {_battery(status)}",
     ]
 
@@ -47,10 +47,10 @@ def allowed_time(elapsed: float, timeout: float) -> str:
 
 
 def _setpoints(status: FlightStatus) -> str:
-    rate = "no setpoints" if status.rate is None else f"{status.rate:.0f} Hz"
+    rate = "no setpoints" if status.setpoint_rate is None else f"{status.setpoint_rate:.0f} Hz"
     if status.latency is None:
         return rate
-    return f"{rate}  latency {1e3 * status.latency:.2f} ms ({status.missed} late)"
+    return f"{rate}  latency {1e3 * status.latency:.2f} ms ({status.missed_deadlines} late)"
 
 
 def _battery(status: FlightStatus) -> str:

@@ -128,7 +128,7 @@ def add_study(commands: Commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     study.add_argument(
-        "name", choices=registry.choices(), metavar="NAME", help="a study, see below"
+        "name", choices=registry.study_names(), metavar="NAME", help="a study, see below"
     )
     case_help = f"case for {registry.names_with_case()}, such as configs/study-case.yaml"
     add_path(study, "--case", case_help)

@@ -27,7 +27,9 @@ def bench(options: argparse.Namespace) -> int:
 
 def study(options: argparse.Namespace) -> int:
     """Run the experiments of the paper and our own."""
-    if options.json and not all(study.prints_json for study in registry.chosen(options.name)):
+    if options.json and not all(
+        study.prints_json for study in registry.selected_studies(options.name)
+    ):
         raise ConfigError(
             f"--json needs study {registry.names_with_json()}; study {options.name} writes its"
             " tables as CSV"

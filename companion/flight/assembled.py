@@ -32,7 +32,7 @@ class AssembledFlight:
             self.context.guidance_loop.maker.predictive.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
-        """The figures of predictive control; None if it did not fly."""
+        """The figures of predictive control; None if the flight did not use it."""
         predictive = self.context.guidance_loop.maker.predictive
         if predictive is None:
             return None

@@ -131,7 +131,7 @@ def _drag_memory(
 def _prepare_trajectories(
     context: FlightContext, note: Callable[[str], None], *, real_time: bool
 ) -> None:
-    """Report how trajectory files were read, and start the solver that follows them, if any."""
+    """Report how trajectory files were read; with `guidance.kind: nmpc`, start its solver."""
     for part in context.maneuvers.parts:
         if isinstance(part, Follow):
             for text in part.notes:
@@ -151,7 +151,7 @@ def _reporter(
     *,
     real_time: bool,
 ) -> StatusReporter:
-    """The reporter of the flight's state; it shows the state only if an observer uses it."""
+    """The reporter of the flight's state, which is shown only if an observer uses it."""
 
     def phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began

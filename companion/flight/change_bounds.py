@@ -1,4 +1,4 @@
-"""Bounds of a change in flight, in addition to the types and ranges of the keys."""
+"""Bounds on changes of values in flight, in addition to the types and ranges of the keys."""
 
 from math import inf
 
@@ -45,7 +45,7 @@ def require_moderate(before: Config, after: Config, name: str) -> None:
 
 
 def _refusal(before: Config, after: Config, change: Difference) -> str | None:
-    """Why this change is not permitted, as a sentence; None: it is."""
+    """Why `change` is not permitted, as a sentence; None: it is permitted."""
     key = change.name
     if key in _WITHOUT_EFFECT_IN_IDENTIFY and flies_identify(before):
         return f"{key} has no effect while the maneuver `identify` is flown"

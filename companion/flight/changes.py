@@ -29,14 +29,14 @@ class ChangeRefusedError(Exception):
 
 
 class Change(NamedTuple):
-    """A change that was made."""
+    """One change of values in flight."""
 
     time: float
-    """Time when it began, s on our clock."""
+    """Time when the change began, s on our clock."""
     by: str
-    """Who made it, such as "the live page"."""
+    """Who made the change, such as "the live page"."""
     keys: tuple[Difference, ...]
-    """Changed keys."""
+    """Changed keys, with the values before and after."""
 
     def __str__(self) -> str:
         return f"changed by {self.by}: {', '.join(map(str, self.keys))}"
@@ -55,11 +55,11 @@ class Changes:
 
     Attributes:
         start: the configuration before the first change, which may precede the flight.
-        wanted: the configuration after the newest change.
+        wanted_config: the configuration after the newest change.
         made: all changes, in order.
         at_flight_start: the configuration when the flight began; the flight's record contains it.
         note: called with each change in words; a flight replaces it while it runs.
-        on_change: called with `wanted` after each change.
+        on_change: called with `wanted_config` after each change.
         on_drag: called with what is known of the vehicle's drag, once the vehicle is identified;
             some checks of a change need it.
 
@@ -68,7 +68,7 @@ class Changes:
     """
 
     def __init__(self, start: Config) -> None:
-        self.wanted = start
+        self.wanted_config = start
         self.made: list[Change] = []
         self.at_flight_start = start
         self.note: Callable[[str], None] = lambda _: None
@@ -94,11 +94,11 @@ class Changes:
 
     def begin_flight(self) -> Config:
         """Begin a flight; return the configuration at its start, for its record."""
-        self.at_flight_start, self._count_before_flight = self.wanted, len(self.made)
+        self.at_flight_start, self._count_before_flight = self.wanted_config, len(self.made)
         return self.at_flight_start
 
     def change(self, values: Values, by: str) -> str:
-        """Begin to change to these values; return the change in words.
+        """Begin to change to `values`; return the change in words.
 
         If another change is still under way, both together must not be too large.
 
@@ -107,14 +107,14 @@ class Changes:
                 is too large. Nothing is changed.
         """
         try:
-            wanted = changed_in_flight(self.start, self.wanted, values, by)
+            wanted = changed_in_flight(self.start, self.wanted_config, values, by)
             require_moderate(self._slew.settled_config, wanted, by)
-            require_moderate(self.wanted, wanted, by)
+            require_moderate(self.wanted_config, wanted, by)
         except ConfigError as error:
             raise ChangeRefusedError(str(error)) from error
         except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
-        before = self.wanted
+        before = self.wanted_config
         text = self._begin_change(wanted, by)
         self._earlier_configs = [*self._earlier_configs, before][-_MAX_UNDO_COUNT:]
         self.on_change(wanted)
@@ -130,7 +130,7 @@ class Changes:
             raise ChangeRefusedError(f"{by}: there is no change to undo")
         text = self._begin_change(self._earlier_configs[-1], by)
         self._earlier_configs.pop()
-        self.on_change(self.wanted)
+        self.on_change(self.wanted_config)
         return text
 
     @contextmanager
@@ -159,10 +159,10 @@ class Changes:
             record: records the values for a replay, or None.
         """
         self._retuning, self._record = retuning, record
-        if self.wanted is not self.start:
-            self._slew.jump(self.wanted)
-            retuning.apply(tuning(self.wanted))
-        if self.wanted is not self.at_flight_start:
+        if self.wanted_config is not self.start:
+            self._slew.jump(self.wanted_config)
+            retuning.apply(tuning(self.wanted_config))
+        if self.wanted_config is not self.at_flight_start:
             self._record_change(self.at_flight_start, at_once=True)
         note_before, self.note = self.note, note
         try:
@@ -170,7 +170,7 @@ class Changes:
                 yield
         finally:
             self._retuning = self._record = None
-            self._slew.jump(self.wanted)
+            self._slew.jump(self.wanted_config)
             self.note = note_before
 
     def step(self, now: float) -> None:
@@ -191,23 +191,23 @@ class Changes:
         Raises:
             ChangeRefusedError: nothing can change in this flight, or the values are equal.
         """
-        fixed = fixed_because(self.start)
-        if fixed is not None:
-            raise ChangeRefusedError(f"{by}: {fixed}; nothing has changed")
-        keys = tuple(differences(self.wanted, wanted))
+        why_fixed = fixed_because(self.start)
+        if why_fixed is not None:
+            raise ChangeRefusedError(f"{by}: {why_fixed}; nothing has changed")
+        keys = tuple(differences(self.wanted_config, wanted))
         if not keys:
             raise ChangeRefusedError(
                 f"{by}: these are the present values already; nothing has changed"
             )
-        refusal = self._refuses(self.wanted, wanted)
+        refusal = self._refuses(self.wanted_config, wanted)
         if refusal is not None:
             raise ChangeRefusedError(f"{by}: {refusal}; nothing has changed")
         try:
             tuning(wanted)
         except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
-        now, before = asyncio.get_running_loop().time(), self.wanted
-        self.wanted = wanted
+        now, before = asyncio.get_running_loop().time(), self.wanted_config
+        self.wanted_config = wanted
         if self._retuning is None:
             self._slew.jump(wanted)
         else:
@@ -219,10 +219,10 @@ class Changes:
         return str(change)
 
     def _record_change(self, before: Config, *, at_once: bool) -> None:
-        """Record for a replay the values in which `wanted` differs from `before`."""
+        """Record for a replay the values in which `wanted_config` differs from `before`."""
         if self._record is not None:
             values: dict[str, dict[str, Any]] = {}
-            for each in differences(before, self.wanted):
+            for each in differences(before, self.wanted_config):
                 values.setdefault(each.section, {})[each.key] = each.after
             self._record.change(values, at_once=at_once)
 

@@ -28,7 +28,7 @@ RequireOurs = Callable[[], None]
 
 
 def roles_of(link: Link) -> frozenset[Role]:
-    """The roles of the vehicle's mode; empty if it is unknown or no mode that a flight uses."""
+    """The roles of the vehicle's mode; empty if the mode is unknown or has no role in a flight."""
     mode = link.state.mode
     return frozenset() if mode is None else link.autopilot.roles(mode)
 
@@ -149,7 +149,7 @@ async def change_mode(
 
 
 async def ask_to_hold(context: FlightContext, require_ours: RequireOurs) -> None:
-    """Change to the autopilot's hold mode; see `change_mode`, also for what is raised."""
+    """Change to the autopilot's hold mode; raises what `change_mode` raises."""
     await change_mode(
         context,
         context.link.autopilot.hold(),

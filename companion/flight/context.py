@@ -34,7 +34,7 @@ _BACKLOG_DRAIN_TIME = 0.5
 """After a stall the backlog is drained within this time, s."""
 
 _HEARTBEAT_ID = 0.0
-"""Message id of HEARTBEAT."""
+"""Message id of HEARTBEAT, as a float for the command that requests a message."""
 
 
 @dataclass(slots=True)
@@ -63,7 +63,7 @@ class FlightContext:
     """The mode when the checks ended. If the mode differs before we command arming, the pilot or
     another station has changed it, and the flight ends."""
     must_disarm: bool = False
-    """Whether an end on the ground disarms: we commanded arming or the take-off."""
+    """Whether the flight must disarm the vehicle on the ground: we commanded arming or take-off."""
     fence_centre: FenceCentre | None = None
     """Centre of the fence in an earlier flight, if the vehicle has not been disarmed since; None:
     the fence is centred where control begins."""
@@ -87,7 +87,7 @@ class FlightContext:
         self.guidance_loop.stand_by()
 
     async def stop(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
-        """Stop the tasks beside the phases, then the stream, and wait for its last answer."""
+        """Stop the tasks beside the phases, then the setpoints, and wait for the last setpoint."""
         try:
             for task in tasks:
                 await cancel(task)

@@ -1,4 +1,4 @@
-"""The phases under our control and the endings, one coroutine each."""
+"""The phases in which we control the vehicle or end the control, one coroutine each."""
 
 import asyncio
 from collections import deque
@@ -25,19 +25,19 @@ _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
 _MIN_HOLDING_TILT = 5.0
-"""Tilt that the thrust must at least allow, °: the vehicle must hold against a breeze."""
+"""Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
 
 _MARGIN_WINDOW = 1.0
 """Window over which `_TiltMargin` takes the maximum of the allowed tilt, s."""
 
 
 async def maneuvers(context: FlightContext) -> None:
-    """Fly the flight's maneuvers to their end, or until guidance gives them up."""
+    """Fly the flight's maneuvers to their end, or until guidance aborts them."""
     await fly_maneuvers(context, context.maneuvers)
 
 
 async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> None:
-    """Fly `sequence` to its end, or until guidance gives it up."""
+    """Fly `sequence` to its end, or until guidance aborts it."""
     now = asyncio.get_running_loop().time
     began = now()
 
@@ -62,7 +62,7 @@ async def fly_commanded(context: FlightContext, commands: Source) -> None:
 
 
 async def _fly(context: FlightContext, source: Source, progress: Callable[[], str]) -> None:
-    """Wait until the vehicle has stopped, then fly a source until it is finished.
+    """Wait until the vehicle has stopped, then fly the references of `source` until it is finished.
 
     Raises:
         FlightEnded: guidance gave up, the source failed, or the thrust is too small to steer.
@@ -206,7 +206,7 @@ def _require_landing(context: FlightContext) -> None:
     """Release control if the pilot ends the landing; a disarmed vehicle may be in any mode.
 
     PX4 changes its mode when it disarms, and reports the new mode first. So a mode counts only
-    together with a heartbeat, which tells both.
+    together with a heartbeat, which contains both mode and arming state.
     """
     if context.armed() and context.link.state.heartbeat_is_newest:
         require_role(context.link, {Role.LAND})

@@ -16,9 +16,9 @@ from companion.safety.actions import fault_message
 _MEASURING_PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
 _WINDOW_PERIODS = 4
-"""Length of the measured window, in units of `_MEASURING_PERIOD`; at first, one unit less."""
+"""Length of the window of a measurement, in `_MEASURING_PERIOD`; the first one is one shorter."""
 _MIN_ROW_AGE = 1.5
-"""Rows newer than this are not used, s: the autopilot may already have left offboard."""
+"""Smallest age of the rows used, s: in newer ones the autopilot may already have left offboard."""
 _MAX_ROWS = 75_000
 """Largest number of rows for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
@@ -76,7 +76,7 @@ class DeadTimeWatch:
             self._measurements += 1
             self._judge_axis(name, self._dead_time(name, self._trace.rates_rows(first)))
 
-    def over_the_flight(self) -> DeadTimes:
+    def measure_whole_flight(self) -> DeadTimes:
         """Measure over the flight (its last `_MAX_ROWS` rows); warn if no warning was given yet."""
         first = max(0, len(self._trace.rates) - _MAX_ROWS)
         rows = self._trace.rates_rows(first)

@@ -37,7 +37,7 @@ class FenceCheck:
     not checked."""
 
     def __call__(self, motion: Motion) -> Violation | None:
-        """The worst violation, or None; says whether a slower motion would avoid it."""
+        """The worst violation, with whether a slower motion would avoid it; None: no violation."""
         worst = self._worst(motion)
         if worst is None:
             return None
@@ -67,7 +67,10 @@ class FenceCheck:
         return float(time), breach
 
     def _candidate_indices(self, stops: Floats) -> list[int]:
-        """Indices of stops to judge: farthest, highest, lowest; for a polygon, along the path."""
+        """Indices of the stopping points to judge: the farthest, highest and lowest of `stops`.
+
+        For a polygon, points at every `_POINT_DISTANCE` along the path are added.
+        """
         distance = np.hypot(stops[:, 0], stops[:, 1])
         indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
         if self.fence.polygon or (self.fence.places and self.origin):

@@ -59,13 +59,15 @@ def _edges(
 ) -> Iterator[tuple[Corner, float]]:
     """The two ends of each edge of a prism: floor, ceiling, and some upright edges."""
     edge_step = max(1, len(outline) // _UPRIGHT_EDGES)
-    for number, (here, there) in enumerate(zip(outline, (*outline[1:], outline[0]), strict=True)):
+    for number, (corner, next_corner) in enumerate(
+        zip(outline, (*outline[1:], outline[0]), strict=True)
+    ):
         for up in heights:
-            yield here, up
-            yield there, up
+            yield corner, up
+            yield next_corner, up
         if number % edge_step == 0:
-            yield here, heights[0]
-            yield here, heights[1]
+            yield corner, heights[0]
+            yield corner, heights[1]
 
 
 def _write(writer: McapWriter, time_ns: int, points: list[Point]) -> None:

@@ -53,9 +53,9 @@ class Flight:
         self._context, self._plan, self._watch = context, plan, watch
         self._observer, self._ask_landing = observer, ask_landing
         self._clock = asyncio.get_running_loop().time
-        self.began = self._entered = self._clock()
+        self.began = self._phase_began = self._clock()
         self._interruption: FlightEnded | None = None
-        self._asking = False
+        self._asking_landing = False
         self._end = self._new_end()
 
     async def run(self) -> str:
@@ -101,9 +101,10 @@ class Flight:
         An exit that is under way continues. While the user is asked whether to land, an interrupt
         answers no.
         """
-        usual = self._usual_exit()
-        self._interruption = FlightEnded(reason, Exit.HOLD if usual is Exit.LAND else usual)
-        if self.failed_in is None or self._asking:
+        usual_exit = self._usual_exit()
+        exit_ = Exit.HOLD if usual_exit is Exit.LAND else usual_exit
+        self._interruption = FlightEnded(reason, exit_)
+        if self.failed_in is None or self._asking_landing:
             self.end(self._interruption)
 
     def on_heartbeat(self) -> None:
@@ -152,7 +153,7 @@ class Flight:
 
     async def _fly(self, phase: Phase) -> None:
         """Run one phase; every failure becomes a `FlightEnded`."""
-        self.phase, self._entered = phase, self._clock()
+        self.phase, self._phase_began = phase, self._clock()
         self._observer.phase(phase.name, phase.waits_for)
         if not self._end.done():
             self._judge(self._watch.judge)  # before the phase commands anything
@@ -164,10 +165,10 @@ class Flight:
     async def _run_until_end(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:
         """Run `work` until it is done, the flight is ended, or `seconds` are over."""
         task = asyncio.create_task(work)
-        either: set[asyncio.Future[Any]] = {task, self._end}
+        awaited: set[asyncio.Future[Any]] = {task, self._end}
         try:
             timeout = None if seconds == inf else seconds
-            await asyncio.wait(either, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait(awaited, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
             if self._end.done():
                 return None
             if not task.done():
@@ -212,11 +213,11 @@ class Flight:
 
     async def _user_wants_landing(self) -> bool:
         """Ask the user whether to land; False if the flight is ended meanwhile, as by a pilot."""
-        self._asking = True
+        self._asking_landing = True
         try:
             return bool(await self._run_until_end(self._ask_landing(), inf))
         finally:
-            self._asking = False
+            self._asking_landing = False
 
     async def _run_repeatedly(self, work: Callable[[], Awaitable[None]]) -> None:
         """Run a task repeatedly while the phases run; an exception in it ends the flight."""
@@ -241,7 +242,7 @@ class Flight:
     async def _report_progress(self) -> None:
         while True:
             await asyncio.sleep(_PROGRESS_PERIOD)
-            phase, elapsed = self.phase, self._clock() - self._entered
+            phase, elapsed = self.phase, self._clock() - self._phase_began
             self._observer.waiting(phase.name, self._context.detail, elapsed, phase.timeout)
 
     @staticmethod

@@ -40,7 +40,7 @@ def facts_of(
     assembled: AssembledFlight,
     phases: Sequence[tuple[float, str]],
     result: str,
-    advised: tuple[str, ...],
+    advice_texts: tuple[str, ...],
 ) -> FlightFacts:
     """The facts of a finished flight.
 
@@ -48,7 +48,7 @@ def facts_of(
         assembled: the flight.
         phases: beginning (s on our clock) and name of each phase.
         result: result of the flight.
-        advised: advice of the flight; see `advice`.
+        advice_texts: advice of the flight; see `advice`.
     """
     flight, context, reporter = assembled.flight, assembled.context, assembled.reporter
     state, began, config = context.link.state, flight.began, context.config
@@ -76,7 +76,7 @@ def facts_of(
         max_tilt=config.limits.max_tilt,
         deadline=config.deadman.deadline,
         lockstep=not reporter.real_time,
-        advice=advised,
+        advice=advice_texts,
         gain_warning=gain_warning(config),
         settings=_learned_settings(context),
         changes=tuple(change.as_dict(began) for change in assembled.changes.made_in_flight),
@@ -84,7 +84,10 @@ def facts_of(
 
 
 def _silence_duration(context: FlightContext, now: float) -> float | None:
-    """Time since the last heartbeat if it is overdue, else since the last frame, s; None: heard."""
+    """Time since the last heartbeat if it is overdue, else since the last frame, s.
+
+    None: frames arrive without a pause, or no heartbeat ever came.
+    """
     heartbeat = context.link.state.heartbeat
     if heartbeat is None:
         return None

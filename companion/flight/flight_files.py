@@ -22,7 +22,7 @@ from companion.recording.recorder import FlightRecorder
 from companion.recording.tlog import TlogWriter
 
 _SUMMARY_RESERVE = 1 << 18
-"""Room kept for `summary.json`, bytes; most take less than 10 kB, and every event adds to them."""
+"""Disk space reserved for `summary.json`, bytes; most need less than 10 kB."""
 
 
 class FlightFiles:
@@ -36,7 +36,7 @@ class FlightFiles:
         folder: existing folder for the files; None: nothing is written.
         environment: environment of the flight.
         note: called with a failure of the recording.
-        follows: whether the maneuvers of the configuration are flown.
+        flies_maneuvers: whether the maneuvers of the configuration are flown.
 
     Attributes:
         folder: folder of the files, or None.
@@ -55,23 +55,23 @@ class FlightFiles:
         environment: Environment,
         note: Callable[[str], None],
         *,
-        follows: bool,
+        flies_maneuvers: bool,
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
         self._counted_before: dict[str, int] = {}
         self._ended_at = 0.0
-        self._failure_told = self._opened = False
+        self._failure_reported = self._is_open = False
         self.tap: TlogWriter | None = None
         self.mcap: FlightRecorder | None = None
         if folder is not None:
-            flown_config.record(config, folder, follows=follows)
-            self._room = ReservedSpace(folder, _SUMMARY_RESERVE)
+            flown_config.record(config, folder, flies_maneuvers=flies_maneuvers)
+            self._reserved_space = ReservedSpace(folder, _SUMMARY_RESERVE)
             loop = asyncio.get_running_loop()
             in_vehicle_time = config.link.lockstep or not environment.realtime
             epoch = 0.0 if in_vehicle_time else time.time() - loop.time()
 
             def on_failure(text: str) -> None:  # called in a writing thread
-                loop.call_soon_threadsafe(self._tell_failure, text)
+                loop.call_soon_threadsafe(self._report_failure, text)
 
             def on_bad_entry(text: str) -> None:  # the same
                 loop.call_soon_threadsafe(note, text)
@@ -90,17 +90,17 @@ class FlightFiles:
         """Create `flight.tlog` and `flight.mcap`, both or none.
 
         Raises:
-            OSError: one cannot be created.
+            OSError: a file cannot be created.
         """
         with ExitStack() as opened:
             for file in (self.tap, self.mcap):
                 if file is not None:
                     opened.enter_context(file)
             opened.pop_all()
-        self._opened = True
+        self._is_open = True
 
     def __enter__(self) -> "FlightFiles":
-        if not self._opened:
+        if not self._is_open:
             self.open()
         return self
 
@@ -109,14 +109,14 @@ class FlightFiles:
             if file is not None:
                 file.close()
 
-    def _tell_failure(self, text: str) -> None:
+    def _report_failure(self, text: str) -> None:
         """Report once that the recording has stopped; a full disk stops both files."""
-        if not self._failure_told:
-            self._failure_told = True
+        if not self._failure_reported:
+            self._failure_reported = True
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """An observer that records phases and events (STATUSTEXTs), and passes them on."""
+        """An observer that records phases and events, as STATUSTEXTs, too, and passes them on."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
@@ -150,11 +150,11 @@ class FlightFiles:
             grants: which requested real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
-        dead_times = assembled.dead_time_watch.over_the_flight()
-        advised = advice(assembled, dead_times)
-        for text in advised:  # shown with the figures, not here
+        dead_times = assembled.dead_time_watch.measure_whole_flight()
+        advice_texts = advice(assembled, dead_times)
+        for text in advice_texts:  # shown with the figures, not here
             if text == dead_times.warning():
-                continue  # told in flight
+                continue  # already reported in flight
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
             recorder.write(text)
         assembled.drag_memory.save()
@@ -175,7 +175,7 @@ class FlightFiles:
             dead_times=dead_times,
             predictive=assembled.predictive_figures(),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            facts=facts_of(assembled, recorder.phases, result, advised),
+            facts=facts_of(assembled, recorder.phases, result, advice_texts),
         )
 
     def save(self, summary: Summary) -> Summary:
@@ -188,16 +188,16 @@ class FlightFiles:
         failures = [file.failure for file in (self.tap, self.mcap) if file and file.failure]
         if failures and not any(text in failures for _, text in events):
             events.append((self._ended_at, failures[0]))  # it was found when the files were closed
-        whole = replace(summary, link={**summary.link, "not_recorded": dropped}, events=events)
+        completed = replace(summary, link={**summary.link, "not_recorded": dropped}, events=events)
         folder = self.folder
         if folder is None:
-            return whole
-        text = whole.as_json() + "\n"
-        self._room.free()
+            return completed
+        text = completed.as_json() + "\n"
+        self._reserved_space.free()
         failure = write_with_timeout(folder / "summary.json", text)
         if failure is not None:
             self._note(f"{folder}: summary.json was not written: {failure}")
-        return whole
+        return completed
 
 
 def _counters(stats: LinkStats) -> dict[str, int]:

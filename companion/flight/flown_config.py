@@ -22,16 +22,16 @@ _TRAJECTORY_FOLDER = "trajectory"
 _TABLE_FILE = "table.csv"
 
 
-def record(config: Config, folder: Path, *, follows: bool = True) -> None:
+def record(config: Config, folder: Path, *, flies_maneuvers: bool = True) -> None:
     """Write `config.yaml` to the folder of a flight, and copy the trajectory's file there.
 
     The file contains the keys of included files. Other files, such as a signing key, are not
     copied; they are named by their absolute path.
 
     Args:
-        config: configuration of the flight; its trajectory can be read.
+        config: configuration of the flight, whose trajectory was read without error.
         folder: folder of the flight.
-        follows: whether the maneuvers of the configuration are flown, including its trajectory.
+        flies_maneuvers: whether the maneuvers of the configuration are flown, and its trajectory.
 
     Raises:
         ConfigError: the trajectory's file has changed and holds no trajectory.
@@ -41,7 +41,7 @@ def record(config: Config, folder: Path, *, follows: bool = True) -> None:
     for place in FILE_KEYS:
         _make_absolute(data, place)
     path = config.flight.trajectory
-    if follows and path is not None and "trajectory" in config.flight.maneuvers:
+    if flies_maneuvers and path is not None and "trajectory" in config.flight.maneuvers:
         data["flight"]["trajectory"] = (
             f"{_TRAJECTORY_FOLDER}/{copy_trajectory(path, folder / _TRAJECTORY_FOLDER)}"
         )

@@ -18,7 +18,7 @@ from companion.safety.actions import FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _REPETITION_PAUSE = 1.0
-"""Time from a landing that failed to the next request, s: the reason may be gone by then."""
+"""Time from a refused or unanswered landing command to the next one, s: the reason may be gone."""
 
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 """Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
@@ -26,7 +26,7 @@ ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFB
 _OBEYS_OR_LANDS = frozenset({Role.OFFBOARD, Role.LAND})
 
 _PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
-"""Called with the error of a request: raises it, or returns the `RequireOurs` of the next one."""
+"""Called with the error of a mode command: raises it, or returns `require_ours` for the retry."""
 
 
 async def hand_over_to_hold(context: FlightContext) -> None:
@@ -53,28 +53,28 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     """Ask the autopilot to land until it does, even if it refuses; then release.
 
     Before each repetition, a vehicle that still obeys us is asked to hold: ArduPilot would not hold
-    its position after our last setpoint. A hold that others command then is respected.
+    its position after our last setpoint. If others command a hold meanwhile, they keep control.
 
     Raises:
         FlightEnded: somebody else has the vehicle.
     """
     require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
-    refused = False
+    refusal_noted = False
 
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
 
     async def prepare(error: LinkError) -> RequireOurs:
-        nonlocal refused
-        if isinstance(error, CommandRefused) and not refused:
-            refused = True
+        nonlocal refusal_noted
+        if isinstance(error, CommandRefused) and not refusal_noted:
+            refusal_noted = True
             context.note(f"{error}; the landing is requested again every second")
-        obeyed = in_role(context.link, Role.OFFBOARD)
+        was_offboard = in_role(context.link, Role.OFFBOARD)
         await asyncio.sleep(_REPETITION_PAUSE)
-        if obeyed and not landing():
+        if was_offboard and not landing():
             await _hold_meanwhile(context, landing)
-        obeys = in_role(context.link, Role.OFFBOARD)
-        return requiring_roles(context.link, _OBEYS_OR_LANDS) if obeys else require_ours
+        is_offboard = in_role(context.link, Role.OFFBOARD)
+        return requiring_roles(context.link, _OBEYS_OR_LANDS) if is_offboard else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 
@@ -89,9 +89,9 @@ async def _hand_over(
     """Stop the motion, and command a mode until the autopilot has entered it; then release.
 
     A command that has no effect is sent again until the phase is over: a vehicle whose uplink loses
-    frames must not be left in the air. It is held where it is then, because it may have drifted.
+    frames must not be left in the air. Before each try, the vehicle is held at its present place.
     """
-    releasing = asyncio.create_task(_release_once_left(context))
+    release_task = asyncio.create_task(_release_once_left(context))
     try:
         while True:
             _stop_moving(context)
@@ -104,7 +104,7 @@ async def _hand_over(
             if done():
                 break
     finally:
-        await cancel(releasing)
+        await cancel(release_task)
     context.release()
 
 
@@ -116,7 +116,7 @@ async def _release_once_left(context: FlightContext) -> None:
 
 
 async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
-    """Ask the autopilot to hold; go on without it if it does not, or if it lands meanwhile."""
+    """Ask the autopilot to hold, then release; do nothing more if that fails or it lands."""
     try:
         await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
     except (CommandRefused, CommandTimeout, LinkLost):

@@ -49,8 +49,8 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
         _require_motions_inside(config, part, motions, None)
     if isinstance(part, HeldHeadingManeuver):
         envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
-        for broken in judge(motions[0], envelope):
-            _refuse_violation(part.name, broken, drag.assumption)
+        for violation in judge(motions[0], envelope):
+            _refuse_violation(part.name, violation, drag.assumption)
 
 
 def require_inside(
@@ -93,34 +93,34 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
 
     if isinstance(maneuver, Follow | HeldHeadingManeuver):
         with naming_trajectory_errors(maneuver.name):
-            broken = violations(maneuver.trajectory, replace(envelope, fence=fence))
-        if broken:
-            raise ConfigError(f"{maneuver.name}: {broken[0]}; {broken[0].remedy}")
+            found = violations(maneuver.trajectory, replace(envelope, fence=fence))
+        if found:
+            raise ConfigError(f"{maneuver.name}: {found[0]}; {found[0].remedy}")
 
 
-def require_still_flyable(config: Config, flown: ManeuverSequence, drag: KnownDrag) -> None:
+def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: KnownDrag) -> None:
     """Check the maneuvers again, because the limits or the vehicle have changed.
 
     The check uses the trajectory that is flown; it is not read or slowed down again.
 
     Args:
-        config: the changed configuration; its maneuvers are those of `flown`.
-        flown: the maneuvers that were made when the flight began.
+        config: the changed configuration; its maneuvers are those of `sequence`.
+        sequence: the maneuvers that were made when the flight began.
         drag: drag of the vehicle.
 
     Raises:
         ConfigError: a maneuver cannot be computed, or not be flown within the limits and the
             fence.
     """
-    for part in flown.parts:
+    for part in sequence.parts:
         if not isinstance(part, Follow):
             require_flyable(config, part, drag)
             continue
         with naming_trajectory_errors(part.name):
-            broken = violations(part.trajectory, envelope_of(config, drag))
-        if broken:
+            found = violations(part.trajectory, envelope_of(config, drag))
+        if found:
             raise ConfigError(
-                f"{part.name}: {broken[0]}; a trajectory is not slowed down again in flight, so "
+                f"{part.name}: {found[0]}; a trajectory is not slowed down again in flight, so "
                 f"choose a value with which it keeps the limits{drag.assumption}"
             )
 
@@ -171,12 +171,12 @@ def _predicted_motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
 _cached_motion = lru_cache(maxsize=32)(_predicted_motion)
 
 
-def _refuse_violation(name: str, broken: Violation | None, assumption: str = "") -> None:
-    if broken is None:
+def _refuse_violation(name: str, violation: Violation | None, assumption: str = "") -> None:
+    if violation is None:
         return
     # `--slow-down` applies to trajectories only.
-    remedy = _SLOWER_REMEDY if broken.slowing_helps else broken.remedy
-    raise ConfigError(f"{name}: {broken}; {remedy}{assumption}")
+    remedy = _SLOWER_REMEDY if violation.slowing_helps else violation.remedy
+    raise ConfigError(f"{name}: {violation}; {remedy}{assumption}")
 
 
 def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
@@ -200,8 +200,10 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
 
 def with_reserve(config: Config, envelope: Envelope) -> Envelope:
     """The limits with a tilt that keeps `flight.slow_down_reserve_m_s2` of acceleration unused."""
-    most = config.limits.max_horizontal_acceleration - config.flight.slow_down_reserve_m_s2
-    return replace(envelope, max_tilt=atan(most / GRAVITY))
+    max_acceleration = (
+        config.limits.max_horizontal_acceleration - config.flight.slow_down_reserve_m_s2
+    )
+    return replace(envelope, max_tilt=atan(max_acceleration / GRAVITY))
 
 
 def _fence_check(config: Config, origin: Place | None) -> FenceCheck:

@@ -99,8 +99,8 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
             reserve = config.flight.slow_down_reserve_m_s2
             notes = (*notes, *slow_down_notes(trajectory, slower, reserve))
             trajectory = slower.trajectory
-        elif broken := violations(trajectory, envelope):
-            first = min(broken, key=lambda one: one.slowing_helps)
+        elif found := violations(trajectory, envelope):
+            first = min(found, key=lambda one: one.slowing_helps)
             assumption = drag.assumption if first.slowing_helps else ""
             raise ConfigError(f"{path}: {first}; {first.remedy}{assumption}")
     notes = (*notes, overview(trajectory))

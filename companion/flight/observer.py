@@ -15,7 +15,7 @@ class Observer(Protocol):
         ...
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Once a second: the phase, the condition it waits for, elapsed time and timeout (s)."""
+        """Once a second: name of the phase, what it waits for, elapsed time and timeout (s)."""
         ...
 
     def status(self, status: FlightStatus) -> None:
@@ -31,16 +31,16 @@ class SilentObserver:
     """An observer that ignores everything."""
 
     def phase(self, name: str, waits_for: str) -> None:
-        """Ignore it."""
+        """Ignore the phase."""
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Ignore it."""
+        """Ignore the progress."""
 
     def status(self, status: FlightStatus) -> None:
-        """Ignore it."""
+        """Ignore the state."""
 
     def event(self, time: float, text: str) -> None:
-        """Ignore it."""
+        """Ignore the event."""
 
 
 class SeveralObservers:
@@ -128,7 +128,7 @@ class EventRecorder:
         return type(self._observer).status is not SilentObserver.status
 
     def status(self, status: FlightStatus) -> None:
-        """Pass the state on; if this raises, the caller notes it, and passes on no more states."""
+        """Pass the state on; if the observer raises, the caller must pass on no more states."""
         self._observer.status(status)
 
     def event(self, time: float, text: str) -> None:

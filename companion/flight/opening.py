@@ -1,4 +1,4 @@
-"""What a session opens and requests before its flight, from the configuration."""
+"""Makes, from the configuration, the link and the real-time settings of a session."""
 
 from pathlib import Path
 

@@ -20,7 +20,7 @@ _MANEUVER_GRACE = 10.0
 _COMMAND_TIMEOUT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKEOVER_TIMEOUT = 15.0
-"""Timeout for the takeover with its preflight checks, whose parameters a bad link may lose, s."""
+"""Timeout for the takeover with its preflight checks, s; a lossy link delays their parameters."""
 _LISTENING_TIMEOUT = 10.0
 """Time to wait for a vehicle that is not heard any more, s."""
 
@@ -32,9 +32,9 @@ class Phase:
     """One phase of a flight."""
 
     name: str
-    """Shown to the user."""
+    """Name, shown to the user."""
     waits_for: str
-    """The condition it waits for, shown to the user."""
+    """The condition that ends the phase, shown to the user."""
     work: Work
     """The coroutine of the phase."""
     timeout: float
@@ -47,8 +47,8 @@ class Phase:
     """Roles of the allowed modes; a mode without one of them is a takeover, and so is an unknown
     mode. Empty: any mode."""
     monitored: bool = False
-    """Whether the safety monitors may end the phase. An exit is not monitored, because the breach
-    that caused it would end it too."""
+    """Whether the safety monitors may end the phase. The phases of an exit are not monitored: the
+    breach that caused the exit would end them, too."""
 
     def exit_on_failure(self, *, standing: bool) -> Exit:
         """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""

@@ -67,9 +67,9 @@ class PreflightChecks:
         wanted = wanted_rates(self._config, self._link)
         self._granted = await self._link.set_rates(wanted, window_s=0.1)
         for message, rate in self._granted.items():
-            if rate.granted < rate.asked:
+            if rate.granted < rate.requested:
                 self._note_once(
-                    f"{message}: asked for {rate.asked:g} Hz, granted {rate.granted:g} Hz"
+                    f"{message}: asked for {rate.requested:g} Hz, granted {rate.granted:g} Hz"
                 )
 
     async def require(self, stage: Stage) -> Evidence:
@@ -95,7 +95,7 @@ class PreflightChecks:
         drag = self.drag_of(evidence.identity)
         planned = self._maneuvers if self._maneuvers.parts else None
         evidence = replace(evidence, stage=stage, maneuvers=planned, known_drag=drag)
-        self._act_on(run_checks(self._config, evidence, again=before is not None))
+        self._act_on(run_checks(self._config, evidence, repeated=before is not None))
         return evidence
 
     def _act_on(self, findings: list[Finding]) -> None:

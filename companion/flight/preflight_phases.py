@@ -158,7 +158,7 @@ def _require_untouched(context: FlightContext) -> None:
 
 
 def _require_flyable_by_vehicle(context: FlightContext) -> None:
-    """Check the maneuvers again: with this vehicle's drag, and a fence in latitude and longitude.
+    """Check the maneuvers again, with this vehicle's drag and its latitude and longitude.
 
     Raises:
         FlightEnded: a maneuver leaves the fence or exceeds a limit.

@@ -95,7 +95,7 @@ class Session:
         environment = self._environment
         config = self.changes.begin_flight()
         record = FlightFiles(
-            config, self._folder, environment, self.note, follows=self._plan is None
+            config, self._folder, environment, self.note, flies_maneuvers=self._plan is None
         )
         settings = realtime_settings(self._config) if environment.realtime else RealtimeSettings()
         with realtime.requested(settings) as grants, record:
@@ -137,7 +137,7 @@ class Session:
 
     @staticmethod
     async def _report_status(assembled: AssembledFlight) -> None:
-        """Record and show the state of the flight; a fault in it does not end the flight."""
+        """Record and show the state of the flight; an exception here does not end the flight."""
         try:
             await assembled.reporter.run()
         except Exception as error:

@@ -1,4 +1,4 @@
-"""Checks of a configuration before anything is begun: what cannot be used is refused."""
+"""Checks of a configuration before the flight begins; one that cannot be used is refused."""
 
 from companion.config import Config
 from companion.control.inner_loop import planner

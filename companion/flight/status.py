@@ -23,7 +23,7 @@ _STATUS_PERIOD = 0.1
 _RATE_WINDOW = 1.0
 """Time over which the rate of setpoints is counted, s."""
 _MAX_TELEMETRY_AGE = 1.0
-"""A position or attitude that was received longer ago is unknown by now, s."""
+"""Age above which a position or attitude counts as unknown, s."""
 
 
 class FlightStatus(NamedTuple):
@@ -31,36 +31,36 @@ class FlightStatus(NamedTuple):
 
     time: float
     """Time since the flight began, s."""
-    airborne: float | None
+    airborne_time: float | None
     """Time since the vehicle left the ground, s."""
     phase: str
     """Name of the phase."""
     detail: str
     """What the phase waits for."""
     elapsed: float
-    """Time in this phase, s."""
+    """Time since the phase began, s."""
     timeout: float
-    """Timeout of this phase, s; may be infinite."""
+    """Timeout of the phase, s; may be infinite."""
     maneuver: str | None = None
     """Name of the maneuver that is flown."""
     maneuver_elapsed: float = 0.0
-    """Time in this maneuver, s."""
+    """Time since the maneuver began, s."""
     maneuver_duration: float | None = None
-    """Duration of this maneuver, s; None: another program ends it."""
+    """Duration of the maneuver, s; None: no maneuver, or another program ends it."""
     height: float | None = None
     """Height above home, m."""
     speed: float | None = None
-    """Speed, m/s."""
+    """Speed, horizontal and vertical together, m/s."""
     tilt: float | None = None
     """Tilt, rad."""
-    error: float | None = None
+    tracking_error: float | None = None
     """Distance from the reference, m."""
-    rate: float | None = None
+    setpoint_rate: float | None = None
     """Rate of setpoints, Hz."""
     latency: float | None = None
     """Time from the last answered sample to its setpoint, s; None in lockstep, and while the
     control loop is off."""
-    missed: int | None = None
+    missed_deadlines: int | None = None
     """Deadlines missed so far; None in lockstep."""
     battery: Battery | None = None
     """Battery of the vehicle."""
@@ -82,7 +82,7 @@ class StatusReporter:
 
     Args:
         context: context of the flight.
-        ladder: the safety monitors.
+        ladder: tells which safety monitors have raised an alarm.
         trace: receives the motion.
         began: when the flight began, s on our clock.
         phase: returns the running phase, and when it began, s on our clock.
@@ -108,7 +108,7 @@ class StatusReporter:
         self._context, self._safety_ladder, self._trace = context, ladder, trace
         self.real_time = real_time
         self._began, self._phase, self._show, self._clock = began, phase, show, clock
-        self._counted: deque[tuple[float, int]] = deque()
+        self._setpoint_counts: deque[tuple[float, int]] = deque()
         self._rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
@@ -121,7 +121,7 @@ class StatusReporter:
             await asyncio.sleep(due - self._clock())
 
     def _show_status(self) -> None:
-        """Show the state; after a fault of the observer it is only recorded."""
+        """Show the state; once the observer has raised an exception, show no more states."""
         if self._show is None:
             return
         try:
@@ -146,44 +146,44 @@ class StatusReporter:
             None if tilt is None else degrees(tilt),
             self._error(),
         )
-        known = (nan if one is None else one for one in row)
-        self._trace.add_motion(now, (now - self._began, *known))
+        finite_row = (nan if value is None else value for value in row)
+        self._trace.add_motion(now, (now - self._began, *finite_row))
 
     def status(self) -> FlightStatus:
         """The present state."""
         now, context = self._clock(), self._context
-        (phase, entered), record = self._phase(), context.loop.record
-        flown = flown_part(context.guidance_loop.flown_source, now)
+        (phase, phase_began), record = self._phase(), context.loop.record
+        maneuver = flown_part(context.guidance_loop.flown_source, now)
         return FlightStatus(
             time=now - self._began,
-            airborne=None if self.takeoff is None else now - self.takeoff,
+            airborne_time=None if self.takeoff is None else now - self.takeoff,
             phase=phase.name,
             detail=context.detail,
-            elapsed=now - entered,
+            elapsed=now - phase_began,
             timeout=phase.timeout,
-            maneuver=None if flown is None else flown.name,
-            maneuver_elapsed=0.0 if flown is None else flown.elapsed,
-            maneuver_duration=None if flown is None else flown.duration,
+            maneuver=None if maneuver is None else maneuver.name,
+            maneuver_elapsed=0.0 if maneuver is None else maneuver.elapsed,
+            maneuver_duration=None if maneuver is None else maneuver.duration,
             height=self._height(now),
             speed=self._speed(now),
             tilt=self._tilt(now),
-            error=self._error(),
-            rate=self._setpoint_rate(now, record),
+            tracking_error=self._error(),
+            setpoint_rate=self._setpoint_rate(now, record),
             latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
-            missed=record.missed_deadlines if self.real_time else None,
+            missed_deadlines=record.missed_deadlines if self.real_time else None,
             battery=context.link.state.battery,
             monitored=phase.monitored and context.loop.offboard_active,
-            alarms=self._safety_ladder.raised,
+            alarms=self._safety_ladder.raised_alarms,
             view=view(context, now),
         )
 
     def _setpoint_rate(self, now: float, record: LoopRecord) -> float | None:
         """Rate of setpoints over the last second, Hz; None if none was sent."""
-        counted = self._counted
-        counted.append((now, record.setpoints))
-        while len(counted) > 2 and now - counted[1][0] >= _RATE_WINDOW:
-            counted.popleft()
-        since, before = counted[0]
+        counts = self._setpoint_counts
+        counts.append((now, record.setpoints))
+        while len(counts) > 2 and now - counts[1][0] >= _RATE_WINDOW:
+            counts.popleft()
+        since, before = counts[0]
         sent = record.setpoints - before
         return sent / (now - since) if sent and now > since else None
 

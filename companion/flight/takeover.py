@@ -28,7 +28,7 @@ _BRAKING_TIME = 5.0
 """Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
 
 _SETTLE_TIME = 1.0
-"""Hold in offboard before the maneuvers begin, s, so that the takeover does not disturb them."""
+"""Time of holding in offboard before the maneuvers begin, s: the takeover must not disturb them."""
 
 
 async def check_airborne(context: FlightContext) -> None:
@@ -87,7 +87,7 @@ def _require_armed_on_ground(context: FlightContext) -> None:
 
 
 async def offboard(context: FlightContext) -> None:
-    """Check the vehicle again, take over, and settle."""
+    """Check the vehicle again, take over, and hold for `_SETTLE_TIME`."""
     context.detail = "the preflight checks before the takeover"
     await context.preflight.require(Stage.AIRBORNE)
     await _wait_until_held(context)

@@ -41,7 +41,7 @@ class SameVehicle:
         self._other_uid: str | None = None
         self._frames = 0
         self._updated_at = clock()
-        self._silent_for = self._past_silence = 0.0
+        self._silence = self._long_silence = 0.0
 
     def begin(self) -> None:
         """Begin to watch: from now on, every frame must come from one vehicle."""
@@ -49,25 +49,25 @@ class SameVehicle:
         self._uid = self._other_uid = None
         self._peers, self._restarts = self._link.stats.peers, self._link.clock.restarts
         self._frames, self._updated_at = self._link.stats.frames, self._clock()
-        self._silent_for = self._past_silence = 0.0
+        self._silence = self._long_silence = 0.0
 
     def commit(self) -> None:
         """Note that the vehicle is being armed: from now on a replacement ends the flight.
 
-        Silence is then a matter of the watch and the safety monitors.
+        From then on, only the watch and the safety monitors judge silence.
         """
-        self._committed, self._past_silence = True, 0.0
+        self._committed, self._long_silence = True, 0.0
 
     def update(self) -> None:
         """Measure the silence; the watch calls this 50 times a second."""
         now, frames = self._clock(), self._link.stats.frames
-        since, self._updated_at = now - self._updated_at, now
+        interval, self._updated_at = now - self._updated_at, now
         if frames == self._frames:
-            self._silent_for += min(since, _LONGEST_UPDATE_INTERVAL)
+            self._silence += min(interval, _LONGEST_UPDATE_INTERVAL)
             return
-        if self._silent_for > LONGEST_SILENCE and not self._committed:
-            self._past_silence = self._silent_for
-        self._frames, self._silent_for = frames, 0.0
+        if self._silence > LONGEST_SILENCE and not self._committed:
+            self._long_silence = self._silence
+        self._frames, self._silence = frames, 0.0
 
     def note_identity(self, identity: Identity) -> None:
         """Take the identity from AUTOPILOT_VERSION; an unknown hardware id is ignored."""
@@ -88,8 +88,8 @@ class SameVehicle:
             self._peers == self._link.stats.peers
             and self._restarts == self._link.clock.restarts
             and self._other_uid is None
-            and not self._past_silence
-            and (self._silent_for <= LONGEST_SILENCE or self._committed)
+            and not self._long_silence
+            and (self._silence <= LONGEST_SILENCE or self._committed)
         ) or not self._begun
 
     def require(self) -> None:
@@ -116,8 +116,8 @@ class SameVehicle:
             return f"the autopilot may have restarted: {self._link.clock.last_change}"
         if self._other_uid is not None:
             return f"another vehicle answers: hardware id {self._other_uid}, not {self._uid}"
-        if self._past_silence:
-            return f"the vehicle was not heard for {self._past_silence:.1f} s"
+        if self._long_silence:
+            return f"the vehicle was not heard for {self._long_silence:.1f} s"
         return None
 
 
@@ -153,7 +153,7 @@ class DragMemory:
         self.on_known: Callable[[KnownDrag], None] = lambda _: None
 
     def load(self, identity: Identity) -> KnownDrag:
-        """What is known of this vehicle's drag; it is read when the vehicle is first identified."""
+        """Return what is known of this vehicle's drag; the file is read only for a new vehicle."""
         if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid
             self._known_drag = of_vehicle(self._config, self._directory, identity.uid)

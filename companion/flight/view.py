@@ -17,13 +17,13 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
     Values that are not known are left out.
     """
     loop, guidance_loop, state = context.loop, context.guidance_loop, context.link.state
-    shown = {**_attitude(context, now), **_motion_values(context, now)}
+    values = {**_attitude(context, now), **_motion_values(context, now)}
     origin = context.snapshot_builder.fence_centre_ned
     if origin is not None:
-        shown.update(_with_axis_names("fence", origin, "m"))
+        values.update(_with_axis_names("fence", origin, "m"))
     wind = guidance_loop.estimate.disturbance
     stats, round_trip = context.link.stats, context.link.timesync.round_trip_s
-    shown.update(
+    values.update(
         wind_north_m_s2=wind[0],
         wind_east_m_s2=wind[1],
         height_m=state.height,
@@ -35,7 +35,7 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
         unanswered=sum(loop.record.unanswered.values()),
         offboard_active=loop.offboard_active,
     )
-    known = ((name, value) for name, value in shown.items() if value is not None)
+    known = ((name, value) for name, value in values.items() if value is not None)
     return {
         name: round(value, 5) if isinstance(value, float) else value
         for name, value in known
@@ -45,18 +45,18 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
 
 def _attitude(context: FlightContext, now: float) -> dict[str, float | None]:
     """Values of the newest sample, and of the target while setpoints are sent."""
-    loop, shown = context.loop, dict[str, float | None]()
+    loop, values = context.loop, dict[str, float | None]()
     sample, command = loop.resets.newest, loop.command
     if sample is not None:
         north, east = coefficients(sample.q)
-        shown.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))
-        shown.update(measured_north=north, measured_east=east)
-        shown.update(_with_axis_names("measured", sample.body_rates, "rad_s", _RATE_AXES))
+        values.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))
+        values.update(measured_north=north, measured_east=east)
+        values.update(_with_axis_names("measured", sample.body_rates, "rad_s", _RATE_AXES))
     if command is not None and loop.on:
         target = command.target_at(now)
-        shown.update(target_north=target.north, target_east=target.east)
-        shown.update(target_heading_rad=target.heading, thrust=loop.record.thrust)
-    return shown
+        values.update(target_north=target.north, target_east=target.east)
+        values.update(target_heading_rad=target.heading, thrust=loop.record.thrust)
+    return values
 
 
 def _motion_values(context: FlightContext, now: float) -> dict[str, float | None]:
@@ -64,29 +64,29 @@ def _motion_values(context: FlightContext, now: float) -> dict[str, float | None
     motion, height = context.guidance_loop.motion, context.link.state.height
     if motion is None:
         return {}
-    shown: dict[str, float | None] = {}
-    shown.update(_with_axis_names("estimated", motion.position_ned, "m"))
-    shown.update(_with_axis_names("estimated", motion.velocity_ned, "m_s"))
+    values: dict[str, float | None] = {}
+    values.update(_with_axis_names("estimated", motion.position_ned, "m"))
+    values.update(_with_axis_names("estimated", motion.velocity_ned, "m_s"))
     reference = _reference(context, now)
     if reference is not None:
-        shown.update(_with_axis_names("reference", reference.position_ned, "m"))
+        values.update(_with_axis_names("reference", reference.position_ned, "m"))
         north, east, down = reference.acceleration_ned
         thrust = hypot(north, east, GRAVITY - down)
         if thrust > 0.0:  # in free fall no direction of the thrust is wanted
-            shown.update(reference_north=north / thrust, reference_east=east / thrust)
+            values.update(reference_north=north / thrust, reference_east=east / thrust)
         if height is not None:
             above = motion.position_ned[2] - reference.position_ned[2]
-            shown.update(reference_height_m=height + above)
-    return shown
+            values.update(reference_height_m=height + above)
+    return values
 
 
 def _reference(context: FlightContext, now: float) -> Reference | None:
     """The reference that is flown, if the autopilot obeys us and there is one."""
     guidance_loop = context.guidance_loop
-    flown, motion = guidance_loop.flown_source, guidance_loop.motion
-    if not context.loop.offboard_active or flown.pose is None or motion is None:
+    source, motion = guidance_loop.flown_source, guidance_loop.motion
+    if not context.loop.offboard_active or source.pose is None or motion is None:
         return None
-    return flown.reference(now, motion, 0.0)(now)
+    return source.reference(now, motion, 0.0)(now)
 
 
 def _with_axis_names(

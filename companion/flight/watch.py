@@ -23,11 +23,11 @@ PX4 sends one every 0.5 s.
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
 _COUNTING_TIME = 0.1
-"""Time over which `set_rates` counts messages, s; nothing waits for it."""
+"""Time over which `set_rates` counts messages, s; the counts are not used."""
 
 
 class RateRequester:
-    """Requests a message again if its rate has become too low, as another station may cause.
+    """Requests a message again if its rate has become too low: another station may have changed it.
 
     It sends SET_MESSAGE_INTERVAL at most once a flight for each message, and does not block.
 
@@ -89,7 +89,7 @@ class Watch:
         self._rate_requester = rate_requester
         # Whether setpoints were stopped while the autopilot obeyed them: it may still wait for us.
         self._stopped_in_control = False
-        self._status_at = self._heartbeat_asked_at = -inf
+        self._current_mode_at = self._heartbeat_asked_at = -inf
         self._heartbeat_request: asyncio.Task[None] | None = None
         self._mode_request: asyncio.Task[None] | None = None
 
@@ -121,39 +121,43 @@ class Watch:
             FlightEnded: the phase must end; see `judge`.
         """
         now = self._clock()
-        early, self._status_at = now - self._status_at < _CURRENT_MODE_PERIOD, now
-        if early:
+        is_early, self._current_mode_at = now - self._current_mode_at < _CURRENT_MODE_PERIOD, now
+        if is_early:
             self._request_heartbeat(now)
         self.judge(phase)
 
     def _request_heartbeat(self, now: float) -> None:
         """Request a heartbeat, unless one was requested within `_HEARTBEAT_REQUEST_PERIOD`."""
-        asking = self._heartbeat_request is not None and not self._heartbeat_request.done()
-        if not asking and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
+        is_requesting = self._heartbeat_request is not None and not self._heartbeat_request.done()
+        if not is_requesting and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
             self._heartbeat_asked_at = now
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
     def ask_mode(self) -> None:
-        """Request a heartbeat; let the loop resume after a gap if its mode still obeys us."""
+        """After a gap in the setpoints, request a heartbeat; resume them if its mode obeys us."""
         # Without an answer the silence monitor ends the flight.
         self._mode_request = asyncio.create_task(self._confirm_control())
 
     async def _confirm_control(self) -> None:
-        """Wait for a fresh heartbeat, because one from the backlog may carry an old mode."""
+        """Wait for a fresh heartbeat; resume the setpoints if its mode obeys or awaits them.
+
+        A heartbeat from the backlog may carry an old mode.
+        """
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state
         roles = roles_of(self._context.link)
         # The takeover needs the stream before offboard is entered. During a failsafe the stream
         # must not resume, because it would end the failsafe.
-        entering = loop.taking_over and Role.READY in roles and not state.failsafe
-        if loop.awaiting_mode and (Role.OFFBOARD in roles or entering):
+        may_enter = loop.taking_over and Role.READY in roles and not state.failsafe
+        if loop.awaiting_mode and (Role.OFFBOARD in roles or may_enter):
             loop.resume()
 
     def _judge_snapshot(self, now: float) -> None:
-        """Give the ladder a snapshot and carry out its verdict."""
+        """Let the safety ladder judge a snapshot, and take the action that it demands."""
         self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
-        if snapshot.health.foreign:  # it may also be the autopilot's own setpoint, in a new mode
+        # A foreign setpoint may also be the autopilot's own, in a new mode.
+        if snapshot.health.foreign_reports:
             self._request_heartbeat(now)
         self._rate_requester.check(snapshot.health)
         verdict = self._safety_ladder.step(snapshot)
@@ -172,8 +176,8 @@ class Watch:
     def _judge_heartbeat(self, now: float) -> None:
         """Judge the age of the mode and of the heartbeat at `now`, the time of this judgement.
 
-        Unless we are in control, our own stalls do not count: what came meanwhile is read after
-        them, and a vehicle that takes off must not be left for a stall of ours.
+        While the autopilot does not obey us, stalls of this program do not count as age: heartbeats
+        that came during a stall are read after it, and a stall must not end a take-off.
         """
         state, loop = self._context.link.state, self._context.loop
         # While taking over, it may obey the first setpoint although no heartbeat has told so.

@@ -50,12 +50,12 @@ CHECKS: tuple[Check, ...] = (
 )
 
 
-def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> list[Finding]:
-    """All findings, also safe ones; `again`: without the checks in `CHECKED_ONCE`."""
+def run_checks(config: Config, evidence: Evidence, *, repeated: bool = False) -> list[Finding]:
+    """All findings, also safe ones; `repeated`: without the checks in `CHECKED_ONCE`."""
     return [
         finding
         for check in CHECKS
-        if not (again and check in CHECKED_ONCE)
+        if not (repeated and check in CHECKED_ONCE)
         for finding in check(config, evidence)
     ]
 
@@ -63,8 +63,8 @@ def run_checks(config: Config, evidence: Evidence, *, again: bool = False) -> li
 def blocking(config: Config, findings: Iterable[Finding]) -> list[Finding]:
     """The findings that forbid a flight: unsafe and not accepted, or not ready."""
     findings = tuple(findings)
-    waiting = (finding for finding in findings if finding.result is CheckResult.NOT_READY)
-    return [*not_accepted(config, findings), *waiting]
+    not_ready = (finding for finding in findings if finding.result is CheckResult.NOT_READY)
+    return [*not_accepted(config, findings), *not_ready]
 
 
 def not_accepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:

@@ -26,7 +26,7 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether samples are fresh at arrival, if TIMESYNC can measure their age."""
     sample_age, stale_after = evidence.samples.age, config.deadman.telemetry_stale
     if sample_age is None:
-        if evidence.link.other_clock:
+        if evidence.link.timesync_on_other_clock:
             yield Finding(
                 Key.AGE,
                 INEFFECTIVE,
@@ -58,22 +58,22 @@ def round_trip(config: Config, seconds: float) -> Finding:
     gain = config.planner.gain_per_s
     gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
     product = gain * seconds if gain_matters else 0.0
-    late = product > _MAYBE_SHAKING_PRODUCT
+    is_late = product > _MAYBE_SHAKING_PRODUCT
     return Finding(
         Key.ROUND_TRIP,
-        UNSAFE if product > _SHAKING_PRODUCT else INEFFECTIVE if late else SAFE,
+        UNSAFE if product > _SHAKING_PRODUCT else INEFFECTIVE if is_late else SAFE,
         f"the link's round trip takes {1e3 * seconds:.1f} ms"
-        + (f", long for planner.gain_per_s {gain:g}" if late else ""),
-        "the vehicle shakes, because the attitude is corrected too late" if late else "",
+        + (f", long for planner.gain_per_s {gain:g}" if is_late else ""),
+        "the vehicle shakes, because the attitude is corrected too late" if is_late else "",
         f"use a faster link, or lower planner.gain_per_s to {_MAYBE_SHAKING_PRODUCT / seconds:.1f}"
-        if late
+        if is_late
         else "",
         "TIMESYNC",
     )
 
 
 def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the vehicle's clock runs steadily, as the control law needs it."""
+    """Whether the vehicle's clock runs steadily, at the rate of ours."""
     samples, source = evidence.samples, "ATTITUDE_QUATERNION time_boot_ms"
     if samples.clock_change:
         yield Finding(
@@ -85,19 +85,19 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "ATTITUDE_QUATERNION",
             source,
         )
-    elif samples.not_newer:
+    elif samples.not_newer_count:
         yield Finding(
             Key.CLOCK,
             UNSAFE
-            if samples.not_newer > _UNSAFE_NOT_NEWER_SHARE * samples.received
+            if samples.not_newer_count > _UNSAFE_NOT_NEWER_SHARE * samples.sample_count
             else INEFFECTIVE,
-            f"{samples.not_newer} of {samples.received} samples are stamped no later than the one "
-            "before",
+            f"{samples.not_newer_count} of {samples.sample_count} samples are stamped no later "
+            "than the one before",
             "they are not answered, and if that lasts, control is given back",
             "send attitude over one link only; restart the autopilot if its clock stands still",
             source,
         )
-    elif samples.received >= _MIN_SAMPLES and samples.clock_rate is not None:
+    elif samples.sample_count >= _MIN_SAMPLES and samples.clock_rate is not None:
         yield _clock_rate(config, evidence, samples.clock_rate, source)
 
 

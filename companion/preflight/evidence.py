@@ -36,7 +36,7 @@ class Identity(NamedTuple):
     version: str | None = None
     """Version of the flight software, such as 4.7.0-dev."""
     capabilities: int | None = None
-    """MAV_PROTOCOL_CAPABILITY."""
+    """Bits of MAV_PROTOCOL_CAPABILITY."""
     uid: str | None = None
     """Hardware id in hexadecimal digits; `None` if the hardware has none."""
 
@@ -60,7 +60,7 @@ class LinkQuality(NamedTuple):
     """Range of the round trips, s."""
     notices: tuple[str, ...] = ()
     """Messages of the link about signatures and the peer."""
-    other_clock: bool = False
+    timesync_on_other_clock: bool = False
     """Whether TIMESYNC uses another clock than the samples' stamps."""
 
     @property
@@ -72,19 +72,19 @@ class LinkQuality(NamedTuple):
 class SampleTimes(NamedTuple):
     """Times of the attitude samples received, by both clocks."""
 
-    received: int = 0
+    sample_count: int = 0
     """Number of samples."""
     longest_pause: float = 0.0
     """Longest time between two samples by our clock, s."""
-    not_newer: int = 0
+    not_newer_count: int = 0
     """Number of samples stamped no later than the one before."""
     clock_rate: float | None = None
-    """Vehicle seconds per second of ours; `None` for too few samples."""
+    """Seconds of the vehicle's clock per second of ours; `None` for too few samples."""
     age: float | None = None
-    """Median age of the samples at arrival, s; `None`: unknown (`VehicleClock`)."""
+    """Median age of the samples at arrival, s; `None`: TIMESYNC does not measure it."""
     clock_change: str = ""
     """Description of a jump or restart of the vehicle's clock; empty: none."""
-    unusable: int = 0
+    unusable_count: int = 0
     """Number of samples that are not a unit quaternion or not finite."""
     rate: float | None = None
     """Effective rate, Hz, lowered by bursts (`IntervalSums`); `None` for too few samples."""
@@ -97,9 +97,9 @@ class OtherNodes(NamedTuple):
     """(system, component) of every node that was heard."""
     companions: frozenset[tuple[int, int]] = frozenset()
     """Nodes whose heartbeat has the type onboard controller."""
-    steering: frozenset[tuple[int, int]] = frozenset()
+    setpoint_senders: frozenset[tuple[int, int]] = frozenset()
     """Nodes that sent setpoints."""
-    foreign_target: bool = False
+    target_is_foreign: bool = False
     """Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed, so that another
     node must have sent setpoints."""
 
@@ -116,7 +116,7 @@ class Evidence:
     """The parameters that matter to a flight."""
     streams: Mapping[str, StreamRate]
     """Rates requested, granted and counted, by message."""
-    received: Mapping[str, int]
+    received_counts: Mapping[str, int]
     """Number of messages since the link was opened, for each message of `streams`."""
     window: float
     """Time over which messages were counted, s."""
@@ -143,8 +143,8 @@ class Evidence:
     def awaits_position(self) -> bool:
         """Whether the vehicle has no position yet, or its estimator is not ready."""
         readiness = self.state.readiness
-        estimator_only = readiness._replace(position=True, home=True, prearm_good=True)
-        return not readiness.position or self.autopilot.not_ready(estimator_only) is not None
+        estimator_only = readiness._replace(has_position=True, has_home=True, prearm_passed=True)
+        return not readiness.has_position or self.autopilot.not_ready(estimator_only) is not None
 
     @property
     def booting(self) -> bool:
@@ -152,8 +152,8 @@ class Evidence:
         return self.state.readiness.estimator_flags is None
 
     @property
-    def awaited(self) -> tuple[str, ...]:
-        """Messages that the vehicle cannot send yet."""
+    def awaited_messages(self) -> tuple[str, ...]:
+        """Messages that the vehicle will send only when it has booted or has a position."""
         if not self.awaits_position:
             return ()
         return tuple(

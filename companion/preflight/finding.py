@@ -1,8 +1,8 @@
 """Findings of the preflight checks: fact, consequence, remedy, and source.
 
 A finding about a parameter has the parameter's name as key. A finding about a message rate has the
-key `link.streams.MESSAGE`, or, below a limit, the limit's: `link.min_attitude_rate_hz` or
-`link.min_position_rate_hz`. All other keys are listed here.
+key `link.streams.MESSAGE`, or that of the limit that the rate does not reach:
+`link.min_attitude_rate_hz` or `link.min_position_rate_hz`. All other keys are in `Key`.
 """
 
 from dataclasses import dataclass
@@ -88,7 +88,7 @@ class Finding:
     source: str = ""
     """Source of the fact: a MAVLink message, a reference, a measurement."""
     change: ParameterChange | None = None
-    """The parameter to set, if that fixes it."""
+    """The parameter change that would fix the problem; `None`: no such change."""
 
     def sentence(self) -> str:
         """The finding without its source, for the user."""

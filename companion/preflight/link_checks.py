@@ -23,14 +23,14 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
     result = (
         UNSAFE if share > _UNSAFE_LOSS_SHARE else INEFFECTIVE if share > TOLERABLE_LOSS else SAFE
     )
-    bad = result is not SAFE
+    is_lossy = result is not SAFE
     yield Finding(
         Key.LOSS,
         result,
         f"{100.0 * share:.1f} % of the vehicle's messages are lost",
-        "our setpoints are lost, too, and we see the pilot's mode changes late" if bad else "",
+        "our setpoints are lost, too, and we see the pilot's mode changes late" if is_lossy else "",
         "lower link.attitude_rate_hz and link.position_rate_hz, or use a better link"
-        if bad
+        if is_lossy
         else "",
         "gaps in MAVLink sequence numbers",
     )
@@ -129,17 +129,17 @@ def signing_findings(
 def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether other nodes use our ids, are companion computers, or send setpoints."""
     link, others = config.link, evidence.other_nodes
-    ours = link.source_system, link.source_component
-    if ours in others.sources:
+    our_ids = link.source_system, link.source_component
+    if our_ids in others.sources:
         yield Finding(
             Key.OUR_IDS,
             UNSAFE,
-            f"another program uses system/component {ours[0]}/{ours[1]}, our own ids",
+            f"another program uses system/component {our_ids[0]}/{our_ids[1]}, our own ids",
             "each program receives answers to the other one, and both may send setpoints",
             "end the other program, or give each its own link.source_component",
             "frames heard",
         )
-    for system, component in sorted(others.companions - {ours}):
+    for system, component in sorted(others.companions - {our_ids}):
         yield Finding(
             Key.SECOND_COMPANION,
             INEFFECTIVE,
@@ -148,14 +148,14 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "make sure that it only listens",
             "HEARTBEAT of type onboard controller",
         )
-    steering = sorted(others.steering)
-    if steering or others.foreign_target:
-        who = ", ".join(f"{system}/{component}" for system, component in steering)
+    senders = sorted(others.setpoint_senders)
+    if senders or others.target_is_foreign:
+        sender_names = ", ".join(f"{system}/{component}" for system, component in senders)
         yield Finding(
             Key.OTHER_SETPOINTS,
             UNSAFE,
-            f"somebody else sends setpoints{': ' + who if who else ''}",
+            f"somebody else sends setpoints{': ' + sender_names if sender_names else ''}",
             "the autopilot obeys whichever came last, so two would steer one vehicle",
             "end the other program",
-            "setpoints heard" if steering else "ATTITUDE_TARGET while disarmed",
+            "setpoints heard" if senders else "ATTITUDE_TARGET while disarmed",
         )

@@ -47,11 +47,11 @@ class LinkListener:
         self._stamps: list[tuple[float, float]] = []
         self._ages: list[float] = []
         self._clock_changes = link.clock.changes
-        self._unusable = 0
+        self._unusable_count = 0
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
-        self._steering: set[tuple[int, int]] = set()
-        self._foreign_target = False
+        self._setpoint_senders: set[tuple[int, int]] = set()
+        self._target_is_foreign = False
         self._resets_before: int | None = None
         self.resets = 0
 
@@ -74,17 +74,17 @@ class LinkListener:
         """The attitude samples so far."""
         pairs = list(zip(self._stamps, self._stamps[1:], strict=False))
         if not pairs:
-            return SampleTimes(len(self._stamps), unusable=self._unusable)
+            return SampleTimes(len(self._stamps), unusable_count=self._unusable_count)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
         enough = len(self._stamps) >= _MIN_SAMPLES and last > first
         arrivals, clock = IntervalSums(), self._link.clock
         for earlier, later in pairs:
             arrivals.add(later[0] - earlier[0])
         return SampleTimes(
-            received=len(self._stamps),
+            sample_count=len(self._stamps),
             longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
-            not_newer=sum(later[1] <= earlier[1] for earlier, later in pairs),
-            unusable=self._unusable,
+            not_newer_count=sum(later[1] <= earlier[1] for earlier, later in pairs),
+            unusable_count=self._unusable_count,
             clock_rate=(last_stamp - first_stamp) / (last - first) if enough else None,
             age=median(self._ages) if self._ages and clock.age_known else None,
             clock_change=clock.last_change if clock.changes != self._clock_changes else "",
@@ -97,15 +97,15 @@ class LinkListener:
         return OtherNodes(
             frozenset(self._sources),
             frozenset(self._companions),
-            frozenset(self._steering),
-            self._foreign_target,
+            frozenset(self._setpoint_senders),
+            self._target_is_foreign,
         )
 
     def _on_foreign(self, frame: Frame) -> None:
         source = frame.system, frame.component
         self._sources.add(source)
         if frame.message_id in _SETPOINT_IDS:
-            self._steering.add(source)
+            self._setpoint_senders.add(source)
         if (
             frame.message_id == _HEARTBEAT_ID
             and frame.payload[_TYPE_OFFSET : _TYPE_OFFSET + 1] == _ONBOARD_CONTROLLER
@@ -120,12 +120,12 @@ class LinkListener:
             self._ages.append(age)
         rates = message.rollspeed, message.pitchspeed, message.yawspeed
         usable = is_unit((message.q1, message.q2, message.q3, message.q4))
-        self._unusable += not (usable and all(map(isfinite, rates)))
+        self._unusable_count += not (usable and all(map(isfinite, rates)))
 
     def _on_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
         moving = any(abs(value) > _MAX_IDLE_TARGET for value in (*rates, message.thrust))
-        self._foreign_target = self._foreign_target or (moving and self._link.state.armed is False)
+        self._target_is_foreign |= moving and self._link.state.armed is False
 
     def _on_odometry(self, message: Message) -> None:
         before, self._resets_before = self._resets_before, message.reset_counter

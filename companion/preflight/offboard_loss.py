@@ -29,7 +29,7 @@ from companion.vehicle.parameter_rules import CheckResult
 _POINT_PERIOD = 0.05
 """Shortest time between the points of the maneuvers that are checked, s."""
 _MAX_POINTS = 1500
-"""Largest number of these points; longer maneuvers are checked at longer intervals."""
+"""Largest number of checked points; long maneuvers are checked at longer intervals."""
 _DERIVATIVE_STEP = 0.02
 """Time over which the rate of change of the thrust is taken, s."""
 _START_POSE = Pose((0.0, 0.0, 0.0), 0.0)
@@ -39,7 +39,7 @@ class WorstReach(NamedTuple):
     """How far the vehicle can be carried if our setpoints stop at any moment of the maneuvers.
 
     Attributes:
-        away, up, down: Largest horizontal distance, climb and fall from where it was then, m.
+        away, up, down: Largest horizontal distance, climb and fall after the setpoints stop, m.
         breach: The first breach of the fence, as the end of a sentence; `None`: none.
         time: When setpoints must stop to cause `breach`, s after control begins.
     """
@@ -110,7 +110,13 @@ def worst_reach(
 
 
 def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str | None:
-    """The breach of the fence at a place that the vehicle can reach from `offset`.
+    """The breach of the fence at a place that the vehicle can reach after the setpoints stop.
+
+    Args:
+        config: Configuration of the flight.
+        offset: Position when the setpoints stop, relative to where control began, m NED.
+        reached: How far the vehicle can be carried from there.
+        fence: The fence.
 
     Returns:
         The breach, as the end of a sentence; `None`: none.
@@ -188,16 +194,20 @@ def _motions(
 def _tilt_step(
     reference: Reference, tilt: tuple[float, float], gain: float, period: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Follow `tilt` (coefficients north, east) in an open-loop step for one `period` (s).
+    """Predict the tilt during one `period` (s) of an open-loop step.
+
+    `tilt` is given as acceleration coefficients (north, east); `gain` is that of the planner, 1/s.
 
     Returns:
-        Rates of change of the acceleration coefficients (north, east) now, 1/s; and the
-        coefficients at the end of the period.
+        Rates of change of the coefficients at the beginning of the period, 1/s, and the
+        coefficients at its end.
     """
     if reference.coefficients is not None:
         tilt_goal = reference.coefficients
         remaining_share = exp(-gain * period)
-        north_error, east_error = (goal - now for goal, now in zip(tilt_goal, tilt, strict=True))
+        north_error, east_error = (
+            goal - present for goal, present in zip(tilt_goal, tilt, strict=True)
+        )
         tilt_after = (
             tilt_goal[0] - north_error * remaining_share,
             tilt_goal[1] - east_error * remaining_share,

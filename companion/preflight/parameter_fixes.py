@@ -118,11 +118,11 @@ Ask = Callable[[Finding], Awaitable[Answer]]
 
 
 class ChangeOutcome(NamedTuple):
-    """The outcome of a change."""
+    """Whether a parameter change was made, and why not."""
 
     change: ParameterChange
     refusal: str = ""
-    """Why it was not made; empty if it was made."""
+    """Why the change was not made; empty if it was made."""
 
 
 class VehicleArmedError(LinkError):
@@ -181,11 +181,13 @@ async def restore(link: Link, undo: Undo, report: Callable[[ChangeOutcome], None
     for parameter, old in reversed(undo.parameters.items()):
         require_disarmed(link)
         try:
-            now = float(await link.read_parameter(parameter))
+            present = float(await link.read_parameter(parameter))
         except ParameterError as error:
             report(ChangeOutcome(ParameterChange(parameter, old, old, reboot=False), str(error)))
             continue
-        report(await _set_and_read_back(link, ParameterChange(parameter, now, old, reboot=False)))
+        report(
+            await _set_and_read_back(link, ParameterChange(parameter, present, old, reboot=False))
+        )
 
 
 def require_disarmed(link: Link) -> None:

@@ -1,4 +1,4 @@
-"""Reads the parameters that matter to a flight from a vehicle."""
+"""Reads from a vehicle the parameters that matter to a flight."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -52,7 +52,7 @@ async def survey(
     link: Link,
     rules: Iterable[ParameterRule],
     *,
-    before: Survey | None = None,
+    earlier_survey: Survey | None = None,
     first_round: RetryPolicy = _FIRST_ROUND,
     second_round: RetryPolicy = _SECOND_ROUND,
 ) -> Survey:
@@ -65,7 +65,7 @@ async def survey(
     Args:
         link: Link to the vehicle.
         rules: Rules of its autopilot.
-        before: An earlier survey of the same vehicle. Parameters without a value in it are not
+        earlier_survey: Survey of the same vehicle. Parameters without a value in it are not
             requested again, because each costs seconds on a link that loses frames.
         first_round: Policy of the first round of requests.
         second_round: Policy of the second round.
@@ -75,11 +75,11 @@ async def survey(
     """
     rules, requests = tuple(rules), _Requests(link)
     unread: frozenset[str] = frozenset()
-    if before is not None:
-        unread = before.unread
-        rules = tuple(rule for rule in rules if rule.name in before.values)
+    if earlier_survey is not None:
+        unread = earlier_survey.unread
+        rules = tuple(rule for rule in rules if rule.name in earlier_survey.values)
         requests.leave_out(
-            name for rule in rules for name in rule.names if name != before.names[rule.name]
+            name for rule in rules for name in rule.names if name != earlier_survey.names[rule.name]
         )
     await requests.ask(rules, first_round)
     # An autopilot that answered nothing at all is a finding of its own.

@@ -34,7 +34,7 @@ def companion_settings(config: Config) -> CompanionSettings:
 
 
 def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Judge the parameters that were read, and those that were not."""
+    """Judge the values of the parameters, and report parameters that were not received."""
     rules, survey = evidence.autopilot.parameters, evidence.survey
     if not survey.values:
         yield Finding(
@@ -55,8 +55,8 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 + evidence.autopilot.name,
             )
     yield from _missing_parameters(evidence)
-    for found in judge(rules, survey.values, companion_settings(config)):
-        yield _finding(found, survey.names[found.rule.name])
+    for result in judge(rules, survey.values, companion_settings(config)):
+        yield _finding(result, survey.names[result.rule.name])
 
 
 def _unknown(rule: ParameterRule, found: str, fix: str) -> Finding:
@@ -94,24 +94,24 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether neither the rule's parameter nor its alternative has a value, but one may exist."""
-    names = {rule.name, rule.instead}
+    """Whether the rule's parameter and its alternative have no value, though one may exist."""
+    names = {rule.name, rule.alternative}
     return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread)
 
 
-def _finding(found: ParameterFinding, name: str) -> Finding:
+def _finding(result: ParameterFinding, name: str) -> Finding:
     change, fix = None, ""
-    if found.set_to is not None:
-        change = ParameterChange(name, found.value, found.set_to, found.rule.reboot)
-        fix = f"set {name} to {found.set_to:g}"
-        if found.rule.reboot:
+    if result.set_to is not None:
+        change = ParameterChange(name, result.value, result.set_to, result.rule.reboot)
+        fix = f"set {name} to {result.set_to:g}"
+        if result.rule.reboot:
             fix += " and restart the autopilot"
     return Finding(
-        found.rule.name,
-        found.result,
-        f"{name} is {found.value:g}",
-        found.because or found.rule.meaning,
+        result.rule.name,
+        result.result,
+        f"{name} is {result.value:g}",
+        result.because or result.rule.meaning,
         fix,
-        found.rule.source,
+        result.rule.source,
         change,
     )

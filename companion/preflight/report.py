@@ -38,15 +38,15 @@ def findings_lists(config: Config, findings: Sequence[Finding]) -> RenderableTyp
     for result, (title, style) in reversed(_GROUP_TITLES.items()):
         matching = [finding for finding in findings if finding.result is result]
         if matching:
-            parts += [Text(title, style=style), _list(matching, config.flight.accept), Text()]
+            parts += [Text(title, style=style), _entries(matching, config.flight.accept), Text()]
     return Group(*parts, _last_line(config, findings))
 
 
-def _list(findings: Iterable[Finding], accepted: Sequence[str]) -> RenderableType:
+def _entries(findings: Iterable[Finding], accepted: Sequence[str]) -> RenderableType:
     """One entry for each finding; if it is not safe, remedy and source have their own lines."""
-    entries = Table.grid(padding=(0, 1))
-    entries.add_column()
-    entries.add_column()
+    table = Table.grid(padding=(0, 1))
+    table.add_column()
+    table.add_column()
     for finding in findings:
         because = f": {finding.because}" if finding.because else ""
         entry = Text(f"{finding.found}{because}")
@@ -56,8 +56,8 @@ def _list(findings: Iterable[Finding], accepted: Sequence[str]) -> RenderableTyp
             if finding.key in accepted:
                 entry.append("\nExcepted by flight.accept")
             entry.append(f"\nSource: {finding.source}", style="dim")
-        entries.add_row("-", entry)
-    return entries
+        table.add_row("-", entry)
+    return table
 
 
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
@@ -88,8 +88,8 @@ def outcome_line(outcome: ChangeOutcome) -> str:
     change = outcome.change
     if outcome.refusal:
         return f"not set: {outcome.refusal}"
-    later = "; takes effect after the autopilot reboots" if change.reboot else ""
-    return f"{change.parameter}: {change.old:g} → {change.new:g}, read back{later}"
+    reboot_hint = "; takes effect after the autopilot reboots" if change.reboot else ""
+    return f"{change.parameter}: {change.old:g} → {change.new:g}, read back{reboot_hint}"
 
 
 def as_dict(config: Config, findings: Sequence[Finding]) -> dict[str, Any]:

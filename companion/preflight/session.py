@@ -32,7 +32,7 @@ _POLL_PERIOD = 0.05
 _WARNING_SEVERITY = 4
 """MAV_SEVERITY of a warning; a lower number is worse."""
 _RELEASE_SUFFIXES = {0: "-dev", 64: "-alpha", 128: "-beta", 192: "-rc", 255: ""}
-"""FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
+"""Version suffix by FIRMWARE_VERSION_TYPE, the lowest byte of `flight_sw_version`."""
 
 
 def wanted_rates(config: Config, link: Link) -> dict[str, float]:
@@ -72,7 +72,7 @@ async def gather(
     before, began = replace(link.stats), loop.time()
     with LinkListener(link, loop.time) as listener:
         parameters_read, achieved, identity = await asyncio.gather(
-            survey(link, link.autopilot.parameters, before=earlier_survey),
+            survey(link, link.autopilot.parameters, earlier_survey=earlier_survey),
             link.measure_rates(granted, seconds),
             _identity_and_texts(link) if prearm_checks else request_identity(link),
         )
@@ -82,7 +82,7 @@ async def gather(
         state=link.state,
         survey=parameters_read,
         streams={name: rate._replace(achieved=achieved[name]) for name, rate in granted.items()},
-        received={name: counts.get(message_id(name), 0) for name in granted},
+        received_counts={name: counts.get(message_id(name), 0) for name in granted},
         window=seconds,
         link=_link_quality(link, before, tuple(notices)),
         samples=listener.samples,
@@ -139,7 +139,7 @@ def _link_quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> Li
         round_trip=link.timesync.round_trip_s,
         jitter=link.timesync.jitter_s,
         notices=notices,
-        other_clock=link.clock.delay.unknown is DelayUnknown.OTHER_CLOCK,
+        timesync_on_other_clock=link.clock.delay.why_unknown is DelayUnknown.OTHER_CLOCK,
     )
 
 

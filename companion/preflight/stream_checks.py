@@ -11,7 +11,7 @@ from companion.vehicle.streams import StreamRate
 SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _MIN_RATE_SHARE = 0.7
-"""Smallest share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
+"""Smallest accepted share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""
 _FULL_RATE_SHARE = 0.95
 """Share of the requested rate from which a rate counts as reached."""
 _MIN_EXPECTED_COUNT = 5.0
@@ -35,7 +35,7 @@ def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
     good_rates = []
     for name, rate in evidence.streams.items():
         fault = _rate_fault(name, rate, evidence)
-        if name in evidence.awaited and rate.granted >= _MIN_RATE_SHARE * rate.asked:
+        if name in evidence.awaited_messages and rate.granted >= _MIN_RATE_SHARE * rate.requested:
             continue  # `readiness` reports it
         effective = _effective_rate(name, rate, evidence)
         if name in minimum_rates and effective < minimum_rates[name][1]:
@@ -78,21 +78,21 @@ def _effective_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
 
 def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, str] | None:
     """The fault of a message's rate, and the remedy; None: no fault."""
-    asked, achieved = rate.asked, rate.achieved
+    expected, achieved = rate.requested, rate.achieved
     key, faster_loop = _RATE_KEYS.get(name), "raise the rate of the autopilot's loop"
     if rate.refusal:
         return f"{name} is refused ({rate.refusal})", "a newer version of the autopilot may send it"
-    if rate.granted < _MIN_RATE_SHARE * asked:
+    if rate.granted < _MIN_RATE_SHARE * expected:
         return (
-            f"{name}: asked for {asked:g} Hz, granted {rate.granted:g} Hz",
+            f"{name}: asked for {expected:g} Hz, granted {rate.granted:g} Hz",
             f"lower {key}, or {faster_loop}" if key else faster_loop,
         )
     countable = _is_countable(name, rate, evidence)
-    asked = _expected_rate(name, rate)
-    if achieved >= _MIN_RATE_SHARE * asked if countable else evidence.received[name] > 0:
+    expected = _expected_rate(name, rate)
+    if achieved >= _MIN_RATE_SHARE * expected if countable else evidence.received_counts[name] > 0:
         return None
     return (
-        f"{name} arrives at {achieved:.0f} Hz, asked for {asked:g} Hz",
+        f"{name} arrives at {achieved:.0f} Hz, asked for {expected:g} Hz",
         "raise the link's speed, lower link.attitude_rate_hz and link.position_rate_hz, or end "
         "other programs on this computer if it is busy",
     )
@@ -105,7 +105,7 @@ def _is_countable(name: str, rate: StreamRate, evidence: Evidence) -> bool:
 
 def _expected_rate(name: str, rate: StreamRate) -> float:
     """The rate to expect of a message, Hz: the requested one, unless it is sent on change."""
-    return min(rate.asked, _SENT_ON_CHANGE.get(name, rate.asked))
+    return min(rate.requested, _SENT_ON_CHANGE.get(name, rate.requested))
 
 
 def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
@@ -113,8 +113,8 @@ def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
     if name in _SENT_ON_CHANGE:
         return f"{name} on change, and at {_SENT_ON_CHANGE[name]:g} Hz between"
     if not _is_countable(name, rate, evidence):
-        return f"{name} (asked for {rate.asked:g}, too seldom to be counted here)"
-    share = f"{name} {rate.achieved:.0f} of {rate.asked:g}"
-    if rate.achieved >= _FULL_RATE_SHARE * rate.asked:
+        return f"{name} (asked for {rate.requested:g}, too seldom to be counted here)"
+    share = f"{name} {rate.achieved:.0f} of {rate.requested:g}"
+    if rate.achieved >= _FULL_RATE_SHARE * rate.requested:
         return share
     return f"{share} ({100.0 * _MIN_RATE_SHARE:.0f} % suffices)"

@@ -49,7 +49,7 @@ def battery(config: Config, state: VehicleState) -> Finding:
             Key.BATTERY,
             INEFFECTIVE,
             "the vehicle does not report its battery's charge",
-            "limits.min_battery_percent protects nothing",
+            "limits.min_battery_percent has no effect",
             "set the battery's capacity or number of cells in the autopilot",
             source,
         )
@@ -99,12 +99,12 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     yield from failsafe(state)
     ready = state.readiness
     if stage is Stage.AIRBORNE:  # the pre-arm checks no longer apply
-        ready = ready._replace(prearm_good=True)
+        ready = ready._replace(prearm_passed=True)
     missing = evidence.autopilot.not_ready(ready)
     texts = "; ".join(dict.fromkeys(evidence.warnings))
     if missing is not None:
-        silent = evidence.awaited
-        unsent = f", and does not send {', '.join(silent)} yet" if silent else ""
+        awaited = evidence.awaited_messages
+        unsent = f", and does not send {', '.join(awaited)} yet" if awaited else ""
         yield Finding(
             Key.READY,
             NOT_READY,
@@ -131,7 +131,7 @@ def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE,
             fault if seen is None else f"{fault}; satellites in its last message: {seen}",
             "the vehicle does not know where it is",
-            "wait for its fix, in the open",
+            "wait for a GPS fix, with a clear view of the sky",
             source,
         )
 
@@ -166,13 +166,12 @@ def ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the attitude samples are usable."""
-    samples = evidence.samples
-    if samples.unusable:
+    unusable, count = evidence.samples.unusable_count, evidence.samples.sample_count
+    if unusable:
         yield Finding(
             Key.ATTITUDE,
-            UNSAFE if samples.unusable > _MAX_UNUSABLE_SHARE * samples.received else INEFFECTIVE,
-            f"{samples.unusable} of {samples.received} attitude samples are no unit quaternion of "
-            "finite numbers",
+            UNSAFE if unusable > _MAX_UNUSABLE_SHARE * count else INEFFECTIVE,
+            f"{unusable} of {count} attitude samples are no unit quaternion of finite numbers",
             "they are not answered, and if that lasts, control is given back",
             "wait until the estimator has settled; if this goes on, do not fly",
             "ATTITUDE_QUATERNION",

@@ -14,7 +14,7 @@ from companion.mavlink.tlog_file import messages
 from companion.recording.mcap_file.flight_events import Event
 from companion.report.flight_data import Curve, FlightData, Floats, Span, spans
 from companion.vehicle.flight_log import read_flight_log
-from companion.vehicle.registry import BY_NUMBER
+from companion.vehicle.registry import AUTOPILOTS_BY_NUMBER
 
 _MESSAGE_NAMES = frozenset(
     {"ATTITUDE_QUATERNION", "ATTITUDE", "LOCAL_POSITION_NED", "HEARTBEAT", "STATUSTEXT"}
@@ -83,7 +83,7 @@ class _TelemetryReader:
             self._note_attitude(kind, message)
 
     def _note_heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
-        autopilot = BY_NUMBER.get(heartbeat.autopilot)
+        autopilot = AUTOPILOTS_BY_NUMBER.get(heartbeat.autopilot)
         if autopilot is None or self.vehicle not in (None, source):
             return
         self.vehicle = source

@@ -14,7 +14,7 @@ class Action(Enum):
     WARN = "warn"
     """Report the breach once and fly on."""
     HOLD = "hold"
-    """Give up the maneuver, brake and hold the place of the stop, still in offboard.
+    """Abort the maneuver, brake, and hold where the vehicle has stopped, still in offboard.
 
     `SafetyLadder` says what follows.
     """
@@ -53,14 +53,14 @@ class Exit(Enum):
 
 
 class Stream(Enum):
-    """What a breach that ends control does to the stream of setpoints, before its exit begins."""
+    """What a breach that ends control does to the stream of setpoints, before the exit begins."""
 
     CONTINUES = "continues"
-    """The exit ends it, once the autopilot obeys."""
+    """The exit ends the stream, once the autopilot obeys the exit's command."""
     ENDS = "ends"
-    """It ends with a setpoint of zero body rates: later ones would not arrive in time."""
+    """The stream ends with a setpoint of zero body rates: later ones would not arrive in time."""
     STOPS = "stops"
-    """It stops at once: the data for another setpoint cannot be trusted."""
+    """The stream stops at once: the data for another setpoint cannot be trusted."""
 
 
 EXIT_OF_ACTION = {

@@ -29,8 +29,8 @@ def failsafe(snapshot: Snapshot, _: bool) -> str | None:
     return "the autopilot reports a failsafe" if snapshot.autopilot.failsafe else None
 
 
-def battery(least: float) -> Judge:
-    """The battery's remaining charge is below `least` (0..1), or is no longer reported.
+def battery(min_charge: float) -> Judge:
+    """The battery's remaining charge is below `min_charge` (0..1), or is no longer reported.
 
     A vehicle that never reported a charge is flown without this monitor.
     """
@@ -46,11 +46,11 @@ def battery(least: float) -> Judge:
             if known_at is None or not outdated(known_at, snapshot.now):
                 return None
             return "the battery's charge is not reported any more"
-        if newest.remaining >= least:
+        if newest.remaining >= min_charge:
             return None
         return (
             f"battery at {100 * newest.remaining:.0f} %, below "
-            f"limits.min_battery_percent = {100 * least:.0f}"
+            f"limits.min_battery_percent = {100 * min_charge:.0f}"
         )
 
     return judge
@@ -79,41 +79,47 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset in the last 30 s; only a warning: references move with a reset."""
-    found = snapshot.resets
-    if found.recent == 0:
+    """The estimator was reset in the last 30 s: a warning only, as references move with a reset."""
+    resets = snapshot.resets
+    if resets.recent_count == 0:
         return None
     return (
-        f"the estimator was reset: {found.shift:.1f} m and {degrees(found.heading):.0f}° of "
+        f"the estimator was reset: {resets.position_shift:.1f} m and "
+        f"{degrees(resets.heading_shift):.0f}° of "
         "heading in total; the references moved with it"
     )
 
 
-def too_many_estimator_resets(most: int, shift: float, heading: float) -> Judge:
-    """The estimator was reset more than `most` times within 30 s, or by too much in this flight.
+def too_many_estimator_resets(max_count: int, max_shift: float, max_heading: float) -> Judge:
+    """The estimator was reset more than `max_count` times within 30 s, or too far in this flight.
 
-    Too much: position jumps of more than `shift` (m) in total, heading jumps of more than
-    `heading` (rad) in total, or one jump of the thrust axis by more than half of `heading`.
+    Too far: position jumps of more than `max_shift` (m) in total, heading jumps of more than
+    `max_heading` (rad) in total, or one jump of the thrust axis by more than half of `max_heading`.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
-        found = snapshot.resets
-        if found.shift > shift:
-            reset = f"by {found.shift:.1f} m, more than safety.max_reset_m = {shift:g}"
-        elif abs(found.heading) > heading:
-            reset = (
-                f"by {degrees(abs(found.heading)):.0f}° of heading, more than "
-                f"safety.max_reset_deg = {degrees(heading):g}"
+        resets = snapshot.resets
+        if resets.position_shift > max_shift:
+            excess = (
+                f"by {resets.position_shift:.1f} m, more than safety.max_reset_m = {max_shift:g}"
             )
-        elif found.tilt > 0.5 * heading:
-            reset = (
-                f"by {degrees(found.tilt):.0f}° of tilt, more than half of "
-                f"safety.max_reset_deg = {degrees(heading):g}"
+        elif abs(resets.heading_shift) > max_heading:
+            excess = (
+                f"by {degrees(abs(resets.heading_shift)):.0f}° of heading, more than "
+                f"safety.max_reset_deg = {degrees(max_heading):g}"
             )
-        elif found.recent > most:
-            reset = f"{found.recent} times within 30 s, more than safety.max_resets = {most}"
+        elif resets.largest_tilt_jump > 0.5 * max_heading:
+            excess = (
+                f"by {degrees(resets.largest_tilt_jump):.0f}° of tilt, more than half of "
+                f"safety.max_reset_deg = {degrees(max_heading):g}"
+            )
+        elif resets.recent_count > max_count:
+            excess = (
+                f"{resets.recent_count} times within 30 s, more than "
+                f"safety.max_resets = {max_count}"
+            )
         else:
             return None
-        return f"the autopilot's estimator was reset {reset}"
+        return f"the autopilot's estimator was reset {excess}"
 
     return judge

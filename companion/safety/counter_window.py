@@ -18,14 +18,14 @@ _LONGEST_READING_INTERVAL = 0.03
 
 
 class _Counters(NamedTuple):
-    """The counters at one reading; `late`: by how much that reading was too late, s."""
+    """The counters at one reading; `late_by`: how late the reading was, s."""
 
     now: float
     frames: int
     lost: int
     setpoints: int
     missed: int
-    late: float
+    late_by: float
     setpoint_intervals: IntervalSums
     positions: int
 
@@ -50,7 +50,7 @@ class CounterWindow:
     def read(self, now: float) -> None:
         """Read the counters at `now`, s of event-loop time."""
         readings, stats, record = self._readings, self._link.stats, self._record
-        late = max(0.0, now - readings[-1].now - _LONGEST_READING_INTERVAL) if readings else 0.0
+        late_by = max(0.0, now - readings[-1].now - _LONGEST_READING_INTERVAL) if readings else 0.0
         readings.append(
             _Counters(
                 now,
@@ -58,7 +58,7 @@ class CounterWindow:
                 stats.lost,
                 record.setpoints,
                 record.missed_deadlines,
-                late,
+                late_by,
                 record.setpoint_intervals.copy(),
                 self._link.state.position_count,
             )
@@ -71,7 +71,7 @@ class CounterWindow:
 
         Stalls that ended more than about a second ago are forgotten.
         """
-        return sum(reading.late for reading in self._readings if reading.now > since)
+        return sum(reading.late_by for reading in self._readings if reading.now > since)
 
     def health(self) -> Health:
         """The shares and rates of a `Health`; all are unknown until the window is filled."""
@@ -79,13 +79,13 @@ class CounterWindow:
         span = last.now - first.now
         if span < _FILLED_SHARE * _AVERAGING_TIME:
             return Health()
-        late = sum(reading.late for reading in self._readings) - first.late
+        stalled = sum(reading.late_by for reading in self._readings) - first.late_by
         missed = (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
         lost = last.lost - first.lost
         return Health(
-            lost=share_lost(last.frames - first.frames, lost),
-            missed=missed if self._real_time else None,
-            starved=late / span,
+            lost_share=share_lost(last.frames - first.frames, lost),
+            missed_share=missed if self._real_time else None,
+            starved_share=stalled / span,
             answer_rate=last.setpoint_intervals.rate_since(first.setpoint_intervals),
             position_rate=(last.positions - first.positions) / span,
         )

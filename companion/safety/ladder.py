@@ -22,12 +22,12 @@ class Verdict(NamedTuple):
 class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
-    The action HOLD gives up the maneuver, and the flight with it. If all breaches with this action
-    end within `hold_time`, the vehicle lands. Otherwise the action `Monitor.then` of a breach that
-    has not ended follows, the most severe one of several.
+    The action HOLD aborts the maneuver and ends the flight. If all breaches with this action end
+    within `hold_time`, the vehicle lands. Otherwise the most severe `Monitor.then` of the breaches
+    that have not ended is the next action.
 
     Args:
-        monitors: the table; among equally severe breaches the first row decides.
+        monitors: the monitors of the flight; among equally severe breaches the first one decides.
         hold_time: time allowed for a hold to end its breach, s.
 
     Attributes:
@@ -44,10 +44,10 @@ class SafetyLadder:
         self._alarms = [Alarm(monitor) for monitor in monitors]
         self._hold_time = hold_time
         self._held_at: float | None = None
-        self._held_for = ""
+        self._hold_reason = ""
 
     @property
-    def raised(self) -> tuple[str, ...]:
+    def raised_alarms(self) -> tuple[str, ...]:
         """The names of the monitors with a raised alarm."""
         return tuple(alarm.monitor.name for alarm in self._alarms if alarm.reason is not None)
 
@@ -62,15 +62,15 @@ class SafetyLadder:
         if self._held_at is not None:
             return self._after_hold(snapshot.now, self._held_at)
         if worst is not None and worst.monitor.action is Action.HOLD:
-            self._held_at, self._held_for = snapshot.now, worst.reason or ""
+            self._held_at, self._hold_reason = snapshot.now, worst.reason or ""
             return _verdict(worst, Action.HOLD)
         return None
 
     def _after_hold(self, now: float, held_at: float) -> Verdict | None:
-        """The verdict after the hold has ended its breach or `hold_time` is over; else None."""
+        """The verdict if all breaches with HOLD have ended or `hold_time` is over; else None."""
         breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
         if not breaches:
-            return Verdict(Action.LAND, self._held_for)
+            return Verdict(Action.LAND, self._hold_reason)
         if now - held_at < self._hold_time:
             return None
         worst = max(breaches, key=lambda alarm: alarm.monitor.then.severity)
@@ -80,7 +80,7 @@ class SafetyLadder:
         """Report that an alarm was raised or ended; return whether it was raised."""
         name = alarm.monitor.name
         if alarm.reason is None:
-            self.note(f"safety: {name} is over")
+            self.note(f"safety: {name} alarm is over")
             self.on_change(False, name, "", "")
         else:
             self.breaches[alarm.reason] = name

@@ -31,9 +31,9 @@ def silence(limit: float, *, heard: bool) -> Judge:
 
 
 def _silence_cause(now: float, control: Control, limit: float) -> str:
-    if control.stalled > _STALL_SHARE * (now - control.last_answer):
+    if control.stall_time > _STALL_SHARE * (now - control.last_answer):
         # Data that came during the stall were read late, so they only seem old.
-        still = control.stalled
+        still = control.stall_time
         return f"this program did not run for {still:.1f} s (computer overloaded or suspended)"
     if now - control.last_sample > limit:
         if control.attitude_not_finite:
@@ -60,66 +60,66 @@ def clock_changed(snapshot: Snapshot, _: bool) -> str | None:
     return snapshot.control.clock_change
 
 
-def loss(most: float) -> Judge:
-    """More than the share `most` of the vehicle's frames is lost."""
+def loss(max_share: float) -> Judge:
+    """More than the share `max_share` of the vehicle's frames is lost."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        lost = snapshot.health.lost
-        if lost is None or lost <= with_hysteresis(most, raised):
+        lost_share = snapshot.health.lost_share
+        if lost_share is None or lost_share <= with_hysteresis(max_share, raised):
             return None
         return (
-            f"{100 * lost:.0f} % of the vehicle's frames are lost, more than "
-            f"safety.max_loss = {most:g} ({100 * most:g} %)"
+            f"{100 * lost_share:.0f} % of the vehicle's frames are lost, more than "
+            f"safety.max_loss = {max_share:g} ({100 * max_share:g} %)"
         )
 
     return judge
 
 
-def round_trip(most: float) -> Judge:
-    """The round trip of TIMESYNC takes longer than `most`, s."""
+def round_trip(max_seconds: float) -> Judge:
+    """The round trip of TIMESYNC takes longer than `max_seconds`, s."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         seconds = snapshot.health.round_trip
-        if seconds is None or seconds <= with_hysteresis(most, raised):
+        if seconds is None or seconds <= with_hysteresis(max_seconds, raised):
             return None
         return (
             f"the link's round trip takes {1e3 * seconds:.0f} ms, longer than "
-            f"safety.max_round_trip_ms = {1e3 * most:.0f}"
+            f"safety.max_round_trip_ms = {1e3 * max_seconds:.0f}"
         )
 
     return judge
 
 
 def late_setpoints(stale: float) -> Judge:
-    """Each probe answered in the last 0.7 s was answered later than after 1.5 times `stale`, s.
+    """Every probe answered in the last 0.7 s had a round trip longer than 1.5 times `stale`, s.
 
     `stale` is the largest age of a sample that is answered. If its setpoint takes as long again,
     the vehicle tilts in growing swings, while all telemetry still looks good.
     """
-    most = 1.5 * stale
+    max_seconds = 1.5 * stale
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         seconds = snapshot.health.uplink.round_trip
-        if seconds is None or seconds <= with_hysteresis(most, raised):
+        if seconds is None or seconds <= with_hysteresis(max_seconds, raised):
             return None
         return (
             f"setpoints reach the vehicle too late: the link's round trip takes "
             f"{1e3 * seconds:.0f} ms, longer than 1.5 · deadman.telemetry_stale_ms = "
-            f"{1e3 * most:.0f}"
+            f"{1e3 * max_seconds:.0f}"
         )
 
     return judge
 
 
-def lost_setpoints(most: int) -> Judge:
-    """More than `most` TIMESYNC probes in a row were sent and not answered.
+def lost_setpoints(max_unanswered: int) -> Judge:
+    """More than `max_unanswered` TIMESYNC probes in a row were sent and not answered.
 
-    The telemetry still comes, otherwise `silence` has ended control before.
+    Telemetry still arrives: without it, the judge `silence` would have ended control earlier.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
-        unanswered = snapshot.health.uplink.unanswered
-        if unanswered is None or unanswered <= most:
+        unanswered = snapshot.health.uplink.unanswered_count
+        if unanswered is None or unanswered <= max_unanswered:
             return None
         return (
             f"setpoints do not reach the vehicle: the last {unanswered} TIMESYNC requests, ten a "
@@ -129,85 +129,87 @@ def lost_setpoints(most: int) -> Judge:
     return judge
 
 
-def foreign_setpoints(most: int) -> Judge:
-    """The autopilot reported more than `most` setpoints of another program within 5 s."""
+def foreign_setpoints(max_reports: int) -> Judge:
+    """The autopilot reported more than `max_reports` setpoints of another program within 5 s."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
-        found = snapshot.health.foreign
-        if found <= most:
+        reports = snapshot.health.foreign_reports
+        if reports <= max_reports:
             return None
         return (
             "another program sends setpoints to the vehicle: within 5 s the autopilot reported "
-            f"{found} that this program did not send (ATTITUDE_TARGET)"
+            f"{reports} that this program did not send (ATTITUDE_TARGET)"
         )
 
     return judge
 
 
-def deadlines(most: float) -> Judge:
-    """More than the share `most` of the setpoints misses deadman.deadline_ms."""
+def deadlines(max_share: float) -> Judge:
+    """More than the share `max_share` of the setpoints misses deadman.deadline_ms."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        missed = snapshot.health.missed
-        if missed is None or missed <= with_hysteresis(most, raised):
+        missed_share = snapshot.health.missed_share
+        if missed_share is None or missed_share <= with_hysteresis(max_share, raised):
             return None
         return (
-            f"{100 * missed:.0f} % of the setpoints miss deadman.deadline_ms, more than "
-            f"safety.max_missed = {most:g} ({100 * most:g} %)"
+            f"{100 * missed_share:.0f} % of the setpoints miss deadman.deadline_ms, more than "
+            f"safety.max_missed = {max_share:g} ({100 * max_share:g} %)"
         )
 
     return judge
 
 
-def starvation(most: float) -> Judge:
-    """CPU starvation: the program's timer lost more than the share `most` of the last second."""
+def starvation(max_share: float) -> Judge:
+    """CPU starvation: our timer lost more than the share `max_share` of the last second."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        starved = snapshot.health.starved
-        if starved is None or starved <= with_hysteresis(most, raised):
+        starved_share = snapshot.health.starved_share
+        if starved_share is None or starved_share <= with_hysteresis(max_share, raised):
             return None
         return (
-            f"CPU starvation: the program's timer lost {100 * starved:.0f} % of the last second, "
-            f"more than safety.max_starved = {most:g} ({100 * most:g} %)"
+            f"CPU starvation: the program's timer lost {100 * starved_share:.0f} % of the last "
+            f"second, more than safety.max_starved = {max_share:g} ({100 * max_share:g} %)"
         )
 
     return judge
 
 
-def gaps(most: int) -> Judge:
-    """The setpoints had more than `most` gaps within 5 s."""
+def gaps(max_gaps: int) -> Judge:
+    """The setpoints had more than `max_gaps` gaps within 5 s."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
-        found = snapshot.health.gaps
-        if found <= most:
+        count = snapshot.health.gaps
+        if count <= max_gaps:
             return None
         return (
-            f"setpoints paused {found} times within 5 s, each time for longer than "
+            f"setpoints paused {count} times within 5 s, each time for longer than "
             "deadman.telemetry_stale_ms"
         )
 
     return judge
 
 
-def answer_rate(least: float) -> Judge:
-    """The effective rate of setpoints (`IntervalSums`) is below `least` Hz."""
+def answer_rate(min_rate: float) -> Judge:
+    """The effective rate of setpoints (`IntervalSums`) is below `min_rate` Hz."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = snapshot.health.answer_rate
-        if rate is None or rate >= minimum_with_hysteresis(least, raised):
+        if rate is None or rate >= minimum_with_hysteresis(min_rate, raised):
             return None
-        return f"setpoints are sent at {rate:.0f} Hz, below link.min_attitude_rate_hz = {least:g}"
+        return (
+            f"setpoints are sent at {rate:.0f} Hz, below link.min_attitude_rate_hz = {min_rate:g}"
+        )
 
     return judge
 
 
-def position_rate(least: float) -> Judge:
-    """Positions come at less than `least` Hz."""
+def position_rate(min_rate: float) -> Judge:
+    """Positions come at less than `min_rate` Hz."""
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         rate = snapshot.health.position_rate
-        if rate is None or rate >= minimum_with_hysteresis(least, raised):
+        if rate is None or rate >= minimum_with_hysteresis(min_rate, raised):
             return None
-        return f"positions come at {rate:.0f} Hz, below link.min_position_rate_hz = {least:g}"
+        return f"positions come at {rate:.0f} Hz, below link.min_position_rate_hz = {min_rate:g}"
 
     return judge

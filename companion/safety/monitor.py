@@ -34,7 +34,7 @@ class Monitor:
     name: str
     """Name in the documentation and in messages."""
     judge: Judge
-    """See `Judge`; it has no clock and no memory."""
+    """Judges each snapshot, without a clock or memory of its own; see `Judge`."""
     action: Action
     """Action that a breach leads to."""
     lasts: float = 0.0
@@ -61,7 +61,7 @@ class Alarm:
         self._since: float | None = None
 
     def step(self, snapshot: Snapshot) -> bool:
-        """Judge one snapshot; return whether the alarm was raised or ended by it."""
+        """Judge one snapshot; return whether the alarm was raised or ended now."""
         breach = self.monitor.judge(snapshot, self.reason is not None)
         if (breach is None) is (self.reason is None):
             self._since = None

@@ -91,14 +91,14 @@ def thrust(lowest: float, highest: float) -> Judge:
 
 
 def outside(fence: Fence) -> Judge:
-    """The vehicle is outside the fence, or, for one in latitude and longitude, that is unknown."""
+    """The vehicle is outside the fence, or its place is unknown and the fence is in degrees."""
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion
         if motion.offset is None:
             return None
-        found = fence.breach(motion.offset, motion.height, motion.origin)
-        return None if found is None else str(found)
+        breach = fence.breach(motion.offset, motion.height, motion.origin)
+        return None if breach is None else str(breach)
 
     return judge
 
@@ -111,9 +111,9 @@ def braking(fence: Fence) -> Judge:
         offset, velocity, height = motion.offset, motion.velocity, motion.height
         if offset is None or fence.breach(offset, height, motion.origin) is not None:
             return None
-        found = fence.stop_breach(
+        breach = fence.stop_breach(
             offset, velocity, height, motion.origin, acceleration=motion.acceleration
         )
-        return None if found is None else f"braking now would end {found}"
+        return None if breach is None else f"braking now would end {breach}"
 
     return judge

@@ -1,9 +1,9 @@
 """Monitors of other packages: they run beside ours, and cannot stop or soften them.
 
-Each stands in the table three times: as it was made, as a monitor of its own faults, and as one of
-the time it takes. A judge that raises is not asked again, and the vehicle is handed back: a flight
-that was to be watched must not go on unwatched. A slow judge delays the answers to samples, and a
-warning names it.
+Each one has three rows in the table: the monitor itself, one for exceptions of its judge, and one
+for the time that the judge takes. A judge that raises is not called again, and the vehicle
+is handed back, because the flight must not go on without a monitor that the user wanted. A slow
+judge delays the answers to samples, and a warning names it.
 """
 
 from collections.abc import Callable
@@ -21,56 +21,64 @@ from companion.user_code import UserCodeError, naming_user_code
 _ACTIONS = (Action.WARN, Action.HOLD, Action.HAND_BACK, Action.LAND)
 """The actions that a monitor of another package may have."""
 _AFTER_HOLD = (Action.HAND_BACK, Action.LAND)
-_SLOW = 0.003
-"""A judge that takes longer is slow, s: a sample comes every 4 ms, and must be answered."""
-_SLOW_FOR = 0.5
-"""Time for which every answer must be slow before the warning, s; a busy computer is quicker now
-and then."""
+_MAX_JUDGING_TIME = 0.003
+"""Longest time that a judge may take, s: a sample comes every 4 ms, and must be answered."""
+_SLOW_DURATION = 0.5
+"""Time for which every call of a judge must be too slow before the warning, s; on a busy computer,
+only some are."""
 
 MonitorFactory = Callable[[Config], Monitor]
-"""What an entry point in `companion.monitors` names: makes a monitor for a configuration."""
+"""Makes a monitor for a configuration; entry points in `companion.monitors` name such functions."""
 
 
 def plugin_monitors(config: Config) -> tuple[Monitor, ...]:
     """The monitors that `safety.monitors` names, three rows for each.
 
     Raises:
-        ConfigError: one cannot be loaded or made, or its judge fails on a snapshot in which nothing
-            is known.
+        ConfigError: a monitor cannot be loaded or made, or its judge fails on a snapshot in which
+            nothing is known.
     """
     return tuple(row for name in config.safety.monitors for row in _rows(name, config))
 
 
 def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
-    where = f"safety.monitors: {name}"
+    setting = f"safety.monitors: {name}"
     try:
         factory = plugins.load(plugins.MONITORS, name)
         with naming_user_code("monitor", factory):
             monitor = factory(config)
     except (plugins.PluginError, UserCodeError) as error:
-        raise ConfigError(f"{where}: {error}") from error
+        raise ConfigError(f"{setting}: {error}") from error
     if not isinstance(monitor, Monitor):
-        raise ConfigError(f"{where} made no companion.safety.monitor.Monitor but {monitor!r}")
+        raise ConfigError(f"{setting} made no companion.safety.monitor.Monitor but {monitor!r}")
     if monitor.action not in _ACTIONS or monitor.then not in _AFTER_HOLD:
         raise ConfigError(
-            f"{where}: its action must be WARN, HOLD, HAND_BACK or LAND, and what follows a hold "
-            "HAND_BACK or LAND"
+            f"{setting}: its action must be WARN, HOLD, HAND_BACK or LAND, and "
+            "`then`, its action after a hold, HAND_BACK or LAND"
         )
-    guarded = GuardedJudge(monitor)
-    guarded.judge(Snapshot(0.0), False)
-    if guarded.fault is not None:
-        raise ConfigError(f"{where} cannot be used where a value is not known: {guarded.fault}")
+    guarded_judge = GuardedJudge(monitor)
+    guarded_judge.judge(Snapshot(0.0), False)
+    if guarded_judge.fault is not None:
+        raise ConfigError(
+            f"{setting} cannot be used where a value is not known: {guarded_judge.fault}"
+        )
+    watching = replace(monitor, name=name, judge=guarded_judge.judge, stream=Stream.CONTINUES)
     return (
-        replace(monitor, name=name, judge=guarded.judge, stream=Stream.CONTINUES),
+        watching,
         replace(
-            monitor,
+            watching,
             name=f"{name} (its fault)",
-            judge=guarded.judge_fault,
+            judge=guarded_judge.judge_fault,
             action=Action.HAND_BACK,
             lasts=0.0,
-            stream=Stream.CONTINUES,
         ),
-        Monitor(f"{name} (its time)", guarded.judge_time, Action.WARN, lasts=_SLOW_FOR),
+        replace(
+            watching,
+            name=f"{name} (its time)",
+            judge=guarded_judge.judge_time,
+            action=Action.WARN,
+            lasts=_SLOW_DURATION,
+        ),
     )
 
 
@@ -84,7 +92,7 @@ class GuardedJudge:
     def __init__(self, monitor: Monitor) -> None:
         self.fault: str | None = None
         self._judge = monitor.judge
-        self._taken = 0.0
+        self._judging_time = 0.0
 
     def judge(self, snapshot: Snapshot, raised: bool) -> str | None:
         """What the judge returns; None from its first fault on."""
@@ -101,14 +109,14 @@ class GuardedJudge:
             self.fault = str(error)
             return None
         finally:
-            self._taken = perf_counter() - began
+            self._judging_time = perf_counter() - began
 
     def judge_fault(self, snapshot: Snapshot, raised: bool) -> str | None:
         """The fault of the judge as a breach."""
         return None if self.fault is None else f"{self.fault}; the vehicle is handed back"
 
     def judge_time(self, snapshot: Snapshot, raised: bool) -> str | None:
-        """A breach if the judge's latest answer took too long."""
-        if self._taken <= with_hysteresis(_SLOW, raised):
+        """A breach if the latest call of the judge took too long."""
+        if self._judging_time <= with_hysteresis(_MAX_JUDGING_TIME, raised):
             return None
-        return f"it takes {1e3 * self._taken:.0f} ms to judge, and delays the setpoints"
+        return f"it takes {1e3 * self._judging_time:.0f} ms to judge, and delays the setpoints"

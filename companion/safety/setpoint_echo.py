@@ -1,4 +1,4 @@
-"""Finds setpoints of another program, in what the autopilot reports that it obeys."""
+"""Detects setpoints of another program in the ATTITUDE_TARGET that the autopilot reports."""
 
 from collections import deque
 from math import isfinite
@@ -10,17 +10,16 @@ from companion.vehicle.autopilot import Autopilot
 _COUNTING_TIME = 5.0
 _KEPT_REPORTS = 256
 _THRUST_ROUNDING, _RATE_ROUNDING = 1e-7, 1e-6
-"""Largest difference from a setpoint of ours: ATTITUDE_TARGET has numbers of single precision.
-Thrust is a share of the full thrust, rates up to 10 rad/s."""
+"""Largest difference of a reported thrust (0..1) and body rate (rad/s) from our setpoint, because
+ATTITUDE_TARGET has single precision."""
 
 
 class SetpointEcho:
     """Compares the autopilot's ATTITUDE_TARGET with the setpoints that this program sent.
 
     While an autopilot obeys body rates, it reports the rates of the newest setpoint (PX4) or its
-    thrust (ArduPilot). In recorded flights of both real autopilots every report did. So one that
-    fits no setpoint of ours shows that another program sends setpoints, too: an autopilot obeys
-    whoever sends.
+    thrust (ArduPilot), as every report of recorded flights confirms. So a report that fits no
+    setpoint of ours shows that another program sends setpoints, too; the autopilot obeys both.
 
     Args:
         sent: the latest setpoints of this program, the newest last; they are appended elsewhere.
@@ -28,34 +27,36 @@ class SetpointEcho:
 
     def __init__(self, sent: deque[tuple[BodyRates, float]]) -> None:
         self._sent = sent
-        self._by_thrust = False
-        self._echoes = False
-        self._foreign: deque[float] = deque(maxlen=_KEPT_REPORTS)
+        self._compares_thrust = False
+        self._matched_once = False
+        self._foreign_times: deque[float] = deque(maxlen=_KEPT_REPORTS)
 
     def begin(self, autopilot: Autopilot) -> None:
         """Note that control of this autopilot begins: earlier reports do not count."""
-        self._by_thrust = autopilot.rates_about_target_axes  # it then reports the target's rates
-        self._echoes = False
-        self._foreign.clear()
+        # With rates about the axes of its target, an autopilot reports the rates of that target.
+        self._compares_thrust = autopilot.rates_about_target_axes
+        self._matched_once = False
+        self._foreign_times.clear()
 
     def take(self, message: Message, now: float) -> None:
         """Take an ATTITUDE_TARGET that arrived at `now`, s of event-loop time."""
         rates = BodyRates(message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
         if self._is_ours(rates, message.thrust):
-            self._echoes = True
-        elif self._echoes and isfinite(sum(rates) + message.thrust):
-            self._foreign.append(now)
+            self._matched_once = True
+        elif self._matched_once and isfinite(sum(rates) + message.thrust):
+            self._foreign_times.append(now)
 
     def foreign_reports(self, now: float) -> int:
         """Number of reports of the last 5 s that show a setpoint of another program.
 
-        It remains 0 until a report has shown a setpoint of ours: the autopilot may change them.
+        The number remains 0 until a report has matched one of our setpoints, because an autopilot
+        may report changed setpoints.
         """
-        return sum(now - at <= _COUNTING_TIME for at in self._foreign)
+        return sum(now - at <= _COUNTING_TIME for at in self._foreign_times)
 
     def _is_ours(self, rates: BodyRates, thrust: float) -> bool:
         newest_first = reversed(self._sent)
-        if self._by_thrust:
+        if self._compares_thrust:
             return any(abs(thrust - sent) <= _THRUST_ROUNDING for _, sent in newest_first)
         return any(
             all(abs(a - b) <= _RATE_ROUNDING for a, b in zip(rates, sent, strict=True))

@@ -15,7 +15,7 @@ UNHEARD_S = 0.3
 could go unnoticed."""
 
 
-class Autopilot(NamedTuple):
+class AutopilotStatus(NamedTuple):
     """The autopilot's status; None: not received."""
 
     armed: bool | None = True
@@ -34,9 +34,9 @@ class Motion(NamedTuple):
     body_rates: Vector = (0.0, 0.0, 0.0)
     """Measured rates about the body axes, rad/s."""
     offset: Vector | None = None
-    """Position relative to the fence's centre, which is usually where control began, m, or None."""
+    """Position relative to the fence's centre (usually where control began), m NED, or None."""
     velocity: Vector = (0.0, 0.0, 0.0)
-    """m/s."""
+    """Velocity, m/s NED."""
     height: float | None = None
     """Height above home, m, or None; in the autopilot's frame, with estimator resets."""
     tracking_error: float | None = None
@@ -50,7 +50,7 @@ class Motion(NamedTuple):
 
 
 class Control(NamedTuple):
-    """When data last arrived, which sample was last answered, and why the newest one is not.
+    """When data last arrived, which sample was last answered, and why the newest sample is not.
 
     Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
     """
@@ -70,24 +70,24 @@ class Control(NamedTuple):
     last_heard: float = inf
     """When the arrival of a frame of any kind from the vehicle was last noticed."""
     position_fresh: bool = True
-    """Whether the newest position is fresh."""
+    """Whether the newest position is not older than deadman.position_stale_ms."""
     clock_change: str | None = None
     """Latest jump, stop or restart of the vehicle's clock since control began, in words, or
     None."""
-    stalled: float = 0.0
+    stall_time: float = 0.0
     """Time for which this program did not run since the last answer, s."""
 
 
 class Health(NamedTuple):
     """Link and computer over the last second; None: unknown."""
 
-    lost: float | None = None
+    lost_share: float | None = None
     """Share of the vehicle's frames that were lost."""
     round_trip: float | None = None
     """Round trip of TIMESYNC, s."""
-    missed: float | None = None
+    missed_share: float | None = None
     """Share of setpoints that missed their deadline; None in lockstep."""
-    starved: float | None = None
+    starved_share: float | None = None
     """Share of the time by which the program's timer was late."""
     answer_rate: float | None = None
     """Effective rate of setpoints, Hz (`IntervalSums`)."""
@@ -96,8 +96,8 @@ class Health(NamedTuple):
     position_rate: float | None = None
     """Rate of positions, Hz."""
     uplink: Uplink = Uplink()
-    """The way to the vehicle, over the last moments."""
-    foreign: int = 0
+    """Present delay and loss on the link to the vehicle."""
+    foreign_reports: int = 0
     """Number of reports of the last 5 s in which the autopilot obeyed another program's setpoint
     (`SetpointEcho`)."""
 
@@ -105,13 +105,13 @@ class Health(NamedTuple):
 class Resets(NamedTuple):
     """Estimator resets since control began."""
 
-    recent: int = 0
+    recent_count: int = 0
     """Number of resets within the last 30 s."""
-    shift: float = 0.0
+    position_shift: float = 0.0
     """Length of the vector sum of the position jumps, m."""
-    heading: float = 0.0
+    heading_shift: float = 0.0
     """Sum of the heading jumps, with their signs, rad."""
-    tilt: float = 0.0
+    largest_tilt_jump: float = 0.0
     """Largest jump of the thrust axis, rad."""
 
 
@@ -120,7 +120,7 @@ class Snapshot(NamedTuple):
 
     now: float
     """Time of the snapshot, s of event-loop time."""
-    autopilot: Autopilot = Autopilot()
+    autopilot: AutopilotStatus = AutopilotStatus()
     motion: Motion = Motion()
     control: Control = Control()
     health: Health = Health()

@@ -12,7 +12,7 @@ from companion.safety.counter_window import CounterWindow
 from companion.safety.setpoint_echo import SetpointEcho
 from companion.safety.snapshot import (
     UNHEARD_S,
-    Autopilot,
+    AutopilotStatus,
     Control,
     Health,
     Motion,
@@ -88,8 +88,8 @@ class SnapshotBuilder:
         """Centre of the fence in the autopilot's frame; None before control or without position."""
         if self.fence_centre_ned is None:
             return None
-        back = minus((0.0, 0.0, 0.0), self._loop.resets.shift)
-        return FenceCentre(minus(self.fence_centre_ned, back), self._fence_place)
+        to_autopilot_frame = minus((0.0, 0.0, 0.0), self._loop.resets.shift)
+        return FenceCentre(minus(self.fence_centre_ned, to_autopilot_frame), self._fence_place)
 
     def unheard(self, now: float) -> float | None:
         """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
@@ -98,7 +98,7 @@ class SnapshotBuilder:
         return silence if silence > UNHEARD_S else None
 
     def listen(self, now: float) -> None:
-        """Take the counters at `now`; the watch calls this at least 50 times a second."""
+        """Read the counters at `now`; the watch calls this at least 50 times a second."""
         frames = self._link.stats.frames
         if frames != self._frames_heard:
             self._frames_heard, self._heard_at = frames, now
@@ -109,11 +109,11 @@ class SnapshotBuilder:
         """The snapshot at `now`, s of event-loop time; call `listen` before."""
         state, loop, clock = self._link.state, self._loop, self._link.clock
         record = loop.record
-        refused = self._link.stats.non_finite_at
-        placed = -inf if state.position is None else state.position.received
+        refused_at = self._link.stats.non_finite_at
+        position_received = -inf if state.position is None else state.position.received
         return Snapshot(
             now,
-            Autopilot(
+            AutopilotStatus(
                 state.armed,
                 state.landed,
                 state.failsafe,
@@ -125,10 +125,10 @@ class SnapshotBuilder:
             Control(
                 record.last_answer,
                 record.last_sample,
-                refused.get("ATTITUDE_QUATERNION", -inf) > record.last_sample,
+                refused_at.get("ATTITUDE_QUATERNION", -inf) > record.last_sample,
                 record.reason,
-                placed,
-                refused.get("LOCAL_POSITION_NED", -inf) > placed,
+                position_received,
+                refused_at.get("LOCAL_POSITION_NED", -inf) > position_received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.changes == self._clock_changes else clock.last_change,
@@ -167,7 +167,7 @@ class SnapshotBuilder:
             round_trip=timesync.round_trip_s,
             gaps=sum(at > since for at in self._loop.record.gaps),
             uplink=timesync.uplink,
-            foreign=self.echo.foreign_reports(now),
+            foreign_reports=self.echo.foreign_reports(now),
         )
 
     def _resets(self, now: float) -> Resets:

@@ -131,5 +131,5 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
 
 
 def fence_of(config: Config) -> Fence:
-    """The fence of `limits` and `safety`, for a motion known `_ESTIMATE_DELAY` too late."""
+    """The fence of `limits` and `safety`, allowing for an estimate late by `_ESTIMATE_DELAY`."""
     return replace(config.fence, estimate_delay=_ESTIMATE_DELAY)

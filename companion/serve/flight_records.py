@@ -99,7 +99,7 @@ class FlightRecords:
         def note(text: str) -> None:  # `FlightFiles.save` calls it in a thread
             loop.call_soon_threadsafe(self._note, text)
 
-        return FlightFiles(config, folder, self._environment, note, follows=False)
+        return FlightFiles(config, folder, self._environment, note, flies_maneuvers=False)
 
     async def _in_thread(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
         """Call `work` in a thread, so that a slow disk blocks nothing; return its result."""

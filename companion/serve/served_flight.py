@@ -90,7 +90,7 @@ class ServedFlight:
         self._autopilot = Address(link.settings.target_system, link.settings.target_component)
         self._owner_name, self._release_commanded_at = name, -inf
         self._source = ServedSource(
-            name, commanded_motion(changes.wanted), ownership, self._heading
+            name, commanded_motion(changes.wanted_config), ownership, self._heading
         )
         self._assembled = assemble(
             config,

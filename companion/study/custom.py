@@ -19,7 +19,7 @@ from companion.study.drawing import (
     label_tilt_rate,
     new_figure,
 )
-from companion.study.inner_loop import quickened
+from companion.study.inner_loop import faster_inner_loop
 from companion.study.measures import (
     cross_track,
     deviation,
@@ -29,12 +29,12 @@ from companion.study.measures import (
     settling_time,
     signed_distance_from_line,
 )
-from companion.study.methods import BY_PLANNER, LIMIT, Method, planner_of
+from companion.study.methods import LIMIT, METHOD_BY_PLANNER, Method, planner_of
 from companion.study.outcome import Cell, Job, Outcome, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
 
-Flights = dict[tuple[Method, float], Response]
-"""The response of each method at each sample rate, Hz."""
+Responses = dict[tuple[Method, float], Response]
+"""Response by method and sample rate (Hz)."""
 
 
 def prepare(case_file: Path) -> Job:
@@ -49,31 +49,31 @@ def prepare(case_file: Path) -> Job:
 
 def _run(case: Case, tick: Tick) -> Outcome:
     """Fly the case with each of its methods at each of its rates."""
-    flown: Flights = {}
+    responses: Responses = {}
     for hz in case.rates_hz:
-        for method in (m for name, m in BY_PLANNER.items() if name in case.methods):
+        for method in (m for name, m in METHOD_BY_PLANNER.items() if name in case.methods):
             tick(f"{method.label} at {hz:g} Hz")
-            flown[method, hz] = _fly(case, method, hz)
+            responses[method, hz] = _fly(case, method, hz)
     return Outcome(
         name="custom",
         title="Custom case",
         conditions=_conditions(case),
-        figure=_figure(case, flown),
+        figure=_figure(case, responses),
         caption=(
             f"Every method at {case.rates_hz[0]:g} Hz, at the heading with its largest cross-track."
             f" The reference is {_reference_text(case)}."
         ),
-        tables=(_results(case, flown),),
-        series=(_responses(case, flown),),
+        tables=(_results(case, responses),),
+        series=(_responses(case, responses),),
     )
 
 
-def _results(case: Case, flown: Flights) -> Table:
+def _results(case: Case, responses: Responses) -> Table:
     """The table of the largest errors and rates of each method at each sample rate."""
     return Table(
         "custom",
         "The custom case; largest values over"
-        f" {_counted(case.headings_deg, 'heading')}, rates as commanded.",
+        f" {_count_text(case.headings_deg, 'heading')}, rates as commanded.",
         (
             "method",
             "rate, Hz",
@@ -93,18 +93,18 @@ def _results(case: Case, flown: Flights) -> Table:
                 largest_tilt_rate(response),
                 heading_effect(response),
             )
-            for (method, hz), response in flown.items()
+            for (method, hz), response in responses.items()
         ),
     )
 
 
-def _responses(case: Case, flown: Flights) -> Table:
+def _responses(case: Case, responses: Responses) -> Table:
     """The table of every sample of every response."""
     return Table(
         "custom-response",
         "Every sample of every response; rates are held until the next sample.",
         ("method", "rate, Hz", "heading, °", "time, s", "a_N", "a_E", "ω_x", "ω_y", "ω_z"),
-        tuple(row for key, response in flown.items() for row in _samples(case, *key, response)),
+        tuple(row for key, response in responses.items() for row in _samples(case, *key, response)),
     )
 
 
@@ -124,7 +124,7 @@ def _samples(
             )
 
 
-def _counted(things: tuple[float, ...], word: str) -> str:
+def _count_text(things: tuple[float, ...], word: str) -> str:
     return f"{len(things)} {word}" + ("s" if len(things) > 1 else "")
 
 
@@ -133,7 +133,7 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
     step = case.step(rate_hz)
     if case.inner_loop:
         inner_loop = replace(
-            quickened(case.quickness), transport_delay=1e-3 * case.transport_delay_ms
+            faster_inner_loop(case.quickness), transport_delay=1e-3 * case.transport_delay_ms
         )
         return fly_loop(planner, step, inner_loop)
     return fly(planner, step)
@@ -142,15 +142,15 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
 def _reference(case: Case, rate_hz: float) -> Floats:
     """(samples + 1, 2) coefficients of the first-order reference.
 
-    With `rate_limit: paper` their speed has the limit of equation 33.
+    With `rate_limit: paper` the speed of the reference is limited by equation 33.
     """
     model = FirstOrderReference(case.gain_per_s, case.planner_limits().coefficient_speed)
     return case.step(rate_hz).reference(model)
 
 
 def _reference_text(case: Case) -> str:
-    limited = case.limits.rate_limit == "paper"
-    return "first order " + ("with the limit of equation 33" if limited else "without limits")
+    is_limited = case.limits.rate_limit == "paper"
+    return "first order " + ("with the limit of equation 33" if is_limited else "without limits")
 
 
 def _conditions(case: Case) -> str:
@@ -170,19 +170,21 @@ def _conditions(case: Case) -> str:
     )
 
 
-def _figure(case: Case, flown: Flights) -> Figure:
+def _figure(case: Case, responses: Responses) -> Figure:
     hz = case.rates_hz[0]
     step, reference = case.step(hz), _reference(case, hz)
-    shown = {method: response for (method, rate), response in flown.items() if rate == hz}
-    worst_heading = {m: int(cross_track(r).argmax()) for m, r in shown.items()}
-    curves = [(m, m.label, r.at_heading(worst_heading[m])) for m, r in shown.items()]
+    shown_responses = {
+        method: response for (method, rate), response in responses.items() if rate == hz
+    }
+    worst_heading = {m: int(cross_track(r).argmax()) for m, r in shown_responses.items()}
+    curves = [(m, m.label, r.at_heading(worst_heading[m])) for m, r in shown_responses.items()]
     figure, ((north, east), (plane, from_straight_line), (from_reference, rate)) = new_figure(
         3, 2, height=3.0
     )
     draw_response(north, east, step.time, curves)
     draw_reference(north, east, step.time, reference, _reference_text(case))
     draw_plane(plane, curves, np.array([step.start, step.target]))
-    for m, response in shown.items():
+    for m, response in shown_responses.items():
         draw_line(
             from_straight_line,
             step.time,

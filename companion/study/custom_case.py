@@ -22,7 +22,7 @@ class CaseLimits(Section):
     max_tilt_deg: Annotated[float, Field(ge=1.0, le=75.0)] | None = None
     """Largest tilt of the target."""
     max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
-    """W_M, largest roll-pitch rate."""
+    """Largest roll-pitch rate, W_M in the paper."""
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
@@ -63,7 +63,7 @@ class Case(Section):
     inner_loop: bool = False
     """True: fly with the mock vehicle's rate loop, rotors and rigid body. False: ideal rates."""
     quickness: Annotated[int, Field(ge=1, le=10)] = 1
-    """All times of the inner loop are divided by this; at 1 it responds as measured on a PX4."""
+    """Factor that divides all times of the inner loop; 1: it responds as measured on a PX4."""
     transport_delay_ms: Annotated[int, Field(ge=0, le=500)] = 0
     """Transport delay of the setpoints; needs inner_loop."""
 
@@ -71,7 +71,7 @@ class Case(Section):
     def _step_makes_sense(self) -> "Case":
         for name, end in (("start", self.start), ("target", self.target)):
             if hypot(*end) >= sin(radians(75.0)):
-                raise ValueError(f"{name} must be a tilt below 75°: shorter than 0.966")
+                raise ValueError(f"{name} must be a tilt below 75°: √(north² + east²) below 0.966")
         if self.start == self.target:
             raise ValueError("start and target are the same: nothing to fly")
         tilt = self.limits.max_tilt_deg
@@ -83,10 +83,12 @@ class Case(Section):
 
     @model_validator(mode="after")
     def _lists_make_sense(self) -> "Case":
-        unknown = [name for name in self.methods if name not in LAW_NAMES]
-        if unknown:
-            known = ", ".join(LAW_NAMES)
-            raise ValueError(f"unknown method {unknown[0]!r} in methods; known: {known}")
+        unknown_names = [name for name in self.methods if name not in LAW_NAMES]
+        if unknown_names:
+            known_names = ", ".join(LAW_NAMES)
+            raise ValueError(
+                f"unknown method {unknown_names[0]!r} in methods; known: {known_names}"
+            )
         for key in ("methods", "rates_hz"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
                 raise ValueError(f"{key} has the same value twice")
@@ -110,10 +112,10 @@ class Case(Section):
     @property
     def steps_to_fly(self) -> float:
         """Number of simulation steps of the whole case; with inner_loop, of physics steps."""
-        flown_s = len(self.headings_deg) * len(self.methods) * self.seconds
+        total_s = len(self.headings_deg) * len(self.methods) * self.seconds
         if self.inner_loop:
-            return flown_s * len(self.rates_hz) * 1000.0 * self.quickness
-        return flown_s * sum(self.rates_hz)
+            return total_s * len(self.rates_hz) * 1000.0 * self.quickness
+        return total_s * sum(self.rates_hz)
 
     def step(self, rate_hz: float) -> Step:
         """The step of this case at one of its sample rates."""

@@ -24,12 +24,12 @@ LEVEL: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ROLL_STEP = BodyRates(0.5, 0.0, 0.0)
 """Step of the rate setpoint with which the rate loop is measured, rad/s."""
 ROLL_STEP_S = 0.25
-"""Duration of that flight, s."""
+"""Duration of the simulated response to `ROLL_STEP`, s."""
 
 
 @dataclass(frozen=True, slots=True)
 class InnerLoopFlight:
-    """A flight of n planner samples. Rates are body rates (FRD), rad/s."""
+    """Result of a flight of n planner samples. Rates are body rates (FRD), rad/s."""
 
     time: NDArray[np.float64]
     """(n+1,), s from the start."""
@@ -37,13 +37,14 @@ class InnerLoopFlight:
     """(n+1, 4), attitude (w, x, y, z), body → world (NED)."""
     body_rates: NDArray[np.float64]
     """(n+1, 3), true rates of the vehicle."""
-    commanded: NDArray[np.float64]
+    commanded_rates: NDArray[np.float64]
     """(n, 3), rates commanded at each sample, before any delay."""
     tilt_saturated: NDArray[np.bool_]
     """(n,), whether the rotors could not produce the commanded roll and pitch torque in at least
     one physics step of the sample."""
     yaw_saturated: NDArray[np.bool_]
-    """(n,), the same for the yaw torque."""
+    """(n,), whether the rotors could not produce the commanded yaw torque in at least one physics
+    step of the sample."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class InnerLoop:
         q = normalised(start)
         multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust_to_hold_height(q))
         setpoints = self._setpoint_queue(multirotor.throttle(_thrust_to_hold_height(q)))
-        attitudes, body_rates, commanded, saturated = [q], [multirotor.body_rates], [], []
+        attitudes, body_rates, commanded_rates, saturated = [q], [multirotor.body_rates], [], []
         for _ in range(samples):
             rates = planner.rates(q, target, 1.0 / rate_hz, BodyRates(*multirotor.body_rates))
             setpoint = rates, multirotor.throttle(_thrust_to_hold_height(q))
@@ -95,13 +96,13 @@ class InnerLoop:
             q = multirotor.q
             attitudes.append(q)
             body_rates.append(multirotor.body_rates)
-            commanded.append(rates)
+            commanded_rates.append(rates)
             saturated.append((tilt_saturated, yaw_saturated))
         return InnerLoopFlight(
             np.arange(samples + 1) / rate_hz,
             np.array(attitudes),
             np.array(body_rates),
-            np.array(commanded),
+            np.array(commanded_rates),
             *np.array(saturated).T,
         )
 
@@ -111,7 +112,7 @@ class InnerLoop:
         The time includes all delays, and can be compared with 1/p of a planner. It must be shorter
         than `ROLL_STEP_S`.
         """
-        goal = ROLL_STEP.roll * (1.0 - exp(-1.0))
+        target_rate = ROLL_STEP.roll * (1.0 - exp(-1.0))
         flight = self.fly(
             _ConstantRates(ROLL_STEP),
             LEVEL,
@@ -120,9 +121,9 @@ class InnerLoop:
             rate_hz=self.airframe.physics_rate_hz,
         )
         roll = flight.body_rates[:, 0]
-        crossing = int(np.argmax(roll >= goal))
-        between = slice(crossing - 1, crossing + 1)
-        return float(np.interp(goal, roll[between], flight.time[between]))
+        crossing = int(np.argmax(roll >= target_rate))
+        bracket = slice(crossing - 1, crossing + 1)
+        return float(np.interp(target_rate, roll[bracket], flight.time[bracket]))
 
     def _setpoint_queue(self, throttle: float) -> deque[tuple[BodyRates, float]]:
         """Queue of the delayed setpoints (rates, throttle), newest last; at first all rates 0."""
@@ -130,7 +131,7 @@ class InnerLoop:
         return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * length, maxlen=length)
 
 
-def quickened(factor: int) -> InnerLoop:
+def faster_inner_loop(factor: int) -> InnerLoop:
     """The default inner loop with all of its times divided by `factor`.
 
     Inertia and rotor lag are divided by `factor`, and the torques are the same. So the body rates

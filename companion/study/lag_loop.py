@@ -22,7 +22,7 @@ class LagFlight(NamedTuple):
 
     q: Floats
     """(samples + 1, 4), attitude (w, x, y, z)."""
-    commanded: Floats
+    commanded_rates: Floats
     """(samples, 3), commanded body rates, rad/s."""
 
 
@@ -31,8 +31,8 @@ class LagBody:
 
     Args:
         q: attitude at the start, at rest.
-        lag_ms: τ, ms.
-        dead_time_ms: θ, ms.
+        lag_ms: lag τ, ms.
+        dead_time_ms: dead time θ, ms.
 
     Attributes:
         q: attitude, body → world.
@@ -46,11 +46,11 @@ class LagBody:
         self._mean_decay = 1e-3 * lag_ms * (1.0 - self._decay) * STEP_HZ  # mean over a step
         self._delayed = deque([self.rates] * (dead_time_ms + 1))
 
-    def turn(self, commanded: BodyRates, steps: int) -> None:
-        """Simulate this number of steps with the body rates `commanded` (rad/s)."""
+    def simulate(self, commanded_rates: BodyRates, steps: int) -> None:
+        """Simulate `steps` steps of 1/STEP_HZ s with constant commanded rates, rad/s."""
         decay, mean_decay, (roll, pitch, yaw) = self._decay, self._mean_decay, self.rates
         for _ in range(steps):
-            self._delayed.append(commanded)
+            self._delayed.append(commanded_rates)
             self._delayed.popleft()
             roll_goal, pitch_goal, yaw_goal = self._delayed[0]
             # The difference of each rate from its delayed command decays.
@@ -74,9 +74,9 @@ class LagLoop:
     """The inner loop of a planner that commands a `LagBody`."""
 
     lag_ms: int
-    """τ, ms."""
+    """Lag τ of the body rates, ms."""
     dead_time_ms: int
-    """θ, ms."""
+    """Dead time θ of the body rates, ms."""
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
@@ -87,10 +87,10 @@ class LagLoop:
         """
         steps = round(STEP_HZ / rate_hz)
         body = LagBody(start, self.lag_ms, self.dead_time_ms)
-        attitudes, commanded = [start], []
+        attitudes, commanded_rates = [start], []
         for _ in range(round(seconds * rate_hz)):
             rates = planner.rates(body.q, target, 1.0 / rate_hz, body.rates)
-            commanded.append(rates)
-            body.turn(rates, steps)
+            commanded_rates.append(rates)
+            body.simulate(rates, steps)
             attitudes.append(body.q)
-        return LagFlight(np.array(attitudes), np.array(commanded))
+        return LagFlight(np.array(attitudes), np.array(commanded_rates))

@@ -14,11 +14,12 @@ FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second
 """Titles of `DelayedSecondOrder.cells`."""
 
 _THINNING = 10
-"""The second-order model is fitted to every tenth sample."""
+"""Number of samples from one to the next to which the second-order model is fitted."""
 _AT_REST = Coefficients(0.0, 0.0)
 _LOWER_BOUNDS = np.array([log(0.1), log(0.01), 0.0])
+"""Lower bounds of log ω (ω in rad/s), log ζ and the dead time (s) in the fit."""
 _UPPER_BOUNDS = np.array([log(1000.0), log(100.0), 0.5])
-"""Bounds of log ω (rad/s), log ζ and the dead time (s) in the fit."""
+"""Upper bounds of log ω (ω in rad/s), log ζ and the dead time (s) in the fit."""
 
 
 def deviation(response: Response, reference: Floats) -> Floats:
@@ -51,15 +52,15 @@ def cross_track(response: Response) -> Floats:
 def settling_time(response: Response, share: float = 0.05) -> Floats:
     """(headings,) time from which the distance to the target stays within `share` of the step, s.
 
-    It is inf if the response is outside at its end.
+    The time is inf if the response ends outside.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     offset = response.coefficients - target[:, None]
-    beyond = np.hypot(offset[:, 0], offset[:, 1]) > share * np.hypot(*(target - start))
-    first_inside = beyond.shape[0] - np.argmax(beyond[::-1], axis=0)  # after the last sample beyond
-    arrived = np.where(beyond.any(axis=0), first_inside, 0)
+    is_outside = np.hypot(offset[:, 0], offset[:, 1]) > share * np.hypot(*(target - start))
+    after_last_outside = is_outside.shape[0] - np.argmax(is_outside[::-1], axis=0)
+    first = np.where(is_outside.any(axis=0), after_last_outside, 0)  # first sample to stay inside
     time = response.step.time
-    return np.where(arrived < len(time), time[np.minimum(arrived, len(time) - 1)], np.inf)
+    return np.where(first < len(time), time[np.minimum(first, len(time) - 1)], np.inf)
 
 
 def largest_tilt_rate(response: Response) -> float:
@@ -99,9 +100,9 @@ class DelayedSecondOrder(NamedTuple):
 
 def second_order_path(step: Step, fit: DelayedSecondOrder, time: Floats) -> Floats:
     """(n, 2) coefficients of the fitted model, from rest, at (n,) times after the step, s."""
-    moving = np.maximum(time - fit.dead_time, 0.0)
+    model_time = np.maximum(time - fit.dead_time, 0.0)
     return np.array(
-        [fit.model.after(step.start, _AT_REST, step.target, float(t))[0] for t in moving]
+        [fit.model.after(step.start, _AT_REST, step.target, float(t))[0] for t in model_time]
     )
 
 

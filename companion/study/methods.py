@@ -49,7 +49,7 @@ EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
 PAPER_METHODS = (QUATERNION, SO3, EULER, PROPOSED)
 """The methods of the paper's comparison, in drawing order: wide lines first."""
-BY_PLANNER = {method.planner: method for method in (*PAPER_METHODS, EXACT)}
+METHOD_BY_PLANNER = {method.planner: method for method in (*PAPER_METHODS, EXACT)}
 """The method of every planner without memory, by name of the planner, in drawing order."""
 
 

@@ -24,13 +24,13 @@ class Table:
     """A table of results, written as CSV and Markdown and shown on the page."""
 
     name: str
-    """Name of its files, without the ending."""
+    """Name of the table's files, without extension."""
     caption: str
-    """One sentence."""
+    """Caption, one sentence."""
     columns: tuple[str, ...]
-    """Titles with units."""
+    """Titles of the columns, with units."""
     rows: tuple[tuple[Cell, ...], ...]
-    """One cell for each column."""
+    """Rows, with one cell for each column."""
 
     def as_csv(self) -> str:
         """The table as comma-separated values, with all digits of numbers."""
@@ -76,7 +76,7 @@ class Finding:
     statement: str
     """One sentence that can be true or false."""
     holds: bool
-    """Whether the numbers support it."""
+    """Whether the numbers support the statement."""
     evidence: str
     """The numbers, and the bound with which they were compared."""
 
@@ -86,7 +86,7 @@ class Outcome:
     """The results of one study."""
 
     name: str
-    """Name of its files, without the ending."""
+    """Name of the figure's files, without extension."""
     title: str
     """Title on the page."""
     conditions: str

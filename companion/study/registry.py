@@ -34,7 +34,7 @@ class Study(NamedTuple):
     takes_case: bool = False
     """Whether the study reads a case from `--case FILE`."""
     prints_json: bool = False
-    """Whether its outcome has rows for `--json`."""
+    """Whether the study's outcome has rows for `--json`."""
 
 
 _ENTRIES = (
@@ -76,23 +76,23 @@ _ENTRIES = (
 STUDIES = {study.name: study for study in _ENTRIES}
 
 
-def chosen(name: str) -> tuple[Study, ...]:
+def selected_studies(name: str) -> tuple[Study, ...]:
     """The studies that a name on the command line selects."""
     if name == ALL:
         return tuple(study for study in STUDIES.values() if study.in_all)
     return (STUDIES[name],)
 
 
-def choices() -> tuple[str, ...]:
+def study_names() -> tuple[str, ...]:
     """All names that the command line accepts."""
     return (*STUDIES, ALL)
 
 
 def help_table() -> str:
     """Help text with one line for each name that the command line accepts."""
-    everything = ", ".join(study.name for study in chosen(ALL))
+    all_names = ", ".join(study.name for study in selected_studies(ALL))
     lines = [(study.name, study.summary) for study in STUDIES.values()]
-    return "\n".join(f"  {name:<8}{text}" for name, text in [*lines, (ALL, everything)])
+    return "\n".join(f"  {name:<8}{text}" for name, text in [*lines, (ALL, all_names)])
 
 
 def names_with_json() -> str:
@@ -113,6 +113,6 @@ def check_extras(name: str) -> None:
     """
     for package in _PACKAGES["study"]:
         require(package, "study", "`companion study`")
-    for study in chosen(name):
+    for study in selected_studies(name):
         for package in _PACKAGES.get(study.extra, ()):
             require(package, study.extra, f"`companion study {study.name}`")

@@ -21,8 +21,8 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
         OSError: a file cannot be written.
     """
     _lay_out(outcome.figure)
-    for ending in ("svg", "png"):
-        _write(folder / f"{outcome.name}.{ending}", _image(outcome.figure, ending))
+    for extension in ("svg", "png"):
+        _write(folder / f"{outcome.name}.{extension}", _image(outcome.figure, extension))
     for table in (*outcome.tables, *outcome.series):
         _write(folder / f"{table.name}.csv", table.as_csv().encode())
     for table in outcome.tables:
@@ -64,19 +64,19 @@ def _lay_out(figure: Figure) -> None:
     figure.set_layout_engine("none")
 
 
-def _image(figure: Figure, ending: str) -> bytes:
+def _image(figure: Figure, extension: str) -> bytes:
     """The content of a figure's file; the same figure gives the same bytes."""
     buffer = io.BytesIO()
-    metadata = {"Date": None} if ending == "svg" else {"Software": None}
-    figure.savefig(buffer, format=ending, dpi=_DPI, metadata=metadata)
+    metadata = {"Date": None} if extension == "svg" else {"Software": None}
+    figure.savefig(buffer, format=extension, dpi=_DPI, metadata=metadata)
     return buffer.getvalue()
 
 
 def _write(path: Path, content: bytes) -> None:
     """Replace a file in one step, so that an interruption leaves the old one or the new one."""
-    part = path.with_name(f"{path.name}.part")
+    temporary_path = path.with_name(f"{path.name}.part")
     try:
-        part.write_bytes(content)
-        part.replace(path)
+        temporary_path.write_bytes(content)
+        temporary_path.replace(path)
     finally:
-        part.unlink(missing_ok=True)
+        temporary_path.unlink(missing_ok=True)

@@ -54,7 +54,7 @@ def run(
         OSError: a result cannot be written, a worker was killed, or the solver process of the
             study `nmpc` does not start (ChildProcessError).
     """
-    jobs = {study.name: _make_job(study, case_file) for study in registry.chosen(name)}
+    jobs = {study.name: _make_job(study, case_file) for study in registry.selected_studies(name)}
     page = _prepare_folder(out, "study" if name == registry.ALL else name)
     workers = min(workers, len(jobs))
     with _progress(console) as progress:

@@ -26,10 +26,11 @@ class Step:
     """A step from one steady tilt to another, flown at several headings."""
 
     start: Coefficients
+    """Acceleration coefficients (north, east) before the step."""
     target: Coefficients
-    """`start` and `target`: acceleration coefficients (north, east)."""
+    """Acceleration coefficients (north, east) of the target."""
     gain: float = 5.0
-    """P of the planners and of the first-order reference, 1/s."""
+    """Gain p of the planners and of the first-order reference, 1/s."""
     rate_hz: float = 1000.0
     """Sample rate of the planner."""
     seconds: float = 2.0
@@ -89,7 +90,7 @@ class LoopFlight(Protocol):
         ...
 
     @property
-    def commanded(self) -> Floats:
+    def commanded_rates(self) -> Floats:
         """(samples, 3) commanded body rates, rad/s."""
         ...
 
@@ -125,5 +126,5 @@ def fly_loop(planner: Planner, step: Step, loop: Loop) -> Response:
     return Response(
         step,
         batch.coefficients(np.stack([flight.q for flight in flights], axis=-1)),
-        np.stack([flight.commanded for flight in flights], axis=-1),
+        np.stack([flight.commanded_rates for flight in flights], axis=-1),
     )

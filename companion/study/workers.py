@@ -21,16 +21,16 @@ _POLL_S = 0.05
 
 
 class _Channels(NamedTuple):
-    """What a worker shares with the main process."""
+    """Queue and event that a worker shares with the main process."""
 
-    ticks: Any
+    tick_queue: Any
     """Queue of (study, part), put by the workers."""
-    stop: Any
+    stop_event: Any
     """Event, set when the run is interrupted."""
 
 
-_shared: list[_Channels] = []
-"""In a worker, its `_Channels`: queues can only be passed to a process when it starts."""
+_worker_channels: list[_Channels] = []
+"""The `_Channels` of this worker process; queues can only be passed to a process when it starts."""
 
 
 class _StoppedError(Exception):
@@ -70,14 +70,14 @@ def run_in_workers(
                 name: pool.submit(_run_one, run_study, name)
                 for name in sorted(parts, key=lambda name: -parts[name])
             }
-        _forward_ticks(list(futures.values()), channels.ticks, tick)
+        _forward_ticks(list(futures.values()), channels.tick_queue, tick)
         return {name: futures[name].result() for name in parts}
     except BrokenProcessPool as error:
         raise OSError(
             "a worker process was killed, perhaps for lack of memory; run again with --workers 1"
         ) from error
     finally:
-        channels.stop.set()
+        channels.stop_event.set()
         pool.shutdown(cancel_futures=True)
 
 
@@ -85,7 +85,7 @@ def run_in_workers(
 def interrupts_blocked() -> Iterator[None]:
     """Block SIGINT in the context, and unblock it afterwards.
 
-    Processes that are started in the context inherit this, so that Ctrl-C does not end them.
+    Processes started in the context inherit the blocked signal, so Ctrl-C does not end them.
     """
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -95,14 +95,14 @@ def interrupts_blocked() -> Iterator[None]:
 
 
 def _forward_ticks(
-    futures: Sequence[Future[Outcome]], ticks: Any, tick: Callable[[str, str], None]
+    futures: Sequence[Future[Outcome]], tick_queue: Any, tick: Callable[[str, str], None]
 ) -> None:
     """Pass the workers' progress to `tick` until all studies have ended or one has failed."""
     pending = set(futures)
     while pending:
         done, pending = wait(pending, timeout=_POLL_S)
-        while not ticks.empty():
-            tick(*ticks.get())
+        while not tick_queue.empty():
+            tick(*tick_queue.get())
         for future in done:
             future.result()  # raises the study's exception
 
@@ -110,16 +110,16 @@ def _forward_ticks(
 def _start_worker(channels: _Channels) -> None:
     """Store the channels when a worker process starts."""
     end_with_parent()
-    _shared.append(channels)
+    _worker_channels.append(channels)
 
 
 def _run_one(run_study: RunStudy, name: str) -> Outcome:
     """Run one study in a worker process."""
-    (channels,) = _shared
+    (channels,) = _worker_channels
 
     def tick(part: str) -> None:
-        if channels.stop.is_set():
+        if channels.stop_event.is_set():
             raise _StoppedError
-        channels.ticks.put((name, part))
+        channels.tick_queue.put((name, part))
 
     return run_study(name, tick)

@@ -30,14 +30,14 @@ class Role(Enum):
 class Readiness(NamedTuple):
     """Telemetry that decides whether a vehicle can be armed and flown; `None`: not known now."""
 
-    prearm_good: bool | None
-    """The autopilot's own pre-arm checks pass."""
+    prearm_passed: bool | None
+    """Whether the autopilot's own pre-arm checks pass."""
     estimator_flags: int | None
     """ESTIMATOR_STATUS_FLAGS."""
-    position: bool
-    """A finite local position was received in the last 5 s."""
-    home: bool
-    """The home position was received."""
+    has_position: bool
+    """Whether a finite local position was received in the last 5 s."""
+    has_home: bool
+    """Whether the home position was received."""
 
 
 class ControlEntry(Enum):
@@ -51,11 +51,11 @@ class OffboardLossFailsafe(NamedTuple):
     """What the autopilot does when setpoints stop."""
 
     parameter: str
-    """Name of the parameter that sets how long it holds the last body rates, s."""
+    """Name of the parameter for the time in which the autopilot holds the last body rates, s."""
     action: str
-    """What it does after that time, in words."""
+    """What the autopilot does when it no longer holds the last body rates, in words."""
     brakes: bool
-    """Whether it then brakes the vehicle to a stop."""
+    """Whether `action` brakes the vehicle to a stop."""
 
 
 FLIGHT_RATES: Mapping[str, float] = MappingProxyType(

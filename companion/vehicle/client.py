@@ -68,7 +68,7 @@ class VehicleClient:
         return self.state.autopilot
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
-        """Call `callback` with each message of that name; return a function that ends this.
+        """Call `callback` with each message of that name; return a function to unsubscribe.
 
         Raises:
             UnknownMessage: The dialect has no such message.

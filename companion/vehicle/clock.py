@@ -29,7 +29,7 @@ _MIN_CLOCK_SETBACK = 0.5
 _TIMESYNC_LAG = 0.012
 """Largest lag of TIMESYNC behind the samples' stamps in the simulators, s (measured)."""
 _TIMESYNC_WAIT = 3.0
-"""Time allowed for TIMESYNC after the first sample, s; then an unknown age is reported."""
+"""Time from the first sample to the report that TIMESYNC does not measure ages, s."""
 
 
 class VehicleClock:
@@ -52,7 +52,7 @@ class VehicleClock:
     """
 
     def __init__(self, *, lockstep: bool = False) -> None:
-        self.rate = ClockRate(fixed=lockstep)
+        self.rate = ClockRate(same_clock=lockstep)
         self.delay = TelemetryDelay()
         self.changes = self.restarts = 0
         self.last_change = ""
@@ -103,7 +103,7 @@ class VehicleClock:
         """
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
-        quickest = self._quickest + self.rate.slowest * (received - self._received)
+        quickest = self._quickest + self.rate.lowest_rate * (received - self._received)
         fits = time > self._newest and ahead <= quickest + SMALLEST_JUMP
         if not fits or self._misfits.stamps:
             misfit = self._adapt_to(Stamp(time, ahead, received), time_boot_ms, quickest)
@@ -115,7 +115,7 @@ class VehicleClock:
         if late < 0.0:
             quickest, late = ahead, 0.0
         self._quickest, self._received, self._newest, self._late = quickest, received, time, late
-        if received >= self.rate.due:
+        if received >= self.rate.note_due:
             self.rate.note(received, quickest)
         return SampleTiming(time, late + self.delay.seconds)
 
@@ -162,14 +162,14 @@ class VehicleClock:
         self._reported_unknown = not self.age_known
         if self._reported_unknown:
             self.on_event(
-                f"the age of telemetry is not known, because {self.delay.unknown.value}; "
-                "a sample that arrives later than the others is noticed, but not a delay of all"
+                f"the age of telemetry is not known, because {self.delay.why_unknown.value}; "
+                "a single late sample is noticed, but a delay of all samples is not"
             )
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _adapt_to(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Take a misfit, or the first stamp that fits again; return why it is not used, or None."""
+        """Adapt to a misfit or to the first stamp after misfits; return the misfit, or None."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
@@ -196,11 +196,11 @@ class VehicleClock:
         Exchanges after the last sample that fitted do not count, because the clock may have jumped
         before them.
         """
-        most = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
-        return stamp.time > self._newest and stamp.ahead - quickest <= most
+        largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
+        return stamp.time > self._newest and stamp.ahead - quickest <= largest_delay
 
     def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Add a misfit to the others; if they show a jump of the clock, accept it, return None."""
+        """Add a misfit; if the misfits show a jump of the clock, accept it and return None."""
         if not self._misfits.continued_by(stamp):
             self._drop_misfits()
         self._misfits.stamps.append(stamp)
@@ -226,7 +226,7 @@ class VehicleClock:
             self._accept_jump(-late, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
-        """Drop the misfits; the first time that one was stamped ahead of the clock, report it."""
+        """Drop the misfits; report the first one ever that is stamped ahead of the clock."""
         ahead = any(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True

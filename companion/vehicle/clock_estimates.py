@@ -36,24 +36,24 @@ class ClockRate:
     """Estimates the rate of the vehicle's clock.
 
     Args:
-        fixed: Whether the vehicle and the loop have the same clock.
+        same_clock: Whether the vehicle and the loop have the same clock.
 
     Attributes:
         rate: Rate of the vehicle's clock minus that of the loop's clock, s per s.
-        slowest: The lowest rate that is possible now, s per s.
-        due: Event-loop time at which the next offset should be noted, s.
+        lowest_rate: The lowest rate that is possible now, s per s.
+        note_due: Event-loop time at which the next offset should be noted, s.
     """
 
-    def __init__(self, *, fixed: bool = False) -> None:
+    def __init__(self, *, same_clock: bool = False) -> None:
         self.rate = 0.0
-        self.due = inf if fixed else -inf
-        self._unsure = 0.0 if fixed else MOST_DRIFT
-        self.slowest = -self._unsure
+        self.note_due = inf if same_clock else -inf
+        self._rate_error = 0.0 if same_clock else MOST_DRIFT
+        self.lowest_rate = -self._rate_error
         self._noted: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
 
     def spread(self, seconds: float) -> float:
         """Difference between the fastest and the slowest possible clock after `seconds`, s."""
-        return 2.0 * self._unsure * seconds
+        return 2.0 * self._rate_error * seconds
 
     def note(self, now: float, offset: float) -> None:
         """Take the quickest sample's offset (vehicle time minus event-loop time) once a second.
@@ -65,24 +65,24 @@ class ClockRate:
             offset: The offset, s.
         """
         if self._noted:
-            then, before = self._noted[-1]
-            if offset - before > MOST_DRIFT * (now - then) + _LATE_SAMPLES_RISE:
+            noted_at, noted_offset = self._noted[-1]
+            if offset - noted_offset > MOST_DRIFT * (now - noted_at) + _LATE_SAMPLES_RISE:
                 self._noted.clear()  # the noted offsets are of late samples
-                self.rate, self._unsure = 0.0, MOST_DRIFT
-                self.slowest = -MOST_DRIFT
-        self.due = now + _NOTE_PERIOD
+                self.rate, self._rate_error = 0.0, MOST_DRIFT
+                self.lowest_rate = -MOST_DRIFT
+        self.note_due = now + _NOTE_PERIOD
         self._noted.append((now, offset))
-        then, before = self._noted[0]
-        if now - then < _MIN_WINDOW * _NOTE_PERIOD:
+        noted_at, noted_offset = self._noted[0]
+        if now - noted_at < _MIN_WINDOW * _NOTE_PERIOD:
             return
-        self._unsure = _RATE_UNCERTAINTY
-        slope = (offset - before) / (now - then)
+        self._rate_error = _RATE_UNCERTAINTY
+        slope = (offset - noted_offset) / (now - noted_at)
         self.rate = max(-MOST_DRIFT, min(MOST_DRIFT, slope))
-        self.slowest = self.rate - self._unsure
+        self.lowest_rate = self.rate - self._rate_error
 
 
 class DelayUnknown(Enum):
-    """Why the delay is not known."""
+    """Why the delay of the quickest sample is not known."""
 
     UNANSWERED = "the autopilot does not answer TIMESYNC"
     OTHER_CLOCK = "TIMESYNC uses a different clock than time_boot_ms"
@@ -93,14 +93,14 @@ class _Exchange(NamedTuple):
 
     at: float
     """Event-loop time of the answer, s."""
-    first_error: float
-    """Largest error of the delay at that time, s."""
+    initial_error: float
+    """Largest error of `delay` at the time `at`, s."""
     delay: float
     """TIMESYNC's offset minus the quickest sample's, s."""
 
     def error(self, now: float) -> float:
         """Largest error of the delay at the event-loop time `now`, s."""
-        return self.first_error + MOST_DRIFT * (now - self.at)
+        return self.initial_error + MOST_DRIFT * (now - self.at)
 
 
 class TelemetryDelay:
@@ -112,13 +112,13 @@ class TelemetryDelay:
     Attributes:
         known: Whether the delay is known.
         seconds: The delay, s; 0 while it is not known.
-        unknown: Why the delay is not known; without meaning while it is known.
+        why_unknown: Why the delay is not known; without meaning while it is known.
     """
 
     def __init__(self) -> None:
         self.known = False
         self.seconds = 0.0
-        self.unknown = DelayUnknown.UNANSWERED
+        self.why_unknown = DelayUnknown.UNANSWERED
         self._exchanges: deque[_Exchange] = deque(maxlen=round(EXCHANGE_LIFETIME) + 10)
         self._implausible: _Exchange | None = None
 
@@ -142,14 +142,14 @@ class TelemetryDelay:
         exchange = _Exchange(now, error, delay)
         if -(error + _MAX_TIMESYNC_LAG) <= delay <= _MAX_DELAY:
             self._implausible = None
-            self.unknown = DelayUnknown.UNANSWERED
+            self.why_unknown = DelayUnknown.UNANSWERED
             self._exchanges.append(exchange)
             self.expire(now)
             return None
         before, self._implausible = self._implausible, exchange
         if before is None:
             return None
-        if abs(before.delay - delay) > before.first_error + error + _MAX_TIMESYNC_LAG:
+        if abs(before.delay - delay) > before.initial_error + error + _MAX_TIMESYNC_LAG:
             return None
         self._implausible = None
         if self._exchanges and delay < 0.0:
@@ -190,7 +190,7 @@ class TelemetryDelay:
     def forget(self, why: DelayUnknown) -> None:
         """Forget all exchanges: the delay is not known any more, because of `why`."""
         self._exchanges.clear()
-        self.known, self.unknown = False, why
+        self.known, self.why_unknown = False, why
         self.seconds = 0.0
 
     def expire(self, now: float) -> None:
@@ -199,7 +199,7 @@ class TelemetryDelay:
         while exchanges and now - exchanges[0].at > EXCHANGE_LIFETIME:
             exchanges.popleft()
         if not exchanges:
-            self.forget(self.unknown)
+            self.forget(self.why_unknown)
             return
         self.known = True
         best = min(exchanges, key=lambda each: each.error(now))

@@ -45,9 +45,9 @@ class Stamp(NamedTuple):
     time: float
     """Vehicle time, s."""
     ahead: float
-    """Vehicle time minus event-loop time at its arrival, s; its offset less its delay."""
+    """`time` minus `received`, s: the offset of the clocks less the sample's delay."""
     received: float
-    """Event-loop time of its arrival, s."""
+    """Event-loop time of the sample's arrival, s."""
 
 
 class MisfitRun:

@@ -9,7 +9,7 @@ from companion.mavlink.errors import LogError
 from companion.mavlink.messages import Message
 from companion.mavlink.tlog_file import messages
 from companion.vehicle.autopilot import Autopilot, Role
-from companion.vehicle.registry import AUTOPILOT_NAMES, BY_NUMBER
+from companion.vehicle.registry import AUTOPILOT_NAMES, AUTOPILOTS_BY_NUMBER
 
 Row = tuple[float, ...]
 
@@ -20,7 +20,7 @@ _STANDARD_GRAVITY = 9.80665
 _RECENT_SAMPLES = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
 _MAX_CLOCK_DIFFERENCE = 1.0
-"""Stamps of accelerometer and attitude that differ by more than this, s, are of two clocks."""
+"""Stamps of accelerometer and attitude that differ by more than this, s, come from two clocks."""
 _MESSAGE_NAMES = {
     "HEARTBEAT",
     "SET_ATTITUDE_TARGET",
@@ -60,14 +60,14 @@ def read_flight_log(path: Path | str) -> FlightLog:
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:
         raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
-    if not reader.obeyed:
+    if not reader.obeyed_setpoints:
         raise LogError(
             f"{path}: holds no body rates that the vehicle obeyed: no SET_ATTITUDE_TARGET with "
             "body rates was sent while it was armed in the mode that obeys them"
         )
     # Both attitude messages carry the same rates, so only one of them is used.
     return FlightLog(
-        reader.obeyed,
+        reader.obeyed_setpoints,
         max(reader.rates_with_quaternion, reader.rates_with_euler, key=len),
         reader.specific_thrust,
     )
@@ -79,50 +79,50 @@ class _Reader:
 
     vehicle: tuple[int, int] | None = None
     """System and component of the autopilot, from its first heartbeat."""
-    obeyed: list[Row] = field(default_factory=list)
+    obeyed_setpoints: list[Row] = field(default_factory=list)
     """Setpoints that the autopilot obeyed."""
     rates_with_quaternion: list[Row] = field(default_factory=list)
     """Body rates from ATTITUDE_QUATERNION."""
     rates_with_euler: list[Row] = field(default_factory=list)
     """Body rates from ATTITUDE."""
     specific_thrust: list[Row] = field(default_factory=list)
-    """From the accelerometer."""
+    """The accelerometer's −z axis; see `FlightLog.specific_thrust`."""
     _autopilot: Autopilot | None = None
-    _obeying: bool = False
-    _unconfirmed: list[Row] = field(default_factory=list)
+    _was_obeying: bool = False
+    _unconfirmed_setpoints: list[Row] = field(default_factory=list)
     _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT_SAMPLES))
 
     def take(self, source: tuple[int, int], message: Message) -> None:
         """Take one message from `source` (system, component)."""
-        kind = message.get_type()
-        if kind == "SET_ATTITUDE_TARGET":
+        message_type = message.get_type()
+        if message_type == "SET_ATTITUDE_TARGET":
             self._setpoint(message)
-        elif kind == "HEARTBEAT":
+        elif message_type == "HEARTBEAT":
             self._heartbeat(source, message)
         elif source == self.vehicle:
-            self._telemetry(kind, message)
+            self._telemetry(message_type, message)
 
     def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
-        if self.vehicle is None and heartbeat.autopilot in BY_NUMBER:
-            self.vehicle, self._autopilot = source, BY_NUMBER[heartbeat.autopilot]
+        if self.vehicle is None and heartbeat.autopilot in AUTOPILOTS_BY_NUMBER:
+            self.vehicle, self._autopilot = source, AUTOPILOTS_BY_NUMBER[heartbeat.autopilot]
         if source != self.vehicle or self._autopilot is None:
             return
         mode = self._autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
         armed = bool(heartbeat.base_mode & _ARMED_FLAG)
         obeying = armed and Role.OFFBOARD in self._autopilot.roles(mode)
-        if obeying and self._obeying:
-            self.obeyed.extend(self._unconfirmed)
-        self._unconfirmed.clear()
-        self._obeying = obeying
+        if obeying and self._was_obeying:
+            self.obeyed_setpoints.extend(self._unconfirmed_setpoints)
+        self._unconfirmed_setpoints.clear()
+        self._was_obeying = obeying
 
     def _setpoint(self, setpoint: Message) -> None:
         if not self._stamps_ms or setpoint.type_mask & _RELEVANT_BITS != IGNORE_ATTITUDE:
             return
-        echoes = setpoint.time_boot_ms in self._stamps_ms
-        answered = setpoint.time_boot_ms if echoes else self._stamps_ms[-1]
-        self._unconfirmed.append(
+        stamp_is_known = setpoint.time_boot_ms in self._stamps_ms
+        sample_ms = setpoint.time_boot_ms if stamp_is_known else self._stamps_ms[-1]
+        self._unconfirmed_setpoints.append(
             (
-                1e-3 * answered,
+                1e-3 * sample_ms,
                 setpoint.body_roll_rate,
                 setpoint.body_pitch_rate,
                 setpoint.body_yaw_rate,
@@ -130,15 +130,15 @@ class _Reader:
             )
         )
 
-    def _telemetry(self, kind: str, message: Message) -> None:
-        if kind == "HIGHRES_IMU":
+    def _telemetry(self, message_type: str, message: Message) -> None:
+        if message_type == "HIGHRES_IMU":
             self._accelerometer(1e-6 * message.time_usec, -message.zacc)
-        elif kind == "SCALED_IMU":
+        elif message_type == "SCALED_IMU":
             milli_g = -message.zacc
             self._accelerometer(1e-3 * message.time_boot_ms, 1e-3 * _STANDARD_GRAVITY * milli_g)
         else:
-            of_quaternion = kind == "ATTITUDE_QUATERNION"
-            rows = self.rates_with_quaternion if of_quaternion else self.rates_with_euler
+            is_quaternion = message_type == "ATTITUDE_QUATERNION"
+            rows = self.rates_with_quaternion if is_quaternion else self.rates_with_euler
             time = 1e-3 * message.time_boot_ms
             rows.append((time, message.rollspeed, message.pitchspeed, message.yawspeed))
             self._stamps_ms.append(message.time_boot_ms)

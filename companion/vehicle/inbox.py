@@ -142,7 +142,7 @@ class Inbox:
         return True
 
     def may_prove_date(self, sender: str) -> bool:
-        """Whether an answer to TIMESYNC could prove the date of `sender`, whose claim was refused.
+        """Whether `sender`, refused for its signature's date, could prove it by answering TIMESYNC.
 
         If so, the transport sends to `sender`, and the next frame that `receive` accepts makes
         `sender` the peer.

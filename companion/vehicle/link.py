@@ -135,8 +135,8 @@ class Link(VehicleClient):
                 ) from None
             finally:
                 unsubscribe()
-        if self.state.unsupported is not None:
-            raise self.state.unsupported
+        if self.state.unsupported_error is not None:
+            raise self.state.unsupported_error
         assert self.state.heartbeat is not None
         return self.state.heartbeat
 

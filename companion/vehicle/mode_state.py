@@ -31,7 +31,7 @@ class ModeState:
         armings: Number of times that a heartbeat showed a newly armed vehicle.
         autopilot: How to command the vehicle; known from the first heartbeat of an autopilot that
             this program flies.
-        unsupported: The error to raise if this program cannot fly the autopilot.
+        unsupported_error: The error to raise if this program cannot fly the autopilot.
     """
 
     def __init__(self, router: Router, clock: Callable[[], float]) -> None:
@@ -41,7 +41,7 @@ class ModeState:
         self.heartbeat_is_newest = True
         self.armings = 0
         self.autopilot: Autopilot | None = None
-        self.unsupported: UnsupportedAutopilot | None = None
+        self.unsupported_error: UnsupportedAutopilot | None = None
         self._base_mode = 0
         router.subscribe("HEARTBEAT", self._on_heartbeat)
         router.subscribe("CURRENT_MODE", self._on_current_mode)
@@ -81,15 +81,18 @@ class ModeState:
     def _on_heartbeat(self, message: Message) -> None:
         if message.autopilot == _AUTOPILOT_INVALID:
             return  # another component that uses the autopilot's id
-        kind = message.autopilot, message.type in MULTIROTORS
-        if self.autopilot is not None and kind != (self.autopilot.mav_autopilot, True):
+        autopilot_and_type = message.autopilot, message.type in MULTIROTORS
+        if self.autopilot is not None and autopilot_and_type != (
+            self.autopilot.mav_autopilot,
+            True,
+        ):
             return  # an autopilot does not change its kind: this is another component
         if self.autopilot is None:
             try:
                 self.autopilot = autopilot_for(message.autopilot, message.type)
-                self.unsupported = None
+                self.unsupported_error = None
             except UnsupportedAutopilot as error:
-                self.unsupported = error
+                self.unsupported_error = error
         armed = bool(message.base_mode & _ARMED_FLAG)
         self.armings += armed and not self.armed
         mode = str(message.custom_mode)

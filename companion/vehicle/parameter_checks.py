@@ -32,8 +32,8 @@ def first_problem(*checks: Check) -> Check:
     """A check that reports the first problem that any of the checks finds."""
 
     def check(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
-        found = (each(value, values, settings) for each in checks)
-        return next((problem for problem in found if problem is not None), None)
+        problems = (each(value, values, settings) for each in checks)
+        return next((problem for problem in problems if problem is not None), None)
 
     return check
 

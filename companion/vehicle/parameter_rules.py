@@ -81,17 +81,17 @@ class ParameterRule:
     check: Check
     """Judges the value; returns `None` if the value is right."""
     source: str
-    """Where this rule comes from."""
+    """Source of the rule: a reference or a measurement."""
     vital: bool = False
-    """Without the parameter it is unknown what a setpoint does, or how long it is held. A vehicle
-    that does not send it is not flown."""
+    """Whether a vehicle that does not send the parameter is not flown: without it, the effect of a
+    setpoint, or how long the autopilot holds it, is unknown."""
     universal: bool = False
-    """Every supported version has the parameter, and some of its values are unsafe. If it was not
+    """Whether every supported version has the parameter, with some unsafe values. If it was not
     received on a link that loses frames, it may have such a value."""
-    instead: str = ""
+    alternative: str = ""
     """Name of the rule for the parameter that other versions have in its place."""
     reboot: bool = False
-    """A change takes effect only after the autopilot restarts."""
+    """Whether a change takes effect only after the autopilot restarts."""
 
     @property
     def name(self) -> str:
@@ -124,7 +124,7 @@ def judge(
 ) -> list[ParameterFinding]:
     """Apply the rules in their order; a rule whose parameter is absent is left out.
 
-    A value that is NaN or infinite is unsafe under every rule, and is not shown to other rules.
+    A value that is NaN or infinite is unsafe, and other rules treat its parameter as absent.
     """
     findings = []
     finite = {name: value for name, value in values.items() if isfinite(value)}

@@ -54,9 +54,9 @@ class Heartbeat(NamedTuple):
     """HEARTBEAT of the autopilot."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     autopilot: int
-    """MAV_AUTOPILOT."""
+    """MAV_AUTOPILOT number."""
     mode: str
     """The autopilot's name for the mode."""
     custom_mode: int
@@ -71,7 +71,7 @@ class CurrentMode(NamedTuple):
     """CURRENT_MODE of the autopilot."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     mode: str
     """The autopilot's name for the mode."""
     intended: str
@@ -82,20 +82,20 @@ class LocalPosition(NamedTuple):
     """LOCAL_POSITION_NED."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     vehicle_time: float
     """The vehicle's time stamp, s, on the clock of `AttitudeSample.vehicle_time`."""
     position_ned: Vector
-    """M."""
+    """Position, m NED."""
     velocity_ned: Vector
-    """m/s."""
+    """Velocity, m/s NED."""
 
 
 class LandedState(NamedTuple):
     """EXTENDED_SYS_STATE."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     state: int
     """MAV_LANDED_STATE: 1 on ground, 2 in air, 3 taking off, 4 landing."""
 
@@ -104,18 +104,18 @@ class GlobalPosition(NamedTuple):
     """GLOBAL_POSITION_INT."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     latitude_deg: float
-    """WGS84."""
+    """Latitude (WGS84), °."""
     longitude_deg: float
-    """WGS84."""
+    """Longitude (WGS84), °."""
 
 
 class Battery(NamedTuple):
     """SYS_STATUS or BATTERY_STATUS; a value that the vehicle does not know is `None`."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     voltage_v: float | None
     """Voltage of the whole battery, V."""
     remaining: float | None
@@ -140,13 +140,13 @@ class AttitudeTargetThrust(NamedTuple):
     """ATTITUDE_TARGET: the thrust setpoint of the autopilot, whatever its source."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     thrust: float
     """Collective thrust, 0..1."""
 
 
 class AttitudeTarget(NamedTuple):
-    """ATTITUDE_TARGET: the attitude along whose axes the autopilot takes body rates."""
+    """ATTITUDE_TARGET: the attitude about whose axes the autopilot takes body rates."""
 
     time_boot_ms: int
     """The vehicle's time stamp as received, ms since its boot."""
@@ -158,7 +158,7 @@ class Gps(NamedTuple):
     """GPS_RAW_INT."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     fix_type: int
     """GPS_FIX_TYPE; 3 or more is a 3D fix."""
     satellites: int | None
@@ -178,7 +178,7 @@ class Prearm(NamedTuple):
     """SYS_STATUS: the autopilot's own pre-arm checks."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     good: bool
     """Whether the checks pass."""
 
@@ -187,11 +187,11 @@ class Home(NamedTuple):
     """HOME_POSITION."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     latitude_deg: float
-    """WGS84."""
+    """Latitude (WGS84), °."""
     longitude_deg: float
-    """WGS84."""
+    """Longitude (WGS84), °."""
     altitude_m: float
     """Altitude above mean sea level, m."""
     down: float
@@ -202,6 +202,6 @@ class Estimator(NamedTuple):
     """ESTIMATOR_STATUS (PX4) or EKF_STATUS_REPORT (ArduPilot), whose flags mean the same."""
 
     received: float
-    """Event-loop time, s."""
+    """Event-loop time of arrival, s."""
     flags: int
     """ESTIMATOR_STATUS_FLAGS."""

@@ -12,7 +12,7 @@ from companion.vehicle.px4.events import EventReader
 
 AUTOPILOTS: tuple[Autopilot, ...] = (Px4(), ArduPilot())
 
-BY_NUMBER = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
+AUTOPILOTS_BY_NUMBER = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
 """The autopilots by MAV_AUTOPILOT."""
 
 AUTOPILOT_NAMES = " or ".join(
@@ -36,8 +36,8 @@ def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
             f"the vehicle (MAV_TYPE {vehicle_type}) is no multirotor; this program flies only "
             "multirotors"
         )
-    if mav_autopilot in BY_NUMBER:
-        return BY_NUMBER[mav_autopilot]
+    if mav_autopilot in AUTOPILOTS_BY_NUMBER:
+        return AUTOPILOTS_BY_NUMBER[mav_autopilot]
     raise UnsupportedAutopilot(
         f"the vehicle's autopilot (MAV_AUTOPILOT {mav_autopilot}) is not supported; this version "
         f"flies {AUTOPILOT_NAMES}"

@@ -59,8 +59,8 @@ class VehicleState(ModeState, _Values):
     Mode and arming are in the base class `ModeState`.
 
     Attributes:
-        landed_state: `LandedState`; to `landed`, `flying` and `taking_off` an outdated one is
-            unknown.
+        landed_state: `LandedState`, even if it is outdated; `landed`, `flying` and `taking_off`
+            then count it as unknown.
         position: `LocalPosition` with the newest time stamp of the vehicle.
         attitude_target: `AttitudeTarget`; only of an autopilot with `rates_about_target_axes`, and
             only with a unit quaternion.

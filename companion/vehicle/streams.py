@@ -22,7 +22,7 @@ _ROUNDING = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not l
 class StreamRate(NamedTuple):
     """The rate of one message, as requested, granted and measured, Hz."""
 
-    asked: float
+    requested: float
     """Requested rate; 0 requests that the message stops."""
     granted: float
     """Rate that the autopilot accepted; 0 if it refused all rates."""
@@ -72,7 +72,7 @@ async def set_rates(
 async def _request(
     commands: CommandClient, number: int, rate: float, interval_step_us: int
 ) -> tuple[float, str]:
-    """Request one message; return the granted rate in Hz, and the last refusal if that is 0."""
+    """Request one message; return the granted rate in Hz, and, if it is 0, the last refusal."""
     refusal = ""
     for _ in range(_MAX_HALVINGS + 1):
         interval_us = _DISABLED_INTERVAL

@@ -1,9 +1,9 @@
 """TIMESYNC: compares the clocks, and measures delay and loss on the link to the vehicle.
 
 Source: the MAVLink time synchronisation protocol. An exchange is a request whose answer enters the
-estimate of the vehicle's clock. A probe is a request that does not: it only measures the link to
-the vehicle, by which setpoints go. Setpoints are not acknowledged, so only the answers to probes
-show that setpoints come late or are lost.
+estimate of the vehicle's clock. A probe is a request whose answer only measures the link to the
+vehicle, over which setpoints are sent. Setpoints are not acknowledged, so only the answers to
+probes show that setpoints come late or are lost.
 """
 
 import asyncio
@@ -26,7 +26,8 @@ _UPLINK_WINDOW = 0.7 * _NS_PER_S
 """Window of `Uplink.round_trip`, ns: it uses only probes answered in the last 0.7 s. A link that
 becomes slow is noticed after about this time: until then the answers from before still count."""
 _MIN_PROBES = 6
-"""Fewer probes sent in this window say nothing: probing has just begun, or begun again."""
+"""Smallest number of probes sent in `_UPLINK_WINDOW` to judge the link: with fewer, probing has
+just begun."""
 _KEPT_REQUESTS = 16
 """Number of unanswered requests of each kind that are kept, and of round trips."""
 
@@ -37,13 +38,13 @@ class Uplink(NamedTuple):
     round_trip: float | None = None
     """Shortest round trip of the probes answered in the last 0.7 s, s; None: none was, or fewer
     than six were sent."""
-    unanswered: int | None = None
+    unanswered_count: int | None = None
     """Number of probes sent since the newest request that was answered, at most 16; None: the
     vehicle has not answered any TIMESYNC request."""
 
 
 class _Requests:
-    """Our requests of one kind: the unanswered ones, and the round trips of the latest others.
+    """Our requests of one kind: the unanswered ones, and the latest round trips of answered ones.
 
     All times are event-loop times, ns.
     """
@@ -58,18 +59,18 @@ class _Requests:
         self._unanswered.append(stamp)
 
     def take_answer(self, stamp: int, now: int) -> bool:
-        """Take the answer to the request sent at `stamp`; return False if there is none."""
+        """Take the answer to the request sent at `stamp`; False if that request is not open."""
         if stamp not in self._unanswered:
             return False
         self._unanswered.remove(stamp)
         self._round_trips.append((now, now - stamp))
         return True
 
-    def unanswered_since(self, stamp: int) -> int:
-        """Number of unanswered requests sent after `stamp`."""
-        return sum(sent > stamp for sent in self._unanswered)
+    def unanswered_count(self, since: int) -> int:
+        """Number of unanswered requests sent after `since`."""
+        return sum(sent > since for sent in self._unanswered)
 
-    def sent(self, since: float) -> int:
+    def sent_count(self, since: float) -> int:
         """Number of requests sent at `since` or later."""
         answered = sum(ended - trip >= since for ended, trip in self._round_trips)
         return answered + sum(stamp >= since for stamp in self._unanswered)
@@ -146,11 +147,11 @@ class TimeSync:
         after 16 s.
         """
         since = self._now_ns() - _UPLINK_WINDOW
-        judged = self._probes.sent(since) >= _MIN_PROBES
-        answered = self._newest_answered
+        enough_probes = self._probes.sent_count(since) >= _MIN_PROBES
+        newest_answered = self._newest_answered
         return Uplink(
-            min(self._probes.round_trips(since), default=None) if judged else None,
-            None if answered is None else self._probes.unanswered_since(answered),
+            min(self._probes.round_trips(since), default=None) if enough_probes else None,
+            None if newest_answered is None else self._probes.unanswered_count(newest_answered),
         )
 
     def _send_request(self, requests: _Requests, stamp: int) -> None:

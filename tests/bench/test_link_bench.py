@@ -31,7 +31,7 @@ def test_every_sample_is_answered_and_its_time_taken(module):
     try:
         sender.wait_ready()
         sender.send_for(100.0, 0.5)
-        assert sender.sent == 50
+        assert sender.sent_samples == 50
         assert 0 < len(sender.round_trips_ns) <= 50
         assert min(sender.round_trips_ns) > 0
         assert sender.cpu_ns > 0

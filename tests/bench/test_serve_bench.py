@@ -3,16 +3,16 @@
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.bench import serve
-from companion.bench.client_program import Counter
+from companion.bench.client_program import FrameCounter
 
 
 def test_missing_frames_are_counted():
     autopilot, other = dialect.MAVLink(None, 1, 1), dialect.MAVLink(None, 1, 191)
     beat = dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)
-    counter = Counter()
+    counter = FrameCounter()
     for sequence in (254, 255, 0, 3):
         autopilot.seq = sequence
-        counter.take(beat.pack(other) + beat.pack(autopilot))
+        counter.count_frames(beat.pack(other) + beat.pack(autopilot))
     assert (counter.received, counter.lost) == (4, 2)
 
 

@@ -19,7 +19,7 @@ def dask():
 
 @pytest.fixture
 def connected(dask):
-    """Replaces `cluster.connected`: it connects to that worker."""
+    """Replaces `cluster.cluster_client`: it connects to that worker."""
 
     @contextmanager
     def connect(*_):

@@ -23,7 +23,7 @@ TILT = {"limits.max_tilt_deg": [20, 25, 30]}
 
 def row_of(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.of_error("ok") | {"ok": True, "digest": f"d{case.index}"}
+    return row | outcomes.error_outcomes("ok") | {"ok": True, "digest": f"d{case.index}"}
 
 
 @pytest.fixture
@@ -118,7 +118,7 @@ def test_a_folder_that_holds_other_files_or_is_none_is_refused(begun, tmp_path):
     description = folder.describe(campaign, 1, None)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine")
-    with pytest.raises(ConfigError, match="holds files, but no campaign that was begun"):
+    with pytest.raises(ConfigError, match="holds files, but no campaign;"):
         folder.make(tmp_path / "other", campaign, description)
     assert [path.name for path in (tmp_path / "other").iterdir()] == ["notes.txt"]
     below = tmp_path / "table.csv" / "below"
@@ -126,7 +126,7 @@ def test_a_folder_that_holds_other_files_or_is_none_is_refused(begun, tmp_path):
         folder.make(below, campaign, description)
     with (
         pytest.raises(ConfigError, match="cannot be written: Not a directory"),
-        folder.locked(below),
+        folder.lock(below),
     ):
         pass
 

@@ -15,9 +15,9 @@ from companion.campaign.tune.candidates import (
     tune_section,
     unseen_campaign,
 )
-from companion.campaign.tune.certainty import compared
-from companion.campaign.tune.first_flight import learned
-from companion.campaign.tune.scores import Score, scored
+from companion.campaign.tune.certainty import compare
+from companion.campaign.tune.first_flight import learned_config
+from companion.campaign.tune.scores import Score, score_of
 from companion.campaign.tune.search import Search
 from companion.campaign.tune.writing import CheckedResult, result_text, summary_lines
 from companion.cli.main import main
@@ -105,12 +105,12 @@ def test_it_starts_with_the_configuration_and_finds_a_better_one(whole):
     found, tried, flights = whole
     assert tried[0] == {"planner.gain_per_s": 5.0, "guidance.drag_per_s": 1.0}
     assert tried[1] == {"planner.gain_per_s": 5.5, "guidance.drag_per_s": 1.0}
-    assert found.tried == 14
+    assert found.tried_count == 14
     assert found.best.score.rms < 0.7 * 0.18  # 0.18 m with the configuration as it is
     assert found.best.values["planner.gain_per_s"] <= 7.0
-    assert found.near[0] == found.best
-    assert found.stopped_early > 1  # crashes, and errors far above the best one
-    assert flights == 4 * (14 - found.stopped_early) + 2 * found.stopped_early
+    assert found.near_best[0] == found.best
+    assert found.stopped_early_count > 1  # crashes, and errors far above the best one
+    assert flights == 4 * (14 - found.stopped_early_count) + 2 * found.stopped_early_count
 
 
 def test_an_interrupted_search_goes_on_with_the_same_candidates(whole, tmp_path):
@@ -128,12 +128,12 @@ def test_the_result_tells_how_sure_it_is_and_can_be_included(whole, tmp_path):
     made = campaign(tmp_path)
     other, found = unseen_campaign(made, 3), whole[0]
     assert {case.seed for case in other.cases()}.isdisjoint(case.seed for case in made.cases())
-    before = scored([row_of(case) for case in other.cases()], 1.0)
-    after = scored([row_of(case) for case in cases(other, found.best.values)], 1.0)
-    comparison = compared(before, after, 3)
+    before = score_of([row_of(case) for case in other.cases()], 1.0)
+    after = score_of([row_of(case) for case in cases(other, found.best.values)], 1.0)
+    comparison = compare(before, after, 3)
     result = CheckedResult(made, found, found.best, before, after, comparison)
     assert comparison.ratio.low <= comparison.ratio.value <= comparison.ratio.high < 0.8
-    assert comparison.better == comparison.samples == 3
+    assert comparison.better_samples == comparison.samples == 3
     said = " ".join(summary_lines(result))
     assert f"{comparison.ratio.value:.2f} times the error before" in said
     assert "14 candidates over 4 flights each" in said
@@ -146,15 +146,15 @@ def test_the_result_tells_how_sure_it_is_and_can_be_included(whole, tmp_path):
 def test_a_flight_that_ended_early_is_no_error_but_is_told(tmp_path):
     flown, ended = [row_of(case) for case in campaign(tmp_path).cases()], None
     ended = flown[0] | {"result": "the fence was left"}
-    score = scored([*flown[:2], ended, flown[3]], 1.0)
+    score = score_of([*flown[:2], ended, flown[3]], 1.0)
     assert score.inside == (True, True, False, True)
     assert Score.from_attributes(json.loads(json.dumps(score.as_attributes()))) == score
-    comparison = compared(score, scored(flown, 1.0), 4)
+    comparison = compare(score, score_of(flown, 1.0), 4)
     assert comparison.samples == 3
     assert comparison.ratio.value == pytest.approx(1.0)
     # The estimated errors are those of the same three samples.
-    assert comparison.estimated == pytest.approx([0.5 * comparison.before.value] * 2)
-    assert comparison.estimate == pytest.approx([0.1] * 2)
+    assert comparison.estimated_errors == pytest.approx([0.5 * comparison.before.value] * 2)
+    assert comparison.estimator_errors == pytest.approx([0.1] * 2)
 
 
 @pytest.mark.slow
@@ -171,7 +171,7 @@ def test_a_first_flight_teaches_a_vehicle_that_is_40_percent_off(tmp_path):
     path = tmp_path / "unlike.yaml"
     path.write_text(json.dumps(unlike.campaign("px4", 1.4)))
     made = loading.load(path)
-    known = learned(made)
+    known = learned_config(made)
     assert known.vehicle.lag_ms + known.vehicle.dead_time_ms == pytest.approx(1.4 * 87.0, rel=0.1)
     assert known.guidance.drag_per_s == pytest.approx(1.4, rel=0.15)
     found = list(starts(made, tune_section(made), known))

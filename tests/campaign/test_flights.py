@@ -141,7 +141,7 @@ def threads(monkeypatch):
         ):
             yield client
 
-    monkeypatch.setattr(running, "connected", connected)
+    monkeypatch.setattr(running, "cluster_client", connected)
 
 
 def test_a_campaign_is_run_resumed_and_one_case_is_flown_again(quick, threads, capsys, monkeypatch):
@@ -190,9 +190,9 @@ def _refusals(file, out, capsys):
     assert main(["campaign", str(out)]) == 2
     assert "begun by another version: this one has numpy" in capsys.readouterr().err
     with (
-        folder.locked(out),
+        folder.lock(out),
         pytest.raises(ConfigError, match="another process"),
-        folder.locked(out),
+        folder.lock(out),
     ):
         pass
 
@@ -229,7 +229,7 @@ def test_what_ends_a_run_early_loses_no_finished_unit(quick, threads, capsys, mo
 
 def quick_row(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.of_error("internal error: oops" if case.index == 0 else "ok")
+    return row | outcomes.error_outcomes("internal error: oops" if case.index == 0 else "ok")
 
 
 def test_units_take_seconds_and_leave_work_for_all():

@@ -95,10 +95,10 @@ def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
         ),
         ({"set": {"mock.airframe.no.such": 1}}, "unknown key mock.airframe.no"),
         ({"set": {"limits.max_tilt_deg": 120}}, "max_tilt_deg"),
-        ({"sweep": {"flight.trajectory": [5, 6]}}, "flight.trajectory: each value must be a file"),
+        ({"sweep": {"flight.trajectory": [5, 6]}}, "flight.trajectory: each value must be a path"),
         (
             {"sweep": {"flight.trajectory": {"uniform": [0, 1]}}},
-            "flight.trajectory: each value must be a file",
+            "flight.trajectory: each value must be a path",
         ),
     ],
 )
@@ -113,10 +113,10 @@ def test_a_case_is_described_with_its_values(tmp_path):
     first, second = load(
         tmp_path, set={"vehicle.lag_ms": 50, "vehicle.dead_time_ms": 9}, **told
     ).cases()
-    assert first.described() == "case 0 (vehicle.damping = null, planner.gain_per_s = 1.23457)"
-    assert second.described() == "case 1 (vehicle.damping = 0.7, planner.gain_per_s = 1.23457)"
+    assert first.description() == "case 0 (vehicle.damping = null, planner.gain_per_s = 1.23457)"
+    assert second.description() == "case 1 (vehicle.damping = 0.7, planner.gain_per_s = 1.23457)"
     assert (
-        load(tmp_path, sweep={}).case(next(load(tmp_path, sweep={}).planned_cases())).described()
+        load(tmp_path, sweep={}).case(next(load(tmp_path, sweep={}).planned_cases())).description()
         == "case 0"
     )
 

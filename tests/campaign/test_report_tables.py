@@ -68,11 +68,11 @@ def test_two_factors_with_few_values_are_crossed():
         "wind": [1.0, 1.0, 1.0, 1.0],
         "position_rms_m": [0.1, 0.2, 0.3, None],
     }
-    table = tables.crossed(results(told, ["wind", "a", "b"]))
+    table = tables.two_factors(results(told, ["wind", "a", "b"]))
     assert table.title == "Median true position error, RMS, m and share of good flights: a × b"
     assert table.header == ("a", "false", "true")
     assert table.rows == [("x", "0.2 (100%)", "0.1 (100%)"), ("y", "– (100%)", "0.3 (0%)")]
-    assert tables.crossed(results(told, ["wind", "a"])) is None
+    assert tables.two_factors(results(told, ["wind", "a"])) is None
 
 
 def test_missing_and_boolean_values_are_written_as_such():

@@ -24,14 +24,14 @@ TILT = {"limits.max_tilt_deg": [20, 25, 30]}
 
 def row_of(case):
     row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.of_error("ok") | {"ok": True}
+    return row | outcomes.error_outcomes("ok") | {"ok": True}
 
 
 @pytest.fixture
 def on_dask(connected, monkeypatch):
     """Lets campaigns run on this worker; their flights take no time."""
 
-    monkeypatch.setattr(running, "connected", connected)
+    monkeypatch.setattr(running, "cluster_client", connected)
     monkeypatch.setattr(unit, "fly_case", row_of)
 
 
@@ -163,7 +163,7 @@ def test_a_run_that_ends_before_it_began_says_so(tmp_path, monkeypatch, capsys, 
         raise error
         yield
 
-    monkeypatch.setattr(running, "connected", connected)
+    monkeypatch.setattr(running, "cluster_client", connected)
     file = written(tmp_path, sweep=TILT)
     assert main(["campaign", str(file), "--out", str(tmp_path / "out"), "--workers", "2"]) == 1
     assert capsys.readouterr().out == f"{said}; no campaign was started\n"
@@ -222,7 +222,7 @@ def test_a_scheduler_that_does_not_answer_is_wrong_usage(monkeypatch):
     for address in ("tcp://127.0.0.1:1", "nothing://x"):
         with (
             pytest.raises(ConfigError, match=f"no Dask scheduler answers at {address}"),
-            cluster.connected(address, None),
+            cluster.cluster_client(address, None),
         ):
             pass
 
@@ -257,7 +257,7 @@ def test_a_cluster_of_other_versions_is_refused_before_anything_is_flown():
 
 @pytest.mark.timeout(120)
 def test_our_own_workers_ignore_ctrl_c_and_end_with_the_run():
-    with cluster.connected(None, 1) as client:
+    with cluster.cluster_client(None, 1) as client:
         assert cluster.number_of_workers(client) == 1
         cluster.wait_for_workers(client)
         (ended,) = cluster.run_tasks(client, {7: (signal.pthread_sigmask, signal.SIG_BLOCK, [])})
@@ -274,10 +274,12 @@ def test_progress_counts_what_earlier_runs_flew(tmp_path, dask, on_dask, capsys)
     description = folder.describe(campaign, 2, None)
     folder.make(out, campaign, description)
     shown = []
-    engine.run(dask, campaign, description, out, lambda progress: shown.append(progress.flown))
+    engine.run(
+        dask, campaign, description, out, lambda progress: shown.append(progress.flown_cases)
+    )
     assert shown[0] == 0
     assert sorted(shown[1:])[-1] == 3
-    assert engine.run(dask, campaign, description, out) == Progress(flown=3)
+    assert engine.run(dask, campaign, description, out) == Progress(flown_cases=3)
 
 
 def test_a_termination_waits_until_the_cluster_is_made():

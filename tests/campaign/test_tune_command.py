@@ -19,11 +19,11 @@ from companion.campaign.tune.candidates import (
     clamped_to_search,
     starts,
     starts_near,
-    suggested,
+    suggested_values,
     tune_section,
 )
-from companion.campaign.tune.certainty import compared
-from companion.campaign.tune.scores import scored
+from companion.campaign.tune.certainty import compare
+from companion.campaign.tune.scores import score_of
 from companion.campaign.tune.search import Candidate, Search, SearchResults
 from companion.campaign.tune.writing import CheckedResult, result_text, summary_lines
 from companion.campaign.versions import VersionError
@@ -43,7 +43,7 @@ TUNE = FILE["tune"]
 def quick(connected, monkeypatch):
     """Candidates are flown by `row_of` on a worker in this process."""
 
-    monkeypatch.setattr(command, "connected", connected)
+    monkeypatch.setattr(command, "cluster_client", connected)
     monkeypatch.setattr(command, "Search", partial(Search, learning_flight=lambda _: None))
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     monkeypatch.setattr(unit, "fly_case", row_of)
@@ -222,7 +222,7 @@ def test_suggestions_are_rounded_within_their_range():
             return low + 0.98765432 * (high - low)
 
     ranges = SEARCH | {"limits.max_climb_m_s": Swept(uniform=(0.0, 1.0001))}
-    assert suggested(Trial(), ranges) == {
+    assert suggested_values(Trial(), ranges) == {
         "planner.name": "so3",
         "planner.gain_per_s": 7.93,
         "guidance.drag_per_s": 1.98,
@@ -241,15 +241,15 @@ def test_a_candidate_whose_keys_do_not_fit_together_is_not_flown(tmp_path, monke
 
     monkeypatch.setattr("companion.campaign.tune.search.cases", refuse)
     found = search.run(2)
-    assert (found.tried, found.stopped_early, found.best) == (2, 2, None)
+    assert (found.tried_count, found.stopped_early_count, found.best) == (2, 2, None)
 
 
 def result(made, values, near_values, before, after):
     rows = [row_of(case) for case in made.cases()]
-    good = scored(rows, 1.0)
+    good = score_of(rows, 1.0)
     best = Candidate(1, values, good)
     found = SearchResults(5, 0, best, [replace(best, values=each) for each in near_values])
-    return CheckedResult(made, found, best, before or good, after or good, compared(good, good, 4))
+    return CheckedResult(made, found, best, before or good, after or good, compare(good, good, 4))
 
 
 def test_the_reasons_say_where_a_value_lies_among_the_best(tmp_path):
@@ -284,16 +284,16 @@ def test_the_reasons_say_where_a_value_lies_among_the_best(tmp_path):
         "  # not set before; the best 3 candidates have 1.1 to 1.9 of 1 to 2; it matters little "
         "here",
     ]
-    assert "The interval holds 1: fly more samples" in told
+    assert "The interval contains 1, so the result may not be better" in told
 
 
 def test_flights_that_ended_early_are_told_and_with_too_few_nothing_is_compared(tmp_path):
     made = campaign(tmp_path)
     rows = [row_of(case) for case in made.cases()]
     ended = [row | {"result": "the fence was left"} for row in rows[:3]]
-    few = scored([*ended, rows[3]], 1.0)
-    whole = scored(rows, 1.0)
-    assert compared(few, whole, 4) is None
+    few = score_of([*ended, rows[3]], 1.0)
+    whole = score_of(rows, 1.0)
+    assert compare(few, whole, 4) is None
     told = result(made, {}, [], few, whole)._replace(comparison=None)
     *_, early, nothing = summary_lines(told)
     assert early.startswith("Of 4 flights that the search has not seen, 3 ended early with the ")
@@ -322,7 +322,7 @@ def test_first_flights_without_data_leave_the_configuration_as_it_is(tmp_path, m
     made = campaign(tmp_path)
     flights = Flights(lambda *_: None)
     monkeypatch.setattr(first_flight, "CaseFlight", flights)
-    assert first_flight.learned(made) == made.base
+    assert first_flight.learned_config(made) == made.base
     doublets, course = flights.flown
     assert doublets.config.flight.maneuvers == ("identify",)
     assert doublets.config.planner.name == "first-order"
@@ -333,7 +333,7 @@ def test_first_flights_teach_the_drag(tmp_path, monkeypatch):
     made = campaign(tmp_path)
     flights = Flights(lambda place, _: LearnedFile(place, "aa").save(Drag(0.4, 0.03), 5.0))
     monkeypatch.setattr(first_flight, "CaseFlight", flights)
-    known = first_flight.learned(made)
+    known = first_flight.learned_config(made)
     assert (known.guidance.drag_per_s, known.guidance.quadratic_drag_per_m) == (0.4, 0.03)
 
 
@@ -349,7 +349,9 @@ def test_first_flights_teach_the_response(tmp_path, monkeypatch, damped):
     monkeypatch.setattr(first_flight, "read_flight_log", lambda _: rows)
     monkeypatch.setattr(first_flight, "identify_vehicle", lambda *told: seen)
     search = TUNE["search"] | ({"vehicle.damping": {"uniform": [0.5, 1]}} if damped else {})
-    vehicle = first_flight.learned(campaign(tmp_path, tune=TUNE | {"search": search})).vehicle
+    vehicle = first_flight.learned_config(
+        campaign(tmp_path, tune=TUNE | {"search": search})
+    ).vehicle
     assert vehicle.damping == (0.75 if damped else None)
     assert vehicle.lag_ms == (75.0 if damped else 47.5)
     assert vehicle.yaw_lag_ms == 370.0
@@ -364,4 +366,4 @@ def test_a_response_that_cannot_be_fitted_is_not_learned(tmp_path, monkeypatch):
     monkeypatch.setattr(first_flight, "read_flight_log", lambda _: rows)
     monkeypatch.setattr(first_flight, "identify_vehicle", fail)
     made = campaign(tmp_path)
-    assert first_flight.learned(made) == made.base
+    assert first_flight.learned_config(made) == made.base

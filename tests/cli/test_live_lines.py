@@ -21,7 +21,7 @@ from companion.vehicle.records import Battery
 
 HOVERING = FlightStatus(
     time=47.2,
-    airborne=33.1,
+    airborne_time=33.1,
     phase="maneuvers",
     detail="circle, 5 of 14 s flown",
     elapsed=30.0,
@@ -32,10 +32,10 @@ HOVERING = FlightStatus(
     height=5.02,
     speed=2.04,
     tilt=radians(12.4),
-    error=0.036,
-    rate=249.6,
+    tracking_error=0.036,
+    setpoint_rate=249.6,
     latency=0.00012,
-    missed=3,
+    missed_deadlines=3,
     battery=Battery(0.0, 15.93, 0.83),
     monitored=True,
 )
@@ -105,7 +105,7 @@ def test_what_is_unknown_is_a_dash_and_an_alarm_is_named():
 
 
 def test_in_lockstep_no_latency_is_shown():
-    third = status_lines(HOVERING._replace(latency=None, missed=None))[2]
+    third = status_lines(HOVERING._replace(latency=None, missed_deadlines=None))[2]
     assert "latency" not in third
     assert "late" not in third
 

@@ -60,7 +60,7 @@ def test_a_bad_change_changes_nothing_and_is_explained(values):
     changes = Changes(Config())
     with pytest.raises(ChangeRefusedError) as refused:
         changes.change(values, "a test")
-    assert changes.wanted == Config()
+    assert changes.wanted_config == Config()
     assert not changes.made
     assert not changes.can_undo
     told = str(refused.value)
@@ -142,7 +142,7 @@ def test_a_second_change_counts_together_with_one_that_still_takes_effect():
             changes.change({"planner": {"gain_per_s": 2.0}}, "the page")
             with pytest.raises(ChangeRefusedError, match=r"from 5 to 0\.8 is more than a factor"):
                 changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
-            assert changes.wanted.planner.gain_per_s == 2.0
+            assert changes.wanted_config.planner.gain_per_s == 2.0
             changes.step(asyncio.get_running_loop().time() + SLEW_TIME)
             changes.change({"planner": {"gain_per_s": 0.8}}, "the file")
 

@@ -60,7 +60,7 @@ def turns(seconds, dead_times, amplitude=0.5, seed=1):
 def test_each_axis_is_measured_behind_its_own_lag():
     bench = Bench()
     bench.fly(*turns(20.0, (0.04, 0.045, 0.08)))
-    found = bench.watch.over_the_flight()
+    found = bench.watch.measure_whole_flight()
     measured = [axis.measured for axis in found.axes.values()]
     assert measured == pytest.approx([0.04, 0.045, 0.08], abs=0.003)
     assert [axis.configured for axis in found.axes.values()] == [0.04, 0.04, 0.08]
@@ -76,7 +76,7 @@ def test_a_link_that_becomes_slow_in_flight_is_told_once():
     ((when, text),) = bench.notes
     assert 32.0 < when < 46.0
     assert "dead time is not as configured" in text
-    bench.watch.over_the_flight()
+    bench.watch.measure_whole_flight()
     assert len(bench.notes) == 1
 
 
@@ -87,14 +87,16 @@ def test_an_acceleration_limit_is_taken_out_too():
     record[1][:, 0] = shaped
     bench = Bench(tilt=TILT._replace(acceleration_limit_deg_s2=math.degrees(8.0)))
     bench.fly(*record)
-    assert bench.watch.over_the_flight().axes["roll"].measured == pytest.approx(0.04, abs=0.003)
+    assert bench.watch.measure_whole_flight().axes["roll"].measured == pytest.approx(
+        0.04, abs=0.003
+    )
 
 
 def test_what_only_the_whole_flight_shows_is_told_at_its_end():
     bench = Bench()
     bench.fly(*turns(8.0, (0.08, 0.04, 0.08)))
     assert bench.notes == []
-    bench.watch.over_the_flight()
+    bench.watch.measure_whole_flight()
     ((_, text),) = bench.notes
     assert "roll 80 ms (configured 40 ms);" in text
 
@@ -124,14 +126,14 @@ def test_what_the_autopilot_did_after_it_took_over_unheard_does_not_count():
     bench.fly(*turns(12.0, (0.04, 0.04, 0.08), amplitude=0.1))
     commanded, _ = turns(1.0, (0.04, 0.04, 0.08), seed=3)
     bench.fly(commanded, 2.0 * commanded)  # as it happens, it does the like at once
-    measured = [axis.measured for axis in bench.watch.over_the_flight().axes.values()]
+    measured = [axis.measured for axis in bench.watch.measure_whole_flight().axes.values()]
     assert measured == pytest.approx([0.04, 0.04, 0.08], abs=0.005)
 
 
 def test_a_hover_does_not_tell_and_is_not_guessed_from():
     bench = Bench()
     bench.fly(*turns(16.0, (0.08, 0.08, 0.2), amplitude=0.003))
-    found = bench.watch.over_the_flight()
+    found = bench.watch.measure_whole_flight()
     assert [axis.measured for axis in found.axes.values()] == [None, None, None]
     assert bench.notes == []
 
@@ -139,7 +141,7 @@ def test_a_hover_does_not_tell_and_is_not_guessed_from():
 def test_without_a_lag_nothing_is_measured():
     bench = Bench(UNKNOWN, UNKNOWN)
     bench.fly(*turns(12.0, (0.08, 0.08, 0.2)))
-    found = bench.watch.over_the_flight()
+    found = bench.watch.measure_whole_flight()
     assert not found.lag_known
     assert [axis.measured for axis in found.axes.values()] == [None, None, None]
 
@@ -149,7 +151,7 @@ def test_the_age_of_samples_is_that_of_their_arrival():
     ages = np.where(np.arange(2000) % 50 == 0, 0.030, 0.004)
     bench = Bench()
     bench.fly(still, still, ages)
-    found = bench.watch.over_the_flight().sample_age
+    found = bench.watch.measure_whole_flight().sample_age
     assert found == pytest.approx((0.004, 0.030), abs=1e-6)
 
 
@@ -157,7 +159,7 @@ def test_without_timesync_no_age_is_told():
     still = np.zeros((2000, 3))
     bench = Bench()
     bench.fly(still, still, math.nan)
-    assert all(math.isnan(value) for value in bench.watch.over_the_flight().sample_age)
+    assert all(math.isnan(value) for value in bench.watch.measure_whole_flight().sample_age)
 
 
 def test_the_yaml_gives_each_axis_its_response_in_si(tmp_path):

@@ -121,7 +121,7 @@ def test_the_state_is_shown_in_every_phase(good):
     flying = [state for state in observer.states if state.maneuver == "hover"]
     assert len(flying) == pytest.approx(20, abs=3)
     assert all(state.monitored and state.alarms == () for state in flying)
-    assert flying[-1].rate == pytest.approx(100.0, rel=0.05)
+    assert flying[-1].setpoint_rate == pytest.approx(100.0, rel=0.05)
     assert {state.latency for state in observer.states} == {None}  # in lockstep
     times = [state.time for state in observer.states]
     assert np.diff(times) == pytest.approx(0.1, abs=0.05)

@@ -38,7 +38,7 @@ def status(time):
     }
     return FlightStatus(
         time=time,
-        airborne=time,
+        airborne_time=time,
         phase="maneuvers",
         detail="",
         elapsed=time,
@@ -48,10 +48,10 @@ def status(time):
         maneuver_duration=60.0,
         speed=3.1,
         tilt=0.2,
-        error=0.08,
-        rate=250.0,
+        tracking_error=0.08,
+        setpoint_rate=250.0,
         latency=0.0003,
-        missed=0,
+        missed_deadlines=0,
         monitored=True,
         view=view,
     )

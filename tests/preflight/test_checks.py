@@ -32,7 +32,7 @@ SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.IN
 NOT_READY = CheckResult.NOT_READY
 PX4, ARDUPILOT = autopilot_for(12, 2), autopilot_for(3, 2)
 QUALITY = LinkQuality(1000, 0, 0, 0, 0, 0.004, 0.001)
-READY = Readiness(prearm_good=True, estimator_flags=0x3FF, position=True, home=True)
+READY = Readiness(prearm_passed=True, estimator_flags=0x3FF, has_position=True, has_home=True)
 ATTITUDE_TARGET_CAPABILITY = 64
 
 
@@ -64,7 +64,7 @@ GOOD = Evidence(
         "LOCAL_POSITION_NED": StreamRate(50.0, 50.0, 50.0),
         "HOME_POSITION": StreamRate(1.0, 1.0, 0.0),
     },
-    received={"ATTITUDE_QUATERNION": 900, "LOCAL_POSITION_NED": 200, "HOME_POSITION": 1},
+    received_counts={"ATTITUDE_QUATERNION": 900, "LOCAL_POSITION_NED": 200, "HOME_POSITION": 1},
     window=1.0,
     link=QUALITY,
     samples=SampleTimes(200, 0.006, 0, 1.0001),
@@ -136,7 +136,7 @@ def test_a_round_trip_may_be_longer_with_less_gain_and_in_lockstep(section):
 
 @pytest.mark.parametrize(("unusable", "expected"), [(0, {}), (2, INEFFECTIVE), (3, UNSAFE)])
 def test_attitude_that_cannot_be_answered(unusable, expected):
-    evidence = replace(GOOD, samples=GOOD.samples._replace(unusable=unusable))
+    evidence = replace(GOOD, samples=GOOD.samples._replace(unusable_count=unusable))
     found_here = found(vehicle_checks.attitude, evidence)
     assert found_here == ({Key.ATTITUDE: expected} if expected else {})
 
@@ -152,7 +152,7 @@ def test_attitude_that_cannot_be_answered(unusable, expected):
     ],
 )
 def test_how_old_attitude_is_when_it_arrives(age, other_clock, expected):
-    link = QUALITY._replace(other_clock=other_clock)
+    link = QUALITY._replace(timesync_on_other_clock=other_clock)
     evidence = replace(GOOD, link=link, samples=GOOD.samples._replace(age=age))
     assert found(clock_checks.age, evidence) == expected
 
@@ -166,9 +166,9 @@ def test_how_old_attitude_is_when_it_arrives(age, other_clock, expected):
         ({"clock_rate": 0.97}, {Key.CLOCK: UNSAFE}),
         ({"clock_rate": 0.97, "longest_pause": 0.1}, {Key.CLOCK: INEFFECTIVE}),
         ({"clock_change": "the vehicle's clock jumped"}, {Key.CLOCK: UNSAFE}),
-        ({"received": 9, "clock_rate": 0.5}, {}),
-        ({"not_newer": 40}, {Key.CLOCK: INEFFECTIVE}),
-        ({"not_newer": 41}, {Key.CLOCK: UNSAFE}),
+        ({"sample_count": 9, "clock_rate": 0.5}, {}),
+        ({"not_newer_count": 40}, {Key.CLOCK: INEFFECTIVE}),
+        ({"not_newer_count": 41}, {Key.CLOCK: UNSAFE}),
     ],
 )
 def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
@@ -185,8 +185,8 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
             OtherNodes(sources=frozenset({(1, 192)}), companions=frozenset({(1, 192)})),
             {Key.SECOND_COMPANION: INEFFECTIVE},
         ),
-        (OtherNodes(steering=frozenset({(255, 190)})), {Key.OTHER_SETPOINTS: UNSAFE}),
-        (OtherNodes(foreign_target=True), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (OtherNodes(setpoint_senders=frozenset({(255, 190)})), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (OtherNodes(target_is_foreign=True), {Key.OTHER_SETPOINTS: UNSAFE}),
     ],
 )
 def test_others_on_the_link(other_nodes, expected):
@@ -203,7 +203,7 @@ def test_rates_that_are_refused_cut_or_not_reached():
     assert found(stream_checks.streams, slow) == {"link.min_attitude_rate_hz": UNSAFE}
     refused = streams(HOME_POSITION=StreamRate(1.0, 0.0, 0.0, "UNSUPPORTED"))
     assert found(stream_checks.streams, refused) == {"link.streams.HOME_POSITION": INEFFECTIVE}
-    never = replace(GOOD, received={**GOOD.received, "HOME_POSITION": 0})
+    never = replace(GOOD, received_counts={**GOOD.received_counts, "HOME_POSITION": 0})
     assert found(stream_checks.streams, never) == {"link.streams.HOME_POSITION": INEFFECTIVE}
 
 
@@ -213,7 +213,7 @@ def test_a_rate_below_the_requested_one_that_is_safe_says_why():
         "CURRENT_MODE": StreamRate(20.0, 20.0, 2.0),
     }
     evidence = replace(GOOD, streams=streams, window=4.0)
-    evidence = replace(evidence, received={**GOOD.received, "CURRENT_MODE": 8})
+    evidence = replace(evidence, received_counts={**GOOD.received_counts, "CURRENT_MODE": 8})
     (finding,) = stream_checks.streams(CONFIG, evidence)
     assert finding.result is CheckResult.SAFE
     assert finding.found == (
@@ -234,7 +234,7 @@ def test_bursts_are_judged_on_the_ground_as_in_flight():
 def test_asked_again_nothing_is_asked_that_only_the_configuration_decides():
     unused = changed(CONFIG, {"flight": {"accept": ("NO_SUCH_CHECK",)}}, "test")
     assert Key.ACCEPT in amiss(run_checks(unused, GOOD))
-    assert amiss(run_checks(unused, GOOD, again=True)) == {}
+    assert amiss(run_checks(unused, GOOD, repeated=True)) == {}
 
 
 def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
@@ -254,7 +254,7 @@ def test_what_the_link_says_of_signatures_is_told_with_its_remedy():
         ({"battery": Battery(0.0, 16.0, 0.19)}, {Key.BATTERY: UNSAFE}),
         ({"battery_silent": True}, {Key.BATTERY: UNSAFE}),
         ({"failsafe": True}, {Key.FAILSAFE: UNSAFE}),
-        ({"readiness": READY._replace(home=False)}, {Key.READY: NOT_READY}),
+        ({"readiness": READY._replace(has_home=False)}, {Key.READY: NOT_READY}),
     ],
 )
 def test_the_state_of_the_vehicle(changes, expected):
@@ -271,16 +271,16 @@ def test_a_lost_gps_tells_its_satellites(seen, told):
     assert finding.found.endswith(told)
 
 
-BOOTING = Readiness(prearm_good=False, estimator_flags=None, position=False, home=False)
-LOST = READY._replace(prearm_good=False, estimator_flags=0x1)
+BOOTING = Readiness(prearm_passed=False, estimator_flags=None, has_position=False, has_home=False)
+LOST = READY._replace(prearm_passed=False, estimator_flags=0x1)
 SILENT_POSITION = {**GOOD.streams, "LOCAL_POSITION_NED": StreamRate(50.0, 50.0, 0.0)}
 
 
 def without_position(readiness, **changes):
     streams = {**SILENT_POSITION, **changes}
     told = state(readiness=readiness, global_position=None)
-    received = {**GOOD.received, "HOME_POSITION": 0}
-    return replace(GOOD, state=told, streams=streams, received=received)
+    received = {**GOOD.received_counts, "HOME_POSITION": 0}
+    return replace(GOOD, state=told, streams=streams, received_counts=received)
 
 
 @pytest.mark.parametrize("readiness", [BOOTING, LOST])
@@ -300,7 +300,7 @@ def test_a_position_that_will_never_come_is_not_hidden_by_not_being_ready():
     for rate in (StreamRate(50.0, 0.0, 0.0, "UNSUPPORTED"), StreamRate(50.0, 5.0, 0.0)):
         evidence = without_position(BOOTING, LOCAL_POSITION_NED=rate)
         assert found(stream_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
-    evidence = without_position(READY._replace(prearm_good=False))
+    evidence = without_position(READY._replace(prearm_passed=False))
     assert found(stream_checks.streams, evidence)["link.min_position_rate_hz"] is UNSAFE
     slow = StreamRate(250.0, 250.0, 3.0)
     evidence = without_position(BOOTING, ATTITUDE_QUATERNION=slow)

@@ -50,7 +50,7 @@ def test_who_else_is_there_and_who_steers():
                     vehicle.send_raw(frames_of(message, system=system, component=component)[0])
                 await until(lambda: len(listener.other_nodes.sources) == 3)
             assert listener.other_nodes.companions == {(1, 192)}
-            assert listener.other_nodes.steering == {(1, 193)}
+            assert listener.other_nodes.setpoint_senders == {(1, 193)}
             vehicle.send_raw(frames_of(setpoint(), system=9)[0])
             await until(lambda: link.stats.ignored_foreign == 4)
             assert len(listener.other_nodes.sources) == 3  # the listener is off
@@ -64,13 +64,13 @@ def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
             with LinkListener(link, asyncio.get_running_loop().time) as listener:
                 vehicle.send(target(0.0), odometry(7))
                 await until(lambda: link.state.reset_counter == 7)
-                assert not listener.other_nodes.foreign_target
+                assert not listener.other_nodes.target_is_foreign
                 vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
                 await until(lambda: link.state.reset_counter == 9)
-                assert not listener.other_nodes.foreign_target
+                assert not listener.other_nodes.target_is_foreign
                 assert listener.resets == 2
                 vehicle.send(heartbeat(), target(0.4), odometry(9))
-                await until(lambda: listener.other_nodes.foreign_target)
+                await until(lambda: listener.other_nodes.target_is_foreign)
 
     asyncio.run(scene())
 
@@ -95,7 +95,7 @@ def test_samples_that_cannot_be_answered(values):
     with LinkListener(link, lambda: 0.0) as listener:
         callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
         callbacks["ATTITUDE_QUATERNION"](attitude(4))
-    assert (listener.samples.received, listener.samples.unusable) == (2, 1)
+    assert (listener.samples.sample_count, listener.samples.unusable_count) == (2, 1)
 
 
 def test_pauses_and_stamps_of_the_samples():

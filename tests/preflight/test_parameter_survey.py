@@ -53,7 +53,7 @@ def test_asked_again_it_is_asked_for_what_it_told_before_alone():
             names = {"MAV_GCS_SYSID": "SYSID_MYGCS", "FS_OPTIONS": "FS_OPTIONS"}
             told = dict.fromkeys(names, 1.0)
             before = Survey(told, names, frozenset({"ARMING_SKIPCHK"}))
-            return await survey(link, rules, before=before)
+            return await survey(link, rules, earlier_survey=before)
 
     values, names, untold, _ = asyncio.run(scene())
     assert asked == ["SYSID_MYGCS", "FS_OPTIONS"]

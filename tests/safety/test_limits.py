@@ -19,7 +19,7 @@ from companion.safety.actions import Exit, FlightEnded, Stream
 from companion.safety.link_judges import silence
 from companion.safety.monitor import Monitor
 from companion.safety.motion_judges import braking
-from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.safety.snapshot import AutopilotStatus, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
 from companion.vehicle.records import Battery, Estimator
 from companion.vehicle.timesync import Uplink
@@ -49,14 +49,14 @@ UPPER = {
     ),
     "speed": (motion_judges.speed, lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0)))),
     "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(tracking_error=v))),
-    "link loss": (link_judges.loss, health("lost")),
+    "link loss": (link_judges.loss, health("lost_share")),
     "round trip": (link_judges.round_trip, health("round_trip")),
     "late setpoints": (
         lambda most: link_judges.late_setpoints(most / 1.5),
         lambda v: at(health=Health(uplink=Uplink(v))),
     ),
-    "deadlines": (link_judges.deadlines, health("missed")),
-    "starvation": (link_judges.starvation, health("starved")),
+    "deadlines": (link_judges.deadlines, health("missed_share")),
+    "starvation": (link_judges.starvation, health("starved_share")),
 }
 LOWER = {
     "answer rate": (link_judges.answer_rate, health("answer_rate")),
@@ -95,7 +95,7 @@ def test_counts_and_shares_at_their_limit_are_allowed():
 
 
 def autopilot(**told):
-    return at(autopilot=Autopilot(**told))
+    return at(autopilot=AutopilotStatus(**told))
 
 
 SAID = [
@@ -136,7 +136,7 @@ SAID = [
     ),
     (
         lambda: link_judges.loss(0.2),
-        at(health=Health(lost=0.6)),
+        at(health=Health(lost_share=0.6)),
         "60 % of the vehicle's frames are lost, more than safety.max_loss = 0.2 (20 %)",
     ),
     (
@@ -158,18 +158,18 @@ SAID = [
     ),
     (
         lambda: link_judges.foreign_setpoints(2),
-        at(health=Health(foreign=3)),
+        at(health=Health(foreign_reports=3)),
         "another program sends setpoints to the vehicle: within 5 s the autopilot reported 3 that "
         "this program did not send (ATTITUDE_TARGET)",
     ),
     (
         lambda: link_judges.deadlines(0.2),
-        at(health=Health(missed=0.6)),
+        at(health=Health(missed_share=0.6)),
         "60 % of the setpoints miss deadman.deadline_ms, more than safety.max_missed = 0.2 (20 %)",
     ),
     (
         lambda: link_judges.starvation(0.2),
-        at(health=Health(starved=0.6)),
+        at(health=Health(starved_share=0.6)),
         "CPU starvation: the program's timer lost 60 % of the last second, "
         "more than safety.max_starved = 0.2 (20 %)",
     ),
@@ -188,7 +188,7 @@ def test_a_breach_is_told_in_these_words(make, snapshot, words):
 
 
 def test_lost_velocity_and_lost_position_are_told_together():
-    lost = at(autopilot=Autopilot(estimator=Estimator(NOW, 0x33F & ~0x1A)), good_flags=0x33F)
+    lost = at(autopilot=AutopilotStatus(estimator=Estimator(NOW, 0x33F & ~0x1A)), good_flags=0x33F)
     assert autopilot_judges.estimator_flags(lost, False).endswith(
         "no valid velocity, position any more"
     )
@@ -210,7 +210,7 @@ def silent(reason=None, **changes):
     [
         (silent(), "no setpoint was sent"),
         (silent(Unanswered.LATE), Unanswered.LATE.words),
-        (silent(Unanswered.LATE, stalled=0.375), Unanswered.LATE.words),
+        (silent(Unanswered.LATE, stall_time=0.375), Unanswered.LATE.words),
         (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
         (
             silent(last_sample=NOW - 0.6, attitude_not_finite=True),

@@ -10,7 +10,7 @@ from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.actions import Stream
-from companion.safety.snapshot import Autopilot, Motion, Snapshot
+from companion.safety.snapshot import AutopilotStatus, Motion, Snapshot
 from companion.testing import fly
 from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 from tests.test_extending import block
@@ -103,7 +103,7 @@ def test_the_monitor_of_the_page_flies_and_raises_its_alarm():
     moving = Snapshot(10.0, motion=Motion(LEVEL, velocity=(0.0, 0.0, 2.5), height=5.0))
     ladder.step(moving)
     ladder.step(moving._replace(now=10.31))
-    assert "sinking" in ladder.raised
+    assert "sinking" in ladder.raised_alarms
     assert ladder.breaches["the vehicle sinks at 2.5 m/s"] == "sinking"
 
 
@@ -142,12 +142,12 @@ def test_a_judge_that_blocks_is_not_taken_for_a_silent_vehicle():
 def test_a_judge_that_raises_is_asked_once_and_stops_no_other_monitor():
     ladder = SafetyLadder(monitors(configured("high")), 3.0)
     rolled = Snapshot(
-        10.0, Autopilot(armed=False), Motion((0.0, 1.0, 0.0, 0.0), height=9.0)
+        10.0, AutopilotStatus(armed=False), Motion((0.0, 1.0, 0.0, 0.0), height=9.0)
     )  # upside down and disarmed
     ladder.step(rolled)
-    assert {"high (its fault)", "disarmed"} <= set(ladder.raised)
+    assert {"high (its fault)", "disarmed"} <= set(ladder.raised_alarms)
     ladder.step(rolled._replace(now=10.5))
-    assert "tilt" in ladder.raised
+    assert "tilt" in ladder.raised_alarms
 
 
 def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
@@ -160,7 +160,7 @@ def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
     for step in range(60):  # of 20 ms; every fifth answer is quick at first
         taken = 0.001 if step < 30 and step % 5 == 0 else 0.015
         ladder.step(Snapshot(10.0 + 0.02 * step))
-        assert ("slow (its time)" in ladder.raised) is (step >= 51)
+        assert ("slow (its time)" in ladder.raised_alarms) is (step >= 51)
     assert notes[-1] == (
         "safety: slow (its time): it takes 15 ms to judge, and delays the setpoints → warn"
     )

@@ -12,7 +12,7 @@ from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.actions import Stream
 from companion.safety.counter_window import CounterWindow
 from companion.safety.monitor import Alarm, Monitor
-from companion.safety.snapshot import Autopilot, Control, Health, Motion, Resets, Snapshot
+from companion.safety.snapshot import AutopilotStatus, Control, Health, Motion, Resets, Snapshot
 from companion.vehicle.records import Battery, Estimator, Gps
 from companion.vehicle.timesync import Uplink
 
@@ -29,7 +29,7 @@ def roll(angle_deg):
 
 FINE = Snapshot(
     NOW,
-    Autopilot(
+    AutopilotStatus(
         battery=Battery(inf, 16.0, 0.9), gps=Gps(inf, 3, 12, 500.0), estimator=Estimator(inf, GOOD)
     ),
     Motion(
@@ -79,10 +79,10 @@ BREACHES = [
     ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
     ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
     ("silence", unanswered(Unanswered.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stalled=0.2), HAND_BACK, 0.0, "stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stalled=0.4), HAND_BACK, 0.0, STALLED),
-    ("silence", unanswered(Unanswered.AWAITING_MODE, stalled=0.4), HAND_BACK, 0.0, STALLED),
-    ("unheard", control(**SILENT, last_heard=OLD, stalled=0.4), LISTEN, 0.0, STALLED),
+    ("silence", unanswered(Unanswered.LATE, stall_time=0.2), HAND_BACK, 0.0, "stale_ms"),
+    ("silence", unanswered(Unanswered.LATE, stall_time=0.4), HAND_BACK, 0.0, STALLED),
+    ("silence", unanswered(Unanswered.AWAITING_MODE, stall_time=0.4), HAND_BACK, 0.0, STALLED),
+    ("unheard", control(**SILENT, last_heard=OLD, stall_time=0.4), LISTEN, 0.0, STALLED),
     (
         "silence",
         unanswered(Unanswered.OLD_TARGET, last_position=OLD),
@@ -134,11 +134,17 @@ BREACHES = [
     ("position rate", health(position_rate=9.0), HAND_BACK, 1.0, "come at 9 Hz, below link.min"),
     ("late setpoints", health(uplink=Uplink(0.16)), HAND_BACK, 0.0, "160 ms, longer than 1.5"),
     ("lost setpoints", health(uplink=Uplink(0.01, 8)), HAND_BACK, 0.0, "the last 8 TIMESYNC"),
-    ("foreign setpoints", health(foreign=3), HAND_BACK, 0.3, "another program sends setpoints"),
-    ("link loss", health(lost=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
+    (
+        "foreign setpoints",
+        health(foreign_reports=3),
+        HAND_BACK,
+        0.3,
+        "another program sends setpoints",
+    ),
+    ("link loss", health(lost_share=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
-    ("deadlines", health(missed=0.3), HAND_BACK, 1.5, "30 % of the setpoints"),
-    ("starvation", health(starved=0.6), HAND_BACK, 1.5, "60 %"),
+    ("deadlines", health(missed_share=0.3), HAND_BACK, 1.5, "30 % of the setpoints"),
+    ("starvation", health(starved_share=0.6), HAND_BACK, 1.5, "60 %"),
 ]
 
 
@@ -256,7 +262,7 @@ def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
     assert verdict.action is LAND
     assert "6.0 m from its reference" in verdict.reason
     assert after == pytest.approx(1.0, abs=0.021)
-    assert climb.told[-1] == "safety: tracking is over"
+    assert climb.told[-1] == "safety: tracking alarm is over"
 
 
 def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
@@ -273,9 +279,9 @@ def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
 
 def test_a_warning_is_told_once_and_when_it_is_over():
     climb = Climb()
-    assert climb.see(health(lost=0.5), 4.0) == (None, None)
+    assert climb.see(health(lost_share=0.5), 4.0) == (None, None)
     assert climb.see(FINE, 4.0) == (None, None)
-    assert [text.split(":")[1] for text in climb.told] == [" link loss", " link loss is over"]
+    assert [text.split(":")[1] for text in climb.told] == [" link loss", " link loss alarm is over"]
 
 
 def test_an_action_can_be_set_but_not_everywhere_to_a_warning():

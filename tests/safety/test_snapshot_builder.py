@@ -10,7 +10,7 @@ from companion.attitude import BodyRates
 from companion.control.heading_frame import HeadingFrame
 from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place
-from companion.safety.snapshot import Autopilot, Health, Motion, Resets
+from companion.safety.snapshot import AutopilotStatus, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.timesync import Uplink
 
@@ -96,7 +96,7 @@ def test_the_autopilots_words_are_passed_on(flight):
     state = flight.state
     told = flight.snapshot()
     assert told.now == 10.0
-    assert told.autopilot == Autopilot(True, False, True, "battery", "gps", state.estimator)
+    assert told.autopilot == AutopilotStatus(True, False, True, "battery", "gps", state.estimator)
     assert (told.had_gps, told.good_flags) == (True, 0x33F)
     flight.state.estimator = None
     assert flight.snapshot().good_flags == 0x33F
@@ -181,7 +181,7 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     assert (told.last_answer, told.last_sample, told.reason) == (9.9, 9.95, Unanswered.LATE)
     assert (told.last_position, told.last_heard) == (9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
-    assert told.stalled == pytest.approx(0.17)
+    assert told.stall_time == pytest.approx(0.17)
     flight.clock.changes = 3
     assert flight.snapshot().control.clock_change == "it jumped"
     assert flight.counted == [(3, now) for now in (10.0, 10.02, 10.04, 10.24)]
@@ -200,21 +200,21 @@ def run_for(flight, seconds):
 
 def test_shares_and_rates_are_those_of_the_last_second(flight):
     told = run_for(flight, 3.0).health
-    assert told.lost == pytest.approx(0.4)
-    assert told.missed == pytest.approx(0.25)
+    assert told.lost_share == pytest.approx(0.4)
+    assert told.missed_share == pytest.approx(0.25)
     assert told.answer_rate == pytest.approx(200.0)
     assert told.position_rate == pytest.approx(10.0, rel=0.03)
-    assert (told.starved, told.round_trip, told.gaps) == (0.0, 0.04, 0)
+    assert (told.starved_share, told.round_trip, told.gaps) == (0.0, 0.04, 0)
     assert told.uplink == Uplink(0.05, 1)
     flight.listen(13.28)  # 0.25 s too late, and the second looked at began at 12.26 s
-    starved = flight.snapshot(13.28).health.starved
+    starved = flight.snapshot(13.28).health.starved_share
     assert starved == pytest.approx(0.25 / 1.02)
     assert len(flight.builder.counters._readings) <= 52
 
 
 def test_shares_are_not_known_before_most_of_a_second_is_seen(flight):
     assert run_for(flight, 0.88).health == Health(round_trip=0.04, uplink=Uplink(0.05, 1))
-    assert run_for(flight, 0.92).health.lost is not None
+    assert run_for(flight, 0.92).health.lost_share is not None
     flight.builder.begin(11.0)
     flight.listen(11.0)
     assert flight.snapshot(11.0).health == Health(round_trip=0.04, uplink=Uplink(0.05, 1))
@@ -228,8 +228,8 @@ def test_rates_of_three_looks_far_apart_are_those_since_the_second_one():
         flight.record.setpoints = flight.record.missed_deadlines = setpoints
         flight.listen(now)
     told = flight.snapshot(13.0).health
-    assert (told.position_rate, told.missed) == (2.0, 1.0)
-    assert told.starved == pytest.approx(1.47 / 1.5)
+    assert (told.position_rate, told.missed_share) == (2.0, 1.0)
+    assert told.starved_share == pytest.approx(1.47 / 1.5)
 
 
 def test_nine_tenths_of_the_window_are_enough():
@@ -242,7 +242,7 @@ def test_deadlines_do_not_count_in_lockstep():
     flight = Flight(real_time=False)
     flight.builder.begin(10.0)
     flight.listen(10.0)
-    assert run_for(flight, 1.0).health.missed is None
+    assert run_for(flight, 1.0).health.missed_share is None
 
 
 def test_gaps_count_for_five_seconds_and_resets_for_thirty_but_none_from_before(flight):
@@ -251,8 +251,8 @@ def test_gaps_count_for_five_seconds_and_resets_for_thirty_but_none_from_before(
     assert flight.snapshot(14.0).health.gaps == 2
     assert flight.snapshot(16.5).health.gaps == 1
     assert flight.snapshot(17.0).health.gaps == 0
-    assert flight.snapshot(31.0).resets.recent == 2
-    assert flight.snapshot(41.5).resets.recent == 1
+    assert flight.snapshot(31.0).resets.recent_count == 2
+    assert flight.snapshot(41.5).resets.recent_count == 1
 
 
 def test_resets_are_summed_from_where_control_began(flight):
@@ -260,6 +260,6 @@ def test_resets_are_summed_from_where_control_began(flight):
     flight.resets.shift, flight.resets.frame = (1.0, 5.0, 7.0), HeadingFrame(-3.0)
     flight.resets.largest_tilt_jump = 0.2
     found = flight.snapshot().resets
-    assert found.shift == pytest.approx(5.0)
-    assert found.heading == pytest.approx(2.0 * 3.141592653589793 - 6.0)
-    assert found.tilt == 0.2
+    assert found.position_shift == pytest.approx(5.0)
+    assert found.heading_shift == pytest.approx(2.0 * 3.141592653589793 - 6.0)
+    assert found.largest_tilt_jump == 0.2

@@ -194,7 +194,7 @@ def test_the_planner_sees_the_vehicle_at_its_own_rate_and_is_held_between():
     assert np.array(attitudes) == pytest.approx(flight.q[:-1], abs=0)
     assert np.array(body_rates) == pytest.approx(flight.body_rates[:-1], abs=0)
     assert flight.time == pytest.approx(np.arange(26) / 50)
-    assert flight.commanded.tolist() == [[0.4, 0.2, 0.0]] * 25
+    assert flight.commanded_rates.tolist() == [[0.4, 0.2, 0.0]] * 25
     # The command is constant: how often it is repeated changes the thrust a little, no torque.
     assert flight.body_rates == pytest.approx(fly(planner, seconds=0.5).body_rates[::20], abs=1e-9)
 
@@ -204,7 +204,7 @@ def test_the_same_flight_twice_is_the_same_to_the_last_bit():
     planner = make_planner("first-order", limits=Limits(max_tilt_rate=pi / 2))
     q, target = attitude(start, 2.0), Target(*goal, 2.0)
     first, second = (fly(planner, None, 0.3, 250, q, target) for _ in range(2))
-    for one, other in ((first.q, second.q), (first.commanded, second.commanded)):
+    for one, other in ((first.q, second.q), (first.commanded_rates, second.commanded_rates)):
         np.testing.assert_array_equal(one, other)
 
 

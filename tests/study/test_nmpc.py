@@ -209,7 +209,7 @@ def test_a_verdict_is_made_of_the_numbers(words, flown, counts, timed, holds):
 
 
 def test_the_studies_of_every_machine_go_without_it(tmp_path, monkeypatch, capsys):
-    assert "nmpc" not in [study.name for study in registry.chosen("all")]
+    assert "nmpc" not in [study.name for study in registry.selected_studies("all")]
     found = importlib.util.find_spec
     monkeypatch.setattr(
         importlib.util, "find_spec", lambda name: None if name == "casadi" else found(name)

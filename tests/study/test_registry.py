@@ -82,7 +82,7 @@ def test_one_entry_puts_a_study_among_all_unless_it_says_otherwise(dummy, tmp_pa
     assert 'id="dummy"' in page
     assert 'id="kmax"' in page
     monkeypatch.setitem(registry.STUDIES, "dummy", dummy._replace(in_all=False))
-    assert [study.name for study in registry.chosen("all")] == ["kmax"]
+    assert [study.name for study in registry.selected_studies("all")] == ["kmax"]
 
 
 def test_the_extra_of_an_entry_is_asked_for(dummy, tmp_path, monkeypatch, capsys):

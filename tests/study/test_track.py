@@ -56,10 +56,10 @@ def vehicle(tmp_path, monkeypatch):
 def test_a_trajectory_is_followed_closely_only_if_led(flown):
     with_lead, without_lead, windy = (flown[0][task] for task in TASKS)
     assert with_lead.ok
-    assert with_lead.telemetry.rms < 0.04
-    assert with_lead.telemetry.rms < with_lead.telemetry.largest < 0.1
-    assert without_lead.telemetry.rms > 3.0 * with_lead.telemetry.rms
-    assert 2.0 * with_lead.telemetry.rms < windy.telemetry.rms < 0.15
+    assert with_lead.telemetry_error.rms < 0.04
+    assert with_lead.telemetry_error.rms < with_lead.telemetry_error.largest < 0.1
+    assert without_lead.telemetry_error.rms > 3.0 * with_lead.telemetry_error.rms
+    assert 2.0 * with_lead.telemetry_error.rms < windy.telemetry_error.rms < 0.15
 
 
 @pytest.mark.slow
@@ -78,8 +78,8 @@ def test_the_truth_is_that_of_the_vehicle_at_the_same_time(vehicle):
     names = ("attitude_noise_deg", "rate_noise_rad_s", "position_noise_m", "velocity_noise_m_s")
     vehicle(sensors={**dict.fromkeys(names, 0.0), "position_delay_ms": 0.0, "ekf": "none"})
     tracked = flights.fly(TASKS[0])
-    assert tracked.telemetry.rms == pytest.approx(tracked.truth.rms, abs=2e-3)
-    assert tracked.truth.rms < 0.03
+    assert tracked.telemetry_error.rms == pytest.approx(tracked.true_error.rms, abs=2e-3)
+    assert tracked.true_error.rms < 0.03
 
 
 @pytest.mark.slow
@@ -94,7 +94,10 @@ def test_each_flight_is_told_as_it_begins(flown):
 @pytest.mark.slow
 def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
     alone, company = flights.fly(TASKS[0]), flown[0][TASKS[0]]
-    assert (alone.telemetry, alone.truth) == (company.telemetry, company.truth)
+    assert (alone.telemetry_error, alone.true_error) == (
+        company.telemetry_error,
+        company.true_error,
+    )
     assert np.array_equal(alone.path, company.path)
 
 
@@ -104,7 +107,10 @@ def test_a_flight_that_fails_has_no_error_to_show(vehicle):
     tracked = flights.fly(TASKS[0])
     assert not tracked.ok
     assert tracked.result
-    assert (tracked.telemetry, tracked.truth) == (PositionError(inf, inf), PositionError(inf, inf))
+    assert (tracked.telemetry_error, tracked.true_error) == (
+        PositionError(inf, inf),
+        PositionError(inf, inf),
+    )
 
 
 def test_what_cannot_be_flown_ends_the_study_before_more_is_begun():

@@ -12,7 +12,7 @@ from companion.vehicle.registry import AUTOPILOTS, autopilot_for
 
 QUADROTOR, HEXAROTOR, FIXED_WING = 2, 13, 1
 PX4, ARDUPILOT = autopilot_for(12, QUADROTOR), autopilot_for(3, HEXAROTOR)
-GOOD = Readiness(prearm_good=True, estimator_flags=0x33F, position=True, home=True)
+GOOD = Readiness(prearm_passed=True, estimator_flags=0x33F, has_position=True, has_home=True)
 EVERY_AUTOPILOT = pytest.mark.parametrize(
     "autopilot", AUTOPILOTS, ids=lambda autopilot: autopilot.name
 )
@@ -90,13 +90,13 @@ def test_a_family_is_complete(autopilot):
 def test_it_is_ready_only_when_nothing_is_missing(autopilot):
     assert autopilot.not_ready(GOOD) is None
     for missing, told in (
-        ({"prearm_good": False}, "the autopilot's pre-arm checks"),
-        ({"prearm_good": None}, "the autopilot's pre-arm checks"),
+        ({"prearm_passed": False}, "the autopilot's pre-arm checks"),
+        ({"prearm_passed": None}, "the autopilot's pre-arm checks"),
         ({"estimator_flags": None}, "the estimator's status ("),
         ({"estimator_flags": 0x33F & ~0x1}, "the estimator ("),
         ({"estimator_flags": 0x33F & ~0x2}, "the estimator ("),
-        ({"position": False}, "a local position (LOCAL_POSITION_NED)"),
-        ({"home": False}, "the home position (HOME_POSITION)"),
+        ({"has_position": False}, "a local position (LOCAL_POSITION_NED)"),
+        ({"has_home": False}, "the home position (HOME_POSITION)"),
     ):
         assert autopilot.not_ready(GOOD._replace(**missing)).startswith(told)
 

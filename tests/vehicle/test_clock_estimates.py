@@ -24,7 +24,7 @@ def test_an_exchange_gives_the_delay():
 def test_two_exchanges_far_behind_are_of_another_clock(known):
     delay, answer = compared(*known, (2.0, 0.005, 900.0), (3.0, 0.005, 900.0))
     assert answer is None
-    assert (delay.known, delay.unknown) == (False, DelayUnknown.OTHER_CLOCK)
+    assert (delay.known, delay.why_unknown) == (False, DelayUnknown.OTHER_CLOCK)
 
 
 def test_two_exchanges_ahead_are_a_clock_that_jumped_once_the_delay_was_known():
@@ -34,7 +34,7 @@ def test_two_exchanges_ahead_are_a_clock_that_jumped_once_the_delay_was_known():
     assert delay.known
     delay, answer = compared(*far)
     assert answer is None
-    assert (delay.known, delay.unknown) == (False, DelayUnknown.OTHER_CLOCK)
+    assert (delay.known, delay.why_unknown) == (False, DelayUnknown.OTHER_CLOCK)
 
 
 def test_the_largest_delay_counts_exchanges_until_then_with_their_errors():

@@ -100,12 +100,12 @@ def test_each_arming_is_counted(bench):
 
 
 def test_an_autopilot_that_is_none_of_ours_is_told_until_one_of_ours_comes(bench):
-    assert (bench.state.current_mode, bench.state.unsupported) == (None, None)
+    assert (bench.state.current_mode, bench.state.unsupported_error) == (None, None)
     state = bench.take(dialect.MAVLink_heartbeat_message(2, 4, 129, 7, 4, 3))
     assert (state.autopilot, state.mode) == (None, "7")
-    assert state.unsupported is not None
+    assert state.unsupported_error is not None
     state = bench.take(px4_heartbeat(0x00060000))
-    assert (state.unsupported, state.mode) == (None, "OFFBOARD")
+    assert (state.unsupported_error, state.mode) == (None, "OFFBOARD")
 
 
 def test_the_mode_is_what_came_last_of_heartbeat_and_current_mode(bench):
@@ -254,11 +254,11 @@ def test_a_message_without_the_charge_does_not_hide_the_charge_of_the_other(benc
 
 
 def test_prearm_check_comes_with_sys_status(bench):
-    assert bench.state.readiness.prearm_good is None
-    assert bench.take(sys_status(0, 0, 0x10000000)).readiness.prearm_good is True
-    assert bench.take(sys_status(0, 0, 0)).readiness.prearm_good is False
+    assert bench.state.readiness.prearm_passed is None
+    assert bench.take(sys_status(0, 0, 0x10000000)).readiness.prearm_passed is True
+    assert bench.take(sys_status(0, 0, 0)).readiness.prearm_passed is False
     bench.now += 5.1
-    assert bench.state.readiness.prearm_good is None
+    assert bench.state.readiness.prearm_passed is None
 
 
 def test_landed_gps_home_estimator(bench):

@@ -83,13 +83,13 @@ def test_unanswered_probes_are_counted_once_the_vehicle_has_answered_any_request
     for _ in range(5):
         bench.timesync.probe()
         bench.now += 0.1
-    assert bench.timesync.uplink.unanswered is None
+    assert bench.timesync.uplink.unanswered_count is None
     bench.answer(0.01)
-    assert bench.timesync.uplink.unanswered == 0
+    assert bench.timesync.uplink.unanswered_count == 0
     for sent in range(1, 17):
         bench.now += 0.1
         bench.timesync.probe()
-        assert bench.timesync.uplink.unanswered == sent
+        assert bench.timesync.uplink.unanswered_count == sent
 
 
 def test_an_answer_leaves_the_probes_sent_after_its_request_unanswered():
@@ -103,7 +103,7 @@ def test_an_answer_leaves_the_probes_sent_after_its_request_unanswered():
 
     def unanswered_after(stamp):
         bench.timesync._on_timesync(SimpleNamespace(tc1=7 * 10**9, ts1=stamp))
-        return bench.timesync.uplink.unanswered
+        return bench.timesync.uplink.unanswered_count
 
     assert unanswered_after(probes[3]) == 2
     assert unanswered_after(probes[1]) == 2  # overtaken on the way
@@ -118,4 +118,4 @@ def test_after_a_reconnect_the_vehicle_must_answer_again_before_probes_count():
     bench.timesync.reset()
     bench.now += 0.1
     bench.timesync.probe()
-    assert bench.timesync.uplink.unanswered is None
+    assert bench.timesync.uplink.unanswered_count is None

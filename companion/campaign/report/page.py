@@ -31,9 +31,10 @@ if TYPE_CHECKING:
 
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0  # exit code
-_GRID_LIKE, _FEW_SAMPLES = 12, 60
-"""Number of different values of a factor: up to the first number it counts as a grid; a sampled
-factor needs the second number for its influence to be separated from that of other factors."""
+_GRID_LIKE = 12
+"""Largest number of different values with which a sampled factor counts as a grid."""
+_FEW_SAMPLES = 60
+"""Number of different values from which the influences of sampled factors can be told apart."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -82,10 +83,10 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
 def page_text(results: Results, campaign: Campaign) -> str:
     """The HTML of the page about a campaign as stored in its folder."""
     by_outcome = {
-        name: each
+        name: found_influences
         for name in (results.error_outcome, RATES, "ok")
-        if name == "ok" or results.measured(name)
-        if (each := influences(results, name))
+        if name == "ok" or results.is_measured(name)
+        if (found_influences := influences(results, name))
     }
     order = _factors_by_influence(results, by_outcome)
     shown_plots = [
@@ -94,7 +95,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         *plots.pareto(results),
         *plots.distributions(results),
     ]
-    first_tables = [tables.worst_cases(results), tables.crossed(results)]
+    first_tables = [tables.worst_cases(results), tables.two_factors(results)]
     if order:
         first_tables.append(tables.success_by_factor(results, order))
     if by_outcome:
@@ -107,7 +108,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         headline=headline(results),
         good=not results.true_cases("crashed") and bool(_success(results).all()),
         lines=[*missing_cases_note(results), *what_to_look_at(results, by_outcome)],
-        tables=[each for each in first_tables if each is not None],
+        tables=[table for table in first_tables if table is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
     )
 
@@ -119,21 +120,21 @@ def headline(results: Results) -> str:
     """
     share = share_of(_success(results))
     success = "with a fault ended as documented" if results.all_faulty else "good"
-    return f"{results.name}: {share.chosen} of {share.total} {results.noun} {success}: {share}"
+    return f"{results.name}: {share.case_count} of {share.total} {results.noun} {success}: {share}"
 
 
 def _success(results: Results) -> NDArray[np.bool_]:
     """(cases,): whether each case was a success in the sense of `headline`."""
-    return results.documented if results.all_faulty else results.good
+    return results.as_documented if results.all_faulty else results.good
 
 
 def missing_cases_note(results: Results) -> list[str]:
     """One sentence: how many cases are missing and how to continue; empty if all are flown."""
-    unflown = results.planned - results.count
+    unflown = results.planned_count - results.count
     if not unflown:
         return []
     return [
-        f"{unflown} of {results.planned} {results.noun} are missing. `companion campaign "
+        f"{unflown} of {results.planned_count} {results.noun} are missing. `companion campaign "
         f"{shlex.quote(str(results.folder))}` goes on with them."
     ]
 
@@ -144,17 +145,19 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     `by_outcome` holds the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
-    if crashed := results.true_cases("crashed"):
-        yield f"{crashed} {results.noun} crashed; they stand first in the table of worst cases."
+    if crashed_count := results.true_cases("crashed"):
+        yield (
+            f"{crashed_count} {results.noun} crashed; they stand first in the table of worst cases."
+        )
     if results.all_faulty:
         yield f"{results.good.sum()} of them were good in spite of the fault."
-    elif results.documented.size:
-        kept, faulty = results.documented.sum(), results.documented.size
-        yield f"{kept} of {faulty} flights with a fault ended as documented."
+    elif results.as_documented.size:
+        documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
+        yield f"{documented_count} of {faulty_count} flights with a fault ended as documented."
     reasons = Counter(results.reason(row) for row in range(results.count) if not results.good[row])
     if reasons:
-        (reason, times) = reasons.most_common(1)[0]
-        yield f"Most frequent reason why a case was not good, {times} times: {reason}."
+        (reason, count) = reasons.most_common(1)[0]
+        yield f"Most frequent reason why a case was not good, {count} times: {reason}."
     yield from _most_influential(results, by_outcome)
     if results.error_outcome == TRUE_ERROR:
         yield (
@@ -181,7 +184,7 @@ def _most_influential(results: Results, by_outcome: dict[str, list[Influence]]) 
             if level.cases.any()
         ),
         default=None,
-        key=lambda each: each[0].high,
+        key=lambda item: item[0].high,
     )
     if worst is not None and worst[0].share < np.mean(results.good):
         lowest, name, value = worst
@@ -198,14 +201,16 @@ def _few_samples(results: Results) -> Iterator[str]:
     largest = max(distinct, default=0)
     if _GRID_LIKE < largest < _FEW_SAMPLES:
         yield (
-            f"Only {largest} different samples of the distributions were flown, so sampled factors "
-            "share influence that only one of them has; raise `samples`."
+            f"Only {largest} different samples of the distributions were flown, so the influence "
+            "of one sampled factor may show for the others, too; raise `samples`."
         )
 
 
 def _factors_by_influence(results: Results, by_outcome: dict[str, list[Influence]]) -> list[str]:
-    """The factors by their influence on success, then on the error; the others last."""
-    listed = [
-        each.factor for name in ("ok", results.error_outcome) for each in by_outcome.get(name, ())
+    """The factors by influence on success, then on the error; those without influence last."""
+    influential = [
+        influence.factor
+        for name in ("ok", results.error_outcome)
+        for influence in by_outcome.get(name, ())
     ]
-    return list(dict.fromkeys([*listed, *results.factors]))
+    return list(dict.fromkeys([*influential, *results.factors]))

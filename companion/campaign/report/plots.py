@@ -30,7 +30,7 @@ _DISTRIBUTIONS = (
     "saturated_share",
 )
 _SHOWN_SHARE = 0.995
-"""Share of the values that a distribution shows; the last bin holds the larger ones."""
+"""Quantile at which the axis of a histogram ends; its last bin also holds all larger values."""
 _BINS = 40
 """Number of bins of a histogram."""
 
@@ -44,15 +44,15 @@ def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
             "type": "scatter",
             "mode": "markers",
             "x": [level.name for level in groups],
-            "y": [_percent(each.share) for each in shares],
+            "y": [_percent(share.share) for share in shares],
             "error_y": {
                 "type": "data",
                 "symmetric": False,
-                "array": [_percent(each.high - each.share) for each in shares],
-                "arrayminus": [_percent(each.share - each.low) for each in shares],
+                "array": [_percent(share.high - share.share) for share in shares],
+                "arrayminus": [_percent(share.share - share.low) for share in shares],
             },
             "marker": {"color": MEASURED_COLOUR, "size": 8},
-            "text": [f"{each.chosen} of {each.total}" for each in shares],
+            "text": [f"{share.case_count} of {share.total}" for share in shares],
             "hovertemplate": "%{x}: %{y:.1f} % (%{text})<extra></extra>",
         }
         layout = axes(x=label(name), y=f"good {results.noun}, %")
@@ -76,11 +76,13 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
             {
                 "type": "bar",
                 "name": "good" if outcome == "ok" else label(outcome),
-                "x": [each.factor for each in found],
-                "y": numbers(np.array([100.0 * each.share for each in found])),
+                "x": [influence.factor for influence in found],
+                "y": numbers(np.array([100.0 * influence.share for influence in found])),
                 "error_y": {
                     "type": "data",
-                    "array": numbers(np.array([100.0 * each.confidence for each in found])),
+                    "array": numbers(
+                        np.array([100.0 * influence.confidence for influence in found])
+                    ),
                 },
                 "marker": {"color": colour},
             }
@@ -98,7 +100,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
 def pareto(results: Results) -> Iterator[Plot]:
     """Error against commanded rate, coloured by thrust deviation; the Pareto front is marked."""
     columns = results.columns
-    names = [results.error_outcome, RATES, *([THRUST] if results.measured(THRUST) else [])]
+    names = [results.error_outcome, RATES, *([THRUST] if results.is_measured(THRUST) else [])]
     points, titles = [], []
     for choice in choices(results):
         part = choice.cases
@@ -149,7 +151,10 @@ def _points(name: str, goals: Floats, titles: list[str], marker: dict[str, Any])
 
 
 def _colour_scale(values: Floats, all_values: Floats, *, shown: bool) -> dict[str, Any]:
-    """Colours of some points by their thrust deviation, on one scale for all points."""
+    """Colours of points by their thrust deviations `values`, on a scale over `all_values`.
+
+    `shown`: whether the colour bar is shown.
+    """
     return {
         "color": numbers(values),
         "cmin": float(all_values.min()),
@@ -163,12 +168,12 @@ def _colour_scale(values: Floats, all_values: Floats, *, shown: bool) -> dict[st
 def distributions(results: Results) -> Iterator[Plot]:
     """Histograms of the outcomes: good cases, and others."""
     for name in _DISTRIBUTIONS:
-        if not results.measured(name):
+        if not results.is_measured(name):
             continue
         values = results.columns[name]
-        known = np.isfinite(values)
-        low = float(values[known].min())
-        high = float(np.quantile(values[known], _SHOWN_SHARE))
+        is_finite = np.isfinite(values)
+        low = float(values[is_finite].min())
+        high = float(np.quantile(values[is_finite], _SHOWN_SHARE))
         if high <= low:
             continue
         edges = np.linspace(low, high, _BINS + 1)
@@ -177,7 +182,7 @@ def distributions(results: Results) -> Iterator[Plot]:
             (True, "good", MEASURED_COLOUR),
             (False, "not good", REFERENCE_COLOUR),
         ):
-            selected = values[known & (results.good == good)]
+            selected = values[is_finite & (results.good == good)]
             counts, _ = np.histogram(np.clip(selected, low, high), edges)
             traces.append(
                 {
@@ -190,7 +195,7 @@ def distributions(results: Results) -> Iterator[Plot]:
                 }
             )
         layout = {**axes(x=label(name), y=results.noun), "barmode": "stack", "bargap": 0.0}
-        p05, median, p95 = np.quantile(values[known], (0.05, 0.5, 0.95))
+        p05, median, p95 = np.quantile(values[is_finite], (0.05, 0.5, 0.95))
         note = (
             f"Median {median:.3g}; nine of ten lie from {p05:.3g} to {p95:.3g}. The last bar "
             "holds all larger values."

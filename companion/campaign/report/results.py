@@ -45,10 +45,10 @@ class Results:
     name: str
     kind: str
     """flights or batch."""
-    planned: int
+    planned_count: int
     """Number of cases of the whole campaign, flown or not."""
     factors: Mapping[str, Any]
-    """Metadata of each swept key, by name."""
+    """Metadata of each factor, by name: `Swept.description`, and its unit."""
     table: "pa.Table"
     """All rows, as returned by `store.read`."""
 
@@ -59,10 +59,12 @@ class Results:
         Raises:
             ConfigError: the folder holds no campaign or no results yet, or a file is damaged.
         """
-        planned = read_description(folder).cases
+        planned_count = read_description(folder).cases
         table = store.read(folder)
         metadata = store.metadata(table)
-        return cls(folder, metadata["name"], metadata["kind"], planned, metadata["factors"], table)
+        return cls(
+            folder, metadata["name"], metadata["kind"], planned_count, metadata["factors"], table
+        )
 
     @cached_property
     def columns(self) -> dict[str, Column]:
@@ -87,7 +89,7 @@ class Results:
         return np.array(self.columns["ok"], dtype=bool)
 
     def failures(self) -> Counter[str]:
-        """How many cases were not good for each reason, with its numbers replaced by `…`."""
+        """How many cases were not good, by reason; the numbers in a reason are replaced by `…`."""
         reasons = (self.reason(row) for row in range(self.count) if not self.good[row])
         return Counter(_NUMBER.sub("…", reason) for reason in reasons)
 
@@ -99,15 +101,15 @@ class Results:
         return str(self.columns["failed_checks"][row] or "") or "crashed"
 
     @cached_property
-    def documented(self) -> NDArray[np.bool_]:
+    def as_documented(self) -> NDArray[np.bool_]:
         """(k,): for each of the k cases with a fault, whether it ended as documented for it."""
-        judged = self.columns.get("as_documented", ())
-        return np.array([value for value in judged if value is not None], dtype=bool)
+        endings = self.columns.get("as_documented", ())
+        return np.array([value for value in endings if value is not None], dtype=bool)
 
     @property
     def all_faulty(self) -> bool:
         """Whether every case has a fault; success then means an ending as documented."""
-        return self.documented.size == self.count > 0
+        return self.as_documented.size == self.count > 0
 
     @property
     def noun(self) -> str:
@@ -117,9 +119,9 @@ class Results:
     @property
     def error_outcome(self) -> str:
         """Name of the outcome that serves as the campaign's error; see `ERRORS`."""
-        return next((name for name in ERRORS if self.measured(name)), ERRORS[-1])
+        return next((name for name in ERRORS if self.is_measured(name)), ERRORS[-1])
 
-    def measured(self, name: str) -> bool:
+    def is_measured(self, name: str) -> bool:
         """Whether there is a column of numbers with this name, with at least one finite value."""
         column = self.columns.get(name)
         return column is not None and column.dtype == float and bool(np.isfinite(column).any())

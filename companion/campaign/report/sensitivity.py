@@ -54,10 +54,13 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     indices = delta.analyze(
         problem, np.column_stack(list(columns.values())), values, seed=_SEED, method="sobol"
     )
-    listed = zip(columns, indices["S1"], indices["S1_conf"], strict=True)
+    named_indices = zip(columns, indices["S1"], indices["S1_conf"], strict=True)
     return sorted(
-        (Influence(name, float(index), float(half_width)) for name, index, half_width in listed),
-        key=lambda each: -each.share,
+        (
+            Influence(name, float(index), float(half_width))
+            for name, index, half_width in named_indices
+        ),
+        key=lambda influence: -influence.share,
     )
 
 

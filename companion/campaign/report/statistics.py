@@ -11,11 +11,11 @@ from companion.campaign.report.results import Column, Floats, Results
 
 CONFIDENCE = 0.95
 _MOST_LEVELS = 12
-"""A factor with more different values is shown in ranges."""
+"""Largest number of different values of a factor that are each shown as a level."""
 _RANGE_COUNT = 5
-"""Number of these ranges."""
+"""Number of ranges that divide a factor with more than `_MOST_LEVELS` different values."""
 _MOST_CHOICES = 300
-"""With more groups of equal values, `choices` shows single cases."""
+"""Largest number of groups of equal values; if there were more, `choices` returns single cases."""
 _NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
 """Prefixes of the factors that a user does not choose."""
 
@@ -26,15 +26,16 @@ class Share(NamedTuple):
     The interval covers the true share in 95 % of campaigns.
     """
 
-    chosen: int
+    case_count: int
     """Number of cases that have the property."""
     total: int
     """Number of all cases."""
     share: float
-    """`chosen` / `total`; NaN for no case."""
+    """`case_count` / `total`; NaN for no case."""
     low: float
-    """The interval, from here to `high`."""
+    """Lower bound of the interval."""
     high: float
+    """Upper bound of the interval."""
 
     def __str__(self) -> str:
         return f"{_percent(self.share)} % ({_percent(self.low)} to {_percent(self.high)} %)"
@@ -47,11 +48,11 @@ def _percent(share: float) -> str:
     return f"{percent:.1f}" if 0.0 < percent < 100.0 else f"{percent:.0f}"
 
 
-def share_of(chosen: NDArray[np.bool_]) -> Share:
+def share_of(has_property: NDArray[np.bool_]) -> Share:
     """The share of cases for which the (cases,) array is True."""
     from scipy.stats import binomtest  # noqa: PLC0415  takes a second to import
 
-    count, total = int(np.sum(chosen)), len(chosen)
+    count, total = int(np.sum(has_property)), len(has_property)
     if not total:
         return Share(0, 0, np.nan, 0.0, 1.0)
     interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
@@ -62,7 +63,7 @@ class Group(NamedTuple):
     """Cases in which some factors have the same or similar values."""
 
     name: str
-    """These values, as text."""
+    """The common values of the factors, as text."""
     cases: NDArray[np.bool_]
     """(cases,), whether each case belongs to the group."""
 
@@ -76,19 +77,23 @@ def levels(column: Column) -> list[Group]:
     """
     distinct = sorted({_sort_key(value) for value in column})
     if column.dtype != float or len(distinct) <= _MOST_LEVELS:
-        shown = distinct if len(distinct) <= _MOST_LEVELS else distinct[: _MOST_LEVELS - 1]
+        shown_keys = distinct if len(distinct) <= _MOST_LEVELS else distinct[: _MOST_LEVELS - 1]
         keys = [_sort_key(value) for value in column]
-        groups = [Group(key[1], np.array([key == each for each in keys])) for key in shown]
-        others = len(distinct) - len(shown)
-        if others:
-            groups.append(Group(f"{others} others", np.array([key not in shown for key in keys])))
+        groups = [
+            Group(key[1], np.array([key == value_key for value_key in keys])) for key in shown_keys
+        ]
+        other_count = len(distinct) - len(shown_keys)
+        if other_count:
+            groups.append(
+                Group(f"{other_count} others", np.array([key not in shown_keys for key in keys]))
+            )
         return groups
     edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGE_COUNT + 1))
     groups = []
     for number, (low, high) in enumerate(pairwise(edges)):
-        last = number == _RANGE_COUNT - 1
-        inside = (column >= low) & ((column <= high) if last else (column < high))
-        groups.append(Group(f"{low:.3g} to {high:.3g}", inside))
+        is_last = number == _RANGE_COUNT - 1
+        in_range = (column >= low) & ((column <= high) if is_last else (column < high))
+        groups.append(Group(f"{low:.3g} to {high:.3g}", in_range))
     null_cases = np.isnan(column)
     if null_cases.any():
         groups.append(Group("null", null_cases))
@@ -115,15 +120,15 @@ def worst_rows(results: Results, count: int) -> list[int]:
     columns = results.columns
     error = columns[results.error_outcome]
     crashed = columns.get("crashed", np.zeros(results.count))
-    documented = columns.get("as_documented", np.full(results.count, None))
+    as_documented = columns.get("as_documented", np.full(results.count, None))
 
     def rank(row: int) -> tuple[bool, bool, bool, float]:
-        size = error[row] if np.isfinite(error[row]) else np.inf
+        error_size = error[row] if np.isfinite(error[row]) else np.inf
         return (
             crashed[row] is not True,
-            documented[row] is not False,
+            as_documented[row] is not False,
             bool(results.good[row]),
-            -float(size),
+            -float(error_size),
         )
 
     return sorted(range(results.count), key=rank)[:count]
@@ -146,9 +151,9 @@ def choices(results: Results) -> list[Group]:
     than `_MOST_CHOICES` groups, each group is a single case. Of many cases only every k-th is
     returned, so that there are fewer than 2·`_MOST_CHOICES`.
     """
-    chosen = [name for name in results.factors if not name.startswith(_NOT_CHOSEN)]
+    chosen_keys = [name for name in results.factors if not name.startswith(_NOT_CHOSEN)]
     rows = range(results.count)
-    keys = [tuple(_sort_key(results.columns[name][row]) for name in chosen) for row in rows]
+    keys = [tuple(_sort_key(results.columns[name][row]) for name in chosen_keys) for row in rows]
     distinct = sorted(set(keys))
     if len(distinct) > _MOST_CHOICES or len(distinct) == len(keys):
         step = max(1, len(keys) // _MOST_CHOICES)
@@ -158,9 +163,9 @@ def choices(results: Results) -> list[Group]:
         ]
     return [
         Group(
-            ", ".join(f"{name} = {text}" for name, (_, text) in zip(chosen, key, strict=True))
+            ", ".join(f"{name} = {text}" for name, (_, text) in zip(chosen_keys, key, strict=True))
             or "all cases",
-            np.array([key == each for each in keys]),
+            np.array([key == row_key for row_key in keys]),
         )
         for key in distinct
     ]

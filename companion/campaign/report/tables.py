@@ -41,7 +41,7 @@ def worst_cases(results: Results) -> Table:
         for row in worst_rows(results, _WORST_SHOWN)
     ]
     header = ("case", "fly it again, recorded", label(results.error_outcome), *shown, "factors")
-    return Table("Worst cases", tuple(each.replace("_", " ") for each in header), rows)
+    return Table("Worst cases", tuple(title.replace("_", " ") for title in header), rows)
 
 
 def _rerun_command(results: Results, case: int) -> str:
@@ -60,7 +60,7 @@ def configuration(campaign: Campaign) -> Table:
 
     Swept keys are left out.
     """
-    swept = campaign.file.swept_keys
+    swept_keys = campaign.file.swept_keys
     rows = [
         (f"{key.section}.{key.name}", json.dumps(key.value), json.dumps(key.default), key.unit)
         for key in keys(campaign.base)
@@ -75,15 +75,15 @@ def configuration(campaign: Campaign) -> Table:
     ]
     title = "Configuration of every case: the limits, and what is not the default"
     header = ("key", "value", "default", "unit")
-    return Table(title, header, [row for row in rows if row[0] not in swept])
+    return Table(title, header, [row for row in rows if row[0] not in swept_keys])
 
 
 def success_by_factor(results: Results, order: Sequence[str]) -> Table:
     """Success rate, median error and median body rate by level of the most influential factors."""
     rows = [row for name in order[:_MOST_FACTORS] for row in _level_rows(results, name)]
-    documented = "as_documented" in results.columns and "fault" in results.factors
+    has_faults = "as_documented" in results.columns and "fault" in results.factors
     header = ["factor", "value", results.noun, "good (95 % interval)"]
-    header += ["ended as documented (95 % interval)"] if documented else []
+    header += ["ended as documented (95 % interval)"] if has_faults else []
     header += [f"median {label(results.error_outcome)}", f"median {label(RATES)}"]
     return Table("Success by factor", tuple(header), rows)
 
@@ -94,9 +94,18 @@ def _level_rows(results: Results, name: str) -> Iterator[tuple[str, ...]]:
         row = [name, level.name, str(int(level.cases.sum()))]
         row.append(str(share_of(results.good[level.cases])))
         if "as_documented" in columns and "fault" in results.factors:
-            judged = [value for value in columns["as_documented"][level.cases] if value is not None]
-            row.append(str(share_of(np.array(judged, dtype=bool))) if judged else EMPTY)
-        row += [_median_text(columns[each][level.cases]) for each in (results.error_outcome, RATES)]
+            endings_documented = [
+                value for value in columns["as_documented"][level.cases] if value is not None
+            ]
+            row.append(
+                str(share_of(np.array(endings_documented, dtype=bool)))
+                if endings_documented
+                else EMPTY
+            )
+        row += [
+            _median_text(columns[outcome][level.cases])
+            for outcome in (results.error_outcome, RATES)
+        ]
         yield tuple(row)
 
 
@@ -107,33 +116,38 @@ def _median_text(values: Floats) -> str:
 
 def sensitivity(influences: dict[str, list[Influence]]) -> Table:
     """The first-order Sobol indices of each outcome, with their intervals."""
-    factors = dict.fromkeys(each.factor for found in influences.values() for each in found)
-    known = {
-        outcome: {each.factor: f"{each.share:.0%} ± {each.confidence:.0%}" for each in found}
+    factors = dict.fromkeys(
+        influence.factor for found in influences.values() for influence in found
+    )
+    index_texts = {
+        outcome: {
+            influence.factor: f"{influence.share:.0%} ± {influence.confidence:.0%}"
+            for influence in found
+        }
         for outcome, found in influences.items()
     }
     rows = [
-        (factor, *(known[outcome].get(factor, EMPTY) for outcome in influences))
+        (factor, *(index_texts[outcome].get(factor, EMPTY) for outcome in influences))
         for factor in factors
     ]
     header = ("factor", *("good" if name == "ok" else OUTCOME_LABELS[name] for name in influences))
     return Table("Share of the variance that a factor explains by itself", header, rows)
 
 
-def crossed(results: Results) -> Table | None:
+def two_factors(results: Results) -> Table | None:
     """Median error and success rate for each pair of values of two factors.
 
     They are the first two factors with 2 to `_MOST_LEVELS` values; None if there are no two.
     """
     columns = results.columns
-    few = [
+    few_valued = [
         name
         for name in results.factors
         if 1 < len({str(value) for value in columns[name]}) <= _MOST_LEVELS
     ]
-    if len(few) < 2:
+    if len(few_valued) < 2:
         return None
-    first, second = few[0], few[1]
+    first, second = few_valued[0], few_valued[1]
     second_levels = levels(columns[second])
     rows = []
     for level in levels(columns[first]):
@@ -145,16 +159,16 @@ def crossed(results: Results) -> Table | None:
         rows.append((level.name, *cells))
     error = label(results.error_outcome)
     title = f"Median {error} and share of good {results.noun}: {first} × {second}"
-    return Table(title, (first, *(each.name for each in second_levels)), rows)
+    return Table(title, (first, *(level.name for level in second_levels)), rows)
 
 
 def all_cases(results: Results) -> Table:
     """All cases or, if they are more, `_MOST_ROWS` of them at even distances."""
     shown = [name for name in results.columns if name not in ("seed", "digest")]
     count = results.count
-    chosen = even_indices(count, _MOST_ROWS)
-    rows = [tuple(_cell(results.columns[name][row]) for name in shown) for row in chosen]
-    part = "" if len(chosen) == count else f", {len(chosen)} of {count}"
+    shown_rows = even_indices(count, _MOST_ROWS)
+    rows = [tuple(_cell(results.columns[name][row]) for name in shown) for row in shown_rows]
+    part = "" if len(shown_rows) == count else f", {len(shown_rows)} of {count}"
     return Table(
         f"Cases{part} (all of them are in results.csv and results.parquet)", tuple(shown), rows
     )

@@ -9,7 +9,7 @@ import numpy as np
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
-from companion.campaign.keys import replaced, with_keys
+from companion.campaign.keys import replace_unchecked, with_keys
 from companion.campaign.swept import Swept
 from companion.config import Config
 from companion.config.flight import OPEN_LOOP
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Values = Mapping[str, Any]
 """Value of each searched key."""
 _UNSEEN_SEED_OFFSET = 1_000_003
-"""Added to the campaign's seed for the cases that the search does not see."""
+"""Number added to the campaign's seed for the cases that the search does not see."""
 _NEARBY_DEVIATION = 0.15
 """Standard deviation of the values around a start, as a share of the range of the key.
 
@@ -49,19 +49,22 @@ def tune_section(campaign: Campaign) -> Tune:
     """
     tune = campaign.file.tune
     if tune is None:
-        raise ConfigError(f"{campaign.name}: there is no section `tune` that says what to search")
+        raise ConfigError(
+            f"{campaign.file_path}: there is no section `tune` that says what to search"
+        )
     if campaign.file.kind != "flights":
-        raise ConfigError(f"{campaign.name}: tune needs kind: flights")
+        raise ConfigError(f"{campaign.file_path}: tune needs kind: flights")
     for key in tune.search.keys() & campaign.file.swept_keys:
         raise ConfigError(
-            f"{campaign.name}: `{key}` is in sweep and in tune.search; remove it from one of them"
+            f"{campaign.file_path}: `{key}` is in sweep and in tune.search; remove it from one of "
+            "them"
         )
-    flown = (case.config.flight.maneuvers for case in campaign.cases())
-    if all(set(OPEN_LOOP).issuperset(maneuvers) for maneuvers in flown):
+    maneuvers_of_cases = (case.config.flight.maneuvers for case in campaign.cases())
+    if all(set(OPEN_LOOP).issuperset(maneuvers) for maneuvers in maneuvers_of_cases):
         raise ConfigError(
-            f"{campaign.name}: tune compares the distances from the reference, and the maneuvers "
-            f"{', '.join(sorted(OPEN_LOOP))} have none; set flight.maneuvers to [circle] or "
-            "another that follows a reference"
+            f"{campaign.file_path}: tune compares the distances from the reference, and the "
+            f"maneuvers {', '.join(sorted(OPEN_LOOP))} have none; set flight.maneuvers to "
+            "[circle] or another that follows a reference"
         )
     return tune
 
@@ -81,7 +84,7 @@ def unseen_campaign(campaign: Campaign, samples: int) -> Campaign:
     return replace(campaign, file=campaign.file.model_copy(update=update))
 
 
-def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
+def suggested_values(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
     """The values that Optuna suggests for a trial; numbers are rounded to three digits."""
     values: dict[str, Any] = {}
     for key, swept in search.items():
@@ -94,31 +97,33 @@ def suggested(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
     return values
 
 
-def starts(campaign: Campaign, tune: Tune, learned: Config | None = None) -> Iterator[Start]:
-    """The starts: the present configuration, `learned`, and the proposal of `companion tune`.
+def starts(campaign: Campaign, tune: Tune, learned_config: Config | None = None) -> Iterator[Start]:
+    """The starts: the campaign's configuration, `learned_config`, and a proposal.
 
-    `learned` is the configuration with the values that first flights measured; None: no such
-    flights. The proposal is computed from `learned` or, without it, from the present configuration.
-    There is no proposal if the rate loop is not known.
+    `learned_config` is the configuration with the values that first flights measured; None: no such
+    flights. The proposal is that of `companion tune` for `learned_config` or, without it, for the
+    campaign's configuration. There is no proposal if the rate loop is not known.
     """
     yield Start(
         "the configuration",
         clamped_to_search(_present_values(campaign.base, tune.search), tune.search),
     )
-    known = learned or campaign.base
-    present = _present_values(known, tune.search)
-    if learned is not None:
-        yield Start("a first flight", clamped_to_search(present, tune.search))
+    start_config = learned_config or campaign.base
+    present_values = _present_values(start_config, tune.search)
+    if learned_config is not None:
+        yield Start("a first flight", clamped_to_search(present_values, tune.search))
     try:
-        changes = propose(replaced(known, planner={"name": "auto"})).changes
+        changes = propose(replace_unchecked(start_config, planner={"name": "auto"})).changes
     except ConfigError:
         return  # its rate loop is not known, or the linear analysis does not cover it
-    proposed = {
+    proposed_values = {
         f"{section}.{key}": value
         for section, keys in changes.items()
         for key, value in keys.items()
     }
-    yield Start("companion tune", clamped_to_search({**present, **proposed}, tune.search))
+    yield Start(
+        "companion tune", clamped_to_search({**present_values, **proposed_values}, tune.search)
+    )
 
 
 def starts_near(
@@ -130,22 +135,27 @@ def starts_near(
     """
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        moved = dict(start.values)
+        moved_values = dict(start.values)
         for key, value in start.values.items():
             swept = search[key]
             if swept.loguniform is not None:
                 low, high = swept.loguniform
-                moved[key] = value * (high / low) ** float(rng.normal(0.0, _NEARBY_DEVIATION))
+                moved_values[key] = value * (high / low) ** float(
+                    rng.normal(0.0, _NEARBY_DEVIATION)
+                )
             elif swept.uniform is not None:
                 low, high = swept.uniform
-                moved[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
-        yield Start(f"near {start.name}", clamped_to_search(moved, search))
+                moved_values[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
+        yield Start(f"near {start.name}", clamped_to_search(moved_values, search))
 
 
 def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
-    """The present values of keys. A null key has the value that the program derives, if any."""
+    """The values of keys in a configuration; for a null key, the value that the program derives.
+
+    A null key without a derived value is left out.
+    """
     weights, drag = hold_weights(config), drag_prior(config).drag
-    derived = {
+    derived_values = {
         "guidance.position_weight_per_s4": weights.position,
         "guidance.velocity_weight_per_s2": weights.velocity,
         "guidance.disturbance_bandwidth_rad_s": disturbance_bandwidth(config),
@@ -155,7 +165,9 @@ def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
     }
     configured = configured_values(config, keys)
     return {
-        key: value for key in keys if (value := configured.get(key, derived.get(key))) is not None
+        key: value
+        for key in keys
+        if (value := configured.get(key, derived_values.get(key))) is not None
     }
 
 
@@ -175,11 +187,11 @@ def clamped_to_search(values: Values, search: Mapping[str, Swept]) -> dict[str, 
 
     Keys that are not searched are left out, and so are values that are not among a key's choices.
     """
-    clamped: dict[str, Any] = {}
+    clamped_values: dict[str, Any] = {}
     for key, value in values.items():
         swept = search.get(key)
         if swept is None or (swept.choice is not None and value not in swept.choice):
             continue
         pair = swept.uniform or swept.loguniform
-        clamped[key] = value if pair is None else min(max(float(value), pair[0]), pair[1])
-    return clamped
+        clamped_values[key] = value if pair is None else min(max(float(value), pair[0]), pair[1])
+    return clamped_values

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from companion.campaign.tune.scores import Floats, Score, pooled
+from companion.campaign.tune.scores import Floats, Score, pooled_rms
 
 CONFIDENCE = 0.95
 _RESAMPLES = 4000
@@ -30,19 +30,20 @@ class Comparison(NamedTuple):
     """RMS horizontal distance of the true position from the reference, m, with the configuration
     before the search."""
     after: Interval
-    """The same distance with the result of the search, m."""
+    """RMS horizontal distance of the true position from the reference, m, with the result of the
+    search."""
     ratio: Interval
     """`after` / `before`."""
-    estimated: tuple[float, float]
+    estimated_errors: tuple[float, float]
     """RMS horizontal distance of the estimated position from the reference, m, before and after."""
-    estimate: tuple[float, float]
+    estimator_errors: tuple[float, float]
     """RMS horizontal distance of the estimated from the true position, m, before and after."""
-    better: int
+    better_samples: int
     """Number of samples in which the result has the smaller RMS error."""
     samples: int
 
 
-def compared(before: Score, after: Score, samples: int) -> Comparison | None:
+def compare(before: Score, after: Score, samples: int) -> Comparison | None:
     """Compare two scores on the same cases, by a paired bootstrap over the samples.
 
     All cases of a sample are drawn together, because they have the same vehicle. A sample in which
@@ -57,31 +58,33 @@ def compared(before: Score, after: Score, samples: int) -> Comparison | None:
         None if fewer than two samples were flown to their end with both configurations.
     """
     scores = before, after
-    errors = [np.array(score.true).reshape(samples, -1) for score in scores]
-    complete = np.isfinite(np.hstack(errors)).all(axis=1)
-    count = int(complete.sum())
+    errors = [np.array(score.true_errors).reshape(samples, -1) for score in scores]
+    is_complete = np.isfinite(np.hstack(errors)).all(axis=1)
+    count = int(is_complete.sum())
     if count < 2:
         return None
-    old, new = (each[complete] for each in errors)
+    before_errors, after_errors = (sample_errors[is_complete] for sample_errors in errors)
 
-    def pooled_compared(values: tuple[float, ...]) -> float:
-        return pooled(np.array(values).reshape(samples, -1)[complete])
+    def pooled_complete(values: tuple[float, ...]) -> float:
+        return pooled_rms(np.array(values).reshape(samples, -1)[is_complete])
 
-    squares = [np.mean(np.square(each), axis=1) for each in (old, new)]
+    mean_squares = [
+        np.mean(np.square(sample_errors), axis=1) for sample_errors in (before_errors, after_errors)
+    ]
     return Comparison(
-        _interval(_rms, squares[0]),
-        _interval(_rms, squares[1]),
-        _interval(_ratio, *squares),
-        (pooled_compared(before.estimated), pooled_compared(after.estimated)),
-        (pooled_compared(before.estimate), pooled_compared(after.estimate)),
-        int(np.sum(squares[1] < squares[0])),
+        _interval(_rms, mean_squares[0]),
+        _interval(_rms, mean_squares[1]),
+        _interval(_ratio, *mean_squares),
+        (pooled_complete(before.estimated_errors), pooled_complete(after.estimated_errors)),
+        (pooled_complete(before.estimator_errors), pooled_complete(after.estimator_errors)),
+        int(np.sum(mean_squares[1] < mean_squares[0])),
         count,
     )
 
 
-def _rms(squares: Floats, axis: int = -1) -> Any:
+def _rms(mean_squares: Floats, axis: int = -1) -> Any:
     """RMS error, m, from the mean squared error of each sample, m²."""
-    return np.sqrt(np.mean(squares, axis=axis))
+    return np.sqrt(np.mean(mean_squares, axis=axis))
 
 
 def _ratio(before: Floats, after: Floats, axis: int = -1) -> Any:
@@ -92,7 +95,7 @@ def _interval(statistic: Callable[..., Any], *samples: Floats) -> Interval:
     """A statistic of paired samples, each (samples,), with its interval by bootstrap."""
     from scipy.stats import bootstrap  # noqa: PLC0415  takes a second to import
 
-    found = bootstrap(
+    interval = bootstrap(
         samples,
         statistic,
         paired=True,
@@ -101,4 +104,4 @@ def _interval(statistic: Callable[..., Any], *samples: Floats) -> Interval:
         method="percentile",
         rng=np.random.default_rng(_SEED),
     ).confidence_interval
-    return Interval(float(statistic(*samples)), float(found.low), float(found.high))
+    return Interval(float(statistic(*samples)), float(interval.low), float(interval.high))

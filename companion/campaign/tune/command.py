@@ -13,7 +13,12 @@ from companion.campaign import engine, estimate, folder
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
-from companion.campaign.cluster import ClusterError, connected, require_packages, wait_for_workers
+from companion.campaign.cluster import (
+    ClusterError,
+    cluster_client,
+    require_packages,
+    wait_for_workers,
+)
 from companion.campaign.loading import load
 from companion.campaign.running import DONE, FAILED, interruptible, progress_bar
 from companion.campaign.tune.candidates import (
@@ -23,8 +28,8 @@ from companion.campaign.tune.candidates import (
     tune_section,
     unseen_campaign,
 )
-from companion.campaign.tune.certainty import compared
-from companion.campaign.tune.scores import Row, scored
+from companion.campaign.tune.certainty import compare
+from companion.campaign.tune.scores import Row, score_of
 from companion.campaign.tune.search import Fly, Search, SearchResults
 from companion.campaign.tune.storage import StorageError
 from companion.campaign.tune.writing import (
@@ -60,19 +65,19 @@ def run(options: argparse.Namespace) -> int:
     console = Console(highlight=False, soft_wrap=True, markup=False)
     for start in starts(campaign, tune):
         cases(campaign, start.values)  # refuses a bad value before any work
-    with folder.locked(search_folder):
+    with folder.lock(search_folder):
         try:
             _begin(search_folder, campaign)
-            with interruptible(), connected(options.scheduler, options.workers) as client:
+            with interruptible(), cluster_client(options.scheduler, options.workers) as client:
                 wait_for_workers(client)
                 console.print(f"Dask's dashboard: {client.dashboard_link}")
-                fly = _fly_on(client, campaign)
+                fly = _make_fly(client, campaign)
                 try:
                     search = Search(campaign, tune, search_folder, fly)
                 except StorageError as error:  # there are no candidates to continue with
                     raise ConfigError(str(error)) from error
-                found = _run_search(search, options.trials or tune.trials, console)
-                return _check_and_write(campaign, tune, search_folder, fly, found, console)
+                results = _run_search(search, options.trials or tune.trials, console)
+                return _check_and_write(campaign, tune, search_folder, fly, results, console)
         except VersionError as error:
             raise ConfigError(str(error)) from error
         except (KeyboardInterrupt, ClusterError, StorageError) as error:
@@ -91,13 +96,13 @@ def _begin(search_folder: Path, campaign: Campaign) -> None:
         folder.make(search_folder, campaign, folder.describe(campaign, 1, None))
 
 
-def _fly_on(client: "Client", campaign: Campaign) -> Fly:
+def _make_fly(client: "Client", campaign: Campaign) -> Fly:
     """A function that flies cases on the cluster; the time of a case is measured here first."""
     kind = campaign.file.kind
     case_s = estimate.case_time(kind, list(campaign.cases())[:1])
 
-    def fly(flown: Sequence[Case]) -> Sequence[Row]:
-        return engine.run_on_cluster(client, kind, flown, case_s)
+    def fly(cases_to_fly: Sequence[Case]) -> Sequence[Row]:
+        return engine.run_on_cluster(client, kind, cases_to_fly, case_s)
 
     return fly
 
@@ -107,24 +112,24 @@ def _run_search(search: Search, trials: int, console: Console) -> SearchResults:
 
     `trials` includes the candidates of earlier runs.
     """
-    newest = SearchResults()
+    newest_results = SearchResults()
     best_so_far = TextColumn("{task.description}")
     try:
         with progress_bar(console, TextColumn("candidates"), best_so_far) as bar:
             task = bar.add_task("", total=trials)
 
-            def show(found: SearchResults) -> None:
-                nonlocal newest
-                newest = found
-                best = "" if found.best is None else f"best {found.best.score.rms:.3f} m"
-                bar.update(task, completed=found.tried, description=best)
+            def show(results: SearchResults) -> None:
+                nonlocal newest_results
+                newest_results = results
+                best = "" if results.best is None else f"best {results.best.score.rms:.3f} m"
+                bar.update(task, completed=results.tried_count, description=best)
 
             show(search.run(trials, show))
     except (StorageError, OSError):
-        if newest.best is not None:
-            console.print(best_so_far_text(newest.best), end="")
+        if newest_results.best is not None:
+            console.print(best_so_far_text(newest_results.best), end="")
         raise
-    return newest
+    return newest_results
 
 
 def _check_and_write(
@@ -132,7 +137,7 @@ def _check_and_write(
     tune: Tune,
     search_folder: Path,
     fly: Fly,
-    found: SearchResults,
+    results: SearchResults,
     console: Console,
 ) -> int:
     """Check the best candidate on unseen cases, write it, and report the outcome.
@@ -143,20 +148,21 @@ def _check_and_write(
     Raises:
         OSError: the result cannot be written; it was printed instead.
     """
-    if found.best is None:
+    if results.best is None:
         console.print(
-            f"None of the {found.tried} candidates kept {tune.inside_share:.1%} of the flights "
-            "inside the envelope: widen tune.search or tune.envelope_m, or raise tune.trials."
+            f"None of the {results.tried_count} candidates kept {tune.inside_share:.1%} of the "
+            "flights inside the envelope: widen tune.search or tune.envelope_m, or raise "
+            "tune.trials."
         )
         return FAILED
     check_campaign = unseen_campaign(campaign, tune.check_samples)
     console.print(
         f"checking on {check_campaign.number_of_cases} flights that the search has not seen…"
     )
-    before = scored(fly(list(check_campaign.cases())), tune.envelope_m)
-    after = scored(fly(cases(check_campaign, found.best.values)), tune.envelope_m)
-    comparison = compared(before, after, tune.check_samples)
-    result = CheckedResult(campaign, found, found.best, before, after, comparison)
+    before = score_of(fly(list(check_campaign.cases())), tune.envelope_m)
+    after = score_of(fly(cases(check_campaign, results.best.values)), tune.envelope_m)
+    comparison = compare(before, after, tune.check_samples)
+    result = CheckedResult(campaign, results, results.best, before, after, comparison)
     path, text = (
         search_folder / RESULT,
         result_text(result, configured_values(campaign.base, tune.search)),

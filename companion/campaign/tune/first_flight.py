@@ -1,4 +1,4 @@
-"""Two flights before the search, which measure the vehicle; one start of the search uses this."""
+"""Two flights before the search that measure the vehicle, for one of the starts of the search."""
 
 import tempfile
 from dataclasses import replace
@@ -8,7 +8,7 @@ from companion.attitude.planner import FIRST_ORDER
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
 from companion.campaign.flight import CaseFlight
-from companion.campaign.keys import replaced
+from companion.campaign.keys import replace_unchecked
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
@@ -22,7 +22,7 @@ from companion.vehicle.flight_log import read_flight_log
 _DAMPING_KEY = "vehicle.damping"
 
 
-def learned(campaign: Campaign) -> Config:
+def learned_config(campaign: Campaign) -> Config:
     """The campaign's configuration with values measured in two flights of the first case's vehicle.
 
     A flight of `companion identify` measures lag and dead time of the rate loop. The flight of the
@@ -34,28 +34,28 @@ def learned(campaign: Campaign) -> Config:
         ConfigError: the first case cannot be flown.
     """
     tune, case, config = campaign.file.tune, next(campaign.cases()), campaign.base
-    damped = tune is not None and _DAMPING_KEY in tune.search
-    return _with_drag(_identified(config, case, damped=damped), case)
+    second_order = tune is not None and _DAMPING_KEY in tune.search
+    return _with_drag(_with_rate_response(config, case, second_order=second_order), case)
 
 
-def _identified(config: Config, case: Case, *, damped: bool) -> Config:
+def _with_rate_response(config: Config, case: Case, *, second_order: bool) -> Config:
     """The configuration with the response of the rate loop measured by `companion identify`.
 
-    It is unchanged if the response cannot be identified.
+    The configuration is unchanged if the response cannot be identified.
     """
-    doublets = replaced(
+    doublets = replace_unchecked(
         case.config,
         planner={"name": FIRST_ORDER},
         flight={"maneuvers": ("identify",), "trajectory": None},
     )
-    with tempfile.TemporaryDirectory(prefix="companion-identify-") as place:
-        folder, fragment = Path(place) / "flight", Path(place) / "vehicle.yaml"
-        CaseFlight(replace(case, config=doublets, fault=None), Path(place)).fly(folder)
+    with tempfile.TemporaryDirectory(prefix="companion-identify-") as parent_folder:
+        folder, fragment = Path(parent_folder) / "flight", Path(parent_folder) / "vehicle.yaml"
+        CaseFlight(replace(case, config=doublets, fault=None), Path(parent_folder)).fly(folder)
         try:
             rows = read_flight_log(folder / TLOG_FILE)
             vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
             axes = config.vehicle.axes
-            text = vehicle_fragment(vehicle, GRAVITY, axes, allow_second_order=damped)
+            text = vehicle_fragment(vehicle, GRAVITY, axes, allow_second_order=second_order)
             fragment.write_text(text, encoding="utf-8")
             identified = load(fragment).model_dump(exclude_unset=True, include={"vehicle"})
             return changed(config, identified, "the identified vehicle")
@@ -64,11 +64,13 @@ def _identified(config: Config, case: Case, *, damped: bool) -> Config:
 
 
 def _with_drag(config: Config, case: Case) -> Config:
-    """The configuration with the drag measured in a flight of the case, if it was measured."""
-    with tempfile.TemporaryDirectory(prefix="companion-drag-") as place:
+    """The configuration with the drag measured in a flight of the case; unchanged without one."""
+    with tempfile.TemporaryDirectory(prefix="companion-drag-") as parent_folder:
         # A recorded flight keeps what it learned beside its folder.
-        CaseFlight(replace(case, fault=None), Path(place)).fly(Path(place) / "flight")
-        learned_file = newest_learned(Path(place))
+        CaseFlight(replace(case, fault=None), Path(parent_folder)).fly(
+            Path(parent_folder) / "flight"
+        )
+        learned_file = newest_learned(Path(parent_folder))
     if learned_file is None:
         return config
     return changed(config, learned_file.as_keys(), "the drag that a flight learned")

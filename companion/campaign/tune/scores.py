@@ -11,29 +11,29 @@ from companion.campaign.swept import Value
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, Value]
-_ERROR_NAMES = "true", "estimated", "estimate"
+_ERROR_NAMES = "true_errors", "estimated_errors", "estimator_errors"
 """Attributes of a score that are errors in m."""
 
 
 class Score(NamedTuple):
     """The score of a candidate; each attribute has an entry for each case."""
 
-    true: tuple[float, ...]
+    true_errors: tuple[float, ...]
     """RMS horizontal distance of the true position from the reference, m; infinite where a case was
     not flown to its end, or had no closed-loop maneuver."""
-    estimated: tuple[float, ...]
+    estimated_errors: tuple[float, ...]
     """RMS horizontal distance of the estimated position from the reference, m; infinite where
-    `true` is."""
-    estimate: tuple[float, ...]
-    """RMS horizontal distance of the estimated from the true position, m; infinite where `true`
-    is."""
+    `true_errors` is."""
+    estimator_errors: tuple[float, ...]
+    """RMS horizontal distance of the estimated from the true position, m; infinite where
+    `true_errors` is."""
     inside: tuple[bool, ...]
-    """Whether the case was flown to its end and stayed inside the envelope."""
+    """Whether each case was flown to its end and stayed inside the envelope."""
 
     @property
     def rms(self) -> float:
-        """RMS of `true` over all cases, m; infinite if a case was not flown to its end."""
-        return pooled(np.array(self.true))
+        """RMS of `true_errors` over all cases, m; infinite if a case was not flown to its end."""
+        return pooled_rms(np.array(self.true_errors))
 
     @property
     def inside_share(self) -> float:
@@ -42,31 +42,31 @@ class Score(NamedTuple):
 
     def first(self, count: int) -> "Score":
         """The score on the first `count` cases alone."""
-        return Score._make(each[:count] for each in self)
+        return Score._make(values[:count] for values in self)
 
     def combined_with(self, rest: "Score") -> "Score":
         """The score on these cases and those of `rest` together."""
         return Score._make(ours + theirs for ours, theirs in zip(self, rest, strict=True))
 
     def as_attributes(self) -> dict[str, Any]:
-        """The score as JSON; an infinite number is null."""
+        """The score as JSON values; an infinite number becomes None."""
         attributes: dict[str, Any] = {
-            name: [each if isfinite(each) else None for each in getattr(self, name)]
+            name: [error if isfinite(error) else None for error in getattr(self, name)]
             for name in _ERROR_NAMES
         }
         return {**attributes, "inside": list(self.inside)}
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> "Score":
-        """The score that `as_attributes` wrote."""
-        true, estimated, estimate = (
-            tuple(inf if each is None else float(each) for each in attributes[name])
+        """The score from the values that `as_attributes` returned."""
+        true_errors, estimated_errors, estimator_errors = (
+            tuple(inf if error is None else float(error) for error in attributes[name])
             for name in _ERROR_NAMES
         )
-        return cls(true, estimated, estimate, tuple(attributes["inside"]))
+        return cls(true_errors, estimated_errors, estimator_errors, tuple(attributes["inside"]))
 
 
-def scored(rows: Sequence[Row], envelope: float | None) -> Score:
+def score_of(rows: Sequence[Row], envelope: float | None) -> Score:
     """The score computed from rows of results, one for each case.
 
     `envelope` is the largest true distance from the reference inside the envelope, m; None: no
@@ -76,22 +76,22 @@ def scored(rows: Sequence[Row], envelope: float | None) -> Score:
         tuple(_number(row, "level_rms_m") for row in rows),
         tuple(_number(row, "estimated_level_rms_m") for row in rows),
         tuple(_number(row, "estimate_level_rms_m") for row in rows),
-        tuple(_inside(row, envelope) for row in rows),
+        tuple(_is_inside(row, envelope) for row in rows),
     )
 
 
-def pooled(rms: Floats) -> float:
+def pooled_rms(rms: Floats) -> float:
     """RMS over all cases, from the RMS error of each case."""
     return float(np.sqrt(np.mean(np.square(rms))))
 
 
 def _number(row: Row, name: str) -> float:
     value = row.get(name)
-    flown = row.get("result") == "ok" and not row.get("crashed")
-    return float(value) if flown and isinstance(value, float) else inf
+    flown_to_end = row.get("result") == "ok" and not row.get("crashed")
+    return float(value) if flown_to_end and isinstance(value, float) else inf
 
 
-def _inside(row: Row, envelope: float | None) -> bool:
+def _is_inside(row: Row, envelope: float | None) -> bool:
     if not isfinite(_number(row, "level_rms_m")):
         return False
     return envelope is None or _number(row, "position_max_m") <= envelope

@@ -16,10 +16,10 @@ from companion.campaign.tune.candidates import (
     clamped_to_search,
     starts,
     starts_near,
-    suggested,
+    suggested_values,
 )
-from companion.campaign.tune.first_flight import learned
-from companion.campaign.tune.scores import Row, Score, pooled, scored
+from companion.campaign.tune.first_flight import learned_config
+from companion.campaign.tune.scores import Row, Score, pooled_rms, score_of
 from companion.campaign.tune.storage import storage_errors
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
@@ -34,18 +34,24 @@ Fly = Callable[[Sequence[Case]], Sequence[Row]]
 STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _STUDY_NAME = "tune"
-_STARTS, _FEWEST_NEAR = 3, 4
-"""Largest number of starts, and smallest number of candidates that are tried near the last one."""
-_FIRST_DIVISOR = 4
-"""A candidate flies the first 1/4 of its cases before the others, at least 2."""
+_MOST_STARTS = 3
+"""Largest number of starts of a search."""
+_FEWEST_NEIGHBOURS = 4
+"""Smallest number of candidates that are tried near the last start."""
+_FIRST_CASES_DIVISOR = 4
+"""Number of all cases of a candidate divided by the number of its first cases.
+
+A candidate flies the first cases alone, and the others only if it is not hopeless."""
 _FEWEST_FIRST_CASES = 2
 _HOPELESS_FACTOR = 1.3
 """A candidate is abandoned when its error on the first cases is more than this factor times that of
 the best candidate on the same cases."""
 _LARGEST_ERROR = 10.0
-"""Larger errors are reported to Optuna as this one, m, and so are flights that ended early."""
-_VALUES_KEY, _SCORE_KEY, _VIOLATION_KEY, _COMPLETE_KEY = "values", "score", "missed", "whole"
-"""Names of the attributes of a trial in Optuna's storage."""
+"""Largest error that is reported to Optuna, m; also the error of a flight that ended early."""
+_VALUES_KEY, _SCORE_KEY = "values", "score"
+"""Attributes of a trial in Optuna's storage: values of the searched keys, and score."""
+_VIOLATION_KEY, _COMPLETE_KEY = "violation", "complete"
+"""Attributes of a trial: violation of the constraint, and whether all cases were flown."""
 
 
 @dataclass(frozen=True)
@@ -63,15 +69,16 @@ class Candidate:
 class SearchResults:
     """The results of a search so far."""
 
-    tried: int = 0
-    """Number of all candidates, including those of `stopped_early`."""
-    stopped_early: int = 0
+    tried_count: int = 0
+    """Number of all candidates, including those of `stopped_early_count`."""
+    stopped_early_count: int = 0
     """Number of candidates that were abandoned, or whose keys were refused."""
     best: Candidate | None = None
     """Candidate with the smallest error of those that met the constraint, `inside_share`; None:
     none met it."""
-    near: list[Candidate] = field(default_factory=list)
-    """The best tenth, or at least the best three, of those that met it; the best first."""
+    near_best: list[Candidate] = field(default_factory=list)
+    """The best tenth, or at least the best three, of the candidates that met the constraint
+    `inside_share`; the best first."""
 
 
 class Search:
@@ -99,7 +106,7 @@ class Search:
         tune: Tune,
         folder: Path,
         fly: Fly,
-        learning_flight: Callable[[Campaign], Config | None] = learned,
+        learning_flight: Callable[[Campaign], Config | None] = learned_config,
     ) -> None:
         import optuna  # noqa: PLC0415  an extra
 
@@ -134,31 +141,35 @@ class Search:
 
     def results(self) -> SearchResults:
         """The results of all trials so far, including those of earlier runs."""
-        complete = [each for each in self._ended_trials() if each.user_attrs.get(_COMPLETE_KEY)]
-        found = [
-            Candidate(
-                each.number,
-                each.user_attrs[_VALUES_KEY],
-                Score.from_attributes(each.user_attrs[_SCORE_KEY]),
-            )
-            for each in complete
-            if each.user_attrs[_VIOLATION_KEY] <= 0.0
+        complete_trials = [
+            trial for trial in self._ended_trials() if trial.user_attrs.get(_COMPLETE_KEY)
         ]
-        good = sorted(found, key=lambda each: each.score.rms)
-        tried = len(self._ended_trials())
-        near = good[: max(3, len(good) // 10)]
-        return SearchResults(tried, tried - len(complete), good[0] if good else None, near)
+        candidates = [
+            Candidate(
+                trial.number,
+                trial.user_attrs[_VALUES_KEY],
+                Score.from_attributes(trial.user_attrs[_SCORE_KEY]),
+            )
+            for trial in complete_trials
+            if trial.user_attrs[_VIOLATION_KEY] <= 0.0
+        ]
+        good = sorted(candidates, key=lambda candidate: candidate.score.rms)
+        tried_count = len(self._ended_trials())
+        near_best = good[: max(3, len(good) // 10)]
+        return SearchResults(
+            tried_count, tried_count - len(complete_trials), good[0] if good else None, near_best
+        )
 
     @property
     def _neighbour_count(self) -> int:
         """Number of candidates near the last start that are tried before Optuna suggests any."""
-        return max(_FEWEST_NEAR, len(self._tune.search))
+        return max(_FEWEST_NEIGHBOURS, len(self._tune.search))
 
     def _sampler(self, number: int) -> Any:
         return self._optuna.samplers.TPESampler(
             seed=self._campaign.file.seed + number,
             multivariate=True,
-            n_startup_trials=_STARTS + self._neighbour_count,
+            n_startup_trials=_MOST_STARTS + self._neighbour_count,
         )
 
     def _enqueue_starts(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
@@ -171,32 +182,35 @@ class Search:
 
     def _interrupted_trial(self) -> "Trial | None":
         """The trial whose flights were interrupted, to be tried again; None: there is none."""
-        running = self._study.get_trials(states=(self._optuna.trial.TrialState.RUNNING,))
-        return self._optuna.trial.Trial(self._study, running[0]._trial_id) if running else None
+        trials = self._study.get_trials(states=(self._optuna.trial.TrialState.RUNNING,))
+        return self._optuna.trial.Trial(self._study, trials[0]._trial_id) if trials else None
 
     def _ended_trials(self) -> "list[FrozenTrial]":
         """The trials that have ended, including pruned ones."""
         states = self._optuna.trial.TrialState
-        ended = states.COMPLETE, states.PRUNED
-        return list(self._study.get_trials(deepcopy=False, states=ended))
+        ended_states = states.COMPLETE, states.PRUNED
+        return list(self._study.get_trials(deepcopy=False, states=ended_states))
 
     def _try_candidate(self, trial: "Trial") -> None:
-        values = clamped_to_search(suggested(trial, self._tune.search), self._tune.search)
+        values = clamped_to_search(suggested_values(trial, self._tune.search), self._tune.search)
         trial.set_user_attr(_VALUES_KEY, values)
         try:
-            flown = cases(self._campaign, values)
+            all_cases = cases(self._campaign, values)
         except ConfigError:  # keys that do not fit together, such as a minimum above a maximum
             self._stop(trial, _LARGEST_ERROR, 1.0)
             return
-        count = min(len(flown), max(_FEWEST_FIRST_CASES, len(flown) // _FIRST_DIVISOR))
-        score = scored(self._fly(flown[:count]), self._tune.envelope_m)
-        violation = self._shortfall(score, len(flown))
-        if count < len(flown) and (violation > 0.0 or self._hopeless(score)):
+        first_count = max(_FEWEST_FIRST_CASES, len(all_cases) // _FIRST_CASES_DIVISOR)
+        first_count = min(len(all_cases), first_count)
+        score = score_of(self._fly(all_cases[:first_count]), self._tune.envelope_m)
+        violation = self._shortfall(score, len(all_cases))
+        if first_count < len(all_cases) and (violation > 0.0 or self._is_hopeless(score)):
             self._stop(trial, _capped_rms(score), max(violation, 0.0))
             return
-        score = score.combined_with(scored(self._fly(flown[count:]), self._tune.envelope_m))
+        score = score.combined_with(
+            score_of(self._fly(all_cases[first_count:]), self._tune.envelope_m)
+        )
         trial.set_user_attr(_SCORE_KEY, score.as_attributes())
-        self._set_violation(trial, self._shortfall(score, len(flown)))
+        self._set_violation(trial, self._shortfall(score, len(all_cases)))
         trial.set_user_attr(_COMPLETE_KEY, True)
         self._study.tell(trial, _capped_rms(score))
 
@@ -217,17 +231,17 @@ class Search:
         0 or less: `inside_share` can still be reached. `score` covers the cases flown so far, and
         `cases_count` is the number of all cases.
         """
-        outside = sum(not each for each in score.inside)
-        return self._tune.inside_share - (cases_count - outside) / cases_count
+        outside_count = sum(not is_inside for is_inside in score.inside)
+        return self._tune.inside_share - (cases_count - outside_count) / cases_count
 
-    def _hopeless(self, score: Score) -> bool:
+    def _is_hopeless(self, score: Score) -> bool:
         best = self.results().best
         return (
             best is not None
-            and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true)).rms
+            and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true_errors)).rms
         )
 
 
 def _capped_rms(score: Score) -> float:
     """The RMS error for Optuna, m; the error of each flight is at most `_LARGEST_ERROR`."""
-    return pooled(np.minimum(score.true, _LARGEST_ERROR))
+    return pooled_rms(np.minimum(score.true_errors, _LARGEST_ERROR))

@@ -13,7 +13,7 @@ from companion.campaign.tune.search import Candidate, SearchResults
 from companion.files import bounded_yaml
 
 _EDGE_SHARE = 0.02
-"""A value counts as at an end of its range if it is closer to it than this share of the range."""
+"""Share of its range within which a value counts as at an end of the range."""
 
 
 class CheckedResult(NamedTuple):
@@ -21,7 +21,7 @@ class CheckedResult(NamedTuple):
 
     campaign: Campaign
     """The campaign, with its section `tune`."""
-    found: SearchResults
+    results: SearchResults
     best: Candidate
     """The candidate that is proposed."""
     before: Score
@@ -34,13 +34,14 @@ class CheckedResult(NamedTuple):
 
 def summary_lines(result: CheckedResult) -> list[str]:
     """What was searched, what was found, and how certain it is."""
-    found, best, tune = result.found, result.best, result.campaign.file.tune
+    results, best, tune = result.results, result.best, result.campaign.file.tune
     assert tune is not None
-    cases = len(best.score.true)
+    cases = len(best.score.true_errors)
     bound = "reach their end" if tune.envelope_m is None else f"stay within {tune.envelope_m:g} m"
     lines = [
-        f"{found.tried} candidates over {cases} flights each, {found.stopped_early} of them "
-        f"refused or stopped early; candidate {best.number} is the best.",
+        f"{results.tried_count} candidates over {cases} flights each,"
+        f" {results.stopped_early_count} of them refused or stopped early; candidate"
+        f" {best.number} is the best.",
         f"Constraint: at least {tune.inside_share:.1%} of the flights must {bound}; in the search "
         f"{best.score.inside_share:.1%} did.",
         f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
@@ -49,15 +50,16 @@ def summary_lines(result: CheckedResult) -> list[str]:
 
 
 def _certainty_lines(result: CheckedResult) -> Iterator[str]:
-    unseen_flights = len(result.after.true)
-    early = [
-        sum(not isfinite(each) for each in score.true) for score in (result.before, result.after)
+    unseen_flights = len(result.after.true_errors)
+    early_counts = [
+        sum(not isfinite(error) for error in score.true_errors)
+        for score in (result.before, result.after)
     ]
-    if any(early):
+    if any(early_counts):
         yield (
-            f"Of {unseen_flights} flights that the search has not seen, {early[0]} ended early "
-            f"with the configuration before the search, and {early[1]} with the result; samples "
-            "with such a flight are not compared."
+            f"Of {unseen_flights} flights that the search has not seen, {early_counts[0]} ended "
+            f"early with the configuration before the search, and {early_counts[1]} with the "
+            "result; samples with such a flight are not compared."
         )
     comparison = result.comparison
     if comparison is None:
@@ -70,9 +72,12 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
     yield (
         f"That is {comparison.ratio.value:.2f} times the error before, 95 % interval "
         f"{comparison.ratio.low:.2f} to {comparison.ratio.high:.2f}; better in "
-        f"{comparison.better} of {comparison.samples} samples."
+        f"{comparison.better_samples} of {comparison.samples} samples."
     )
-    (before, after), (estimate_before, estimate_after) = comparison.estimated, comparison.estimate
+    (before, after), (estimate_before, estimate_after) = (
+        comparison.estimated_errors,
+        comparison.estimator_errors,
+    )
     yield (
         f"On the same flights the estimated position was {before:.3f} -> {after:.3f} m from the "
         f"reference, and {estimate_before:.3f} -> {estimate_after:.3f} m from the true one."
@@ -82,7 +87,7 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
         "if the estimate is late, guidance.position_lateness_ms reduces it."
     )
     if comparison.ratio.high >= 1.0:
-        yield "The interval holds 1: fly more samples before you believe that it is better."
+        yield "The interval contains 1, so the result may not be better: fly more samples."
 
 
 def result_text(result: CheckedResult, present: Mapping[str, Any]) -> str:
@@ -124,21 +129,23 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
 
 
 def _reason(key: str, swept: Swept, result: CheckedResult, before: Any) -> str:
-    """Text about a value: what it was before (None: not set), and those of the best candidates."""
+    """Text about a key: its value `before` (None: not set), and those of the best candidates."""
     before_text = "not set before" if before is None else f"before {_value_text(before)}"
-    near = [each.values[key] for each in result.found.near if key in each.values]
+    near_values = [
+        candidate.values[key] for candidate in result.results.near_best if key in candidate.values
+    ]
     pair = swept.uniform or swept.loguniform
     if pair is None:
-        same = sum(each == result.best.values[key] for each in near)
-        return f"{before_text}; {same} of the best {len(near)} candidates have it"
+        same_count = sum(value == result.best.values[key] for value in near_values)
+        return f"{before_text}; {same_count} of the best {len(near_values)} candidates have it"
     low, high = pair
-    text = f"{before_text}; the best {len(near)} candidates have {min(near):.3g} to {max(near):.3g}"
-    text += f" of {low:g} to {high:g}"
+    text = f"{before_text}; the best {len(near_values)} candidates have {min(near_values):.3g}"
+    text += f" to {max(near_values):.3g} of {low:g} to {high:g}"
     value = float(result.best.values[key])
     if min(value - low, high - value) < _EDGE_SHARE * (high - low):
         return f"{text}; it lies at an end of its range: widen the range"
-    wide = max(near) - min(near) > 0.5 * (high - low)
-    return f"{text}; it matters little here" if wide else text
+    is_wide = max(near_values) - min(near_values) > 0.5 * (high - low)
+    return f"{text}; it matters little here" if is_wide else text
 
 
 def _value_text(value: Any) -> str:

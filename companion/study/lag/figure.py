@@ -43,7 +43,7 @@ _WORSE_COLOUR = "#A33C00"
 """Colour of cells where another method has less cross-track error than model-following, and of the
 verdict `does not hold` on the page."""
 _CUT_HZ, _CUT_LAG_MS, _CUT_DEAD_TIME_MS = 100.0, 25, 40
-"""Sample rate, and fixed lag and dead time, of the two plots in the second row."""
+"""Sample rate, fixed lag and fixed dead time of the two plots in the second row."""
 _SHADE: Line = {
     "facecolor": (FOLLOWING.colour, 0.15),
     "edgecolor": FOLLOWING.colour,
@@ -70,7 +70,7 @@ def draw_figure(grid: Grid, example: Example, complete: CompleteLoopFlights) -> 
     """Draw the figure that `CAPTION` describes."""
     figure = Figure(figsize=(9.2, 15.5), layout="constrained")
     panels: dict[str, Any] = figure.subplot_mosaic(_PANELS)
-    responses = example.free[_CUT_HZ]
+    responses = example.unlimited[_CUT_HZ]
     _draw_paths(panels["path"], responses)
     _draw_distance(panels["time"], responses)
     dead_times, lags = _grid_values(grid)
@@ -80,12 +80,12 @@ def draw_figure(grid: Grid, example: Example, complete: CompleteLoopFlights) -> 
     _draw_cut(panels["lag"], grid, over_lag, lags, "lag")
     for rate in RATES_HZ:
         _draw_ratios(panels[f"{rate:.0f}"], grid, rate)
-    _draw_errors(panels["example errors"], example.following)
+    _draw_errors(panels["example errors"], example.model_following)
     panels["example errors"].set_title(
         f"Wrong lag and dead time, the example, {EXAMPLE_ERRORS_HZ:.0f} Hz"
     )
     _draw_inner_loop_errors(panels["loop errors"], complete)
-    _draw_paths(panels["loop path"], complete.shown)
+    _draw_paths(panels["loop path"], complete.shown_responses)
     panels["loop path"].set_title(f"Path, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz")
     _draw_rates(panels["loop rate"], complete)
     return figure
@@ -111,7 +111,7 @@ def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
 def _draw_cut(
     axes: Axes, grid: Grid, cells: list[GridCell], values_ms: list[int], quantity: str
 ) -> None:
-    """Draw the cross-track of every method over the lag or over the dead time.
+    """Draw the cross-track error of every method over the lag or over the dead time.
 
     Args:
         axes: the panel.
@@ -123,7 +123,7 @@ def _draw_cut(
     for method in METHODS:
         cross_tracks = [grid[cell].by_method[method].cross_track for cell in cells]
         axes.plot(values_ms, cross_tracks, marker=".", **method.line)
-    with_true_delays = [grid[cell].following[NO_ERROR].cross_track for cell in cells]
+    with_true_delays = [grid[cell].model_following[NO_ERROR].cross_track for cell in cells]
     with_worst_delays = [grid[cell].worst_cross_track for cell in cells]
     axes.fill_between(
         values_ms,
@@ -168,7 +168,7 @@ def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
 
 
 def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
-    """Draw the cross-track over the error of the dead time, a line for each error of the lag."""
+    """Draw the cross-track error over the error of the dead time, a line for each lag error."""
     errors = [100.0 * error for error in FINE_ERRORS]
     for lag, style in _LAG_ERROR_STYLES.items():
         cross_tracks = [scores[DelayError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
@@ -182,9 +182,9 @@ def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
 
 def _draw_inner_loop_errors(axes: Axes, complete: CompleteLoopFlights) -> None:
     comparison = complete.by_rate[SHOWN_RATE_HZ]
-    _draw_errors(axes, comparison.following)
+    _draw_errors(axes, comparison.model_following)
     other = comparison.best_other
-    cross_track = comparison.others[other].cross_track
+    cross_track = comparison.other_methods[other].cross_track
     axes.axhline(cross_track, **LIMIT)
     axes.annotate(
         f"{other.label}, the best of the others", (50, cross_track), ha="right", va="bottom"
@@ -200,7 +200,9 @@ def _draw_rates(axes: Axes, complete: CompleteLoopFlights) -> None:
     for method in METHODS:
         cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
         axes.plot(rates, cross_tracks, marker=".", **method.line)
-    with_true_delays = [comparison.following[NO_ERROR].cross_track for comparison in comparisons]
+    with_true_delays = [
+        comparison.model_following[NO_ERROR].cross_track for comparison in comparisons
+    ]
     with_worst_delays = [comparison.worst_cross_track for comparison in comparisons]
     axes.fill_between(
         rates,

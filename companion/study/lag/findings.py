@@ -3,7 +3,7 @@
 from companion.study.lag.flights import (
     MAX_TILT_RATE,
     NO_ERROR,
-    OTHERS,
+    OTHER_METHODS,
     SHOWN_RATE_HZ,
     CompleteLoopFlights,
     DelayError,
@@ -40,11 +40,13 @@ def find(
 
 
 def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
-    cross_tracks = {m: score(r).cross_track for m, r in example.free[100.0].items()}
-    best = min(OTHERS, key=lambda method: cross_tracks[method])
-    worst = max(wrong.cross_track for wrong in example.following.values())
-    rate = max(largest_tilt_rate(response) for response in example.limited.values())
-    limited_cross_track = max(score(response).cross_track for response in example.limited.values())
+    cross_tracks = {m: score(r).cross_track for m, r in example.unlimited[100.0].items()}
+    best = min(OTHER_METHODS, key=lambda method: cross_tracks[method])
+    worst = max(wrong_score.cross_track for wrong_score in example.model_following.values())
+    rate = max(largest_tilt_rate(response) for response in example.rate_limited.values())
+    limited_cross_track = max(
+        score(response).cross_track for response in example.rate_limited.values()
+    )
     return (
         Finding(
             "ours",
@@ -75,12 +77,12 @@ def _over_the_grid(grid: Grid) -> Finding:
     def ratio(cell: GridCell) -> float:
         comparison = grid[cell]
         return (
-            comparison.following[NO_ERROR].cross_track
-            / comparison.others[comparison.best_other].cross_track
+            comparison.model_following[NO_ERROR].cross_track
+            / comparison.other_methods[comparison.best_other].cross_track
         )
 
     closest = max(grid, key=ratio)
-    largest = max(comparison.following[NO_ERROR].cross_track for comparison in grid.values())
+    largest = max(comparison.model_following[NO_ERROR].cross_track for comparison in grid.values())
     return Finding(
         "ours",
         "With the true lag and dead time model-following is the straightest over the whole grid.",
@@ -93,7 +95,7 @@ def _over_the_grid(grid: Grid) -> Finding:
 def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
     worst_cell = max(grid, key=lambda cell: grid[cell].ratio)
     comparison, other = grid[worst_cell], grid[worst_cell].best_other
-    worse_cells = [cell for cell, compared in grid.items() if compared.ratio >= 1.0]
+    worse_cells = [cell for cell, cell_comparison in grid.items() if cell_comparison.ratio >= 1.0]
     where = (
         f", from {min(cell.dead_time_ms for cell in worse_cells)} ms of dead time on"
         if worse_cells
@@ -107,7 +109,7 @@ def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
         f"Worse than the best other method in {len(worse_cells)} of {len(grid)} cells{where}."
         f" The largest ratio is at {worst_cell}, with {comparison.worst_error}:"
         f" {comparison.worst_cross_track:.2g} against"
-        f" {comparison.others[other].cross_track:.2g} of"
+        f" {comparison.other_methods[other].cross_track:.2g} of"
         f" {other.label}.",
     )
 
@@ -115,21 +117,24 @@ def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
 def _too_long_or_too_short(grid: Grid, complete: CompleteLoopFlights) -> Finding:
     short, long = DelayError(-0.5, -0.5), DelayError(0.5, 0.5)
     pairs = [
-        (comparison.following[long], comparison.following[short])
+        (comparison.model_following[long], comparison.model_following[short])
         for cell, comparison in grid.items()
         if cell.dead_time_ms > 0
     ]
-    too_long = max(at_long.cross_track for at_long, _ in pairs)
-    too_short = max(at_short.cross_track for _, at_short in pairs)
-    straighter = sum(at_long.cross_track < at_short.cross_track for at_long, at_short in pairs)
-    loop = complete.by_rate[SHOWN_RATE_HZ].following
+    worst_long = max(long_score.cross_track for long_score, _ in pairs)
+    worst_short = max(short_score.cross_track for _, short_score in pairs)
+    straighter_count = sum(
+        long_score.cross_track < short_score.cross_track for long_score, short_score in pairs
+    )
+    loop_scores = complete.by_rate[SHOWN_RATE_HZ].model_following
     return Finding(
         "ours",
         "A lag and dead time 50 % too long are better than both 50 % too short.",
-        too_long < too_short and loop[long].cross_track < loop[short].cross_track,
-        f"Largest cross-track {too_long:.2g} against {too_short:.2g}, with the complete inner loop"
-        f" {loop[long].cross_track:.2g} against {loop[short].cross_track:.2g}. Too long is the"
-        f" straighter in {straighter} of the {len(pairs)} cells with a dead time.",
+        worst_long < worst_short and loop_scores[long].cross_track < loop_scores[short].cross_track,
+        f"Largest cross-track {worst_long:.2g} against {worst_short:.2g}, with the complete inner"
+        f" loop {loop_scores[long].cross_track:.2g} against {loop_scores[short].cross_track:.2g}."
+        f" Too long is the straighter in {straighter_count} of the {len(pairs)} cells with a dead"
+        " time.",
     )
 
 
@@ -137,8 +142,10 @@ def _with_the_complete_loop(
     complete: CompleteLoopFlights, fit_deviations: dict[Method, float]
 ) -> tuple[Finding, Finding, Finding]:
     by_rate = complete.by_rate
-    cross_tracks = {m: flown.cross_track for m, flown in by_rate[SHOWN_RATE_HZ].by_method.items()}
-    nearest = min(OTHERS, key=lambda method: fit_deviations[method])
+    cross_tracks = {
+        m: method_score.cross_track for m, method_score in by_rate[SHOWN_RATE_HZ].by_method.items()
+    }
+    nearest = min(OTHER_METHODS, key=lambda method: fit_deviations[method])
     worst_rate = max(by_rate, key=lambda rate: by_rate[rate].ratio)
     comparison = by_rate[worst_rate]
     return (
@@ -147,8 +154,9 @@ def _with_the_complete_loop(
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
             all(
-                each.following[NO_ERROR].cross_track < each.others[each.best_other].cross_track
-                for each in by_rate.values()
+                rate_comparison.model_following[NO_ERROR].cross_track
+                < rate_comparison.other_methods[rate_comparison.best_other].cross_track
+                for rate_comparison in by_rate.values()
             ),
             f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[FOLLOWING]:.2g}; first-order"
             f" {cross_tracks[PROPOSED]:.2g}, quaternion {cross_tracks[QUATERNION]:.2g}.",
@@ -160,7 +168,7 @@ def _with_the_complete_loop(
             comparison.ratio < 1.0,
             f"The largest ratio is at {worst_rate:.0f} Hz, with {comparison.worst_error}:"
             f" {comparison.worst_cross_track:.2g} against"
-            f" {comparison.others[comparison.best_other].cross_track:.2g} of"
+            f" {comparison.other_methods[comparison.best_other].cross_track:.2g} of"
             f" {comparison.best_other.label}.",
         ),
         Finding(

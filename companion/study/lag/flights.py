@@ -13,18 +13,19 @@ from companion.study.methods import EXACT, FOLLOWING, PAPER_METHODS, Method
 from companion.study.outcome import Tick
 from companion.study.step import FIGURE_2, Loop, Response, fly_loop
 
-OTHERS = (*PAPER_METHODS, EXACT)
+OTHER_METHODS = (*PAPER_METHODS, EXACT)
 """The methods that do not use lag and dead time of the rate loop."""
-METHODS = (*OTHERS, FOLLOWING)
+METHODS = (*OTHER_METHODS, FOLLOWING)
 RATES_HZ = (50.0, 100.0, 250.0)
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
 LAGS_MS = (10, 25, 40, 60)
 EXAMPLE_LOOP = LagLoop(lag_ms=25, dead_time_ms=45)
-"""The lag is between ArduPilot's (22 ms) and PX4's (47 ms), the dead time above PX4's (40 ms)."""
+"""Rate loop of the example: its lag is between ArduPilot's (22 ms) and PX4's (47 ms), its dead time
+above PX4's (40 ms)."""
 EXAMPLE_RATES_HZ = (100.0, 250.0)
 EXAMPLE_ERRORS_HZ = 100.0  # sample rate of the flights with wrong lag and dead time
 MAX_TILT_RATE = pi / 2.0
-"""W_M of the flights with a rate limit, rad/s."""
+"""Limit W_M of the tilt rate √(ω_x² + ω_y²) in the flights with a limit, rad/s."""
 
 COMPLETE_LOOP = InnerLoop(transport_delay=0.02)
 SHOWN_RATE_HZ = 250.0
@@ -79,7 +80,7 @@ class Score(NamedTuple):
     """How straight and how fast a response is."""
 
     cross_track: float
-    """Largest distance of the coefficients (a/T, no unit) from the straight line."""
+    """Largest distance of the coefficients (a/T, no unit) from the line from start to target."""
     settling_time: float
     """Time from which the distance to the target stays within 5 % of the step, s."""
 
@@ -87,37 +88,37 @@ class Score(NamedTuple):
 class Comparison(NamedTuple):
     """Scores with one rate loop at one sample rate."""
 
-    others: dict[Method, Score]
-    """Score of each method of `OTHERS`."""
-    following: dict[DelayError, Score]
+    other_methods: dict[Method, Score]
+    """Score of each method of `OTHER_METHODS`."""
+    model_following: dict[DelayError, Score]
     """Score of model-following for each error of its assumed lag and dead time, `NO_ERROR`
     included."""
 
     @property
     def by_method(self) -> dict[Method, Score]:
         """Score of every method; model-following assumes the true lag and dead time."""
-        return {**self.others, FOLLOWING: self.following[NO_ERROR]}
+        return {**self.other_methods, FOLLOWING: self.model_following[NO_ERROR]}
 
     @property
     def best_other(self) -> Method:
-        """The method of `OTHERS` with the smallest cross-track."""
-        return min(self.others, key=lambda method: self.others[method].cross_track)
+        """The method of `OTHER_METHODS` with the smallest cross-track error."""
+        return min(self.other_methods, key=lambda method: self.other_methods[method].cross_track)
 
     @property
     def worst_error(self) -> DelayError:
-        """The error of the assumed lag and dead time that gives the largest cross-track."""
-        errors = [error for error in self.following if error != NO_ERROR]
-        return max(errors, key=lambda error: self.following[error].cross_track)
+        """The error of lag and dead time with which model-following has its largest cross-track."""
+        errors = [error for error in self.model_following if error != NO_ERROR]
+        return max(errors, key=lambda error: self.model_following[error].cross_track)
 
     @property
     def worst_cross_track(self) -> float:
-        """Cross-track of model-following with `worst_error`."""
-        return self.following[self.worst_error].cross_track
+        """Largest cross-track of model-following with a wrong lag or dead time; see `Score`."""
+        return self.model_following[self.worst_error].cross_track
 
     @property
     def ratio(self) -> float:
         """`worst_cross_track` / cross-track of `best_other`; below 1 model-following is better."""
-        return self.worst_cross_track / self.others[self.best_other].cross_track
+        return self.worst_cross_track / self.other_methods[self.best_other].cross_track
 
 
 class GridCell(NamedTuple):
@@ -135,22 +136,23 @@ Grid = dict[GridCell, Comparison]
 
 
 class Example(NamedTuple):
-    """The flights with `EXAMPLE_LOOP`."""
+    """The results of the flights with `EXAMPLE_LOOP`."""
 
-    free: dict[float, dict[Method, Response]]
+    unlimited: dict[float, dict[Method, Response]]
     """Responses of every method by sample rate (Hz), without limits."""
-    limited: dict[float, Response]
-    """Responses of model-following with tilt rates up to W_M, by sample rate (Hz)."""
-    following: dict[DelayError, Score]
-    """As in `Comparison`, at the sample rate `EXAMPLE_ERRORS_HZ`."""
+    rate_limited: dict[float, Response]
+    """Responses of model-following with the limit `MAX_TILT_RATE`, by sample rate (Hz)."""
+    model_following: dict[DelayError, Score]
+    """Score of model-following for each error of its assumed lag and dead time, at the sample rate
+    `EXAMPLE_ERRORS_HZ`."""
 
 
 class CompleteLoopFlights(NamedTuple):
-    """The flights with the complete inner loop."""
+    """The results of the flights with the complete inner loop."""
 
     by_rate: dict[float, Comparison]
     """Comparison at each sample rate (Hz)."""
-    shown: dict[Method, Response]
+    shown_responses: dict[Method, Response]
     """Responses of every method at `SHOWN_RATE_HZ`."""
 
 
@@ -171,11 +173,11 @@ def fly_grid(tick: Tick) -> Grid:
         tick(f"dead time {dead_time} ms, lag {lag} ms")
         loop = LagLoop(lag, dead_time)
         delays = _delays_of(loop)
-        errors = [each for each in _combined(GRID_ERRORS) if dead_time or not each.dead_time]
+        errors = [error for error in _error_pairs(GRID_ERRORS) if dead_time or not error.dead_time]
         for rate in RATES_HZ:
             grid[GridCell(rate, dead_time, lag)] = Comparison(
-                {m: score(_fly(m, delays, loop, rate)) for m in OTHERS},
-                _with_errors(errors, delays, loop, rate),
+                {m: score(_fly(m, delays, loop, rate)) for m in OTHER_METHODS},
+                _scores_with_errors(errors, delays, loop, rate),
             )
     return grid
 
@@ -187,24 +189,24 @@ def fly_example() -> Example:
     return Example(
         {hz: {m: _fly(m, delays, loop, hz) for m in METHODS} for hz in EXAMPLE_RATES_HZ},
         {hz: _fly(FOLLOWING, delays, loop, hz, limits) for hz in EXAMPLE_RATES_HZ},
-        _with_errors(_combined(FINE_ERRORS), delays, loop, EXAMPLE_ERRORS_HZ),
+        _scores_with_errors(_error_pairs(FINE_ERRORS), delays, loop, EXAMPLE_ERRORS_HZ),
     )
 
 
 def fly_complete(tick: Tick) -> CompleteLoopFlights:
     """Fly every method at every rate, model-following also with wrong lag and dead time."""
-    flown, by_rate = {}, {}
+    responses, by_rate = {}, {}
     for rate in RATES_HZ:
         tick(f"complete inner loop at {rate:.0f} Hz")
-        flown[rate] = {m: _fly(m, COMPLETE_DELAYS, COMPLETE_LOOP, rate) for m in METHODS}
+        responses[rate] = {m: _fly(m, COMPLETE_DELAYS, COMPLETE_LOOP, rate) for m in METHODS}
         by_rate[rate] = Comparison(
-            {method: score(flown[rate][method]) for method in OTHERS},
-            _with_errors(_combined(FINE_ERRORS), COMPLETE_DELAYS, COMPLETE_LOOP, rate),
+            {method: score(responses[rate][method]) for method in OTHER_METHODS},
+            _scores_with_errors(_error_pairs(FINE_ERRORS), COMPLETE_DELAYS, COMPLETE_LOOP, rate),
         )
-    return CompleteLoopFlights(by_rate, flown[SHOWN_RATE_HZ])
+    return CompleteLoopFlights(by_rate, responses[SHOWN_RATE_HZ])
 
 
-def _combined(errors: tuple[float, ...]) -> list[DelayError]:
+def _error_pairs(errors: tuple[float, ...]) -> list[DelayError]:
     """Every pair of an error of the lag and an error of the dead time."""
     return [DelayError(*pair) for pair in product(errors, repeat=2)]
 
@@ -215,7 +217,7 @@ def _delays_of(loop: LagLoop) -> RateLoopDelays:
     return RateLoopDelays(lag, dead_time, lag, dead_time)
 
 
-def _with_errors(
+def _scores_with_errors(
     errors: list[DelayError], delays: RateLoopDelays, loop: Loop, rate_hz: float
 ) -> dict[DelayError, Score]:
     return {

@@ -61,7 +61,7 @@ def run(tick: Tick) -> Outcome:
     tick("the example")
     example = fly_example()
     complete = fly_complete(tick)
-    fitted = {method: _fit_model(response) for method, response in complete.shown.items()}
+    fitted = {method: _fit_model(response) for method, response in complete.shown_responses.items()}
     return Outcome(
         name="lag",
         title="Lag: behind a rate loop with dead time and lag",
@@ -81,7 +81,7 @@ def run(tick: Tick) -> Outcome:
                 "lag-wrong-knowledge",
                 f"Cross-track of model-following at {EXAMPLE_ERRORS_HZ:.0f} Hz in the example, by"
                 " the error of the assumed lag (rows) and dead time (columns).",
-                example.following,
+                example.model_following,
             ),
             _worst_table(grid),
             _fit_table(complete, fitted),
@@ -91,7 +91,7 @@ def run(tick: Tick) -> Outcome:
                 "Cross-track of model-following with the complete inner loop at"
                 f" {SHOWN_RATE_HZ:.0f} Hz, by the error of its lags (rows) and dead times (columns)"
                 " against those fitted to the inner loop.",
-                complete.by_rate[SHOWN_RATE_HZ].following,
+                complete.by_rate[SHOWN_RATE_HZ].model_following,
             ),
         ),
         findings=find(
@@ -110,12 +110,12 @@ def _fit_model(response: Response) -> _Fitted:
 def _example_table(example: Example) -> Table:
     """Scores of every method by sample rate, and of model-following with a limited tilt rate."""
     rows: list[tuple[Cell, ...]] = []
-    for rate, responses in example.free.items():
-        flown = [(method.label, response) for method, response in responses.items()]
-        flown.append(("model-following, W_M = π/2", example.limited[rate]))
+    for rate, responses in example.unlimited.items():
+        labelled_responses = [(method.label, response) for method, response in responses.items()]
+        labelled_responses.append(("model-following, W_M = π/2", example.rate_limited[rate]))
         rows += [
             (label, round(rate), *score(response), largest_tilt_rate(response))
-            for label, response in flown
+            for label, response in labelled_responses
         ]
     return Table(
         "lag",
@@ -147,14 +147,12 @@ def _worst_table(grid: Grid) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
         comparisons = [grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times]
-        others = [
-            comparison.others[comparison.best_other].cross_track for comparison in comparisons
-        ]
+        best_others = [item.other_methods[item.best_other].cross_track for item in comparisons]
         rows.append(
             (
                 f"{rate:.0f} Hz, {lag} ms",
                 *(comparison.worst_cross_track for comparison in comparisons),
-                *others,
+                *best_others,
             )
         )
     return Table(
@@ -180,8 +178,8 @@ def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _Fitted]) -> 
         " and the second-order model with dead time fitted to each response.",
         ("method", *_SCORE_COLUMNS, *FIT_COLUMNS, "largest deviation from it"),
         tuple(
-            (method.label, *scores[method], *flown.fit.cells, flown.deviation)
-            for method, flown in fitted.items()
+            (method.label, *scores[method], *model_fit.fit.cells, model_fit.deviation)
+            for method, model_fit in fitted.items()
         ),
     )
 
@@ -217,9 +215,9 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
             "All methods over the grid, model-following with the true lag and dead time.",
             ("method", *cell_columns, *_SCORE_COLUMNS),
             tuple(
-                (method.label, cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *flown)
+                (method.label, cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *method_score)
                 for cell, comparison in grid.items()
-                for method, flown in comparison.by_method.items()
+                for method, method_score in comparison.by_method.items()
             ),
         ),
         Table(
@@ -227,9 +225,9 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
             "model-following over the grid, with a wrong lag and dead time.",
             (*cell_columns, "error of the lag", "error of the dead time", *_SCORE_COLUMNS),
             tuple(
-                (cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *error, *flown)
+                (cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *error, *method_score)
                 for cell, comparison in grid.items()
-                for error, flown in comparison.following.items()
+                for error, method_score in comparison.model_following.items()
                 if error != NO_ERROR
             ),
         ),
@@ -243,8 +241,8 @@ def _complete_series(complete: CompleteLoopFlights) -> Table:
         "Cross-track of model-following with the complete inner loop, by rate and error.",
         ("rate, Hz", "error of the lag", "error of the dead time", "cross-track"),
         tuple(
-            (rate, *error, flown.cross_track)
+            (rate, *error, method_score.cross_track)
             for rate, comparison in complete.by_rate.items()
-            for error, flown in comparison.following.items()
+            for error, method_score in comparison.model_following.items()
         ),
     )

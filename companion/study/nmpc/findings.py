@@ -23,30 +23,30 @@ from companion.study.outcome import Claimant, Finding
 _SETTLED_M = 0.1
 """A flight has settled if its errors in the last 2 s are at most this, m."""
 _LAST_PERIODS = round(2.0 * RATE_HZ)
-"""Number of solver periods in the last 2 s."""
+"""Number of solver periods in the last 2 s of a flight."""
 _MAX_ANSWER_MS = 10.0
 """Required 99th percentile of the solver process's answer time, ms; half a period."""
 
 
-def find(flown: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
+def find(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
     """All findings."""
     return (
-        _solved_faster("paper", ("euler", "quaternion"), flown),
-        _solved_faster("ours", ("euler-reduced",), flown),
+        _solved_faster("paper", ("euler", "quaternion"), flights),
+        _solved_faster("ours", ("euler-reduced",), flights),
         _cold_starts(counts),
-        _settles("limited", flown),
-        _settles("proposed", flown),
-        _dead_time(flown),
-        _smallest_error(flown),
+        _settles("limited", flights),
+        _settles("proposed", flights),
+        _dead_time(flights),
+        _smallest_error(flights),
         _in_time(times),
     )
 
 
-def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flown: Flights) -> Finding:
+def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flights: Flights) -> Finding:
     """Whether the proposed model is solved faster than `others`, with one or all iterations."""
     ratios = {
-        (model, iterations): _median_ms(model, iterations, flown)
-        / _median_ms("proposed", iterations, flown)
+        (model, iterations): _median_ms(model, iterations, flights)
+        / _median_ms("proposed", iterations, flights)
         for model in others
         for iterations in (1, MAX_ITERATIONS)
     }
@@ -64,65 +64,68 @@ def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flown: Fligh
     )
 
 
-def _median_ms(model: ModelName, iterations: int, flown: Flights) -> float:
-    return flown[EIGHT.name, Variant(model, iterations)].solve_ms(50)
+def _median_ms(model: ModelName, iterations: int, flights: Flights) -> float:
+    return flights[EIGHT.name, Variant(model, iterations)].solve_ms(50)
 
 
 def _cold_starts(counts: ColdStarts) -> Finding:
-    reached = {m: sum(not isinf(count) for count in counts[m].values()) for m in MODELS}
-    others = max(reached[model] for model in UNLIMITED)
-    reaching = ", ".join(f"{STYLES[model].label} {reached[model]}" for model in MODELS)
+    reached_counts = {m: sum(not isinf(count) for count in counts[m].values()) for m in MODELS}
+    others = max(reached_counts[model] for model in UNLIMITED)
+    reached_text = ", ".join(f"{STYLES[model].label} {reached_counts[model]}" for model in MODELS)
     return Finding(
         "ours",
         "With limits as constraints the solver converges from more states.",
-        reached["limited"] > others,
-        f"States out of {len(STATES)} from which it reaches the tolerance: {reaching}.",
+        reached_counts["limited"] > others,
+        f"States out of {len(STATES)} from which it reaches the tolerance: {reached_text}.",
     )
 
 
-def _settles(model: ModelName, flown: Flights) -> Finding:
-    flight = flown[CIRCLE.name, Variant(model)]
-    last = max(flight.errors[-_LAST_PERIODS:])
+def _settles(model: ModelName, flights: Flights) -> Finding:
+    flight = flights[CIRCLE.name, Variant(model)]
+    last_error = max(flight.errors[-_LAST_PERIODS:])
     return Finding(
         "ours",
         f"From a standing start, {STYLES[model].label} settles on the circle within 4 s.",
-        last < _SETTLED_M,
-        f"The error is {max(flight.errors):.2g} m at most, and {last:.2g} m in the last 2 s of 6 s"
-        f" (bound {_SETTLED_M:g} m).",
+        last_error < _SETTLED_M,
+        f"The error is {max(flight.errors):.2g} m at most, and {last_error:.2g} m in the last 2 s"
+        f" of 6 s (bound {_SETTLED_M:g} m).",
     )
 
 
-def _smallest_error(flown: Flights) -> Finding:
-    compared = []
+def _smallest_error(flights: Flights) -> Finding:
+    comparisons = []
     for task in (CIRCLE, EIGHT):
-        errors = {model: flown[task.name, Variant(model)].rms for model in MODELS}
+        errors = {model: flights[task.name, Variant(model)].rms for model in MODELS}
         other = min((errors[model], STYLES[model].label) for model in UNLIMITED)
-        compared.append((task.name, errors["limited"], *other))
+        comparisons.append((task.name, errors["limited"], *other))
     return Finding(
         "ours",
         "If all models know the dead time, ours has the smallest error on both trajectories.",
-        all(ours < theirs for _, ours, theirs, _ in compared),
+        all(ours < theirs for _, ours, theirs, _ in comparisons),
         "; ".join(
             f"{name}: {ours:.2g} m RMS against {theirs:.2g} m of {label}"
-            for name, ours, theirs, label in compared
+            for name, ours, theirs, label in comparisons
         )
         + ".",
     )
 
 
-def _dead_time(flown: Flights) -> Finding:
+def _dead_time(flights: Flights) -> Finding:
     """Whether models that know the dead time have the smaller error on the figure-eight."""
-    gains = {
-        model: flown[EIGHT.name, Variant(model, knows_dead_time=False)].rms
-        / flown[EIGHT.name, Variant(model)].rms
+    error_ratios = {
+        model: flights[EIGHT.name, Variant(model, knows_dead_time=False)].rms
+        / flights[EIGHT.name, Variant(model)].rms
         for model in UNLIMITED
     }
-    ratios = ", ".join(f"{STYLES[model].label} {gain:.2g} ×" for model, gain in gains.items())
+    ratios_text = ", ".join(
+        f"{STYLES[model].label} {error_ratio:.2g} ×" for model, error_ratio in error_ratios.items()
+    )
     return Finding(
         "ours",
         "Predicting past the dead time helps every model.",
-        min(gains.values()) > 1.0,
-        f"Error on the figure-eight without this prediction, divided by that with it: {ratios}.",
+        min(error_ratios.values()) > 1.0,
+        "Error on the figure-eight without this prediction, divided by that with it:"
+        f" {ratios_text}.",
     )
 
 

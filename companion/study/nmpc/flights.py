@@ -35,9 +35,9 @@ from companion.study.step import Floats
 
 FLIGHT_S = 6
 SETTLED_AFTER_S = 4.0
-"""Time after the begin of a flight from which its errors count, s."""
+"""Time after the beginning of a flight from which its errors count, s."""
 _INPUTS_GIVEN = 8
-"""Number of the latest inputs that the solver gets; they cover dead time plus lead."""
+"""Number of control inputs in a request to the solver, enough for its dead time and lead."""
 _PLANNER_HZ = 250
 _STEPS_PER_SAMPLE = STEP_HZ // _PLANNER_HZ
 
@@ -72,7 +72,7 @@ class Vehicle:
         for _ in range(round(seconds * _PLANNER_HZ)):
             before = _thrust_and_gravity(self.body.q, thrust)
             rates = self._planner.rates(self.body.q, target, dt, self.body.rates)
-            self.body.turn(rates, _STEPS_PER_SAMPLE)
+            self.body.simulate(rates, _STEPS_PER_SAMPLE)
             after = _thrust_and_gravity(self.body.q, thrust)
             self._move(tuple(0.5 * (a + b) for a, b in zip(before, after, strict=True)), dt)
 
@@ -121,8 +121,8 @@ class Flight:
 
     def step(self) -> None:
         """Simulate one period: solve, and fly with the answer of the period before."""
-        now, vehicle, flown = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
-        known = KnownState(
+        now, vehicle, flown_input = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
+        known_state = KnownState(
             now,
             vehicle.position,
             vehicle.velocity,
@@ -130,8 +130,10 @@ class Flight:
             vehicle.body.rates,
             drag=Drag(DRAG),
         )
-        at, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS_GIVEN:])
-        answer = self._solver.answer(Request(self._periods, known, at, self._start, inputs))
+        trajectory_time, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS_GIVEN:])
+        answer = self._solver.answer(
+            Request(self._periods, known_state, trajectory_time, self._start, inputs)
+        )
         self.solve_s.append(answer.solver_seconds)
         self.iterations.append(answer.iterations)
         if answer.status is Status.SOLVED:
@@ -139,30 +141,34 @@ class Flight:
             self._inputs.append(Input(answer.time, *target, answer.thrust))
         else:
             self.failures += 1
-        vehicle.fly(Target(flown.north, flown.east, flown.heading), flown.thrust, 1.0 / RATE_HZ)
+        vehicle.fly(
+            Target(flown_input.north, flown_input.east, flown_input.heading),
+            flown_input.thrust,
+            1.0 / RATE_HZ,
+        )
         self._periods += 1
         self._record()
 
     def _record(self) -> None:
         reference = self._task.trajectory.at(self._task.begin + self._periods / RATE_HZ).position
-        shifted = [a + b for a, b in zip(self._start.position, reference, strict=True)]
-        self.errors.append(dist(shifted, self._vehicle.position))
+        shifted_reference = [a + b for a, b in zip(self._start.position, reference, strict=True)]
+        self.errors.append(dist(shifted_reference, self._vehicle.position))
         self.path.append(self._vehicle.position)
 
     @property
-    def settled(self) -> Floats:
+    def settled_errors(self) -> Floats:
         """The errors from `SETTLED_AFTER_S` on, m."""
         return np.array(self.errors[round(SETTLED_AFTER_S * RATE_HZ) :])
 
     @property
     def rms(self) -> float:
         """Root mean square of the settled errors, m."""
-        return float(np.sqrt(np.mean(self.settled**2)))
+        return float(np.sqrt(np.mean(self.settled_errors**2)))
 
     @property
-    def worst(self) -> float:
+    def largest_error(self) -> float:
         """Largest settled error, m."""
-        return float(self.settled.max())
+        return float(self.settled_errors.max())
 
     def solve_ms(self, percentile: float) -> float:
         """Percentile of the solve times, ms."""
@@ -178,24 +184,26 @@ def fly_all(tick: Tick) -> Flights:
 
     Other load on the computer therefore slows all equally. The order rotates with every period.
     """
-    flown = _new_flights()
-    turns = list(flown.values())
+    flights = _new_flights()
+    flight_order = list(flights.values())
     for second in range(FLIGHT_S):
         tick(f"flights, second {second + 1}")
         for _ in range(round(RATE_HZ)):
-            for flight in turns:
+            for flight in flight_order:
                 flight.step()
-            turns.append(turns.pop(0))
-    return flown
+            flight_order.append(flight_order.pop(0))
+    return flights
 
 
 def _new_flights() -> Flights:
     """All flights of the study, before their first period."""
     unlimited = [
-        Variant(model, knows_dead_time=known) for known in (True, False) for model in UNLIMITED
+        Variant(model, knows_dead_time=knows_dead_time)
+        for knows_dead_time in (True, False)
+        for model in UNLIMITED
     ]
     real_time = [*unlimited, Variant("limited")]
-    to_the_end = [Variant(model, MAX_ITERATIONS) for model in MODELS]
+    to_tolerance = [Variant(model, MAX_ITERATIONS) for model in MODELS]
     entries = [(CIRCLE, variant) for variant in real_time]
-    entries += [(EIGHT, variant) for variant in (*real_time, *to_the_end)]
+    entries += [(EIGHT, variant) for variant in (*real_time, *to_tolerance)]
     return {(task.name, variant): Flight(task, variant) for task, variant in entries}

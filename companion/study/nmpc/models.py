@@ -4,8 +4,8 @@ The paper has `proposed` (34), `euler` (37) and `quaternion` (39), none with a l
 rate. `limited` is the model used in flight, and `euler-reduced` a simplified `euler` for a fair
 comparison. The paper has neither drag nor disturbance; here they are the same in all models.
 
-The controls of the attitude models are body rates. `_led_target` converts them to the target for
-which the planner commands these rates, so that the same inner loop flies all models.
+The controls of the attitude models are body rates. `_first_order_target` converts them to the
+target for which the planner commands these rates, so that the same inner loop flies all models.
 """
 
 from collections.abc import Callable
@@ -57,11 +57,11 @@ def euler(settings: Settings) -> Model:
     """
     state, control, constants = ca.SX.sym("x", 9), ca.SX.sym("u", 4), constants_symbols()
     roll, pitch, yaw = state[6], state[7], state[8]
-    turning = ca.vertcat(*_euler_rates(roll, pitch, control[0], control[1], control[2]))
+    rotation_rates = ca.vertcat(*_euler_rates(roll, pitch, control[0], control[1], control[2]))
     axis = _thrust_axis(roll, pitch, yaw)
     heading = _heading(roll, pitch, yaw)
-    moving = translation(state[3:6], control[3], axis, heading, constants, settings)
-    derivative = ca.vertcat(moving, turning)
+    translation_rates = translation(state[3:6], control[3], axis, heading, constants, settings)
+    derivative = ca.vertcat(translation_rates, rotation_rates)
     aim = ca.SX.sym("aim", 4)
     return Model(
         state=state,
@@ -71,7 +71,7 @@ def euler(settings: Settings) -> Model:
         attitude_reference=aim,
         heading_error=yaw - aim[0],
         attitude_rate_error=control[0:3] - aim[1:4],
-        target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
+        target=_first_order_target(state, derivative, axis[0:2], heading, control[3], settings),
         state_of=lambda motion: (
             *motion[:6],
             *_euler_near_heading(motion.north, motion.east, motion.heading),
@@ -96,8 +96,8 @@ def euler_reduced(settings: Settings) -> Model:
     roll, pitch = state[6], state[7]
     axis = _thrust_axis(roll, pitch, yaw)
     heading = _heading(roll, pitch, yaw)
-    moving = translation(state[3:6], control[2], axis, heading, constants, settings)
-    derivative = ca.vertcat(moving, control[0:2])
+    translation_rates = translation(state[3:6], control[2], axis, heading, constants, settings)
+    derivative = ca.vertcat(translation_rates, control[0:2])
     aim = ca.SX.sym("aim", 2)
     return Model(
         state=state,
@@ -107,7 +107,7 @@ def euler_reduced(settings: Settings) -> Model:
         attitude_reference=aim,
         heading_error=ca.SX(0, 1),
         attitude_rate_error=control[0:2] - aim,
-        target=_led_target(state, derivative, axis[0:2], heading, control[2], settings),
+        target=_first_order_target(state, derivative, axis[0:2], heading, control[2], settings),
         state_of=lambda motion: (
             *motion[:6],
             *_euler_near_heading(motion.north, motion.east, motion.heading)[:2],
@@ -131,15 +131,15 @@ def quaternion(settings: Settings) -> Model:
     w, x, y, z = (state[6 + i] for i in range(4))
     roll, pitch, yaw = (control[i] for i in range(3))
     axis = ca.vertcat(-2.0 * (x * z + w * y), 2.0 * (w * x - y * z), 1.0 - 2.0 * (x * x + y * y))
-    turning = 0.5 * ca.vertcat(
+    rotation_rates = 0.5 * ca.vertcat(
         -x * roll - y * pitch - z * yaw,
         w * roll + y * yaw - z * pitch,
         w * pitch + z * roll - x * yaw,
         w * yaw + x * pitch - y * roll,
     )
     heading = 2.0 * ca.atan2(z, w)
-    moving = translation(state[3:6], control[3], axis, heading, constants, settings)
-    derivative = ca.vertcat(moving, turning)
+    translation_rates = translation(state[3:6], control[3], axis, heading, constants, settings)
+    derivative = ca.vertcat(translation_rates, rotation_rates)
     aim = ca.SX.sym("aim", 5)
     return Model(
         state=state,
@@ -150,7 +150,7 @@ def quaternion(settings: Settings) -> Model:
         # Twice the sine of half the heading error, which is smooth where an angle would jump.
         heading_error=2.0 * (z * aim[0] - w * aim[1]) / ca.sqrt(w * w + z * z),
         attitude_rate_error=control[0:3] - aim[2:5],
-        target=_led_target(state, derivative, axis[0:2], heading, control[3], settings),
+        target=_first_order_target(state, derivative, axis[0:2], heading, control[3], settings),
         state_of=lambda motion: (
             *motion[:6],
             *attitude_of(motion.north, motion.east, motion.heading),
@@ -177,11 +177,11 @@ MAKERS: dict[ModelName, Callable[[Settings], Model]] = {
 
 
 def _conditions_only(conditions: Conditions, _start: Motion) -> Floats:
-    """The constants of a model that needs none besides `Conditions`."""
+    """The constants of a model that has no other constants than `Conditions`."""
     return conditions
 
 
-def _led_target(
+def _first_order_target(
     state: ca.SX,
     derivative: ca.SX,
     coefficients: ca.SX,
@@ -189,7 +189,7 @@ def _led_target(
     thrust: ca.SX,
     settings: Settings,
 ) -> ca.SX:
-    """The target at which a first-order planner commands the rotation in `derivative`.
+    """The target for which a first-order planner commands the rates in `derivative`.
 
     c_d = c + ċ/p, and likewise for the heading.
     """
@@ -204,11 +204,11 @@ def _led_target(
 
 def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
     """Rates of the Euler angles, M(φ, θ)⁻¹·ω, for body rates ω = (x, y, z); symbols or numbers."""
-    turning = ca.sin(roll) * y + ca.cos(roll) * z
+    yaw_term = ca.sin(roll) * y + ca.cos(roll) * z
     return (
-        x + ca.tan(pitch) * turning,
+        x + ca.tan(pitch) * yaw_term,
         ca.cos(roll) * y - ca.sin(roll) * z,
-        turning / ca.cos(pitch),
+        yaw_term / ca.cos(pitch),
     )
 
 
@@ -224,10 +224,10 @@ def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
 
 def _heading(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
     """Heading of the tilt-yaw decomposition, 2·atan2(z, w), from Euler angles, rad."""
-    level, tilted = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))
+    coses, sines = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))  # products
     half = 0.5 * yaw
     return 2.0 * ca.atan2(
-        level * ca.sin(half) - tilted * ca.cos(half), level * ca.cos(half) + tilted * ca.sin(half)
+        coses * ca.sin(half) - sines * ca.cos(half), coses * ca.cos(half) + sines * ca.sin(half)
     )
 
 

@@ -46,7 +46,7 @@ def run(tick: Tick) -> Outcome:
     counts = count_iterations()
     tick("the solver process")
     times = time_process()
-    flown = fly_all(tick)
+    flights = fly_all(tick)
     return Outcome(
         name="nmpc",
         title="Predictive control: solve time and position error of each prediction model",
@@ -58,34 +58,34 @@ def run(tick: Tick) -> Outcome:
             " drag; their only limit is the thrust. Ours adds the limits of tilt and rate and the"
             " second-order response. Solve times depend on this machine and its load."
         ),
-        figure=_draw_figure(flown),
+        figure=_draw_figure(flights),
         caption=_CAPTION,
         tables=(
-            _time_table(flown),
+            _time_table(flights),
             _cold_start_table(counts),
-            _error_table(flown),
+            _error_table(flights),
             _process_table(times),
         ),
-        findings=find(flown, counts, times),
-        series=(_flights_table(flown),),
+        findings=find(flights, counts, times),
+        series=(_flights_table(flights),),
     )
 
 
-def _time_table(flown: Flights) -> Table:
+def _time_table(flights: Flights) -> Table:
     """Solve times of every model, with one iteration and with iterations to the tolerance."""
     rows: list[tuple[Cell, ...]] = []
     for model in MODELS:
-        single = flown[EIGHT.name, Variant(model)]
-        to_the_end = flown[EIGHT.name, Variant(model, MAX_ITERATIONS)]
+        one_iteration = flights[EIGHT.name, Variant(model)]
+        to_tolerance = flights[EIGHT.name, Variant(model, MAX_ITERATIONS)]
         rows.append(
             (
                 STYLES[model].label,
-                single.solve_ms(50),
-                single.solve_ms(99),
-                to_the_end.solve_ms(50),
-                to_the_end.solve_ms(99),
-                float(np.mean(to_the_end.iterations)),
-                int(max(to_the_end.iterations)),
+                one_iteration.solve_ms(50),
+                one_iteration.solve_ms(99),
+                to_tolerance.solve_ms(50),
+                to_tolerance.solve_ms(99),
+                float(np.mean(to_tolerance.iterations)),
+                int(max(to_tolerance.iterations)),
             )
         )
     return Table(
@@ -116,15 +116,18 @@ def _cold_start_table(counts: ColdStarts) -> Table:
     )
 
 
-def _error_table(flown: Flights) -> Table:
+def _error_table(flights: Flights) -> Table:
     """Errors in flight, by model and by whether it knows the dead time."""
     rows: list[tuple[Cell, ...]] = []
-    for (task, variant), eight in flown.items():
+    for (task, variant), eight in flights.items():
         if task != EIGHT.name or variant.iterations > 1:
             continue
-        circle = flown[CIRCLE.name, variant]
+        circle = flights[CIRCLE.name, variant]
         known = "known" if variant.knows_dead_time else "not known"
-        rows.append((variant.label, known, circle.rms, circle.worst, eight.rms, eight.worst))
+        circle_errors, eight_errors = (
+            (flight.rms, flight.largest_error) for flight in (circle, eight)
+        )
+        rows.append((variant.label, known, *circle_errors, *eight_errors))
     return Table(
         "nmpc-error",
         "Distance from the trajectory from 4 s on, one iteration per solve at 50 Hz: after"
@@ -159,7 +162,7 @@ def _process_table(times: ProcessTimes) -> Table:
     )
 
 
-def _flights_table(flown: Flights) -> Table:
+def _flights_table(flights: Flights) -> Table:
     """Error and solve time in every period of every flight."""
     return Table(
         "nmpc-flights",
@@ -183,7 +186,7 @@ def _flights_table(flown: Flights) -> Table:
                 error,
                 seconds,
             )
-            for (task, variant), flight in flown.items()
+            for (task, variant), flight in flights.items()
             for period, (error, seconds) in enumerate(
                 zip(flight.errors, flight.solve_s, strict=True)
             )
@@ -191,21 +194,21 @@ def _flights_table(flown: Flights) -> Table:
     )
 
 
-def _draw_figure(flown: Flights) -> Figure:
+def _draw_figure(flights: Flights) -> Figure:
     """Draw the figure that `_CAPTION` describes."""
     figure, ((path, eight), (circle, times)) = new_figure(2, 2)
-    _draw_paths(path, flown)
-    _draw_errors(circle, flown, CIRCLE, "Error after the standing start")
-    _draw_errors(eight, flown, EIGHT, "Error on the figure-eight")
-    _draw_times(times, flown)
+    _draw_paths(path, flights)
+    _draw_errors(circle, flights, CIRCLE, "Error after the standing start")
+    _draw_errors(eight, flights, EIGHT, "Error on the figure-eight")
+    _draw_times(times, flights)
     circle.set(yscale="log", ylim=(1e-3, None))
     circle.legend(loc="lower left")
     return figure
 
 
-def _draw_paths(axes: Axes, flown: Flights) -> None:
+def _draw_paths(axes: Axes, flights: Flights) -> None:
     for model in MODELS:
-        north, east, _ = np.array(flown[CIRCLE.name, Variant(model)].path).T
+        north, east, _ = np.array(flights[CIRCLE.name, Variant(model)].path).T
         axes.plot(east, north, **STYLES[model].line)
     begin = CIRCLE.trajectory.at(CIRCLE.begin).position
     times = CIRCLE.begin + np.linspace(0.0, 2.0 * np.pi, 100)
@@ -223,18 +226,18 @@ def _draw_paths(axes: Axes, flown: Flights) -> None:
     )
 
 
-def _draw_errors(axes: Axes, flown: Flights, task: Task, title: str) -> None:
+def _draw_errors(axes: Axes, flights: Flights, task: Task, title: str) -> None:
     for model in MODELS:
-        errors = np.array(flown[task.name, Variant(model)].errors)
+        errors = np.array(flights[task.name, Variant(model)].errors)
         time = (np.arange(len(errors)) + 1) / RATE_HZ
         draw_line(axes, time, errors, STYLES[model].line, STYLES[model].label)
     axes.set(title=title, xlabel="time, s", ylabel="distance, m")
 
 
-def _draw_times(axes: Axes, flown: Flights) -> None:
+def _draw_times(axes: Axes, flights: Flights) -> None:
     for model in MODELS:
         for iterations, width in ((1, 1.0), (MAX_ITERATIONS, 2.5)):
-            times = np.sort(flown[EIGHT.name, Variant(model, iterations)].solve_s)
+            times = np.sort(flights[EIGHT.name, Variant(model, iterations)].solve_s)
             share = (np.arange(len(times)) + 1) / len(times)
             axes.plot(1e3 * times, share, **{**STYLES[model].line, "linewidth": width})
     axes.set(

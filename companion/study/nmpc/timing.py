@@ -19,7 +19,7 @@ _COLD_ITERATIONS = 60
 """Number of SQP iterations after which a cold start counts as not converged."""
 _REQUESTS = 150
 """Number of requests with which the solver process is timed."""
-_START_TIMEOUT = 30.0  # s
+_START_TIMEOUT_S = 30.0
 
 
 class State(NamedTuple):
@@ -28,11 +28,11 @@ class State(NamedTuple):
     position_error: Vector
     """Position minus the reference position on the circle, m, NED."""
     velocity: Vector
-    """m/s, NED."""
+    """Velocity, m/s, NED."""
     coefficients: Coefficients
-    """Acceleration coefficients (north, east) of its attitude."""
+    """Acceleration coefficients (north, east) of the attitude."""
     body_rates: BodyRates
-    """rad/s."""
+    """Body rates, rad/s."""
 
 
 _LEVEL, _STILL = Coefficients(0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
@@ -87,7 +87,7 @@ class ProcessTimes(NamedTuple):
     answer_ms: Floats
     """(n,), time from before a request is packed until its answer is unpacked, ms."""
     computing_ms: Floats
-    """(n,), part of it in `Worker.answer`: prediction, reference and solve, ms."""
+    """(n,), time in `Worker.answer` (prediction, reference and solve), part of `answer_ms`, ms."""
     troubles: int
     """Number of answers that were late, failed or implausible."""
 
@@ -122,7 +122,7 @@ def time_process() -> ProcessTimes:
 
 
 def _await_start(solver: Solver, troubles: list[tuple[Trouble, str]]) -> None:
-    deadline = monotonic() + _START_TIMEOUT
+    deadline = monotonic() + _START_TIMEOUT_S
     while not solver.ready:
         if troubles or monotonic() > deadline:
             raise ChildProcessError(troubles[0][1] if troubles else "the solver does not start")

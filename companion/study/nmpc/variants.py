@@ -87,6 +87,6 @@ class Task(NamedTuple):
 
 
 CIRCLE = Task("circle", circle(5.0, Laps(5.0, laps=4.0)), 5.0)
-"""A circle that the vehicle begins at rest, where the trajectory already has 5 m/s."""
+"""A circle at 5 m/s from its first moment; the vehicle begins at rest."""
 EIGHT = Task("eight", gerono_eight(3.0, Laps(5.0, laps=3.0)), 0.0)
 """A figure-eight that begins at rest, like the vehicle."""

@@ -38,7 +38,7 @@ from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _SAME_WITHIN = 1e-9
-"""Coefficients at two headings count as the same if they differ by less."""
+"""Difference below which the coefficients at two headings count as the same."""
 _METHODS = (*PAPER_METHODS, EXACT)
 PARTS = len(_METHODS) + 1
 
@@ -69,14 +69,14 @@ def run(tick: Tick) -> Outcome:
         tick(method.label)
         responses[method] = fly(planner_of(method, FIGURE_2.gain), FIGURE_2)
     tick("the error as the paper prints it")
-    printed = fly(
+    printed_response = fly(
         LawPlanner(_printed_quaternion_law, planner_of(QUATERNION, FIGURE_2.gain).constants),
         FIGURE_2,
     )
     rows: list[tuple[Cell, ...]] = []
     for method, response in responses.items():
         rows += _rows(method.label, response, reference)
-    rows += _rows("quaternion, error q_d ⊗ q⁻¹ as printed", printed, reference)
+    rows += _rows("quaternion, error q_d ⊗ q⁻¹ as printed", printed_response, reference)
     return Outcome(
         name="fig2",
         title="Figure 2: step response without limits",
@@ -106,20 +106,34 @@ def run(tick: Tick) -> Outcome:
                 tuple(rows),
             ),
         ),
-        findings=_findings(responses, printed, reference),
+        findings=_findings(responses, printed_response, reference),
     )
 
 
 def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell, ...]]:
-    away, across = largest_deviation(response, reference), cross_track(response)
-    arrived, effect = settling_time(response), heading_effect(response)
+    deviations, cross_tracks = largest_deviation(response, reference), cross_track(response)
+    settling_times, effect = settling_time(response), heading_effect(response)
     if effect < _SAME_WITHIN:
-        return [(label, float(away.max()), float(across.max()), float(arrived[0]), effect)]
+        return [
+            (
+                label,
+                float(deviations.max()),
+                float(cross_tracks.max()),
+                float(settling_times[0]),
+                effect,
+            )
+        ]
     rows: list[tuple[Cell, ...]] = []
-    for words, index in zip(("best", "worst"), best_and_worst(away), strict=True):
-        row_label = f"{label}, {words} at {degrees(response.step.headings[index]):.0f}°"
+    for rank, index in zip(("best", "worst"), best_and_worst(deviations), strict=True):
+        row_label = f"{label}, {rank} at {degrees(response.step.headings[index]):.0f}°"
         rows.append(
-            (row_label, float(away[index]), float(across[index]), float(arrived[index]), effect)
+            (
+                row_label,
+                float(deviations[index]),
+                float(cross_tracks[index]),
+                float(settling_times[index]),
+                effect,
+            )
         )
     return rows
 
@@ -136,13 +150,13 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         )
         for method in PAPER_METHODS
     ]
-    figure, ((north, east), (away, plane)) = new_figure(2, 2)
+    figure, ((north, east), (deviation_panel, plane)) = new_figure(2, 2)
     draw_response(north, east, time, curves)
     draw_reference(north, east, time, reference)
     for method in PAPER_METHODS:
         error = deviation(responses[method], reference)[:, shown_heading[method]]
-        draw_line(away, time, error, method.line)
-    away.set(
+        draw_line(deviation_panel, time, error, method.line)
+    deviation_panel.set(
         title="Distance from the reference",
         xlabel="time, s",
         ylabel="|c − reference|",
@@ -163,19 +177,20 @@ def _span(limits: tuple[float, float]) -> float:
 
 
 def _findings(
-    responses: dict[Method, Response], printed: Response, reference: Floats
+    responses: dict[Method, Response], printed_response: Response, reference: Floats
 ) -> tuple[Finding, ...]:
-    away = {method: largest_deviation(responses[method], reference) for method in responses}
+    deviations = {method: largest_deviation(responses[method], reference) for method in responses}
     effect = {method: heading_effect(responses[method]) for method in responses}
-    best_other = min(float(away[method].min()) for method in (QUATERNION, SO3, EULER))
-    proposed = float(away[PROPOSED].max())
+    best_other = min(float(deviations[method].min()) for method in (QUATERNION, SO3, EULER))
+    proposed_deviation = float(deviations[PROPOSED].max())
     return (
         Finding(
             "paper",
             "The proposed method follows the first-order reference; the others do not.",
-            proposed < 0.2 * best_other,
-            f"Largest deviation {proposed:.2g}. The best other method at its best heading has"
-            f" {best_other:.2g}, {best_other / proposed:.0f} times as much (required: 5 times).",
+            proposed_deviation < 0.2 * best_other,
+            f"Largest deviation {proposed_deviation:.2g}. The best other method at its best heading"
+            f" has {best_other:.2g}, {best_other / proposed_deviation:.0f} times as much (required:"
+            " 5 times).",
         ),
         Finding(
             "paper",
@@ -192,16 +207,16 @@ def _findings(
             "ours",
             "Heading does not change the response of the quaternion method with the error"
             " q_d ⊗ q⁻¹, as the paper prints it.",
-            heading_effect(printed) < _SAME_WITHIN,
+            heading_effect(printed_response) < _SAME_WITHIN,
             f"With that error as body rates the paths at two headings differ by up to"
-            f" {heading_effect(printed):.2g}, and the largest deviation is"
-            f" {largest_deviation(printed, reference).max():.2g}.",
+            f" {heading_effect(printed_response):.2g}, and the largest deviation is"
+            f" {largest_deviation(printed_response, reference).max():.2g}.",
         ),
         Finding(
             "paper",
             "Heading changes the response of the Euler-angle method.",
             effect[EULER] > _SAME_WITHIN,
-            f"Its largest deviation is {away[EULER].min():.2g} at the best heading and"
-            f" {away[EULER].max():.2g} at the worst.",
+            f"Its largest deviation is {deviations[EULER].min():.2g} at the best heading and"
+            f" {deviations[EULER].max():.2g} at the worst.",
         ),
     )

@@ -24,10 +24,12 @@ def run(tick: Tick) -> Outcome:
     tick(EULER.label)
     response = fly(planner_of(EULER, FIGURE_2.gain), FIGURE_2)
     reference = FIGURE_2.reference()
-    away, across = largest_deviation(response, reference), cross_track(response)
-    best, worst = best_and_worst(away)
+    deviations, cross_tracks = largest_deviation(response, reference), cross_track(response)
+    best, worst = best_and_worst(deviations)
     tick(PROPOSED.label)
-    proposed = largest_deviation(fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference)
+    proposed_deviations = largest_deviation(
+        fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference
+    )
     heading_deg = [round(degrees(heading)) for heading in FIGURE_2.headings]
     return Outcome(
         name="fig3",
@@ -44,7 +46,7 @@ def run(tick: Tick) -> Outcome:
                 "The Euler-angle method by heading.",
                 ("heading, °", "largest deviation from first order", "cross-track"),
                 tuple(
-                    (heading_deg[k], float(away[k]), float(across[k]))
+                    (heading_deg[k], float(deviations[k]), float(cross_tracks[k]))
                     for k in range(len(heading_deg))
                 ),
             ),
@@ -53,17 +55,18 @@ def run(tick: Tick) -> Outcome:
             Finding(
                 "ours",
                 "The Euler-angle method is much better at some headings than at others.",
-                bool(away[best] < 0.5 * away[worst]),
-                f"Largest deviation {away[best]:.2g} at the best heading, {heading_deg[best]}°, and"
-                f" {away[worst]:.2g} at the worst, {heading_deg[worst]}°. The proposed method has"
-                f" {proposed.max():.2g} at every heading.",
+                bool(deviations[best] < 0.5 * deviations[worst]),
+                f"Largest deviation {deviations[best]:.2g} at the best heading,"
+                f" {heading_deg[best]}°, and {deviations[worst]:.2g} at the worst,"
+                f" {heading_deg[worst]}°. The proposed method has"
+                f" {proposed_deviations.max():.2g} at every heading.",
             ),
         ),
     )
 
 
 def _figure(response: Response, reference: Floats) -> Figure:
-    figure, ((north, east), (away, plane)) = new_figure(2, 2)
+    figure, ((north, east), (deviation_panel, plane)) = new_figure(2, 2)
     time, headings = FIGURE_2.time, np.degrees(FIGURE_2.headings)
     angle_to_step = np.abs((headings + 90.0) % 180.0 - 90.0)
     colour_scale = ScalarMappable(Normalize(0.0, 100.0), _ANGLE_COLOURS)
@@ -80,9 +83,9 @@ def _figure(response: Response, reference: Floats) -> Figure:
         title="Paths (ideal: a straight line at $a_E$ = −0.5)", xlabel="$a_E$", ylabel="$a_N$"
     )
     largest = largest_deviation(response, reference)
-    away.scatter(headings, largest, c=colours, s=14, zorder=3)
-    away.plot(headings, largest, **{"color": "#888888", "linewidth": 0.8})
-    away.set(
+    deviation_panel.scatter(headings, largest, c=colours, s=14, zorder=3)
+    deviation_panel.plot(headings, largest, **{"color": "#888888", "linewidth": 0.8})
+    deviation_panel.set(
         title="Largest deviation by heading",
         xlabel="heading, °",
         ylabel="max |c − reference|",

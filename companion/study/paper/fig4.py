@@ -121,9 +121,9 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
 
 def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Finding, ...]:
     rate = {method: largest_tilt_rate(responses[method]) for method in _METHODS}
-    arrived = {method: float(settling_time(responses[method]).max()) for method in _METHODS}
-    across = {method: float(cross_track(responses[method]).max()) for method in _METHODS}
-    away = float(largest_deviation(responses[PAPER_LIMIT], reference).max())
+    settling_times = {method: float(settling_time(responses[method]).max()) for method in _METHODS}
+    cross_tracks = {method: float(cross_track(responses[method]).max()) for method in _METHODS}
+    paper_limit_deviation = float(largest_deviation(responses[PAPER_LIMIT], reference).max())
     euler = settling_time(responses[EULER])
     return (
         Finding(
@@ -131,24 +131,26 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
             "The limit of equation 33 keeps the tilt rate within W_M.",
             rate[PAPER_LIMIT] <= MAX_TILT_RATE * (1.0 + 1e-12),
             f"The largest is {rate[PAPER_LIMIT]:.3f} of {MAX_TILT_RATE:.3f} rad/s; the response"
-            f" follows the limited first-order reference within {away:.2g}.",
+            f" follows the limited first-order reference within {paper_limit_deviation:.2g}.",
         ),
         Finding(
             "ours",
             "The limit of equation 33 makes full use of W_M.",
             rate[PAPER_LIMIT] > 0.99 * MAX_TILT_RATE,
             f"It uses {100.0 * rate[PAPER_LIMIT] / MAX_TILT_RATE:.0f} % of W_M and takes"
-            f" {arrived[PAPER_LIMIT]:.3f} s; the tight limit uses"
-            f" {100.0 * rate[PROPOSED] / MAX_TILT_RATE:.0f} % and takes {arrived[PROPOSED]:.3f} s,"
-            f" along the same straight line (cross-track {across[PROPOSED]:.2g}).",
+            f" {settling_times[PAPER_LIMIT]:.3f} s; the tight limit uses"
+            f" {100.0 * rate[PROPOSED] / MAX_TILT_RATE:.0f} % and takes"
+            f" {settling_times[PROPOSED]:.3f} s, along the same straight line (cross-track"
+            f" {cross_tracks[PROPOSED]:.2g}).",
         ),
         Finding(
             "ours",
             "Under the limit the proposed method is the quickest.",
-            min(arrived, key=lambda method: arrived[method]) in (PROPOSED, PAPER_LIMIT),
-            f"so3 takes {arrived[SO3]:.3f} s, the quaternion method {arrived[QUATERNION]:.3f} s,"
-            f" euler {euler.min():.3f} to {euler.max():.3f} s by heading, first-order"
-            f" {arrived[PROPOSED]:.3f} s. so3 leaves the straight line by {across[SO3]:.2g},"
-            f" first-order by {across[PROPOSED]:.2g}.",
+            min(settling_times, key=lambda method: settling_times[method])
+            in (PROPOSED, PAPER_LIMIT),
+            f"so3 takes {settling_times[SO3]:.3f} s, the quaternion method"
+            f" {settling_times[QUATERNION]:.3f} s, euler {euler.min():.3f} to {euler.max():.3f} s"
+            f" by heading, first-order {settling_times[PROPOSED]:.3f} s. so3 leaves the straight"
+            f" line by {cross_tracks[SO3]:.2g}, first-order by {cross_tracks[PROPOSED]:.2g}.",
         ),
     )

@@ -94,7 +94,7 @@ def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
                 loop.cross_track(method),
                 float(settling_time(loop.responses[method]).max()),
                 *loop.fits[method].cells,
-                loop.from_second_order(method),
+                loop.deviation_from_second_order(method),
                 heading_effect(loop.responses[method]),
             )
             for loop in (quick, measured)
@@ -109,8 +109,8 @@ def _sweep_table(sweep: Sweep) -> Table:
         "Cross-track by the speed of the inner loop, heading 0.",
         ("63 % of a rate step, ms", *(method.label for method in PAPER_METHODS)),
         tuple(
-            (1e3 * time_63, *(across[method] for method in PAPER_METHODS))
-            for time_63, across in sweep.items()
+            (1e3 * time_63, *(cross_tracks[method] for method in PAPER_METHODS))
+            for time_63, cross_tracks in sweep.items()
         ),
     )
 
@@ -119,22 +119,22 @@ def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
     figure, axes = new_figure(4, 2, height=2.9)
     _draw_loop((axes[0, 0], axes[0, 1], axes[1, 0]), quick)
     _draw_loop((axes[2, 0], axes[2, 1], axes[3, 0]), measured)
-    away, across = axes[1, 1], axes[3, 1]
+    deviation_panel, cross_track_panel = axes[1, 1], axes[3, 1]
     step = quick.responses[PROPOSED].step
     for method in PAPER_METHODS:
         error = deviation(quick.responses[method], step.reference())[:, quick.worst_heading(method)]
-        draw_line(away, step.time, error, method.line)
+        draw_line(deviation_panel, step.time, error, method.line)
         times = 1e3 * np.array(list(sweep))
-        values = [tracks[method] for tracks in sweep.values()]
-        across.plot(times, values, marker="o", markersize=4, **method.line)
-    away.set(
+        values = [cross_tracks[method] for cross_tracks in sweep.values()]
+        cross_track_panel.plot(times, values, marker="o", markersize=4, **method.line)
+    deviation_panel.set(
         title=f"Distance from first order, {quick}",
         xlabel="time, s",
         ylabel="|c − reference|",
         xlim=(0.0, 1.5),
         ylim=(0.0, None),
     )
-    across.set(
+    cross_track_panel.set(
         title="Cross-track by quickness, heading 0",
         xlabel="63 % of a rate step, ms",
         ylabel="largest distance from the line",
@@ -152,10 +152,12 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
         (method, method.label, loop.responses[method].at_heading(loop.worst_heading(method)))
         for method in PAPER_METHODS
     ]
-    step, second = loop.responses[PROPOSED].step, loop.fitted_path(PROPOSED)
+    step, second_order_path = loop.responses[PROPOSED].step, loop.fitted_path(PROPOSED)
     draw_response(north, east, step.time, curves)
     draw_reference(north, east, step.time, step.reference())
-    draw_line(north, step.time, second[:, 0], _SECOND_ORDER_LINE, "second-order reference")
+    draw_line(
+        north, step.time, second_order_path[:, 0], _SECOND_ORDER_LINE, "second-order reference"
+    )
     draw_plane(plane, curves, np.array([step.start, step.target]))
     for panel in (north, east):
         panel.set(xlim=(0.0, 1.5))
@@ -166,21 +168,23 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
 def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[Finding, ...]:
     """Findings on straightness, on the order of the response, and on the effect of heading."""
     others = [method for method in PAPER_METHODS if method is not PROPOSED]
-    straightest_at = [
-        t for t, across in sweep.items() if across[PROPOSED] < min(across[m] for m in others)
+    straightest_times = [
+        t
+        for t, cross_tracks in sweep.items()
+        if cross_tracks[PROPOSED] < min(cross_tracks[m] for m in others)
     ]
-    times = ", ".join(f"{1e3 * t:.0f}" for t in straightest_at)
+    times = ", ".join(f"{1e3 * t:.0f}" for t in straightest_times)
     return (
         _straightest("paper", "quick", quick),
         _straightest("ours", "as slow as measured", measured),
         Finding(
             "ours",
             "The proposed method is the straightest with every inner loop.",
-            len(straightest_at) == len(sweep),
+            len(straightest_times) == len(sweep),
             "At heading 0 it is the straightest with "
             + (f"loops of {times} ms (63 % of a rate step)" if times else "none of the loops")
             + ". Its cross-track is "
-            + ", ".join(f"{across[PROPOSED]:.2g}" for across in sweep.values())
+            + ", ".join(f"{cross_tracks[PROPOSED]:.2g}" for cross_tracks in sweep.values())
             + " with "
             + ", ".join(f"{1e3 * t:.0f}" for t in sweep)
             + " ms.",
@@ -215,14 +219,14 @@ def _straightest(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
 
 
 def _second_order(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
-    fit, away = loop.fits[PROPOSED], loop.from_second_order(PROPOSED)
+    fit, fit_deviation = loop.fits[PROPOSED], loop.deviation_from_second_order(PROPOSED)
     bound = _SECOND_ORDER_SHARE * hypot(*np.subtract(FIGURE_2.target, FIGURE_2.start))
     return Finding(
         claimant,
         f"With a complete inner loop that is {speed} the response of the proposed method is second"
         " order.",
-        away < bound,
-        f"It stays within {away:.2g} of ω = {fit.model.frequency:.1f} rad/s,"
+        fit_deviation < bound,
+        f"It stays within {fit_deviation:.2g} of ω = {fit.model.frequency:.1f} rad/s,"
         f" ζ = {fit.model.damping:.2f} after a dead time of {1e3 * fit.dead_time:.0f} ms; required"
         f" are 2 % of the step, {bound:.2g}.",
     )

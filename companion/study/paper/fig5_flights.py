@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import pi
 from typing import NamedTuple
 
-from companion.study.inner_loop import quickened
+from companion.study.inner_loop import faster_inner_loop
 from companion.study.measures import (
     DelayedSecondOrder,
     cross_track,
@@ -24,7 +24,7 @@ _SWEEP = (10, 5, 3, 2, 1)
 PARTS = 2 * len(METHODS) + len(_SWEEP)
 
 Sweep = dict[float, dict[Method, float]]
-"""By `LoopFlights.time_63` of the inner loop (s) and by method: cross-track at heading 0."""
+"""Cross-track at heading 0, by `LoopFlights.time_63` of the inner loop (s) and by method."""
 
 
 class LoopFlights(NamedTuple):
@@ -50,7 +50,7 @@ class LoopFlights(NamedTuple):
         step = self.responses[method].step
         return second_order_path(step, self.fits[method], step.time)
 
-    def from_second_order(self, method: Method) -> float:
+    def deviation_from_second_order(self, method: Method) -> float:
         """Largest deviation of a method from its fitted model, at the heading of the fit."""
         model = self.fitted_path(method)
         return float(largest_deviation(self.responses[method], model)[self.worst_heading(method)])
@@ -61,23 +61,23 @@ class LoopFlights(NamedTuple):
 
 def fly_methods(factor: int, tick: Tick) -> LoopFlights:
     """Fly every method with an inner loop `factor` times as fast as measured on a PX4."""
-    inner_loop = quickened(factor)
-    flown = LoopFlights(inner_loop.rate_time_63(), {}, {})
+    inner_loop = faster_inner_loop(factor)
+    flights = LoopFlights(inner_loop.rate_time_63(), {}, {})
     for method in METHODS:
-        tick(f"{method.label}, {1e3 * flown.time_63:.0f} ms")
+        tick(f"{method.label}, {1e3 * flights.time_63:.0f} ms")
         response = fly_loop(planner_of(method, STEP.gain), STEP, inner_loop)
-        flown.responses[method] = response
-        flown.fits[method] = fit_second_order(
-            STEP, response.at_heading(flown.worst_heading(method))
+        flights.responses[method] = response
+        flights.fits[method] = fit_second_order(
+            STEP, response.at_heading(flights.worst_heading(method))
         )
-    return flown
+    return flights
 
 
 def fly_sweep(tick: Tick) -> Sweep:
     """Fly every method of the paper with inner loops of several speeds."""
     step, sweep = replace(FIGURE_2, headings=(0.0,)), {}
     for factor in _SWEEP:
-        inner_loop = quickened(factor)
+        inner_loop = faster_inner_loop(factor)
         time_63 = inner_loop.rate_time_63()
         tick(f"cross-track, {1e3 * time_63:.0f} ms")
         sweep[time_63] = {

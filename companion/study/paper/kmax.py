@@ -23,18 +23,18 @@ PARTS = 2
 
 
 class _Row(NamedTuple):
-    """K at one tilt, over all directions."""
+    """Scaling factor K (see `scaling_factor`) at one tilt, over all directions."""
 
     tilt_deg: int
     """Tilt, °."""
     largest: float
-    """Largest K."""
+    """Largest K over all directions."""
     bound: float
     """Bound of K by the formula of the paper."""
     smallest: float
-    """Smallest K."""
+    """Smallest K over all directions."""
     rate_share: float
-    """Mean body rate / largest body rate."""
+    """Mean of the body rate over all directions, divided by its largest value."""
 
 
 def scaling_factor(c: Coefficients, direction: float) -> float:
@@ -98,23 +98,23 @@ def run(tick: Tick) -> Outcome:
 
 
 def _findings(rows: tuple[_Row, ...], by_tilt: dict[float, Floats]) -> tuple[Finding, ...]:
-    computed = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED}
-    share = {row.tilt_deg: row.rate_share for row in rows}
+    computed_k = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED}
+    rate_shares = {row.tilt_deg: row.rate_share for row in rows}
     return (
         Finding(
             "paper",
             "K_max = 1/(1 − 2A_M²)²: 1.333 at 30°, 2 at 45°, 4 at 60°.",
-            all(abs(computed[angle] / value - 1.0) < 1e-3 for angle, value in PRINTED.items())
+            all(abs(computed_k[angle] / value - 1.0) < 1e-3 for angle, value in PRINTED.items())
             and all(abs(row[1] / row[2] - 1.0) < 1e-9 for row in rows),
-            "Computed: " + ", ".join(f"{k:.4g} at {a}°" for a, k in computed.items()) + ".",
+            "Computed: " + ", ".join(f"{k:.4g} at {a}°" for a, k in computed_k.items()) + ".",
         ),
         Finding(
             "ours",
             "A movement in any direction needs K_max.",
             min(row[3] / row[1] for row in rows) > 0.99,
             f"At {rows[-1][0]}° K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g},"
-            f" depending on direction. The mean body rate is {100.0 * share[40]:.0f} % of the"
-            f" largest at 40° of tilt and {100.0 * share[60]:.0f} % at 60°.",
+            f" depending on direction. The mean body rate is {100.0 * rate_shares[40]:.0f} % of the"
+            f" largest at 40° of tilt and {100.0 * rate_shares[60]:.0f} % at 60°.",
         ),
     )
 
@@ -128,23 +128,23 @@ def _figure(by_tilt: dict[float, Floats]) -> Figure:
     )
     north, east = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
     levels = np.linspace(1.0, 4.0, 13)
-    filled = disc.contourf(east, north, k, levels=levels, cmap="cividis")
+    filled_contours = disc.contourf(east, north, k, levels=levels, cmap="cividis")
     lines = disc.contour(east, north, k, levels=[1.333, 2.0, 3.0], colors="white", linewidths=0.8)
     disc.clabel(lines, fmt="%.3g", fontsize=7)
-    figure.colorbar(filled, ax=disc, label="K", ticks=[1, 2, 3, 4])
+    figure.colorbar(filled_contours, ax=disc, label="K", ticks=[1, 2, 3, 4])
     disc.set(title="K for a movement to the north", xlabel="$a_E$", ylabel="$a_N$", aspect="equal")
     tilts = np.linspace(0.0, _LARGEST_TILT_SHOWN, 121)
     over_tilt.plot(
         np.degrees(tilts), [bound(t) for t in tilts], label="1/(1 − 2$A_M$²)²", **REFERENCE
     )
-    for extreme, marker, words in ((np.max, "s", "largest"), (np.min, "v", "smallest")):
+    for extreme, marker, label in ((np.max, "s", "largest"), (np.min, "v", "smallest")):
         over_tilt.plot(
             np.degrees(list(by_tilt)),
             [extreme(values) for values in by_tilt.values()],
             marker,
             color=PROPOSED.colour,
             markerfacecolor="none",
-            label=f"{words} over the directions",
+            label=f"{label} over the directions",
         )
     over_tilt.plot(
         list(PRINTED), list(PRINTED.values()), "o", color="black", label="printed in the paper"

@@ -19,22 +19,22 @@ PARTS = 2 * len(RATES_HZ)
 def run(tick: Tick) -> Outcome:
     """Fly the step of figure 2 at several sample rates with `first-order` and with `exact`."""
     steps = {hz: replace(FIGURE_2, rate_hz=hz, headings=(0.0, 1.0, 2.5)) for hz in RATES_HZ}
-    flown: dict[tuple[Method, float], Response] = {}
+    responses: dict[tuple[Method, float], Response] = {}
     for hz, step in steps.items():
         for method in (PROPOSED, EXACT):
             tick(f"{method.label} at {hz:.0f} Hz")
-            flown[method, hz] = fly(planner_of(method, step.gain), step)
-    worst = {
+            responses[method, hz] = fly(planner_of(method, step.gain), step)
+    largest_deviations = {
         key: float(largest_deviation(response, steps[key[1]].reference()).max())
-        for key, response in flown.items()
+        for key, response in responses.items()
     }
     rows = tuple(
         (
             round(hz),
-            worst[PROPOSED, hz],
-            float(cross_track(flown[PROPOSED, hz]).max()),
-            worst[EXACT, hz],
-            float(cross_track(flown[EXACT, hz]).max()),
+            largest_deviations[PROPOSED, hz],
+            float(cross_track(responses[PROPOSED, hz]).max()),
+            largest_deviations[EXACT, hz],
+            float(cross_track(responses[EXACT, hz]).max()),
         )
         for hz in RATES_HZ
     )
@@ -42,7 +42,7 @@ def run(tick: Tick) -> Outcome:
         name="rates",
         title="Sample rates: the discretisation error, and the planner without it",
         conditions="The step of figure 2 at 1000, 500, 250, 100 and 50 Hz, three headings.",
-        figure=_figure(flown, worst, steps),
+        figure=_figure(responses, largest_deviations, steps),
         caption=(
             "Largest deviation by sample rate; the deviation over time at 50 Hz; the path of the"
             " proposed method at each rate, a_E enlarged."
@@ -61,31 +61,32 @@ def run(tick: Tick) -> Outcome:
                 rows,
             ),
         ),
-        findings=(_finding(worst),),
+        findings=(_finding(largest_deviations),),
     )
 
 
-def _finding(worst: dict[tuple[Method, float], float]) -> Finding:
+def _finding(largest_deviations: dict[tuple[Method, float], float]) -> Finding:
     slowest, quickest = min(RATES_HZ), max(RATES_HZ)
-    largest = max(worst[EXACT, hz] for hz in RATES_HZ)
+    largest = max(largest_deviations[EXACT, hz] for hz in RATES_HZ)
     return Finding(
         "paper",
         "The deviation of the proposed method comes from discretisation.",
-        worst[PROPOSED, slowest] > 10.0 * worst[PROPOSED, quickest] and largest <= _ROUNDING,
-        f"It grows from {worst[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
-        f" {worst[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With exact, which solves"
-        f" each sample in closed form, it is at most {largest:.1g} at every rate.",
+        largest_deviations[PROPOSED, slowest] > 10.0 * largest_deviations[PROPOSED, quickest]
+        and largest <= _ROUNDING,
+        f"It grows from {largest_deviations[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
+        f" {largest_deviations[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With exact, which"
+        f" solves each sample in closed form, it is at most {largest:.1g} at every rate.",
     )
 
 
 def _figure(
-    flown: dict[tuple[Method, float], Response],
-    worst: dict[tuple[Method, float], float],
+    responses: dict[tuple[Method, float], Response],
+    largest_deviations: dict[tuple[Method, float], float],
     steps: dict[float, Step],
 ) -> Figure:
     figure, ((over_rate, over_time, plane),) = new_figure(1, 3, width=4.0)
     for method, marker in ((PROPOSED, "o"), (EXACT, "s")):
-        values = [worst[method, hz] for hz in RATES_HZ]
+        values = [largest_deviations[method, hz] for hz in RATES_HZ]
         over_rate.plot(RATES_HZ, values, marker=marker, label=method.label, **method.line)
     over_rate.set(
         title="Largest deviation",
@@ -100,7 +101,7 @@ def _figure(
     over_rate.legend(loc="center right")
     slowest = min(RATES_HZ)
     for method in (PROPOSED, EXACT):
-        error = deviation(flown[method, slowest], steps[slowest].reference())[:, 0]
+        error = deviation(responses[method, slowest], steps[slowest].reference())[:, 0]
         draw_line(over_time, steps[slowest].time[1:], error[1:], method.line, method.label)
     over_time.set(
         title=f"Deviation at {slowest:.0f} Hz",
@@ -110,17 +111,19 @@ def _figure(
     )
     shades = np.linspace(1.0, 0.35, len(RATES_HZ))
     for hz, alpha in zip(reversed(RATES_HZ), shades, strict=True):
-        c = flown[PROPOSED, hz].at_heading(0)
+        c = responses[PROPOSED, hz].at_heading(0)
         line = {**PROPOSED.line, "alpha": alpha}
-        draw_line(plane, _from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
-    exact = flown[EXACT, slowest].at_heading(0)
-    draw_line(plane, _from_line(exact), exact[:, 0], EXACT.line, f"exact, {slowest:.0f} Hz")
+        draw_line(plane, _distance_from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
+    exact = responses[EXACT, slowest].at_heading(0)
+    draw_line(
+        plane, _distance_from_line(exact), exact[:, 0], EXACT.line, f"exact, {slowest:.0f} Hz"
+    )
     plane.set(title="Paths, enlarged across", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
     plane.set_xlim(right=5.2)
     plane.legend(loc="center right")
     return figure
 
 
-def _from_line(c: Floats) -> Floats:
+def _distance_from_line(c: Floats) -> Floats:
     """(n,) distance of (n, 2) coefficients from the straight line of the step, in thousandths."""
     return np.asarray(1e3 * (c[:, 1] - FIGURE_2.target.east))

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.study.drawing import draw_line, new_figure
 from companion.study.methods import EXACT, FOLLOWING, PAPER_METHODS, PROPOSED, REFERENCE, Line
-from companion.study.track.flights import Flown
+from companion.study.track.flights import TrackedFlights
 from companion.study.track.tasks import (
     CALM,
     CIRCLES,
@@ -38,13 +38,13 @@ _MARKERS = ("o", "s")
 """Marker of each of `GUIDANCES`."""
 
 
-def draw_figure(flown: Flown) -> Figure:
+def draw_figure(flights: TrackedFlights) -> Figure:
     """Draw the figure that `CAPTION` describes."""
-    telemetry = {task: 1e3 * tracked.telemetry.rms for task, tracked in flown.items()}
-    truth = {task: 1e3 * tracked.truth.rms for task, tracked in flown.items()}
+    telemetry = {task: 1e3 * flight.telemetry_error.rms for task, flight in flights.items()}
+    truth = {task: 1e3 * flight.true_error.rms for task, flight in flights.items()}
     figure, panels = new_figure(4, 2)
     for column, courses in zip(panels.T, (CIRCLES, EIGHTS), strict=True):
-        _draw_paths(column[0], flown, courses[-1])
+        _draw_paths(column[0], flights, courses[-1])
         _draw_planners(column[1], telemetry, courses)
         column[1].set_title("All planners in still air, by telemetry")
         _draw_planners(column[2], truth, courses)
@@ -55,10 +55,10 @@ def draw_figure(flown: Flown) -> Figure:
     return figure
 
 
-def _draw_paths(axes: Axes, flown: Flown, course: Course) -> None:
+def _draw_paths(axes: Axes, flights: TrackedFlights, course: Course) -> None:
     """Draw the reference path, and the paths flown with and without lead."""
-    with_lead = flown[Task(course, MODEL_FOLLOWING)]
-    without_lead = flown[Task(course, MODEL_FOLLOWING, lead=False)]
+    with_lead = flights[Task(course, MODEL_FOLLOWING)]
+    without_lead = flights[Task(course, MODEL_FOLLOWING, lead=False)]
     draw_line(axes, with_lead.path[:, 3], with_lead.path[:, 2], FOLLOWING.line, "led")
     line_without_lead = {"color": _COLOUR_WITHOUT_LEAD, "linewidth": 1.0}
     draw_line(axes, without_lead.path[:, 3], without_lead.path[:, 2], line_without_lead, "not led")

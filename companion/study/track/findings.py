@@ -6,7 +6,7 @@ from math import isfinite
 from companion.attitude import PLANNER_NAMES
 from companion.attitude.planner import FIRST_ORDER, MODEL_FOLLOWING
 from companion.study.outcome import Finding
-from companion.study.track.flights import Flown, TrackedFlight
+from companion.study.track.flights import TrackedFlight, TrackedFlights
 from companion.study.track.tasks import (
     CALM,
     CIRCLE_AT_5,
@@ -34,34 +34,34 @@ Error = Callable[[TrackedFlight], float]
 """Selects an error of a flight, m."""
 
 
-def find(flown: Flown) -> tuple[Finding, ...]:
+def find(flights: TrackedFlights) -> tuple[Finding, ...]:
     """All findings, those on the planners first."""
     return (
         _smallest(
-            flown,
+            flights,
             "In still air no planner has a smaller position error by telemetry than"
             " model-following.",
-            _by_telemetry,
+            _telemetry_rms,
         ),
         _smallest(
-            flown,
+            flights,
             "In still air no planner has a smaller true position error than model-following.",
-            lambda tracked: tracked.truth.rms,
+            lambda flight: flight.true_error.rms,
         ),
-        _in_wind(flown),
-        *(_lead(flown, wind) for wind in (CALM, WINDY)),
-        _small_enough(flown),
+        _in_wind(flights),
+        *(_lead_finding(flights, wind) for wind in (CALM, WINDY)),
+        _small_enough(flights),
     )
 
 
-def _by_telemetry(tracked: TrackedFlight) -> float:
+def _telemetry_rms(flight: TrackedFlight) -> float:
     """RMS error of the position that guidance received, m."""
-    return tracked.telemetry.rms
+    return flight.telemetry_error.rms
 
 
-def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
+def _smallest(flights: TrackedFlights, statement: str, error: Error) -> Finding:
     def error_of(course: Course, planner: str) -> float:
-        return error(flown[Task(course, planner)])
+        return error(flights[Task(course, planner)])
 
     ours = {course: error_of(course, MODEL_FOLLOWING) for course in COURSES}
     best = {course: min(_OTHERS, key=lambda other: error_of(course, other)) for course in COURSES}
@@ -82,10 +82,10 @@ def _smallest(flown: Flown, statement: str, error: Error) -> Finding:
     )
 
 
-def _in_wind(flown: Flown) -> Finding:
+def _in_wind(flights: TrackedFlights) -> Finding:
     pairs = {
         course: tuple(
-            _by_telemetry(flown[Task(course, planner, wind=WINDY)])
+            _telemetry_rms(flights[Task(course, planner, wind=WINDY)])
             for planner in (MODEL_FOLLOWING, FIRST_ORDER)
         )
         for course in COURSES
@@ -93,21 +93,24 @@ def _in_wind(flown: Flown) -> Finding:
     return Finding(
         "ours",
         f"In {WINDY:g} m/s of wind model-following has a smaller error than first-order.",
-        all(following < first for following, first in pairs.values()),
+        all(
+            model_following_error < first_order_error
+            for model_following_error, first_order_error in pairs.values()
+        ),
         "; ".join(
-            f"{course}: {_in_mm(following)} against {_in_mm(first)}"
-            for course, (following, first) in pairs.items()
+            f"{course}: {_in_mm(model_following_error)} against {_in_mm(first_order_error)}"
+            for course, (model_following_error, first_order_error) in pairs.items()
         )
         + ".",
     )
 
 
-def _lead(flown: Flown, wind: float) -> Finding:
+def _lead_finding(flights: TrackedFlights, wind: float) -> Finding:
     ratios = {}
     for course in (CIRCLE_AT_5, EIGHT_AT_5):
         task = Task(course, MODEL_FOLLOWING, LINEAR, wind)
-        ratios[course] = _by_telemetry(flown[task._replace(lead=False)]) / _by_telemetry(
-            flown[task]
+        ratios[course] = _telemetry_rms(flights[task._replace(lead=False)]) / _telemetry_rms(
+            flights[task]
         )
     return Finding(
         "ours",
@@ -118,15 +121,15 @@ def _lead(flown: Flown, wind: float) -> Finding:
     )
 
 
-def _small_enough(flown: Flown) -> Finding:
-    measured = {task: _by_telemetry(flown[task]) for task in _REQUIRED}
+def _small_enough(flights: TrackedFlights) -> Finding:
+    errors_m = {task: _telemetry_rms(flights[task]) for task in _REQUIRED}
     errors = (
-        f"{task}: {_in_mm(measured[task])} of {_in_mm(limit)}" for task, limit in _REQUIRED.items()
+        f"{task}: {_in_mm(errors_m[task])} of {_in_mm(limit)}" for task, limit in _REQUIRED.items()
     )
     return Finding(
         "ours",
         "model-following with linear guidance has an error as small as required.",
-        all(measured[task] <= limit for task, limit in _REQUIRED.items()),
+        all(errors_m[task] <= limit for task, limit in _REQUIRED.items()),
         "; ".join(errors) + ".",
     )
 

@@ -43,7 +43,7 @@ _SHORT_PHASES = {
     },
 }
 """Vehicle settings that shorten take-off and landing."""
-_TRUTH_PERIOD = 0.02
+_TRUTH_PERIOD_S = 0.02
 """Time between two records of the true position, s of vehicle time."""
 _MEASURED_PHASE = "maneuvers"
 
@@ -60,10 +60,10 @@ class TrackedFlight(NamedTuple):
 
     result: str
     """`ok`, or why the flight ended."""
-    telemetry: PositionError
-    """Distance of the position that guidance received from the reference."""
-    truth: PositionError
-    """Distance of the vehicle's true position from the reference."""
+    telemetry_error: PositionError
+    """Distance from the reference of the position that guidance received, m."""
+    true_error: PositionError
+    """Distance of the vehicle's true position from the reference, m."""
     path: Floats
     """(n, 4), reference north and east, true north and east, m."""
 
@@ -73,10 +73,10 @@ class TrackedFlight(NamedTuple):
         return self.result == "ok"
 
 
-Flown = dict[Task, TrackedFlight]
+TrackedFlights = dict[Task, TrackedFlight]
 
 
-def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
+def fly_all(tasks: Sequence[Task], tick: Tick) -> TrackedFlights:
     """Fly every task, with as many flights at a time as cores; call `tick` as each begins.
 
     The result of a flight does not depend on other flights. On Ctrl-C this function waits for the
@@ -85,25 +85,25 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> Flown:
     Raises:
         ConfigError: raised by a flight, see `fly`; no further flights are begun.
     """
-    count = cores()
-    flown: dict[Task, Future[TrackedFlight]] = {}
-    workers = min(count, len(tasks))
+    core_count = cores()
+    futures: dict[Task, Future[TrackedFlight]] = {}
+    workers = min(core_count, len(tasks))
     with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
         for task in tasks:
-            _await_a_free_core(list(flown.values()), count)
+            _await_free_core(list(futures.values()), core_count)
             tick(str(task))
             with interrupts_blocked():
-                flown[task] = pool.submit(fly, task)
-        return {task: future.result() for task, future in flown.items()}
+                futures[task] = pool.submit(fly, task)
+        return {task: future.result() for task, future in futures.items()}
 
 
-def _await_a_free_core(flights: Sequence[Future[TrackedFlight]], count: int) -> None:
-    unfinished = [flight for flight in flights if not flight.done()]
-    if len(unfinished) >= count:
+def _await_free_core(futures: Sequence[Future[TrackedFlight]], core_count: int) -> None:
+    unfinished = [future for future in futures if not future.done()]
+    if len(unfinished) >= core_count:
         wait(unfinished, return_when=FIRST_COMPLETED)
-    for flight in flights:
-        if flight.done():
-            flight.result()  # raises the flight's exception before more flights are started
+    for future in futures:
+        if future.done():
+            future.result()  # raises the flight's exception before more flights are started
 
 
 def fly(task: Task) -> TrackedFlight:
@@ -116,15 +116,15 @@ def fly(task: Task) -> TrackedFlight:
     wind = {"speed_m_s": task.wind, "gust_m_s": GUST_SHARE * task.wind}
     settings = {**(base.mock or {}), **_SHORT_PHASES, "wind": wind}
     vehicle = MockVehicle(**settings, compiled=can_compile())
-    truth = TruthRecorder(vehicle)
+    truth_recorder = TruthRecorder(vehicle)
     with tempfile.TemporaryDirectory(prefix="companion-track-") as folder:
         course = Path(folder, "course.yaml")
         course.write_text(bounded_yaml.dump(task.course.file_content))
-        summary = fly_in_memory(_task_config(base, task, course), vehicle, observer=truth)
+        summary = fly_in_memory(_task_config(base, task, course), vehicle, observer=truth_recorder)
     if summary.result != "ok":
-        failed = PositionError(inf, inf)
-        return TrackedFlight(summary.result, failed, failed, np.empty((0, 4)))
-    return _measure(summary.trace.tracking_rows(), truth.rows())
+        infinite_error = PositionError(inf, inf)
+        return TrackedFlight(summary.result, infinite_error, infinite_error, np.empty((0, 4)))
+    return _measure(summary.trace.tracking_rows(), truth_recorder.rows())
 
 
 def _task_config(base: Config, task: Task, course: Path) -> Config:
@@ -159,14 +159,14 @@ class TruthRecorder(SilentObserver):
     def __init__(self, vehicle: MockVehicle) -> None:
         self._vehicle = vehicle
         self._rows: list[tuple[float, ...]] = []
-        self._recording: asyncio.Task[None] | None = None
+        self._recording_task: asyncio.Task[None] | None = None
 
     def phase(self, name: str, waits_for: str) -> None:
         """Start to record when the measured phase begins, and stop when the next begins."""
         if name == _MEASURED_PHASE:
-            self._recording = asyncio.create_task(self._record())
-        elif self._recording is not None:
-            self._recording.cancel()
+            self._recording_task = asyncio.create_task(self._record())
+        elif self._recording_task is not None:
+            self._recording_task.cancel()
 
     def rows(self) -> Floats:
         """(n, 4): vehicle time, s, and position north, east and down of home, m."""
@@ -176,7 +176,7 @@ class TruthRecorder(SilentObserver):
         while True:
             truth = self._vehicle.state()
             self._rows.append((truth["time"], *truth["position"]))
-            await asyncio.sleep(_TRUTH_PERIOD)
+            await asyncio.sleep(_TRUTH_PERIOD_S)
 
 
 def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:
@@ -187,13 +187,20 @@ def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:
         truth: rows of `TruthRecorder.rows`.
     """
     time = truth[:, 0]
-    flown = tracking[(tracking[:, 0] >= time[0] + HOLD_S) & (tracking[:, 0] <= time[-1])]
-    reference, telemetry = flown[:, 1:4], flown[:, 4:7]
-    true = np.column_stack([np.interp(flown[:, 0], time, axis) for axis in truth[:, 1:].T])
-    path = np.hstack([reference[:, :2], true[:, :2]])
-    return TrackedFlight("ok", _error(telemetry - reference), _error(true - reference), path)
+    course_rows = tracking[(tracking[:, 0] >= time[0] + HOLD_S) & (tracking[:, 0] <= time[-1])]
+    reference, telemetry = course_rows[:, 1:4], course_rows[:, 4:7]
+    true_position = np.column_stack(
+        [np.interp(course_rows[:, 0], time, axis) for axis in truth[:, 1:].T]
+    )
+    path = np.hstack([reference[:, :2], true_position[:, :2]])
+    return TrackedFlight(
+        "ok",
+        _position_error(telemetry - reference),
+        _position_error(true_position - reference),
+        path,
+    )
 
 
-def _error(offsets: Floats) -> PositionError:
+def _position_error(offsets: Floats) -> PositionError:
     distance = np.linalg.norm(offsets, axis=1)
     return PositionError(float(np.sqrt(np.mean(distance**2))), float(distance.max()))

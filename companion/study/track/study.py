@@ -13,8 +13,8 @@ from companion.study.track.flights import (
     MAX_TILT_DEG,
     MAX_TILT_RATE_DEG_S,
     POSITION_RATE_HZ,
-    Flown,
     PositionError,
+    TrackedFlights,
     fly_all,
 )
 from companion.study.track.tasks import (
@@ -42,7 +42,7 @@ def run(tick: Tick) -> Outcome:
     Raises:
         ConfigError: as `fly_all`.
     """
-    flown = fly_all(tasks(), tick)
+    flights = fly_all(tasks(), tick)
     return Outcome(
         name="track",
         title="Track: position error on trajectories",
@@ -60,26 +60,26 @@ def run(tick: Tick) -> Outcome:
             " telemetry is that of the position that guidance receives. The true position is 10 ms"
             " of flight ahead of it, so a planner that lags by 10 ms has a smaller true error."
         ),
-        figure=draw_figure(flown),
+        figure=draw_figure(flights),
         caption=CAPTION,
-        tables=_tables(flown),
-        findings=find(flown),
-        series=(_flights_table(flown),),
-        rows=_rows(flown),
+        tables=_tables(flights),
+        findings=find(flights),
+        series=(_flights_table(flights),),
+        rows=_rows(flights),
     )
 
 
-def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
+def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
     """The rows that `--json` prints, one for each flight with lead.
 
     Errors are in m, and null if the flight failed. A row also has the errors of the same flight
     without lead, if there was one.
     """
     rows = []
-    for task, tracked in flown.items():
+    for task, flight in flights.items():
         if not task.lead:
             continue
-        not_led = flown.get(task._replace(lead=False))
+        without_lead = flights.get(task._replace(lead=False))
         rows.append(
             {
                 "trajectory": task.course.trajectory,
@@ -87,41 +87,45 @@ def _rows(flown: Flown) -> tuple[dict[str, Any], ...]:
                 "planner": task.planner,
                 "guidance": task.guidance,
                 "wind_mps": task.wind,
-                "position_rms_m": _or_null(tracked.telemetry.rms),
-                "position_max_m": _or_null(tracked.telemetry.largest),
-                "true_rms_m": _or_null(tracked.truth.rms),
-                "true_max_m": _or_null(tracked.truth.largest),
-                "not_led_rms_m": None if not_led is None else _or_null(not_led.telemetry.rms),
-                "not_led_max_m": None if not_led is None else _or_null(not_led.telemetry.largest),
-                "result": tracked.result,
+                "position_rms_m": _or_null(flight.telemetry_error.rms),
+                "position_max_m": _or_null(flight.telemetry_error.largest),
+                "true_rms_m": _or_null(flight.true_error.rms),
+                "true_max_m": _or_null(flight.true_error.largest),
+                "not_led_rms_m": None
+                if without_lead is None
+                else _or_null(without_lead.telemetry_error.rms),
+                "not_led_max_m": None
+                if without_lead is None
+                else _or_null(without_lead.telemetry_error.largest),
+                "result": flight.result,
             }
         )
     return tuple(rows)
 
 
-def _tables(flown: Flown) -> tuple[Table, ...]:
+def _tables(flights: TrackedFlights) -> tuple[Table, ...]:
     """The tables: all planners in still air, by telemetry and by true position; lead and wind."""
     return (
         _planners_table(
             "track",
             "Position error in still air by telemetry, rms, mm.",
-            {task: tracked.telemetry.rms for task, tracked in flown.items()},
+            {task: flight.telemetry_error.rms for task, flight in flights.items()},
         ),
         _planners_table(
             "track-largest",
             "The largest position error of the same flights, mm.",
-            {task: tracked.telemetry.largest for task, tracked in flown.items()},
+            {task: flight.telemetry_error.largest for task, flight in flights.items()},
         ),
         _planners_table(
             "track-true",
             "Error of the true position in the same flights, rms, mm.",
-            {task: tracked.truth.rms for task, tracked in flown.items()},
+            {task: flight.true_error.rms for task, flight in flights.items()},
         ),
-        _lead_and_wind_table(flown),
+        _lead_and_wind_table(flights),
     )
 
 
-def _flights_table(flown: Flown) -> Table:
+def _flights_table(flights: TrackedFlights) -> Table:
     """Table of every flight."""
     return Table(
         "track-flights",
@@ -147,11 +151,11 @@ def _flights_table(flown: Flown) -> Table:
                 task.guidance,
                 task.wind,
                 "yes" if task.lead else "no",
-                *_cells(tracked.telemetry),
-                *_cells(tracked.truth),
-                tracked.result,
+                *_cells(flight.telemetry_error),
+                *_cells(flight.true_error),
+                flight.result,
             )
-            for task, tracked in flown.items()
+            for task, flight in flights.items()
         ),
     )
 
@@ -177,9 +181,9 @@ def _planners_table(name: str, caption: str, errors: dict[Task, float]) -> Table
     )
 
 
-def _lead_and_wind_table(flown: Flown) -> Table:
+def _lead_and_wind_table(flights: TrackedFlights) -> Table:
     def rms(course: Course, planner: str, wind: float, *, lead: bool = True) -> Cell:
-        return _in_mm(flown[Task(course, planner, LINEAR, wind, lead)].telemetry.rms)
+        return _in_mm(flights[Task(course, planner, LINEAR, wind, lead)].telemetry_error.rms)
 
     return Table(
         "track-lead-and-wind",

@@ -23,7 +23,7 @@ class Course(NamedTuple):
     speed: float
     """Steady speed on the circle, largest speed on the figure-eight, m/s."""
     laps: float
-    """Number of laps; with these the vehicle holds the speed for a while."""
+    """Number of laps, enough for the vehicle to hold the speed for a while."""
 
     def __str__(self) -> str:
         return f"{self.trajectory}, {self.speed:g} m/s"

@@ -109,11 +109,11 @@ class ArduPilot:
             return "the estimator's status (EKF_STATUS_REPORT)"
         if flags & _ESTIMATOR_NEEDED != _ESTIMATOR_NEEDED or flags & _NO_POSITION:
             return f"the estimator (EKF_STATUS_REPORT flags 0x{flags:x})"
-        if not readiness.position:
+        if not readiness.has_position:
             return "a local position (LOCAL_POSITION_NED)"
-        if not readiness.home:
+        if not readiness.has_home:
             return "the home position (HOME_POSITION)"
-        if not readiness.prearm_good:
+        if not readiness.prearm_passed:
             return "the autopilot's pre-arm checks"
         return None
 

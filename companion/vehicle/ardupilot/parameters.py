@@ -197,7 +197,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         required(UNSAFE, 0.0, "checks before arming are left out"),
         _REFERENCE,
         universal=True,
-        instead="ARMING_CHECK",
+        alternative="ARMING_CHECK",
     ),
     ParameterRule(
         ("ARMING_CHECK",),

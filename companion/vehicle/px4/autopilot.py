@@ -119,15 +119,15 @@ class Px4:
 
     def not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: position, estimator, home or PX4's own pre-arm checks."""
-        if not readiness.position:
+        if not readiness.has_position:
             return "a local position (LOCAL_POSITION_NED)"
         if readiness.estimator_flags is None:
             return "the estimator's status (ESTIMATOR_STATUS)"
         if readiness.estimator_flags & _ESTIMATOR_NEEDED != _ESTIMATOR_NEEDED:
             return f"the estimator (ESTIMATOR_STATUS flags 0x{readiness.estimator_flags:x})"
-        if not readiness.home:
+        if not readiness.has_home:
             return "the home position (HOME_POSITION)"
-        if not readiness.prearm_good:
+        if not readiness.prearm_passed:
             return "the autopilot's pre-arm checks"
         return None
 
