@@ -119,10 +119,10 @@ class _Reader:
         if not self._stamps_ms or setpoint.type_mask & _RELEVANT_BITS != IGNORE_ATTITUDE:
             return
         stamp_is_known = setpoint.time_boot_ms in self._stamps_ms
-        sample_ms = setpoint.time_boot_ms if stamp_is_known else self._stamps_ms[-1]
+        stamp = setpoint.time_boot_ms if stamp_is_known else self._stamps_ms[-1]
         self._unconfirmed_setpoints.append(
             (
-                1e-3 * sample_ms,
+                1e-3 * stamp,
                 setpoint.body_roll_rate,
                 setpoint.body_pitch_rate,
                 setpoint.body_yaw_rate,
