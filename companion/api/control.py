@@ -37,7 +37,7 @@ class Control:
         context: context of the flight.
         newest: publishes the state of the vehicle.
         loop: loop of the flight.
-        source: takes the references.
+        source: receives the commanded references.
         control_end: future that is done when control has ended.
     """
 

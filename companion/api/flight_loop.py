@@ -1,10 +1,10 @@
 """The event loop in which a program's flight runs: a loop in its own thread, or the program's.
 
-The flight runs in the program's loop if the vehicle waits for each answer, as in lockstep.
+The flight runs in the program's loop if the vehicle's time waits for the program, as in lockstep.
 
 With a thread for the flight, a program that computes, blocks or never yields delays only its own
-commands. The flight continues to answer samples, notices the missing commands, and hands the
-vehicle back.
+commands. The flight continues to answer attitude samples with setpoints, notices the missing
+commands, and hands the vehicle back.
 
 `OwnThreadLoop` and `SharedLoop` have the same methods, for the program's loop to call.
 """
@@ -26,8 +26,8 @@ Arguments = TypeVarTuple("Arguments")
 
 SWITCH_INTERVAL = 5e-5
 """Time for which a busy thread of the program keeps the interpreter, s. Python's default of 5 ms
-would delay each answer by several times 5 ms, because every system call of the flight releases the
-interpreter.
+would delay each setpoint by several times 5 ms, because every system call of the flight releases
+the interpreter.
 """
 
 _CHECK_PERIOD = 0.1
@@ -35,9 +35,9 @@ _CHECK_PERIOD = 0.1
 
 
 class SharedLoop:
-    """Runs the flight in the program's own loop, if the vehicle waits for each answer.
+    """Runs the flight in the program's own loop, if the vehicle's time waits for the program.
 
-    The vehicle waits in lockstep, and when `companion.testing` runs it on a virtual clock.
+    It waits in lockstep, and when `companion.testing` runs it on a virtual clock.
 
     Attributes:
         time: the clock of the flight: a function that returns s.

@@ -48,7 +48,7 @@ class Vehicle:
     `RuntimeError`.
 
     Args:
-        program: the flight's plan, which takes the requests.
+        program: the flight's plan, which receives the requests.
         context: context of the flight; it is only read here.
         newest: publishes the state of the vehicle.
         loop: loop of the flight.

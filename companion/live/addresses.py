@@ -126,7 +126,7 @@ def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, i
 
 
 def _bind(listening: socket.socket, host: str, port: int) -> None:
-    """Bind the socket; the page or the stream of an ended flight first releases the port."""
+    """Bind the socket; ask the page or stream of an ended flight to release the port."""
     deadline, release_agreed = time.monotonic() + _ANSWER_TIMEOUT, False
     while True:
         try:

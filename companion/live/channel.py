@@ -17,8 +17,8 @@ class Channel:
 
     Attributes:
         dropped: number of messages that could not be sent, because the buffer was full, the message
-            too large, or the other end closed. Messages after the first to a closed end are not
-            counted.
+            too large, or the other end closed. After the other end has closed, only the first
+            message is counted.
         open: whether the other end existed at the last attempt.
     """
 

@@ -19,8 +19,8 @@ from companion.guidance import ManeuverSequence
 from companion.tuning import stability
 
 _LEAST_GAIN_DB, _LEAST_PHASE_DEG = 4.0, 20.0
-"""Smallest gain and phase margin that a change may leave. If the loop had less when the flight
-began, a change must not reduce that margin."""
+"""Smallest gain margin, dB, and phase margin, degrees, that a change may leave. A margin that was
+smaller when the flight began must not become smaller still."""
 _ROUNDING = 1e-3
 """Relative error of computed margins that is ignored."""
 
@@ -54,7 +54,10 @@ class ChangeChecks:
         self.current = Config.model_validate(message["config"])
 
     def note_drag(self, message: dict[str, Any]) -> None:
-        """Note the drag of this vehicle; before, the drag of the vehicle flown last is assumed."""
+        """Note the drag of this vehicle, from a message of the flight.
+
+        Until this message comes, the drag of the vehicle flown last is assumed.
+        """
         drag, source = message["drag"], message["source"]
         self._drag = KnownDrag(
             None if drag is None else Drag(*drag), None if source is None else Path(source)
@@ -63,9 +66,14 @@ class ChangeChecks:
     def check(self, values: Values, name: str) -> None:
         """Check new values: valid, not too large a change, stable, and the maneuvers still flyable.
 
+        Args:
+            values: the new values, by section and key.
+            name: who or what requests them, such as the edited file; error messages name it.
+
         Raises:
             ConfigError: a check fails, a key must not change in flight, no key may change with
-                the planner or guidance of this flight, or its maneuvers could not be loaded.
+                the planner or guidance of this flight, or the maneuvers of this flight could not
+                be loaded.
         """
         wanted = changed_in_flight(self.start, self.current, values, name)
         reason = fixed_because(self.start)

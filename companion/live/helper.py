@@ -20,7 +20,8 @@ from companion.realtime import schedule_as_usual
 T = TypeVar("T")
 
 _MOST_PER_TURN = 10
-"""Largest number of messages handled in one turn of the event loop; samples come between turns."""
+"""Largest number of messages handled in one turn of the event loop; attitude samples are answered
+between two turns."""
 
 
 class HelperTasks(NamedTuple):
@@ -29,7 +30,7 @@ class HelperTasks(NamedTuple):
     watched_file: Path | None
     """Configuration file whose edits are applied in flight, or None."""
     config_as_read: Config
-    """Configuration as read from its file for the flight, before options."""
+    """Configuration as read from its file, before options of the command line changed it."""
     page: PageSocket | None
     """Listening socket of the live page; None: no live page."""
     stream: StreamAddress | None
@@ -179,7 +180,7 @@ class Helper:
 
 
 def _helper_name(tasks: HelperTasks) -> str:
-    """Name of the helper process in messages to the user: that of its page, stream or watcher."""
+    """Name of the helper process for the user, such as "the live page" or "the file watcher"."""
     if tasks.page is not None:
         return "the live page"
     return "the file watcher" if tasks.stream is None else "the live stream"

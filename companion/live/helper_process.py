@@ -53,6 +53,10 @@ class Relay:
 
         Changes are made one after the other, each checked together with the earlier ones.
 
+        Args:
+            values: the new values, by section and key.
+            by: who or what requests the change, such as the edited file.
+
         Raises:
             ConfigError: the values cannot be used.
             ChangeRefusedError: the flight refuses them, cannot take them, or has ended.

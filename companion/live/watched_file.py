@@ -15,7 +15,7 @@ _UNCHANGED_CHECKS = 3
 """A file counts as complete after this many checks without a change; editors save in steps."""
 
 Signature = tuple[tuple[int, int, int] | None, ...]
-"""Inode, size and time (ns) of the file and of all its includes; None: it cannot be found."""
+"""Inode, size and time of change (ns) of the file and each included file; None: it is missing."""
 
 
 class Edit:

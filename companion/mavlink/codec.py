@@ -22,7 +22,7 @@ SET_ATTITUDE_TARGET = 82
 IGNORE_ATTITUDE = 128
 """ATTITUDE_TARGET_TYPEMASK: obey all three rates and the thrust, ignore the quaternion.
 
-No other mask is sent: with any other the autopilot chooses a value itself."""
+No other mask is sent: with any other mask the autopilot chooses some of these values itself."""
 
 _FLOAT32_MAX = 3.4028234663852886e38
 _ATTITUDE_LAYOUT = struct.Struct("<I7f")

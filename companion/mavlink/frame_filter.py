@@ -16,7 +16,7 @@ _REFUSED_NOTICES = {
     SignatureResult.WRONG_KEY: "the vehicle signs its frames with another key, so they are "
     "refused; give both sides the same key (link.signing_key_file)",
 }
-"""Notices about refused signatures. Those about time stamps of signatures: `Signing.remarks`."""
+"""Notices about refused signatures; `Signing.remarks` has the notices about their time stamps."""
 
 _KEY_MISSING_NOTICE = (
     "the vehicle signs its frames and we do not, so it may obey nothing we send; set "
@@ -41,7 +41,11 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only because no answer to TIMESYNC proved its date."""
+        """Whether the last frame was refused only because its time stamp is not proved yet.
+
+        The vehicle proves a time stamp far ahead of this program's date by answering a TIMESYNC
+        request.
+        """
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:

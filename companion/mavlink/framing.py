@@ -54,8 +54,8 @@ class FrameScanner:
         streaming: True if a frame may continue in the next call (TCP, serial). False for
             datagrams: an incomplete frame is dropped.
         stats: counts wrong checksums and unknown messages.
-        keep_unknown: whether frames of unknown messages are returned too, with their checksum not
-            checked. Their id is not in `crc_extra`.
+        keep_unknown: whether frames of unknown messages (id not in `crc_extra`) are returned too;
+            their checksum cannot be checked.
     """
 
     def __init__(
@@ -168,7 +168,7 @@ class FrameScanner:
 
 
 def _is_plausible(data: bytes, start: int) -> bool:
-    """Whether this may be a version 2 header: compat_flags 0, message id below 65536."""
+    """Whether a version 2 header may begin at `start`: compat_flags 0, message id below 65536."""
     return data[start] == V2 and data[start + 3] == 0 and data[start + 9] == 0
 
 

@@ -166,7 +166,7 @@ class LockstepEventLoop(LinkEventLoop):
     wall time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
 
     Args:
-        clock: clock to use instead of the one described above; needs `selector` too.
+        clock: clock to use instead of wall time and beacons; it needs `selector` too.
         selector: the selector that advances `clock`.
     """
 

@@ -1,9 +1,9 @@
 """An asyncio event loop that calls the readers of the link with less delay.
 
-When a socket is readable, asyncio first builds and runs a handle for its `add_reader` callback:
-15 to 20 us at 250 Hz, when the caches are cold. The selector here calls a "hot" reader directly,
-before asyncio handles anything else. asyncio's own datagram transport is slower still: it reads
-every packet into a new 256 KiB buffer. `companion bench link` measures this.
+When a socket is readable, asyncio first builds and runs a handle for its `add_reader` callback.
+This takes 15 to 20 us, because the caches are cold at 250 Hz. The selector here calls a "hot"
+reader directly, before asyncio handles anything else. asyncio's own datagram transport is slower
+still: it reads every packet into a new 256 KiB buffer. `companion bench link` measures this.
 """
 
 import asyncio
@@ -18,6 +18,7 @@ from companion.realtime import frozen_objects
 T = TypeVar("T")
 
 Ready = list[tuple[selectors.SelectorKey, int]]
+"""Key and event mask of each file that is ready, as `select` of every selector returns them."""
 
 
 class HotSelector(selectors.DefaultSelector):
@@ -44,7 +45,7 @@ class HotSelector(selectors.DefaultSelector):
         del self._hot[fd]
 
     def select(self, timeout: float | None = None) -> Ready:
-        """Wait for I/O; hot readers are called before this returns."""
+        """Wait for I/O; hot readers are called before `select` returns."""
         others_ready = False
         # Rounded up: a timer that is woken early would only poll again.
         for fd, _ in self._poll.poll(None if timeout is None else ceil(timeout * 1e3)):

@@ -1,7 +1,7 @@
 """Messages by name and number, and their payloads decoded and encoded by pymavlink.
 
 The dialect holds MAVLink common and ArduPilot's estimator status. It lacks CURRENT_MODE, which is
-defined here, and the events, whose payloads are passed on undecoded.
+defined here, and MAVLink's events, whose payloads are passed on undecoded.
 """
 
 import struct

@@ -28,7 +28,7 @@ _TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
 _MAX_REQUESTS = 16  # TIMESYNC requests whose answers are recognised
 
 WRITE_PERIOD_S = 10.0
-"""Time between two writes of the stamps, s. The guide demands one write a minute."""
+"""Time between two writes of the stamps, s. MAVLink's guide demands one write a minute."""
 _STAMP_RESERVE = 15 * TICKS_PER_S
 """Time added to the newest stamps in the file while the link is open, ticks.
 
@@ -130,7 +130,11 @@ class Signing:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only because no answer to TIMESYNC proved its date."""
+        """Whether the last frame was refused only because its time stamp is not proved yet.
+
+        The vehicle proves a time stamp far ahead of this program's date by answering a TIMESYNC
+        request.
+        """
         return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:

@@ -1,9 +1,10 @@
 """Decides which signature time stamps are accepted, and which date this program assumes.
 
-Source: the MAVLink message-signing guide, "Timestamp handling". The stamps of a stream must rise. A
-new stream may be a minute behind. The newest stamp is kept on disk, and the next run starts at this
-stamp or at the computer's clock, whichever is later. The guide accepts every stamp with the right
-key; here, stamps too far in the future are refused.
+Source: the MAVLink message-signing guide, "Timestamp handling". The stamps of a stream must rise.
+The first stamp of a new stream may be a minute older than the newest stamp of the others. The
+newest stamp is kept on disk, and the next run starts at this stamp or at the computer's clock,
+whichever is later. The guide accepts every stamp with the right key; here, stamps too far in the
+future are refused.
 """
 
 import time

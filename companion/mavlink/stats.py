@@ -60,7 +60,12 @@ class LinkStats:
     """(system, component) of the frames in `ignored_foreign`."""
 
     def refuse_non_finite(self, message: str, now: float) -> None:
-        """Count a message of that name as refused at `now`, s of event-loop time."""
+        """Count a message that was refused for a NaN or infinity.
+
+        Args:
+            message: name of the message.
+            now: event-loop time, s.
+        """
         self.non_finite += 1
         self.non_finite_at[message] = now
 
@@ -96,7 +101,10 @@ class FrameCounter:
         self._last_sequence = None
 
     def _missing(self, sequence: int) -> int:
-        """Frames missing before this one; −1 if it is repeated, or late by up to 127 frames."""
+        """Number of frames missing before the frame with the number `sequence`.
+
+        −1 if that frame is repeated, or late by up to 127 frames.
+        """
         step = 1 if self._last_sequence is None else (sequence - self._last_sequence) & 0xFF
         if step == 0 or step > 128:
             return -1

@@ -106,8 +106,8 @@ def status_texts(text: str, severity: int, text_id: int) -> list[Message]:
 class TextFrames:
     """Makes STATUSTEXT frames with texts of this program, for a log; they are not sent.
 
-    The frames come from MAV_COMP_ID_LOG: among this program's own frames, their sequence numbers
-    would look like lost frames.
+    The component id of the frames is MAV_COMP_ID_LOG. With this program's own component id, their
+    sequence numbers would make other frames look lost.
 
     Args:
         system: system id of the frames.

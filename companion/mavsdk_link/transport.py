@@ -3,8 +3,9 @@
 MAVSDK forwards frames between its two connections: one to the vehicle, and one of its type `raw` to
 this process. So each side gets each frame as the other sent it, with its time stamp.
 
-MAVSDK sends from a thread of its own, so a frame reaches the kernel 0.1 ms later. MAVSDK does not
-report whether a frame was sent, and queues frames that a serial port or TCP connection cannot take.
+MAVSDK sends from a thread of its own, so a frame reaches the kernel 0.1 ms later than if this
+program sends it. MAVSDK does not report whether a frame was sent, and queues frames that a serial
+port or TCP connection cannot take.
 """
 
 import asyncio
@@ -73,7 +74,7 @@ class MavsdkTransport:
     """A running MAVSDK. It opens a dropped TCP connection or serial port again by itself.
 
     Args:
-        settings: the endpoint and ids. MAVSDK itself uses the component id above
+        settings: the endpoint and ids. MAVSDK itself uses the component id after
             `source_component`, because it does not forward frames that are addressed to itself.
         receive: called in the event loop for each frame except MAVSDK's own.
 
@@ -111,8 +112,8 @@ class MavsdkTransport:
         """Have MAVSDK forward one frame, once.
 
         Returns:
-            False if the vehicle was not heard yet, or after `close`: MAVSDK's library would then
-            end this process by a segmentation fault.
+            False if the vehicle was not heard yet, or after `close`. A frame passed to MAVSDK's
+            library after `close` would end this process by a segmentation fault.
         """
         if not (self._has_peer and self._is_open):
             return False

@@ -31,7 +31,7 @@ class FlightRecords:
         note: called with each event, as a sentence for the user.
 
     Attributes:
-        grants: the requested real-time settings, granted or refused.
+        grants: results of requesting the real-time settings: each setting is granted or refused.
         on_recorded: called with the folder of each flight when its record is complete; returns a
             sentence for the clients, or None. It runs in a thread, except on a virtual clock.
     """

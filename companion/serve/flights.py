@@ -68,7 +68,7 @@ class ServedFlights:
         return self._clock() >= self._retry_time
 
     def fence_refusal(self) -> str | None:
-        """Why another flight must not begin, as found by `KeptFence.refusal`; None: it may."""
+        """Why the next flight must not begin, as found by `KeptFence.refusal`; None: it may."""
         return self._fence.refusal()
 
     def begin(

@@ -28,7 +28,7 @@ _STEERING_COMMANDS = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CON
 _LEAVING_COMMANDS = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
 _CUSTOM_MODE_FLAG = 1
 _MAIN_MODE = 0xFF << 16
-"""Mask of PX4's main mode in `custom_mode`; OFFBOARD has no sub mode, and PX4 ignores any given."""
+"""Mask of PX4's main mode in `custom_mode`; OFFBOARD has no sub mode, and PX4 ignores its bits."""
 _MODE_MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE})
 """Messages that can command a mode."""
 

@@ -34,7 +34,7 @@ def change_refusal(before: Config, after: Config) -> str | None:
 
     Motions are planned with the limits at the takeover, but the guidance loop uses changed limits
     at once. With lower limits the vehicle could not follow the motions. So the limits of motions
-    must not change, and the tilt limit must stay large enough.
+    must not change, and the tilt limit must stay large enough for these motions.
     """
     changed_names = {each.name for each in differences(before, after)} & _MOTION_LIMITS
     if changed_names:

@@ -42,8 +42,8 @@ class Programs:
         """The program that sent a command.
 
         A program may use different component ids for commands and setpoints. If no setpoint came
-        from the address of `frame`, this is the program with the newest setpoint at the same
-        client.
+        from the address of `frame`, the command counts as sent by the program with the newest
+        setpoint at the same client.
         """
         program = Program(client, source_of(frame))
         if program in self._newest:

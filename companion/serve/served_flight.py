@@ -115,7 +115,7 @@ class ServedFlight:
 
     @property
     def is_ending(self) -> bool:
-        """Whether requests are no longer flown: a monitor holds the vehicle, or an exit runs."""
+        """Whether requests are no longer flown: a monitor holds the vehicle, or the flight ends."""
         has_begun = self._source.start_pose is not None
         flown = self._assembled.context.guidance_loop.flown_source
         is_replaced = has_begun and flown.source is not self._source
@@ -146,7 +146,7 @@ class ServedFlight:
         self._release_commanded_at = self._clock()
 
     def interrupt(self, reason: str) -> None:
-        """Hand the vehicle back."""
+        """Hand the vehicle back for a reason, in words."""
         self._assembled.flight.interrupt(reason)
 
     async def run(self, command: ControlRequest | None) -> bool:

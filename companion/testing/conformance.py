@@ -28,7 +28,7 @@ _GAIN = 5.0  # 1/s
 _DT = 0.004  # s
 _CASE_COUNT = 200
 _SETTLING_TIME = 3.0
-"""Time allowed for a step, s: 15 times the time constant 1/`_GAIN`."""
+"""Time allowed to reach a new target, s: 15 times the time constant 1/`_GAIN`."""
 _MAX_REMAINING_ERROR = 0.02
 """Largest distance of the coefficients from their target after `_SETTLING_TIME`."""
 _MAX_DISTANCE = 1.5
@@ -43,8 +43,8 @@ def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
         seed: seed of the attitudes and targets.
 
     Raises:
-        AssertionError: the planner may not fly; the message gives the start (attitude or target)
-            and the target to be reached.
+        AssertionError: the planner may not fly; the message gives the attitude or target at the
+            start, and the target to be reached.
         PluginError: the plug-in cannot be loaded, or two packages give it.
         TypeError: `planner` is no planner: the law does not return three numbers, or the class has
             not the methods of a `Planner`.

@@ -59,8 +59,8 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
 async def _cancelled_by_ctrl_c(main: Coroutine[Any, Any, T]) -> T:
     """Return the result of `main`; raise CancelledError if Ctrl-C came meanwhile.
 
-    After Ctrl-C a flight ends and returns normally. Without the error, a campaign or a test would
-    go on with the next flight. `asyncio.Runner` turns the error into KeyboardInterrupt.
+    After Ctrl-C a flight ends and returns normally. Without CancelledError, a campaign or a test
+    would go on with the next flight. `asyncio.Runner` turns it into KeyboardInterrupt.
     """
     result = await main
     task = asyncio.current_task()
@@ -87,7 +87,7 @@ def session(
     """A session to be flown inside `run`; the arguments are those of `fly`.
 
     `link.endpoint` and `realtime` have no effect, and `link.lockstep` is set to match the vehicle.
-    `Session.interrupt` and `Session.leave` are Ctrl-C and a second Ctrl-C.
+    `Session.interrupt` acts like Ctrl-C, and `Session.leave` like a second Ctrl-C.
 
     Raises:
         ConfigError: the configuration is wrong.

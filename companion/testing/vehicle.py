@@ -133,7 +133,7 @@ class MockVehicle:
         self.transmit(common.MAVLink_command_long_message(1, 1, number, 0, *padded))
 
     def transmit(self, message: Any, sender: tuple[int, int] = _GROUND_STATION) -> None:
-        """Let another station (system, component) send a pymavlink message to the autopilot."""
+        """Let a station, with the system and component ids `sender`, send a pymavlink message."""
         frame = message.pack(common.MAVLink(None, *sender))
         self.receive(bytes(frame))
 

@@ -118,6 +118,9 @@ class VirtualEventLoop(LockstepEventLoop):
         *args: *Arguments,
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
-        """Schedule a timer; the vehicle advances at most to this time."""
+        """Schedule a timer; before it runs, the vehicle advances at most to the time `when`.
+
+        In lockstep the vehicle completes the step that contains this time.
+        """
         self._virtual_selector.scheduled += 1
         return super().call_at(when, callback, *args, context=context)

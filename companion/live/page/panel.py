@@ -132,7 +132,10 @@ def _range(allowed: str) -> str:
 
 
 def _parsed(text: str) -> Any:
-    """The number in a field, None for an empty field, or a text that the checks refuse."""
+    """Convert the text of a field to a number, or to None if it is empty.
+
+    Any other text is returned unchanged; the checks of the change refuse it.
+    """
     if text in ("", "null"):
         return None
     try:

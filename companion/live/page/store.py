@@ -58,12 +58,12 @@ class Store:
         self.end_text = self.end_text or "the program that flew has ended"
 
     def since(self, count: int) -> list[Message]:
-        """The kept states after the first `count` states."""
+        """The states that came after the first `count` states and are still kept."""
         new_count = min(self.state_count - count, len(self.states))
         return list(self.states)[len(self.states) - new_count :]
 
     def events_since(self, count: int) -> list[dict[str, Any]]:
-        """The kept events after the first `count` events."""
+        """The events that came after the first `count` events and are still kept."""
         new_count = min(self.event_count - count, len(self.events))
         return list(self.events)[len(self.events) - new_count :]
 

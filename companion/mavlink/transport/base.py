@@ -34,8 +34,9 @@ class Receiver(Protocol):
     def may_prove_date(self, sender: str) -> bool:
         """Whether to send frames to `sender`, although its claim was refused.
 
-        True if its signature has the right key but an unproven date. An answer to TIMESYNC can
-        prove the date; the next frame that is accepted then makes `sender` the peer.
+        True if the frame was signed with the right key, but its time stamp is not proved yet
+        (`Signing.awaits_answer`). `sender` can prove it by answering a TIMESYNC request. The next
+        frame that is accepted then makes `sender` the peer.
         """
 
     def claim_lapsed(self) -> bool:

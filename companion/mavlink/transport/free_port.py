@@ -7,7 +7,8 @@ import socket
 from companion.mavlink.errors import LinkError
 
 _FIRST_PORT, _PORT_COUNT = 20_000, 12_000
-"""The ports tried are below 32768, from which on Linux assigns ports to sockets that ask for any.
+"""First port that is tried, and number of ports. All are below 32768, because from there on Linux
+assigns ports to sockets that ask for any.
 """
 
 _PORTS_PER_PROCESS = 50

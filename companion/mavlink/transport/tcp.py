@@ -65,9 +65,9 @@ async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -
 class TcpTransport:
     """A TCP client or server with at most one connection at a time.
 
-    A server goes on listening when the vehicle's connection drops, so the link need not open it
-    again. While a client is connected, a second one is refused, unless the first made no valid
-    claim (`PeerRule`) within 5 s or its claim has lapsed: then the second replaces the first.
+    A server goes on listening when the vehicle's connection drops, so the link need not open the
+    server again. While a client is connected, a second one is refused, unless the first made no
+    valid claim (`PeerRule`) within 5 s or its claim has lapsed: then the second replaces the first.
 
     Attributes:
         local: (host, port) of a listening server; `None` for a client.
@@ -92,7 +92,7 @@ class TcpTransport:
         return self._server is None
 
     def listen(self, server: asyncio.Server) -> None:
-        """Make this the transport of a listening `server`."""
+        """Use `server`, which listens for the vehicle, with this transport."""
         self._server = server
         self.local = server.sockets[0].getsockname()[:2]
 

@@ -2,7 +2,8 @@
 
 Forwarding must not delay the control loop, so an arriving frame is only queued. The queue is
 forwarded right after the next attitude sample has been answered, when the following sample is a
-whole period away. If no sample comes within `_MAX_FORWARDING_DELAY`, the queue is forwarded then.
+whole period away. If no sample comes within `_MAX_FORWARDING_DELAY`, the queue is forwarded after
+this time.
 """
 
 import asyncio
@@ -172,7 +173,7 @@ class Network:
             self._flush_later()
 
     def _queue_frame(self, frame: Frame) -> None:
-        """Queue a frame of the link; forwarding it now could delay the next attitude sample."""
+        """Queue a frame that came over the link; forwarding it now could delay the next sample."""
         if len(self._from_vehicle) >= _MAX_VEHICLE_FRAMES:
             self.overflowed += 1
             return

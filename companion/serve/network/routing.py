@@ -30,14 +30,14 @@ class RoutingStats:
     """Counters of forwarded and dropped frames."""
 
     to_clients: int = 0
-    """Frames of the vehicle that were queued for clients, counted for each client."""
+    """Frames of the vehicle that were queued for clients; a frame for two clients counts twice."""
     to_vehicle: int = 0
     """Clients' frames that were queued for the vehicle."""
     between_clients: int = 0
     """Clients' frames that were queued for other clients."""
     looped: int = 0
     """Frames of clients and of other components that were dropped, because they were repetitions,
-    came from a client that had gone, or had our or the autopilot's address."""
+    came from a client that had gone, or named our component or the autopilot as their sender."""
     no_route: int = 0
     """Frames dropped because their target was never heard."""
 

@@ -21,7 +21,7 @@ _READ_BYTES = 4096
 stop the control loop for too long."""
 _DEAD_TIMEOUT = 60.0
 """Time without an acknowledgement or a read after which a client counts as gone, s. Linux would
-wait for 15 minutes. Until then a client that reconnects often over a bad network would take all
+wait for 15 minutes, in which a client that reconnects often over a bad network would take all
 `_MAX_CLIENTS` places.
 """
 _RETRY_PAUSE = 2.0

@@ -1,4 +1,7 @@
-"""Jerk-limited motions of an error to zero, along one or more axes, by Ruckig (extra `serve`)."""
+"""Jerk-limited motions that reduce an error to zero, along one or more axes.
+
+Ruckig computes them (extra `serve`).
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -31,10 +34,10 @@ class AxisLimits(NamedTuple):
 
 
 class UnplannableError(ValueError):
-    """Ruckig finds no motion.
+    """Ruckig finds no motion that reduces the position or velocity error to zero.
 
-    Numbers of the error or of the limits are too large, differ by too many orders of magnitude, or
-    are not finite.
+    The numbers in this error or in the limits are too large, differ by too many orders of
+    magnitude, or are not finite.
     """
 
 

@@ -21,7 +21,7 @@ from companion.serve.setpoints.commanded_state import (
 from companion.serve.setpoints.request import AxisDemand
 
 _MAX_STREAM_PERIOD = 0.25
-"""Longest time between setpoints of a stream, s; the derivatives of a stream are estimated."""
+"""Setpoints at most this time apart, s, form a stream, whose derivatives are estimated."""
 _DERIVATIVE_WEIGHT = 0.5
 """Weight of a new derivative in the exponential average."""
 _LARGEST_ACCELERATION = 15.0
@@ -69,13 +69,13 @@ class CommandFollower:
         self._commanded_state = CommandedState(self._zero, self._zero, self._zero, self._zero, 0.0)
 
     def begin(self, state: AxisState, now: float) -> None:
-        """Start from a state, and come to rest until a command comes."""
+        """Start from a state, and come to rest unless a command comes first."""
         self._newest_demand, self._approach = None, None
         self._commanded_state = CommandedState(*state, self._zero, now)
         self.stop(now)
 
     def at(self, time: float) -> AxisState:
-        """State at a time, s: the commanded state plus the rest of the error."""
+        """State at a time, s: the commanded state plus the remaining error."""
         commanded = self._commanded_state.at(time)
         if self._approach is None:
             return commanded
@@ -120,7 +120,7 @@ class CommandFollower:
         self._newest_demand, self._commanded_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
-        """Follow an unchanged command; extrapolate it only for `timeout`: its sender may hang."""
+        """Follow an unchanged command; extrapolate it for `timeout` only: its sender may hang."""
         if demand.position is None:
             self._repeat_motion(demand, now, actual)
             return
@@ -169,7 +169,7 @@ class CommandFollower:
     def _plan(
         self, error: AxisState, direction: AxisValues, now: float, *, by_velocity: bool
     ) -> Approach:
-        """A motion of the error to zero; the limits hold along `direction`, not for each axis."""
+        """Plan a motion of `error` to zero; the limits hold along `direction`, not for each axis."""
         length = hypot(*direction)
         limits = [
             each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(part) / length))
@@ -219,7 +219,7 @@ def _blend(old: AxisValues, new: AxisValues) -> AxisValues:
 
 
 def _near_vehicle(current: AxisState, actual: AxisMotion | None, demand: AxisDemand) -> AxisState:
-    """The state `current`, with position or velocity of `actual` where they are too far apart.
+    """The state `current`; its position or velocity is that of `actual` if the two are far apart.
 
     `actual` is the motion of the vehicle. A commanded velocity is never replaced.
     """

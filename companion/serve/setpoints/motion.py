@@ -22,7 +22,7 @@ _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 respond slowly in yaw.
 """
 _MAX_STREAM_PERIOD = 0.25
-"""Longest time between yaw setpoints of a stream, s; the yaw rate of a stream is estimated."""
+"""Yaw setpoints at most this time apart, s, form a stream, whose yaw rate is estimated."""
 
 
 class MotionLimits(NamedTuple):
@@ -112,12 +112,14 @@ class CommandedMotion:
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
     def _clamped(self, vertical: AxisDemand, *speeds: float) -> AxisDemand:
-        """Limit a vertical demand without position to the vertical speeds and acceleration.
+        """Limit a vertical demand that has no position.
 
-        Also an acceleration does not lead beyond the limits of the speed.
+        The velocity is limited to the climb and descent limits, and the acceleration to
+        `_VERTICAL_ACCELERATION`. An acceleration that would lead beyond a speed limit becomes a
+        demand for this speed.
 
         Args:
-            vertical: the demand.
+            vertical: the vertical demand, positive down.
             speeds: vertical speeds of the vehicle and of the reference, m/s, positive down.
         """
         if vertical.position is not None:

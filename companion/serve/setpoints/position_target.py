@@ -201,7 +201,7 @@ def _demand(
 
 
 def _complete_vector(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...] | None:
-    """The values of these axes; None if one of them is not commanded."""
+    """The values of the given `axes`; None if one of them is not commanded."""
     commanded = tuple(value for value in (values[axis] for axis in axes) if value is not None)
     return commanded if len(commanded) == len(axes) else None
 

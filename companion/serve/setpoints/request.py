@@ -1,4 +1,4 @@
-"""The meaning of a setpoint, and the error for one that is not understood."""
+"""The meaning of a setpoint, and the error for a setpoint that is not flown."""
 
 from typing import NamedTuple
 
@@ -77,7 +77,10 @@ _MIN_TAKEOFF_HEIGHT, _MIN_TAKEOFF_SPEED = 1.0, 0.1
 
 
 def climbs(request: Request, situation: Situation) -> bool:
-    """Whether a request leads a vehicle on the ground into the air; attitudes and rates do not."""
+    """Whether a request makes a vehicle on the ground take off.
+
+    Requests of an attitude or of body rates never do.
+    """
     if not isinstance(request, MotionRequest):
         return False
     position, velocity, _ = request.vertical

@@ -11,7 +11,7 @@ _ATTITUDE_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
 _LOCAL_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
 _GLOBAL_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
 SETPOINTS = frozenset({_ATTITUDE_TARGET_ID, _LOCAL_TARGET_ID, _GLOBAL_TARGET_ID})
-"""Numbers of the messages that command a motion, an attitude or body rates."""
+"""Ids of the messages that command a motion, an attitude or body rates."""
 
 
 def decode_setpoint(
