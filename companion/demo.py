@@ -110,10 +110,10 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
             _await_ready(process, log)
             yield
         finally:
-            _end(process, log)
+            _end_vehicle(process, log)
 
 
-def _end(process: "subprocess.Popen[bytes]", log: Path) -> None:
+def _end_vehicle(process: "subprocess.Popen[bytes]", log: Path) -> None:
     """End the vehicle's process.
 
     Raises:

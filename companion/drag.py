@@ -44,17 +44,19 @@ class Drag(NamedTuple):
         per_velocity = self.linear + self.quadratic * speed
         north, east, down = velocity
         a_north, a_east, a_down = acceleration
-        growth = self.quadratic * (north * a_north + east * a_east + down * a_down) / speed
+        per_velocity_rate = (
+            self.quadratic * (north * a_north + east * a_east + down * a_down) / speed
+        )
         return (
-            per_velocity * a_north + growth * north,
-            per_velocity * a_east + growth * east,
-            per_velocity * a_down + growth * down,
+            per_velocity * a_north + per_velocity_rate * north,
+            per_velocity * a_east + per_velocity_rate * east,
+            per_velocity * a_down + per_velocity_rate * down,
         )
 
 
 NO_DRAG = Drag()
 
-_MEAN_SHARE = 8.0 / (3.0 * pi)
+_MEAN_CUBE_SUM = 8.0 / (3.0 * pi)
 """Mean of |cos φ|³ + |sin φ|³ over all angles φ between airspeed and forward axis. Quadratic drag
 along two body axes decelerates along the airspeed by coefficient·|v|² times this sum.
 """
@@ -79,7 +81,9 @@ class AxisDrag(NamedTuple):
         """Deceleration north and east, m/s², at the airspeed (`north`, `east`), m/s."""
         if self.coefficient == 0.0:
             return 0.0, 0.0
-        return along_axes(self.coefficient, cos(self.heading), sin(self.heading), north, east)
+        return axis_drag_deceleration(
+            self.coefficient, cos(self.heading), sin(self.heading), north, east
+        )
 
     def deceleration_rate(
         self,
@@ -97,14 +101,14 @@ class AxisDrag(NamedTuple):
         if self.coefficient == 0.0:
             return 0.0, 0.0
         cosine, sine = cos(self.heading), sin(self.heading)
-        forward, right = _in_axes(cosine, sine, *velocity)
-        a_forward, a_right = _in_axes(cosine, sine, *acceleration)
+        forward, right = _body_components(cosine, sine, *velocity)
+        a_forward, a_right = _body_components(cosine, sine, *acceleration)
         # Derivatives of the components along the axes, which turn.
         forward_rate = a_forward + heading_rate * right
         right_rate = a_right - heading_rate * forward
         speed = _smooth_speed((forward, right, 0.0))
-        mean = _MEAN_SHARE * speed
-        mean_rate = _MEAN_SHARE * (forward * forward_rate + right * right_rate) / speed
+        mean = _MEAN_CUBE_SUM * speed
+        mean_rate = _MEAN_CUBE_SUM * (forward * forward_rate + right * right_rate) / speed
         # d: deceleration along an axis, per coefficient.
         d_forward = forward * (abs(forward) - mean)
         d_right = right * (abs(right) - mean)
@@ -115,25 +119,27 @@ class AxisDrag(NamedTuple):
         return cosine * forward - sine * right, sine * forward + cosine * right
 
 
-def along_axes(
+def axis_drag_deceleration(
     coefficient: Number, cosine: Number, sine: Number, north: Number, east: Number
 ) -> tuple[Number, Number]:
     """Deceleration by an `AxisDrag`, north and east, m/s².
 
     `cosine` and `sine` are those of its heading; `north` and `east` are the airspeed, m/s.
     """
-    forward, right = _in_axes(cosine, sine, north, east)
-    mean = _MEAN_SHARE * _smooth_speed((forward, right, 0.0 * right))
+    forward, right = _body_components(cosine, sine, north, east)
+    mean = _MEAN_CUBE_SUM * _smooth_speed((forward, right, 0.0 * right))
     forward = coefficient * forward * (abs(forward) - mean)
     right = coefficient * right * (abs(right) - mean)
     return cosine * forward - sine * right, sine * forward + cosine * right
 
 
-def _in_axes(cosine: Number, sine: Number, north: Number, east: Number) -> tuple[Number, Number]:
+def _body_components(
+    cosine: Number, sine: Number, north: Number, east: Number
+) -> tuple[Number, Number]:
     return cosine * north + sine * east, cosine * east - sine * north
 
 
-ROUND = AxisDrag()
+ROUND_BODY = AxisDrag()
 """A body whose drag is the same in all directions."""
 
 

@@ -32,14 +32,14 @@ def pip_command(extra: str) -> str:
     """The shell command that installs an extra into the environment that runs this program."""
     in_clone = (_CLONE_FOLDER / "pyproject.toml").is_file()
     requirement = (
-        f"-e '{_from_here(_CLONE_FOLDER)}[{extra}]'"
+        f"-e '{_path_as_typed(_CLONE_FOLDER)}[{extra}]'"
         if in_clone
         else f"'mavlink-companion[{extra}]'"
     )
-    return f"{shlex.quote(_from_here(Path(sys.executable)))} -m pip install {requirement}"
+    return f"{shlex.quote(_path_as_typed(Path(sys.executable)))} -m pip install {requirement}"
 
 
-def _from_here(path: Path) -> str:
+def _path_as_typed(path: Path) -> str:
     """A path as a user in the working folder would write it."""
     folder = Path.cwd()
     return str(path.relative_to(folder)) if path.is_relative_to(folder) else str(path)

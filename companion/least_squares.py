@@ -31,12 +31,12 @@ class Solution(NamedTuple):
     """Values of the linear unknowns, (c,)."""
     residual: Floats
     """Measured minus modelled values, (m,)."""
-    slopes: Floats
+    jacobian: Floats
     """Jacobian of the residual with respect to `unknown`, (m, k), with the weights fitted again at
     each value of `unknown`."""
 
     @property
-    def squares(self) -> float:
+    def sum_of_squares(self) -> float:
         """Sum of the squared residuals."""
         return float(self.residual @ self.residual)
 
@@ -66,27 +66,27 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
     """
     unknown, damping = np.clip(start, lowest, highest), 1e-3
     weights, residual = projection(unknown)
-    slopes = _slopes(projection, unknown)
+    jacobian = _jacobian(projection, unknown)
     for _ in range(_MOST_STEPS):
-        curvature, descent = slopes.T @ slopes, -(slopes.T @ residual)
-        damped = curvature + damping * np.diag(np.diagonal(curvature) + 1e-12)
-        trial = np.clip(unknown + np.linalg.solve(damped, descent), lowest, highest)
+        curvature, descent = jacobian.T @ jacobian, -(jacobian.T @ residual)
+        damped_curvature = curvature + damping * np.diag(np.diagonal(curvature) + 1e-12)
+        trial = np.clip(unknown + np.linalg.solve(damped_curvature, descent), lowest, highest)
         trial_weights, trial_residual = projection(trial)
         reduction = float(residual @ residual - trial_residual @ trial_residual)
         largest_change = float(np.abs(trial - unknown).max())
         if reduction > 0.0:
             unknown, weights, residual = trial, trial_weights, trial_residual
-            slopes = _slopes(projection, unknown)
+            jacobian = _jacobian(projection, unknown)
             damping = max(0.2 * damping, 1e-9)
         else:
             damping *= 5.0
         least_reduction = _SMALLEST_REDUCTION * float(residual @ residual)
         if largest_change < 1e-7 or 0.0 < reduction < least_reduction:
             break
-    return Solution(unknown, weights, residual, slopes)
+    return Solution(unknown, weights, residual, jacobian)
 
 
-def _slopes(projection: Projection, unknown: Floats) -> Floats:
+def _jacobian(projection: Projection, unknown: Floats) -> Floats:
     """Jacobian of the residual of `projection` by central differences, (m, k)."""
     steps = _DIFFERENCE_STEP * np.eye(unknown.size)
     return np.stack(

@@ -35,21 +35,22 @@ def load(group: str, name: str) -> Any:
     """
     matches = tuple(entry_points(group=group, name=name))
     if len(matches) != 1:
-        raise PluginError(_not_one_message(group, name, matches))
+        raise PluginError(_match_count_message(group, name, matches))
     try:
         return matches[0].load()
     except Exception as error:
         raise PluginError(
-            f"the plug-in {name!r} ({_origin(matches[0])}) cannot be loaded: {error!r}"
+            f"the plug-in {name!r} ({_entry_point_source(matches[0])}) cannot be loaded: {error!r}"
         ) from error
 
 
-def _not_one_message(group: str, name: str, matches: Sequence[EntryPoint]) -> str:
+def _match_count_message(group: str, name: str, matches: Sequence[EntryPoint]) -> str:
     if matches:
-        return f"{' and '.join(map(_origin, matches))} both give a plug-in {name!r}; uninstall one"
+        sources = " and ".join(map(_entry_point_source, matches))
+        return f"{sources} both give a plug-in {name!r}; uninstall one"
     return f"no plug-in {name!r} in {group}; installed: {', '.join(names(group)) or 'none'}"
 
 
-def _origin(entry_point: EntryPoint) -> str:
+def _entry_point_source(entry_point: EntryPoint) -> str:
     package = entry_point.dist.name if entry_point.dist is not None else "an unknown package"
     return f"{entry_point.value} of {package}"

@@ -43,7 +43,7 @@ def no_garbage_collection() -> Iterator[None]:
             gc.enable()
 
 
-class _Frozen:
+class _FrozenState:
     """State of `frozen_objects` in this process.
 
     Attributes:
@@ -63,17 +63,17 @@ def frozen_objects() -> Iterator[None]:
     These objects are mostly modules and live as long as the program. If some objects were frozen
     before the block, all stay frozen after it, because Python cannot unfreeze only some.
     """
-    is_outermost = not _Frozen.blocks
-    if is_outermost and not _Frozen.by_caller:
-        _Frozen.by_caller = gc.get_freeze_count() > 0
+    is_outermost = not _FrozenState.blocks
+    if is_outermost and not _FrozenState.by_caller:
+        _FrozenState.by_caller = gc.get_freeze_count() > 0
     gc.collect()
     gc.freeze()
-    _Frozen.blocks += 1
+    _FrozenState.blocks += 1
     try:
         yield
     finally:
-        _Frozen.blocks -= 1
-        if is_outermost and not _Frozen.by_caller:
+        _FrozenState.blocks -= 1
+        if is_outermost and not _FrozenState.by_caller:
             gc.unfreeze()
 
 
@@ -81,7 +81,7 @@ class RealtimeError(Exception):
     """A required setting was refused; the message gives the reason and the remedy."""
 
 
-class Refused(Exception):  # noqa: N818 - a refusal is not an error of this program
+class SettingRefused(Exception):  # noqa: N818 - a refusal is not an error of this program
     """The system refuses a setting; the message gives the reason and the remedy."""
 
 
@@ -118,7 +118,7 @@ class RealtimeSettings:
 
 
 @contextmanager
-def requested(settings: RealtimeSettings) -> Iterator[tuple[SettingResult, ...]]:
+def requested_settings(settings: RealtimeSettings) -> Iterator[tuple[SettingResult, ...]]:
     """Request all settings; undo the granted ones at the end of the block.
 
     Raises:
@@ -126,11 +126,11 @@ def requested(settings: RealtimeSettings) -> Iterator[tuple[SettingResult, ...]]
     """
     results: list[SettingResult] = []
     with ExitStack() as undo:
-        for name, setting, apply in _requested_settings(settings):
+        for name, setting, apply in _setting_requests(settings):
             try:
                 undo.callback(apply())
                 results.append(SettingResult(name, setting))
-            except Refused as refused:
+            except SettingRefused as refused:
                 results.append(SettingResult(name, setting, str(refused)))
         refusals = [str(result) for result in results if result.refusal is not None]
         if refusals and settings.required:
@@ -142,45 +142,49 @@ _Undo = Callable[[], object]
 _Apply = Callable[[], _Undo]
 
 
-def _requested_settings(settings: RealtimeSettings) -> Iterator[tuple[str, str, _Apply]]:
+def _setting_requests(settings: RealtimeSettings) -> Iterator[tuple[str, str, _Apply]]:
     """For each requested setting: its key, the setting in words, and a function that applies it."""
     priority, processors = settings.fifo_priority, settings.processors
     if processors:
         numbers = ", ".join(map(str, processors))
-        yield "cpu_affinity", f"processor {numbers}", lambda: _run_on(processors)
+        yield "cpu_affinity", f"processor {numbers}", lambda: _set_processors(processors)
     if settings.freeze_gc:
         yield "freeze_gc", "no garbage collection in flight", _stop_collecting
     if settings.lock_memory:
         yield "lock_memory", "memory locked in RAM", _lock_memory
     if priority is not None:  # last: the others take time, at normal priority
-        yield "scheduler", f"SCHED_FIFO at priority {priority}", lambda: _take_fifo(priority)
+        yield (
+            "scheduler",
+            f"SCHED_FIFO at priority {priority}",
+            lambda: _set_fifo_priority(priority),
+        )
 
 
-def _take_fifo(priority: int) -> _Undo:
+def _set_fifo_priority(priority: int) -> _Undo:
     scheduler_before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     # Threads that start later (recording, MAVSDK) must inherit the priority: a preempted thread
     # that holds the interpreter lock would block the control loop.
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
-        raise Refused(f"this user lacks the permission; {_HOW_FIFO}") from None
+        raise SettingRefused(f"this user lacks the permission; {_HOW_FIFO}") from None
     except OSError as error:
-        raise Refused(f"{error.strerror}") from None
+        raise SettingRefused(f"{error.strerror}") from None
     return lambda: os.sched_setscheduler(0, scheduler_before, parameters)
 
 
-def _run_on(processors: tuple[int, ...]) -> _Undo:
+def _set_processors(processors: tuple[int, ...]) -> _Undo:
     processors_before = os.sched_getaffinity(0)
     missing = [number for number in processors if number not in processors_before]
     if missing:
-        raise Refused(
+        raise SettingRefused(
             f"processor {', '.join(map(str, missing))} is not available to this program; "
             f"available are {', '.join(map(str, sorted(processors_before)))}"
         )
     try:
         os.sched_setaffinity(0, processors)
     except OSError as error:
-        raise Refused(f"{error.strerror}") from None
+        raise SettingRefused(f"{error.strerror}") from None
     return lambda: os.sched_setaffinity(0, processors_before)
 
 
@@ -189,12 +193,12 @@ def _lock_memory() -> _Undo:
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
         # Even if the limit suffices now, an allocation in flight could fail.
-        raise Refused(f"this user may lock only {limit // 1024} KiB; {_HOW_MEMORY}")
+        raise SettingRefused(f"this user may lock only {limit // 1024} KiB; {_HOW_MEMORY}")
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
         number = ctypes.get_errno()
         if number in (errno.EPERM, errno.ENOMEM):
-            raise Refused(f"{os.strerror(number)}; {_HOW_MEMORY}")
-        raise Refused(os.strerror(number))
+            raise SettingRefused(f"{os.strerror(number)}; {_HOW_MEMORY}")
+        raise SettingRefused(os.strerror(number))
     return libc.munlockall
 
 

@@ -21,7 +21,9 @@ class UserCodeError(Exception):
 
 
 @contextmanager
-def naming_user_code(role: str, code: object, *passed: type[BaseException]) -> Iterator[None]:
+def naming_user_code(
+    role: str, code: object, *passed_errors: type[BaseException]
+) -> Iterator[None]:
     """Convert an error that user code raises in the block to one that names the code.
 
     An error of an object of this program, such as a trajectory made by `slow_down`, is raised
@@ -30,19 +32,19 @@ def naming_user_code(role: str, code: object, *passed: type[BaseException]) -> I
     Args:
         role: what the code is to the flight, such as "trajectory".
         code: the object or function that is called in the block.
-        passed: errors that the code may raise; they are raised unchanged.
+        passed_errors: errors that the code may raise; they are raised unchanged.
 
     Raises:
         UserCodeError: the code raised anything else, also SystemExit or CancelledError, which would
             end the event loop or the guidance of the flight.
     """
-    unchanged: tuple[type[BaseException], ...] = (KeyboardInterrupt, UserCodeError, *passed)
+    unchanged: tuple[type[BaseException], ...] = (KeyboardInterrupt, UserCodeError, *passed_errors)
     try:
         yield
     except unchanged:
         raise
     except BaseException as error:
-        code = _innermost(code)
+        code = _innermost_trajectory(code)
         # A function has a name; of another object, the class is named.
         source = code if hasattr(code, "__qualname__") else type(code)
         package = _package(source.__module__)
@@ -51,18 +53,18 @@ def naming_user_code(role: str, code: object, *passed: type[BaseException]) -> I
         text = " ".join(f"{type(error).__name__}: {error}".removesuffix(": ").split())
         raise UserCodeError(
             f"an error outside this program: the {role} {source.__qualname__} of the module "
-            f"{source.__module__} raised {text[:_LONGEST_TEXT]}{_place(package, error)}"
+            f"{source.__module__} raised {text[:_LONGEST_TEXT]}{_error_place(package, error)}"
         ) from error
 
 
-def _innermost(code: object) -> object:
+def _innermost_trajectory(code: object) -> object:
     """The user's trajectory inside trajectories of this program, or the object itself."""
     while _package(type(code).__module__) == _OUR_PACKAGE and hasattr(code, "trajectory"):
         code = code.trajectory
     return code
 
 
-def _place(package: str, error: BaseException) -> str:
+def _error_place(package: str, error: BaseException) -> str:
     """File and line of the innermost call in a package, in brackets; empty if there is none."""
     places = [
         f" ({frame.f_code.co_filename}:{line})"

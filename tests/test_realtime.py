@@ -11,11 +11,11 @@ import sys
 import pytest
 
 from companion import realtime
-from companion.realtime import RealtimeError, RealtimeSettings, requested
+from companion.realtime import RealtimeError, RealtimeSettings, requested_settings
 
 
 def refusals(settings):
-    with requested(settings) as grants:
+    with requested_settings(settings) as grants:
         return [grant.refusal for grant in grants]
 
 
@@ -26,7 +26,9 @@ def test_who_asks_for_nothing_gets_nothing():
 def test_what_this_computer_surely_grants_is_granted_and_given_back():
     before = os.sched_getaffinity(0)
     one = (min(before),)
-    with requested(RealtimeSettings(processors=one, freeze_gc=True, required=True)) as grants:
+    with requested_settings(
+        RealtimeSettings(processors=one, freeze_gc=True, required=True)
+    ) as grants:
         assert [str(grant) for grant in grants] == [
             f"realtime: processor {one[0]}: granted",
             "realtime: no garbage collection in flight: granted",
@@ -48,7 +50,7 @@ def unfrozen(monkeypatch):
         return calls, counted
 
     monkeypatch.setattr(gc, "unfreeze", lambda: calls.append("unfrozen"))
-    monkeypatch.setattr(realtime._Frozen, "by_caller", False)
+    monkeypatch.setattr(realtime._FrozenState, "by_caller", False)
     return told
 
 
@@ -87,7 +89,8 @@ def policies_elsewhere():
     return in_a_thread, in_a_process
 
 before = os.sched_getscheduler(0)
-with realtime.requested(realtime.RealtimeSettings(fifo_priority=7, lock_memory=True)) as grants:
+settings = realtime.RealtimeSettings(fifo_priority=7, lock_memory=True)
+with realtime.requested_settings(settings) as grants:
     memory, scheduler = grants
     assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == (scheduler.refusal is None)
     if scheduler.refusal is None:
@@ -150,7 +153,7 @@ def test_a_processor_that_is_not_there_is_named():
 def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():
     with (
         pytest.raises(RealtimeError, match=r"processor 1023: not granted.*realtime\.required"),
-        requested(RealtimeSettings(processors=(1023,), freeze_gc=True, required=True)),
+        requested_settings(RealtimeSettings(processors=(1023,), freeze_gc=True, required=True)),
     ):
         raise AssertionError("nothing may fly")
     assert gc.isenabled()
@@ -158,9 +161,7 @@ def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():
 
 def test_the_priority_is_taken_last():
     """Else what takes long (the collection before the freeze) would be done at that priority."""
-    taken = [
-        name for name, *_ in realtime._requested_settings(RealtimeSettings(1, (0,), True, True))
-    ]
+    taken = [name for name, *_ in realtime._setting_requests(RealtimeSettings(1, (0,), True, True))]
     assert taken[-1] == "scheduler"
 
 
@@ -189,7 +190,7 @@ def test_another_error_of_the_kernel_is_told_without_the_permission(monkeypatch)
 def test_a_collector_that_the_caller_stopped_stays_stopped():
     gc.disable()
     try:
-        with requested(RealtimeSettings(freeze_gc=True)):
+        with requested_settings(RealtimeSettings(freeze_gc=True)):
             assert not gc.isenabled()
         assert not gc.isenabled()
     finally:

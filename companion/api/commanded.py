@@ -31,12 +31,12 @@ def checked_copy(reference: Reference) -> Reference:
         acceleration_ned=finite_vector("acceleration_ned", reference.acceleration_ned),
         heading=finite_number("heading", reference.heading),
         heading_rate=finite_number("heading_rate", reference.heading_rate),
-        horizontal=_horizontal(reference.horizontal),
-        vertical=_vertical(reference.vertical),
+        horizontal=_copied_horizontal(reference.horizontal),
+        vertical=_copied_vertical(reference.vertical),
     )
 
 
-def _horizontal(command: HorizontalCommand) -> HorizontalCommand:
+def _copied_horizontal(command: HorizontalCommand) -> HorizontalCommand:
     if isinstance(command, TiltCommand):
         north, east = command.coefficients
         coefficients = Coefficients(finite_number("north", north), finite_number("east", east))
@@ -48,7 +48,7 @@ def _horizontal(command: HorizontalCommand) -> HorizontalCommand:
     raise TypeError(f"horizontal is a HorizontalMode, TiltCommand or BodyRates, not {command!r}")
 
 
-def _vertical(command: VerticalCommand) -> VerticalCommand:
+def _copied_vertical(command: VerticalCommand) -> VerticalCommand:
     if isinstance(command, ThrustCommand):
         return ThrustCommand(finite_number("thrust", command.thrust))
     if isinstance(command, VerticalMode):

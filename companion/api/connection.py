@@ -68,7 +68,7 @@ async def connect(
         overrides["flight"]["arm"] = arm
     flown_config = changed(changed(flown_config, changes or {}, "changes"), overrides, "connect")
     records = flight_folder(flown_config.recording.directory) if folder is None else Path(folder)
-    async with flying(flown_config, records, observer) as vehicle:
+    async with connect_configured(flown_config, records, observer) as vehicle:
         yield vehicle
 
 
@@ -89,7 +89,7 @@ def as_config(config: Configuration) -> Config:
 
 
 @asynccontextmanager
-async def flying(
+async def connect_configured(
     config: Config,
     folder: Path | None,
     observer: Observer | None = None,
@@ -122,13 +122,13 @@ async def _connected_vehicle(
 ) -> AsyncGenerator[Vehicle, None]:
     """The vehicle after the preflight checks; at the end of the block the flight ends."""
     try:
-        context, newest = await loop.start(_wait_connected(loop, program))
+        context, newest_state = await loop.start(_wait_connected(loop, program))
     except asyncio.CancelledError:
         if not await loop.start(_interrupt(session, "the program was cancelled")):
             flight.cancel()
         raise
     try:
-        yield Vehicle(program, context, newest, loop)
+        yield Vehicle(program, context, newest_state, loop)
     except BaseException as error:
         loop.post(session.note, f"the program raised {error!r}")
         with suppress(FlightEnded):

@@ -35,7 +35,7 @@ class Control:
     Args:
         program: the flight's plan; its `end_error` is raised once the flight has ended.
         context: context of the flight.
-        newest: publishes the state of the vehicle.
+        newest_state: publishes the state of the vehicle.
         loop: loop of the flight.
         source: receives the commanded references.
         control_end: future that is done when control has ended.
@@ -45,12 +45,12 @@ class Control:
         self,
         program: ProgramPlan,
         context: FlightContext,
-        newest: NewestState,
+        newest_state: NewestState,
         loop: FlightLoop,
         source: CommandedSource,
         control_end: asyncio.Future[None],
     ) -> None:
-        self._program, self._context, self._newest = program, context, newest
+        self._program, self._context, self._newest_state = program, context, newest_state
         self._loop, self._source, self._control_end = loop, source, control_end
         self._command: tuple[Reference, float, Vector | None] | None = None
         self._posted = False
@@ -59,7 +59,7 @@ class Control:
     @property
     def state(self) -> State:
         """The newest state of the vehicle."""
-        return self._newest.state()
+        return self._newest_state.state()
 
     async def states(self, seconds: float = inf) -> AsyncIterator[State]:
         """Yield the state at each new attitude sample; skip samples while the caller works.
@@ -78,7 +78,7 @@ class Control:
         def wake(_: object) -> None:
             new_state.set()
 
-        unsubscribe = self._newest.subscribe(new_state.set)
+        unsubscribe = self._newest_state.subscribe(new_state.set)
         self._control_end.add_done_callback(wake)
         end_time = self._loop.time() + seconds
         try:
@@ -198,10 +198,10 @@ class Control:
 
 
 @asynccontextmanager
-async def commanding(
+async def program_control(
     program: ProgramPlan,
     context: FlightContext,
-    newest: NewestState,
+    newest_state: NewestState,
     loop: FlightLoop,
     source: CommandedSource,
     control_end: asyncio.Future[None],
@@ -216,7 +216,7 @@ async def commanding(
             done, _ = await asyncio.wait({control_end}, timeout=0.01)
             if done:
                 control_end.result()
-        yield Control(program, context, newest, loop, source, control_end)
+        yield Control(program, context, newest_state, loop, source, control_end)
     except BaseException as error:
         if not isinstance(error, FlightEnded):
             loop.post(source.fail, f"{source.name} raised {error!r}")

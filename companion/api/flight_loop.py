@@ -147,7 +147,7 @@ class OwnThreadLoop:
 
 
 _switch_interval_lock = threading.Lock()
-_intervals_before: list[float] = []
+_switch_intervals_before: list[float] = []
 """`sys.getswitchinterval()` at the start of each running flight, s. When no flight runs any more,
 the value from before the first flight is restored."""
 
@@ -156,15 +156,15 @@ the value from before the first flight is restored."""
 def quick_switches() -> Iterator[None]:
     """Let Python switch threads after `SWITCH_INTERVAL` while any flight runs."""
     with _switch_interval_lock:
-        _intervals_before.append(sys.getswitchinterval())
-        sys.setswitchinterval(min(SWITCH_INTERVAL, _intervals_before[0]))
+        _switch_intervals_before.append(sys.getswitchinterval())
+        sys.setswitchinterval(min(SWITCH_INTERVAL, _switch_intervals_before[0]))
     try:
         yield
     finally:
         with _switch_interval_lock:
-            interval_before = _intervals_before[0]
-            _intervals_before.pop()
-            if not _intervals_before:
+            interval_before = _switch_intervals_before[0]
+            _switch_intervals_before.pop()
+            if not _switch_intervals_before:
                 sys.setswitchinterval(interval_before)
 
 

@@ -56,27 +56,27 @@ class ProgramPlan:
         self.summary: Summary | None = None
         self.is_over = False
         self.interrupt: Callable[[str], object] = lambda _: None
-        self._waiting: deque[PhaseRequest] = deque()
-        self._running: PhaseRequest | None = None
+        self._waiting_requests: deque[PhaseRequest] = deque()
+        self._running_request: PhaseRequest | None = None
         self._new_request = asyncio.Event()
         self.end_error: Exception | None = None
         self.finished = asyncio.Event()
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """The phases on the ground, then the requested ones, until the last request is done."""
-        if self._running is not None:  # the checks are repeated, and then this request
-            self._waiting.appendleft(self._running)
+        if self._running_request is not None:  # the checks are repeated, and then this request
+            self._waiting_requests.appendleft(self._running_request)
         for phase in ground_phases(context.config.flight):
             yield phase
         if not self.connected.done():
             self.connected.set_result(context)
         while True:
-            if not self._waiting:
+            if not self._waiting_requests:
                 yield self._waiting_phase(context)
-            self._running = request = self._waiting.popleft()
+            self._running_request = request = self._waiting_requests.popleft()
             for phase in request.phases(context):
                 yield phase
-            self._running, self.is_over = None, request.ends_flight
+            self._running_request, self.is_over = None, request.ends_flight
             if not request.done.done():
                 request.done.set_result(None)
             if request.ends_flight:
@@ -102,27 +102,27 @@ class ProgramPlan:
         if self.busy:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
         request = PhaseRequest(phases, ends_flight)
-        self._waiting.append(request)
+        self._waiting_requests.append(request)
         self._new_request.set()
         try:
             await request.done
         except asyncio.CancelledError:
-            if request in self._waiting:
-                self._waiting.remove(request)
+            if request in self._waiting_requests:
+                self._waiting_requests.remove(request)
             self.interrupt("the program cancelled its request")
             raise
 
     @property
     def busy(self) -> bool:
         """Whether a request is waiting or running."""
-        return self._running is not None or bool(self._waiting)
+        return self._running_request is not None or bool(self._waiting_requests)
 
     def end(self, error: Exception) -> None:
         """Note that the flight has ended; calls that wait, and all later ones, raise `error`."""
         self.end_error, self.is_over = error, True
         if not self.connected.done():
             self.connected.set_exception(error)
-        for request in (self._running, *self._waiting):
+        for request in (self._running_request, *self._waiting_requests):
             if request is not None and not request.done.done():
                 request.done.set_exception(error)
                 request.done.exception()  # no warning of asyncio if nobody waits for it any more
@@ -134,7 +134,7 @@ class ProgramPlan:
 
     async def _next_request(self, context: FlightContext) -> None:
         context.detail = _NEXT_CALL
-        while not self._waiting:
+        while not self._waiting_requests:
             self._new_request.clear()
             await self._new_request.wait()
 

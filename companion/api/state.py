@@ -44,9 +44,9 @@ class NewestState:
     """
 
     def __init__(self, context: FlightContext, loop: FlightLoop) -> None:
-        self._newest: State | None = None
+        self._newest_state: State | None = None
         self._context, self._loop = context, loop
-        self._wakes: tuple[_Wake, ...] = ()
+        self._pending_calls: tuple[_PendingCall, ...] = ()
         context.link.subscribe("ATTITUDE_QUATERNION", self._publish)
 
     def state(self) -> State:
@@ -55,20 +55,20 @@ class NewestState:
         Raises:
             RuntimeError: no position or no attitude has come yet.
         """
-        if self._newest is None:
+        if self._newest_state is None:
             raise RuntimeError("no position or no attitude has come from the vehicle yet")
-        return self._newest
+        return self._newest_state
 
     def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
         """Call `callback` in the program's loop after each new state; call the result to stop.
 
         States do not queue up while the program is busy.
         """
-        wake = _Wake(self._loop, callback)
-        self._wakes = (*self._wakes, wake)
+        wake = _PendingCall(self._loop, callback)
+        self._pending_calls = (*self._pending_calls, wake)
 
         def unsubscribe() -> None:
-            self._wakes = tuple(each for each in self._wakes if each is not wake)
+            self._pending_calls = tuple(each for each in self._pending_calls if each is not wake)
 
         return unsubscribe
 
@@ -82,7 +82,7 @@ class NewestState:
         if sample is None:
             return
         q = guidance.attitude()
-        self._newest = State(
+        self._newest_state = State(
             self._loop.time(),
             motion.position_ned,
             motion.velocity_ned,
@@ -91,11 +91,11 @@ class NewestState:
             heading(q),
             context.link.state.height,
         )
-        for wake in self._wakes:
+        for wake in self._pending_calls:
             wake()
 
 
-class _Wake:
+class _PendingCall:
     """Calls a function in the program's loop; a call is dropped while an earlier one is pending."""
 
     def __init__(self, loop: FlightLoop, callback: Callable[[], object]) -> None:

@@ -8,7 +8,7 @@ from functools import partial
 from math import hypot, tau
 from pathlib import Path
 
-from companion.api.control import Control, commanding
+from companion.api.control import Control, program_control
 from companion.api.flight_loop import FlightLoop
 from companion.api.in_thread import call_in_thread
 from companion.api.program import ProgramPlan
@@ -50,16 +50,20 @@ class Vehicle:
     Args:
         program: the flight's plan, which receives the requests.
         context: context of the flight; it is only read here.
-        newest: publishes the state of the vehicle.
+        newest_state: publishes the state of the vehicle.
         loop: loop of the flight.
     """
 
     def __init__(
-        self, program: ProgramPlan, context: FlightContext, newest: NewestState, loop: FlightLoop
+        self,
+        program: ProgramPlan,
+        context: FlightContext,
+        newest_state: NewestState,
+        loop: FlightLoop,
     ) -> None:
         self._program = program
         self._context = context
-        self._newest = newest
+        self._newest_state = newest_state
         self._loop = loop
 
     @property
@@ -69,7 +73,7 @@ class Vehicle:
         Raises:
             RuntimeError: no position or no attitude has come yet.
         """
-        return self._newest.state()
+        return self._newest_state.state()
 
     @property
     def summary(self) -> Summary | None:
@@ -182,8 +186,8 @@ class Vehicle:
         work = partial(fly_commanded, commands=source)
         phase = program_phase("control", f"{name} to end its control", work)
         control_end = self._request(lambda _: (phase,))
-        async with commanding(
-            self._program, self._context, self._newest, self._loop, source, control_end
+        async with program_control(
+            self._program, self._context, self._newest_state, self._loop, source, control_end
         ) as control:
             yield control
 

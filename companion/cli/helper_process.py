@@ -59,7 +59,7 @@ def helper_process(
     tasks = HelperTasks(watched, config_as_read, page, stream, flies_maneuvers, folder)
     helper = Helper(tasks, config)
     if page is not None:
-        page.listening.close()  # the helper process has its own copy
+        page.listening_socket.close()  # the helper process has its own copy
     reason = "the program has ended"
     try:
         yield helper

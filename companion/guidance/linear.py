@@ -5,7 +5,7 @@ from math import sqrt
 from typing import NamedTuple, Protocol
 
 from companion.attitude import Coefficients, Target
-from companion.drag import ROUND, AxisDrag, Drag
+from companion.drag import ROUND_BODY, AxisDrag, Drag
 from companion.guidance.feedback import ChainGains, HeightGains, acceleration_down
 from companion.guidance.inner_response import InnerResponse
 from companion.guidance.reference import (
@@ -65,7 +65,7 @@ class GuidanceInput(NamedTuple):
     disturbance: Horizontal
     drag: Drag
     thrust_limits: tuple[float, float]
-    axis_drag: AxisDrag = ROUND
+    axis_drag: AxisDrag = ROUND_BODY
 
     @property
     def acceleration(self) -> Horizontal:

@@ -214,7 +214,9 @@ class DelayedModel:
     def explained(self, solution: Solution) -> float:
         """R² of a solution; 0 if the measurements are constant."""
         deviation = self.measured - self.measured.mean()
-        return 1.0 - solution.squares / float(deviation @ deviation) if deviation.any() else 0.0
+        return (
+            1.0 - solution.sum_of_squares / float(deviation @ deviation) if deviation.any() else 0.0
+        )
 
     def _offset_columns(self, unknown: Floats) -> Floats:
         """(m, 1 + number of initial states): ones, and free responses of each stretch.

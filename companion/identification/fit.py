@@ -126,10 +126,12 @@ def fit_lag(
 def _with_slew_if_better(best: Solution, fine: DelayedModel, coarse: DelayedModel) -> Solution:
     """The best fit with a slew limit if it is clearly better than `best`, else `best`."""
     coarse_solution = coarse.search(_slewed_start(best, coarse))
-    if coarse_solution.squares > _BETTER_SHARE * coarse.search(best.unknown).squares:
+    if coarse_solution.sum_of_squares > _BETTER_SHARE * coarse.search(best.unknown).sum_of_squares:
         return best
     best_limited = fine.search(coarse_solution.unknown)
-    return best_limited if best_limited.squares < _BETTER_SHARE * best.squares else best
+    return (
+        best_limited if best_limited.sum_of_squares < _BETTER_SHARE * best.sum_of_squares else best
+    )
 
 
 def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
@@ -170,7 +172,7 @@ def _second_order_fit(
     )
     data = DelayedModel(record, model, None, first_data.thinning)
     solution = data.search(start)
-    if solution.squares > _BETTER_SHARE * first_order.squares:
+    if solution.sum_of_squares > _BETTER_SHARE * first_order.sum_of_squares:
         return None
     frequency, damping = frequency_damping(solution.unknown)
     quality = _quality(data, solution)
@@ -208,7 +210,7 @@ def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     sample_period = float(np.median(np.diff(np.concatenate(data.times))))
     residuals = analyse_residual(
         solution.residual,
-        solution.slopes,
+        solution.jacobian,
         lambda delay: data.delayed_commands(unknown, delay),
         response_duration,
         excited_samples,
@@ -238,7 +240,7 @@ def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
         for shift in (-_NEIGHBOUR_DISTANCE, _NEIGHBOUR_DISTANCE)
         if lag > shift
     ]
-    return min(solution, *neighbours, key=lambda each: each.squares)
+    return min(solution, *neighbours, key=lambda each: each.sum_of_squares)
 
 
 def _grid_start(data: DelayedModel) -> Floats:

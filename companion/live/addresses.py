@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 from companion.files.yaml_file import ConfigError
 
-PORT = 8090
+PAGE_PORT = 8090
 STREAM_PORT = 8765
 """Port of the live stream; Foxglove and Lichtblick propose this one."""
 _ANSWER_TIMEOUT = 0.5
-"""Time allowed for the helper process of an ended flight to answer `ask_to_leave`, s."""
+"""Time allowed for the helper process of an ended flight to answer `ask_to_release`, s."""
 _RELEASE_TIMEOUT = 8.0
 """Time allowed for the helper process of an ended flight to release its port, s."""
 
@@ -25,7 +25,7 @@ class PageSocket(NamedTuple):
     port: int
     token: str
     """Secret text that permits changes of values, and watching from another computer."""
-    listening: socket.socket
+    listening_socket: socket.socket
 
     def address_text(self) -> str:
         """A line for the user: address of the page, and the token."""
@@ -67,8 +67,10 @@ def open_page_socket(address: str) -> PageSocket:
         ConfigError: the address is not valid or not of this computer, or the port is in use or
             not permitted.
     """
-    host, listening = _listen(address, "--live", PORT)
-    return PageSocket(host, listening.getsockname()[1], secrets.token_urlsafe(9), listening)
+    host, listening_socket = _listen(address, "--live", PAGE_PORT)
+    return PageSocket(
+        host, listening_socket.getsockname()[1], secrets.token_urlsafe(9), listening_socket
+    )
 
 
 def stream_address(address: str) -> StreamAddress:
@@ -80,29 +82,29 @@ def stream_address(address: str) -> StreamAddress:
         ConfigError: the address is not valid or not of this computer, or the port is in use or
             not permitted.
     """
-    host, listening = _listen(address, "--foxglove", STREAM_PORT)
-    with listening:
-        return StreamAddress(host, listening.getsockname()[1])
+    host, listening_socket = _listen(address, "--foxglove", STREAM_PORT)
+    with listening_socket:
+        return StreamAddress(host, listening_socket.getsockname()[1])
 
 
 def _listen(address: str, option: str, default_port: int) -> tuple[str, socket.socket]:
     """Listen at `address`, the value of the option `option`; return host and socket."""
     host, port = _host_and_port(address, option, default_port)
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listening = socket.socket(family, socket.SOCK_STREAM)
-    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    listening_socket = socket.socket(family, socket.SOCK_STREAM)
+    listening_socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        _bind(listening, host, port)
-        listening.listen(50)
+        _bind(listening_socket, host, port)
+        listening_socket.listen(50)
     except OSError as error:
-        listening.close()
+        listening_socket.close()
         remedy = f"choose another port, such as {option} {port + 1}"
         if error.errno == errno.EADDRNOTAVAIL:
             remedy = f"no interface of this computer has that address; use {option} 0.0.0.0:{port}"
         raise ConfigError(
             f"{option}: cannot listen at port {port} of {host}: {error.strerror}; {remedy}"
         ) from error
-    return host, listening
+    return host, listening_socket
 
 
 def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, int]:
@@ -125,14 +127,14 @@ def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, i
     return host, number
 
 
-def _bind(listening: socket.socket, host: str, port: int) -> None:
+def _bind(listening_socket: socket.socket, host: str, port: int) -> None:
     """Bind the socket; ask the page or stream of an ended flight to release the port."""
     deadline, release_agreed = time.monotonic() + _ANSWER_TIMEOUT, False
     while True:
         try:
-            listening.bind((host, port))
+            listening_socket.bind((host, port))
         except OSError as error:
-            if not release_agreed and ask_to_leave(port):
+            if not release_agreed and ask_to_release(port):
                 deadline, release_agreed = time.monotonic() + _RELEASE_TIMEOUT, True
             if error.errno != errno.EADDRINUSE or time.monotonic() > deadline:
                 raise
@@ -141,17 +143,17 @@ def _bind(listening: socket.socket, host: str, port: int) -> None:
             return
 
 
-def leave_address(port: int) -> str:
+def release_socket_name(port: int) -> str:
     """Name of the local socket through which a page or stream is asked to release its port."""
     return f"\0companion-live-{port}"
 
 
-def ask_to_leave(port: int) -> bool:
+def ask_to_release(port: int) -> bool:
     """Ask the page or stream of an ended flight to release its port; return whether it agreed."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as sock:
         sock.settimeout(1.0)
         try:
-            sock.connect(leave_address(port))
+            sock.connect(release_socket_name(port))
             return sock.recv(8) == b"leaving"
         except OSError:
             return False

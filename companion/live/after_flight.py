@@ -7,7 +7,7 @@ import struct
 from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 
-from companion.live.addresses import leave_address
+from companion.live.addresses import release_socket_name
 
 _LONGEST_TIME_WITHOUT_USERS = 5.0
 """Time after which a page or stream without users ends, s."""
@@ -20,21 +20,21 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
 
     Wait at most an hour.
     """
-    async with _leave_request(port) as leave_requested:
+    async with _release_request(port) as release_requested:
         time_without_users = 0.0
         for _ in range(int(_LONGEST_STAY)):
             time_without_users = 0.0 if is_open() else time_without_users + 1.0
-            if leave_requested.is_set() or time_without_users > _LONGEST_TIME_WITHOUT_USERS:
+            if release_requested.is_set() or time_without_users > _LONGEST_TIME_WITHOUT_USERS:
                 break
-            waiting = asyncio.create_task(leave_requested.wait())
+            waiting = asyncio.create_task(release_requested.wait())
             await asyncio.wait({waiting}, timeout=1.0)
             waiting.cancel()
 
 
 @asynccontextmanager
-async def _leave_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
+async def _release_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
     """Yield an event that the next flight of the same user sets when it needs the port."""
-    leave_requested = asyncio.Event()
+    release_requested = asyncio.Event()
 
     async def answer(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         sock = writer.get_extra_info("socket")
@@ -42,13 +42,13 @@ async def _leave_request(port: int) -> AsyncGenerator[asyncio.Event, None]:
         _, user, _ = struct.unpack("3i", credentials)
         if user == os.getuid():
             writer.write(b"leaving")
-            leave_requested.set()
+            release_requested.set()
         writer.close()
 
     try:
-        server = await asyncio.start_unix_server(answer, leave_address(port))
+        server = await asyncio.start_unix_server(answer, release_socket_name(port))
     except OSError:  # another process has this name, so no request can arrive
-        yield leave_requested
+        yield release_requested
         return
     async with server:
-        yield leave_requested
+        yield release_requested

@@ -19,12 +19,12 @@ class Channel:
         dropped: number of messages that could not be sent, because the buffer was full, the message
             too large, or the other end closed. After the other end has closed, only the first
             message is counted.
-        open: whether the other end existed at the last attempt.
+        is_open: whether the other end existed at the last attempt.
     """
 
     def __init__(self, end: socket.socket) -> None:
         self.dropped = 0
-        self.open = True
+        self.is_open = True
         self._socket = end
 
     @staticmethod
@@ -40,7 +40,7 @@ class Channel:
 
     def send(self, message: Message) -> bool:
         """Send a message or drop it; return whether it was sent."""
-        if not self.open:
+        if not self.is_open:
             return False
         data = json.dumps(message, default=str).encode()
         if len(data) > _LARGEST_MESSAGE:  # the other end would receive only the beginning
@@ -52,7 +52,7 @@ class Channel:
             self.dropped += 1
             return False
         except OSError:  # the other end is gone
-            self.open = False
+            self.is_open = False
             self.dropped += 1
             return False
         return True
@@ -64,7 +64,7 @@ class Channel:
         """
         for data in datagrams(self._socket, max_count):
             if not data:
-                self.open = False
+                self.is_open = False
                 yield None
                 return
             message = json.loads(data)
@@ -72,7 +72,7 @@ class Channel:
 
     def close(self) -> None:
         """Close our end."""
-        self.open = False
+        self.is_open = False
         self._socket.close()
 
 

@@ -18,7 +18,7 @@ from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import ManeuverSequence
 from companion.tuning import stability
 
-_LEAST_GAIN_DB, _LEAST_PHASE_DEG = 4.0, 20.0
+_LEAST_GAIN_MARGIN_DB, _LEAST_PHASE_MARGIN_DEG = 4.0, 20.0
 """Smallest gain margin, dB, and phase margin, degrees, that a change may leave. A margin that was
 smaller when the flight began must not become smaller still."""
 _ROUNDING = 1e-3
@@ -44,12 +44,12 @@ class ChangeChecks:
             self._maneuvers_error = error
 
     @staticmethod
-    def of(message: dict[str, Any]) -> "ChangeChecks":
+    def from_message(message: dict[str, Any]) -> "ChangeChecks":
         """Make the checks from the first message of the flight."""
         start = Config.model_validate(message["config"])
         return ChangeChecks(start, flies_maneuvers=bool(message["follows"]))
 
-    def note(self, message: dict[str, Any]) -> None:
+    def note_config(self, message: dict[str, Any]) -> None:
         """Note the changed configuration, from a message of the flight."""
         self.current = Config.model_validate(message["config"])
 
@@ -97,8 +97,10 @@ def _require_margins(start: Config, wanted: Config, name: str) -> None:
     before, after = stability(start), stability(wanted)
     if not after.stable:
         raise ConfigError(f"{name}: with these values the control loop is unstable")
-    gain_db = min(_LEAST_GAIN_DB, before.gain_db) if before.stable else _LEAST_GAIN_DB
-    phase_deg = min(_LEAST_PHASE_DEG, before.phase_deg) if before.stable else _LEAST_PHASE_DEG
+    gain_db = min(_LEAST_GAIN_MARGIN_DB, before.gain_db) if before.stable else _LEAST_GAIN_MARGIN_DB
+    phase_deg = (
+        min(_LEAST_PHASE_MARGIN_DEG, before.phase_deg) if before.stable else _LEAST_PHASE_MARGIN_DEG
+    )
     tolerance = 1.0 - _ROUNDING
     if not (after.gain_db >= tolerance * gain_db and after.phase_deg >= tolerance * phase_deg):
         raise ConfigError(

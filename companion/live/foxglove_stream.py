@@ -14,11 +14,11 @@ from foxglove.websocket import ChannelView, Client, ServerListener, StatusLevel
 
 from companion.live.after_flight import until_unused
 from companion.live.channel import Message, datagrams
-from companion.live.helper_process import Relay
+from companion.live.helper_process import FlightConnection
 from companion.recording.mcap_file.batch import messages_of
 from companion.recording.mcap_file.channels import ENCODING, SCHEMA_ENCODING, TOPICS
 
-_MOST_PER_TURN = 20
+_MOST_DATAGRAMS_PER_TURN = 20
 """Largest number of datagrams handled in one turn of the event loop."""
 
 
@@ -41,7 +41,7 @@ class _Subscriptions(ServerListener):
         return bool(self._active)
 
 
-class Stream:
+class LiveStream:
     """A server with the channels of `flight.mcap`.
 
     Raises:
@@ -97,31 +97,32 @@ class Stream:
         self._server.stop()
 
 
-async def serve_stream(relay: Relay, feed: socket.socket) -> None:
+async def serve_stream(connection: FlightConnection, feed: socket.socket) -> None:
     """Serve the stream of a flight until the flight has ended and `until_unused` has returned.
 
     The records of the flight arrive on the socket `feed`.
     """
-    host, port = str(relay.first["stream_host"]), int(relay.first["stream_port"])
+    first_message = connection.first_message
+    host, port = str(first_message["stream_host"]), int(first_message["stream_port"])
     try:
-        stream = Stream(host, port)
+        stream = LiveStream(host, port)
     except RuntimeError as error:  # another program took the port after the flight's check
-        relay.note(f"there is no live stream: {error}; the flight goes on without it")
+        connection.note(f"there is no live stream: {error}; the flight goes on without it")
         feed.close()
         return
     loop = asyncio.get_running_loop()
     os.set_blocking(feed.fileno(), False)
 
     def on_readable() -> None:
-        for datagram in datagrams(feed, _MOST_PER_TURN):
+        for datagram in datagrams(feed, _MOST_DATAGRAMS_PER_TURN):
             if datagram:
                 stream.take(datagram)
             else:
                 loop.remove_reader(feed.fileno())
 
     loop.add_reader(feed.fileno(), on_readable)
-    relay.listen(stream.note)
-    await relay.over.wait()
+    connection.listen(stream.note)
+    await connection.flight_ended.wait()
     await until_unused(port, stream.is_open)
     loop.remove_reader(feed.fileno())
     await asyncio.to_thread(stream.close)

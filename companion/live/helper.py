@@ -19,7 +19,7 @@ from companion.realtime import schedule_as_usual
 
 T = TypeVar("T")
 
-_MOST_PER_TURN = 10
+_MOST_MESSAGES_PER_TURN = 10
 """Largest number of messages handled in one turn of the event loop; attitude samples are answered
 between two turns."""
 
@@ -63,7 +63,7 @@ class Helper:
         feed_end: socket.socket | None = None
         if tasks.stream is not None:
             self.feed, feed_end = Feed.pair()
-        page_socket = None if tasks.page is None else tasks.page.listening
+        page_socket = None if tasks.page is None else tasks.page.listening_socket
         self._process = _start_process((process_end, page_socket, feed_end), tasks.folder)
         process_end.close()
         if feed_end is not None:
@@ -133,7 +133,7 @@ class Helper:
 
     def _send(self, kind: str, **content: Any) -> None:
         self._channel.send({"kind": kind, **content})
-        if not self._channel.open and kind != "end":
+        if not self._channel.is_open and kind != "end":
             self._note_ended()
 
     def _note_ended(self) -> None:
@@ -156,7 +156,7 @@ class Helper:
 
     def _on_readable(self) -> None:
         """Handle the requests of the process."""
-        for message in self._channel.received_messages(_MOST_PER_TURN):
+        for message in self._channel.received_messages(_MOST_MESSAGES_PER_TURN):
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self._note_ended()

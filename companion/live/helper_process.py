@@ -25,18 +25,18 @@ _NICENESS = 5
 """Niceness of the process, so that it yields to the flight."""
 
 
-class Relay:
+class FlightConnection:
     """The helper process's end of the channel to the flight: requests changes, takes messages.
 
     Attributes:
-        first: the first message of the flight: configuration and tasks (`HelperTasks`).
+        first_message: the first message of the flight: configuration and tasks (`HelperTasks`).
         checks: checks requested changes.
-        over: set when the flight has ended.
+        flight_ended: set when the flight has ended.
     """
 
-    def __init__(self, channel: Channel, first: Message) -> None:
-        self.first, self.checks = first, ChangeChecks.of(first)
-        self.over = asyncio.Event()
+    def __init__(self, channel: Channel, first_message: Message) -> None:
+        self.first_message, self.checks = first_message, ChangeChecks.from_message(first_message)
+        self.flight_ended = asyncio.Event()
         self._channel = channel
         self._ids = count()
         self._pending_answers: dict[int, asyncio.Future[Message]] = {}
@@ -87,8 +87,8 @@ class Relay:
         number = next(self._ids)
         answer = self._pending_answers[number] = asyncio.get_running_loop().create_future()
         try:
-            if self.over.is_set() or not self._channel.send({**message, "id": number}):
-                ended = self.over.is_set() or not self._channel.open
+            if self.flight_ended.is_set() or not self._channel.send({**message, "id": number}):
+                ended = self.flight_ended.is_set() or not self._channel.is_open
                 reason = "the flight has ended" if ended else "the flight is too busy to take it"
                 raise ChangeRefusedError(f"{reason}; nothing has changed")
             async with asyncio.timeout(_ANSWER_TIMEOUT):
@@ -112,13 +112,13 @@ class Relay:
         for message in self._channel.received_messages():
             if message is None:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
-                self.over.set()
+                self.flight_ended.set()
             else:
                 self._take(message)
 
     def _take(self, message: Message) -> None:
         if message["kind"] == "config":
-            self.checks.note(message)
+            self.checks.note_config(message)
         elif message["kind"] == "drag":
             self.checks.note_drag(message)
         answer = self._pending_answers.get(message.get("id", -1))
@@ -128,23 +128,23 @@ class Relay:
             take(message)
 
 
-async def watch(relay: Relay, path: Path) -> None:
+async def watch(connection: FlightConnection, path: Path) -> None:
     """Apply the edits of a file until the flight ends."""
-    config_as_read = Config.model_validate(relay.first["read"])
-    watched = WatchedFile(path, config_as_read, relay.checks.check)
-    relay.note(f"edits of {path.name} are applied from now on")
-    while not relay.over.is_set():
+    config_as_read = Config.model_validate(connection.first_message["read"])
+    watched = WatchedFile(path, config_as_read, connection.checks.check)
+    connection.note(f"edits of {path.name} are applied from now on")
+    while not connection.flight_ended.is_set():
         edit = await asyncio.to_thread(watched.newest_edit)
         if edit is not None and edit.refusal is not None:
-            relay.note(edit.refusal)
+            connection.note(edit.refusal)
         elif edit is not None:
             try:
-                await relay.change(edit.values, path.name)
+                await connection.change(edit.values, path.name)
                 watched.accept()
             except (ConfigError, ChangeRefusedError) as refused:
-                relay.note(f"{path.name} is not applied: {refused}")
+                connection.note(f"{path.name} is not applied: {refused}")
             except NoAnswerError as error:
-                relay.note(f"{path.name}: {error}")
+                connection.note(f"{path.name}: {error}")
                 watched.accept()  # so that an edit back to the old values is sent
         await asyncio.sleep(_CHECK_PERIOD_S)
 
@@ -163,24 +163,24 @@ async def _serve(descriptor: int, listening: int, feed: int) -> None:
     if first is None:
         return
     os.set_blocking(descriptor, False)
-    relay = Relay(channel, first)
-    serving: list[Awaitable[None]] = [_watch_until_over(relay)]
+    connection = FlightConnection(channel, first)
+    serving: list[Awaitable[None]] = [_watch_until_ended(connection)]
     if feed >= 0:
         from companion.live.foxglove_stream import serve_stream  # noqa: PLC0415  needs the extra
 
-        serving.append(serve_stream(relay, socket.socket(fileno=feed)))
+        serving.append(serve_stream(connection, socket.socket(fileno=feed)))
     if listening >= 0:
         from companion.live.page.server import serve_page  # noqa: PLC0415  needs the extra
 
-        serving.append(serve_page(relay, socket.socket(fileno=listening)))
+        serving.append(serve_page(connection, socket.socket(fileno=listening)))
     await asyncio.gather(*serving)
 
 
-async def _watch_until_over(relay: Relay) -> None:
+async def _watch_until_ended(connection: FlightConnection) -> None:
     """Wait for the end of the flight; until then watch the file, if there is one to watch."""
-    path = relay.first["watch"]
-    watching = None if path is None else asyncio.create_task(watch(relay, Path(path)))
-    await relay.over.wait()
+    path = connection.first_message["watch"]
+    watching = None if path is None else asyncio.create_task(watch(connection, Path(path)))
+    await connection.flight_ended.wait()
     if watching is not None:
         watching.cancel()
 

@@ -14,7 +14,7 @@ _LONGEST_REASON = 400
 _UNCHANGED_CHECKS = 3
 """A file counts as complete after this many checks without a change; editors save in steps."""
 
-Signature = tuple[tuple[int, int, int] | None, ...]
+FileStamps = tuple[tuple[int, int, int] | None, ...]
 """Inode, size and time of change (ns) of the file and each included file; None: it is missing."""
 
 
@@ -49,31 +49,31 @@ class WatchedFile:
         self._path, self._check = path, check
         self._accepted_config = self._newest_config = config_as_read
         self._files = files_of(path)
-        self._newest_signature = self._signature()
-        self._checked_signature: Signature | None = None
+        self._newest_stamps = self._current_stamps()
+        self._checked_stamps: FileStamps | None = None
         self._unchanged_checks = 0
 
     def newest_edit(self) -> Edit | None:
         """The newest edit; None: no new edit, or the file is still being written."""
-        signature = self._signature()
-        if signature != self._newest_signature:
-            self._newest_signature, self._unchanged_checks = signature, 0
+        stamps = self._current_stamps()
+        if stamps != self._newest_stamps:
+            self._newest_stamps, self._unchanged_checks = stamps, 0
         self._unchanged_checks += 1
-        if self._unchanged_checks < _UNCHANGED_CHECKS or signature == self._checked_signature:
+        if self._unchanged_checks < _UNCHANGED_CHECKS or stamps == self._checked_stamps:
             return None
         self._files = files_of(self._path)
-        self._newest_signature = self._checked_signature = self._signature()
-        return self._edit()
+        self._newest_stamps = self._checked_stamps = self._current_stamps()
+        return self._read_edit()
 
     def accept(self) -> None:
         """Accept the newest edit: later edits are compared with it."""
         self._accepted_config = self._newest_config
 
-    def _edit(self) -> Edit | None:
+    def _read_edit(self) -> Edit | None:
         name = self._path.name
         try:
             self._newest_config = load(self._path)
-            values = _values(self._accepted_config, self._newest_config)
+            values = _changed_values(self._accepted_config, self._newest_config)
             if not values:
                 return None
             self._check(values, name)
@@ -83,11 +83,11 @@ class WatchedFile:
             return Edit({}, f"{name} is not applied, and nothing has changed: {text}")
         return Edit(values)
 
-    def _signature(self) -> Signature:
-        return tuple(map(_stamp, self._files))
+    def _current_stamps(self) -> FileStamps:
+        return tuple(map(_file_stamp, self._files))
 
 
-def _values(before: Config, after: Config) -> dict[str, dict[str, Any]]:
+def _changed_values(before: Config, after: Config) -> dict[str, dict[str, Any]]:
     """The values that an edit changes, by section and key; changes of `include` are left out."""
     values: dict[str, dict[str, Any]] = {}
     for each in differences(before, after):
@@ -96,7 +96,7 @@ def _values(before: Config, after: Config) -> dict[str, dict[str, Any]]:
     return values
 
 
-def _stamp(path: Path) -> tuple[int, int, int] | None:
+def _file_stamp(path: Path) -> tuple[int, int, int] | None:
     try:
         stat = path.stat()
     except (OSError, ValueError):

@@ -12,7 +12,7 @@ from fastcrc import crc16
 
 from companion.attitude.types import BodyRates, Quaternion
 from companion.mavlink.errors import InvalidSetpoint
-from companion.mavlink.framing import SIGNED, V2
+from companion.mavlink.framing import SIGNED_FLAG, V2_MAGIC
 from companion.mavlink.messages import CRC_EXTRA
 
 ATTITUDE_QUATERNION = 31
@@ -73,7 +73,7 @@ class SetpointEncoder:
     ) -> None:
         self._system, self._component = system, component
         self._target_system, self._target_component = target_system, target_component
-        self._flags = SIGNED if signed else 0
+        self._flags = SIGNED_FLAG if signed else 0
 
     def frame(self, sequence: int, time_boot_ms: int, rates: BodyRates, thrust: float) -> bytes:
         """Build one frame; with signing, the signature must be appended.
@@ -100,7 +100,7 @@ class SetpointEncoder:
             raise _refusal(time_boot_ms, rates, thrust)
         body = _SETPOINT_LAYOUT.pack(
             # header
-            V2,
+            V2_MAGIC,
             _SETPOINT_PAYLOAD_BYTES,
             self._flags,
             0,

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
 from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
-from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.texts import TextAssembler
 
@@ -77,7 +77,7 @@ class CommandClient:
         self,
         settings: LinkSettings,
         outbox: Outbox,
-        router: Router,
+        dispatcher: MessageDispatcher,
         registry: AnswerQueueRegistry,
         texts: TextAssembler,
     ) -> None:
@@ -85,7 +85,7 @@ class CommandClient:
         self._texts = texts
         self._locks: dict[int, asyncio.Lock] = {}
         self._unanswered_tries: dict[int, deque[_Try]] = {}
-        router.subscribe("COMMAND_ACK", self._on_ack)
+        dispatcher.subscribe("COMMAND_ACK", self._on_ack)
 
     async def send(
         self, command: int, params: tuple[float, ...], timeout_s: float, retries: int

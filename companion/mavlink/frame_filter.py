@@ -60,11 +60,11 @@ class FrameFilter:
         self._stats.foreign_sources.add((frame.system, frame.component))
         return False
 
-    def signature_good(self, frame: Frame) -> bool:
+    def has_good_signature(self, frame: Frame) -> bool:
         """Whether a frame is signed as required; without a key every frame is good."""
         if self._signing is None:
             if frame.signed:
-                self.notice_once(_KEY_MISSING_NOTICE)
+                self.notify_once(_KEY_MISSING_NOTICE)
             return True
         result = self._signing.check(frame)
         self.tell_remarks()
@@ -72,15 +72,15 @@ class FrameFilter:
             return True
         self._stats.bad_signature += 1
         if result in _REFUSED_NOTICES:
-            self.notice_once(_REFUSED_NOTICES[result])
+            self.notify_once(_REFUSED_NOTICES[result])
         return False
 
     def tell_remarks(self) -> None:
         """Pass the remarks about the time stamps of signatures to the user."""
         while self._signing is not None and self._signing.remarks:
-            self.notice_once(self._signing.remarks.pop(0))
+            self.notify_once(self._signing.remarks.pop(0))
 
-    def notice_once(self, text: str) -> None:
+    def notify_once(self, text: str) -> None:
         """Pass a notice to the user, unless the same text was passed before."""
         if text not in self._noticed:
             self._noticed.add(text)

@@ -13,11 +13,11 @@ from fastcrc import crc16
 
 from companion.mavlink.stats import LinkStats
 
-V2 = 0xFD
+V2_MAGIC = 0xFD
 """First byte of a frame of version 2."""
-V1 = 0xFE
+V1_MAGIC = 0xFE
 """First byte of a frame of version 1."""
-SIGNED = 0x01
+SIGNED_FLAG = 0x01
 """Incompatibility flag of a frame with a signature."""
 SIGNATURE_LENGTH = 13
 
@@ -81,9 +81,9 @@ class FrameScanner:
         start, end = 0, len(data)
         while start < end:
             magic = data[start]
-            if magic == V2:
+            if magic == V2_MAGIC:
                 length = self._scan_version_2(data, start, frames)
-            elif magic == V1:
+            elif magic == V1_MAGIC:
                 length = self._scan_version_1(data, start, frames)
             else:
                 length = _NOT_A_FRAME
@@ -100,7 +100,7 @@ class FrameScanner:
             return _INCOMPLETE
         # Indexing single bytes is quicker than `struct` when the caches are cold.
         incompatible = data[start + 2]
-        if incompatible & ~SIGNED:
+        if incompatible & ~SIGNED_FLAG:
             return _NOT_A_FRAME
         message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
         checksum_start = start + _V2_HEADER_LENGTH + data[start + 1]
@@ -159,7 +159,7 @@ class FrameScanner:
     def _unknown_frame(self, data: bytes, start: int, end: int) -> int:
         # Without CRC_EXTRA the checksum cannot be checked. The bytes count as a frame if another
         # frame or the end of the data follows them.
-        if end == len(data) or (end < len(data) and data[end] in (V1, V2)):
+        if end == len(data) or (end < len(data) and data[end] in (V1_MAGIC, V2_MAGIC)):
             self._stats.unknown += 1
             return end - start
         if self._keep_unknown and end > len(data) and _is_plausible(data, start):
@@ -169,7 +169,7 @@ class FrameScanner:
 
 def _is_plausible(data: bytes, start: int) -> bool:
     """Whether a version 2 header may begin at `start`: compat_flags 0, message id below 65536."""
-    return data[start] == V2 and data[start + 3] == 0 and data[start + 9] == 0
+    return data[start] == V2_MAGIC and data[start + 3] == 0 and data[start + 9] == 0
 
 
 def build_frame(
@@ -189,9 +189,9 @@ def build_frame(
     trimmed = payload.rstrip(b"\0") or payload[:1]
     body = (
         _V2_HEADER.pack(
-            V2,
+            V2_MAGIC,
             len(trimmed),
-            SIGNED if signed else 0,
+            SIGNED_FLAG if signed else 0,
             0,
             sequence,
             system,

@@ -14,7 +14,7 @@ from collections.abc import Callable, Coroutine
 from contextvars import Context
 from typing import Any, Protocol, TypeVar, TypeVarTuple
 
-from companion.mavlink.loop import HotSelector, LinkEventLoop, Ready
+from companion.mavlink.loop import HotSelector, LinkEventLoop, ReadyKeys
 
 T = TypeVar("T")
 Arguments = TypeVarTuple("Arguments")
@@ -107,7 +107,7 @@ class SettlingSelector(HotSelector, ABC):
         """Whether a step is open: ready callbacks and due timers run, and no I/O happens."""
         return self._on_settled is not None
 
-    def select(self, timeout: float | None = None) -> Ready:
+    def select(self, timeout: float | None = None) -> ReadyKeys:
         """Settle an open step; otherwise wait for the vehicle."""
         if self._on_settled is None:
             return self.wait(timeout)
@@ -119,7 +119,7 @@ class SettlingSelector(HotSelector, ABC):
         return []
 
     @abstractmethod
-    def wait(self, timeout: float | None) -> Ready:
+    def wait(self, timeout: float | None) -> ReadyKeys:
         """Wait for I/O, as `select` of every selector does."""
 
 
@@ -130,14 +130,14 @@ class _SteppingSelector(SettlingSelector):
         super().__init__()
         self._clock = clock
 
-    def select(self, timeout: float | None = None) -> Ready:
+    def select(self, timeout: float | None = None) -> ReadyKeys:
         was_settling = self.settling
         ready = super().select(timeout)
         if was_settling and not self.settling:
             self._clock.start_waiting()
         return ready
 
-    def wait(self, timeout: float | None) -> Ready:
+    def wait(self, timeout: float | None) -> ReadyKeys:
         time_left = None if timeout == 0 else self._clock.time_left()
         if time_left is None:
             return HotSelector.select(self, timeout)
@@ -148,7 +148,7 @@ class _SteppingSelector(SettlingSelector):
             self._clock.advance_alone()
         return ready
 
-    def _spin(self) -> Ready:
+    def _spin(self) -> ReadyKeys:
         """Poll for the next beacon without sleeping: waking up would take longer."""
         deadline = time.perf_counter() + _SPIN_S
         while time.perf_counter() < deadline:

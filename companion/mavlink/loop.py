@@ -17,7 +17,7 @@ from companion.realtime import frozen_objects
 
 T = TypeVar("T")
 
-Ready = list[tuple[selectors.SelectorKey, int]]
+ReadyKeys = list[tuple[selectors.SelectorKey, int]]
 """Key and event mask of each file that is ready, as `select` of every selector returns them."""
 
 
@@ -44,7 +44,7 @@ class HotSelector(selectors.DefaultSelector):
         self._poll.unregister(fd)
         del self._hot[fd]
 
-    def select(self, timeout: float | None = None) -> Ready:
+    def select(self, timeout: float | None = None) -> ReadyKeys:
         """Wait for I/O; hot readers are called before `select` returns."""
         others_ready = False
         # Rounded up: a timer that is woken early would only poll again.

@@ -36,7 +36,7 @@ class Outbox:
             settings.target_component,
             signed=settings.signing is not None,
         )
-        self._latched: tuple[int, BodyRates, float] | None = None
+        self._latched_setpoint: tuple[int, BodyRates, float] | None = None
         self.transport: Transport | None = None
         self.last_setpoint_at = -inf
 
@@ -64,14 +64,14 @@ class Outbox:
             InvalidSetpoint: a value must not reach the vehicle; nothing was kept.
         """
         self._setpoint_encoder.frame(0, time_boot_ms, rates, thrust)
-        self._latched = (time_boot_ms, rates, thrust)
+        self._latched_setpoint = (time_boot_ms, rates, thrust)
 
     def close_step(self, time_boot_ms: int) -> None:
         """Close a lockstep step: send the setpoint kept by `latch`, or else a SYSTEM_TIME.
 
         The SYSTEM_TIME is not recorded.
         """
-        latched, self._latched = self._latched, None
+        latched, self._latched_setpoint = self._latched_setpoint, None
         if latched is not None:
             self.send_setpoint(*latched)
         else:

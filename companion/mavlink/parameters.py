@@ -10,17 +10,17 @@ from collections.abc import Callable
 from math import isfinite
 from typing import NamedTuple
 
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import ParameterRefused, UnansweredParameter, UnknownParameter
 from companion.mavlink.messages import MESSAGE_IDS, Message
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
-from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 
 _VALUE_LAYOUT = struct.Struct("<4sHH16sB")
 _SET_LAYOUT = struct.Struct("<4sBB16sB")
 _READ_LAYOUT = struct.Struct("<hBB16s")
-_BY_NAME = -1  # `param_index` of a request by name
+_INDEX_BY_NAME = -1  # `param_index` of a request by name
 _MAX_NAME_LENGTH = 16
 
 _INTEGER_LAYOUTS = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
@@ -46,7 +46,7 @@ class ParameterClient:
     Args:
         settings: system and component ids of the vehicle and of this program.
         outbox: sends the requests.
-        router: delivers the answers.
+        dispatcher: delivers the answers.
         registry: ends the waits when the connection drops.
         bytewise: returns whether an integer is sent as its four bytes (PX4) instead of as a float
             (ArduPilot).
@@ -56,7 +56,7 @@ class ParameterClient:
         self,
         settings: LinkSettings,
         outbox: Outbox,
-        router: Router,
+        dispatcher: MessageDispatcher,
         registry: AnswerQueueRegistry,
         bytewise: Callable[[], bool],
     ) -> None:
@@ -65,8 +65,8 @@ class ParameterClient:
         self._pending: dict[str, AnswerQueue[_Value | int]] = {}  # a value, or a MAV_PARAM_ERROR
         self._locks: dict[str, asyncio.Lock] = {}
         self._bytewise = bytewise
-        router.subscribe_raw("PARAM_VALUE", self._on_value)
-        router.subscribe("PARAM_ERROR", self._on_error)
+        dispatcher.subscribe_raw("PARAM_VALUE", self._on_value)
+        dispatcher.subscribe("PARAM_ERROR", self._on_error)
 
     async def read(self, name: str, timeout_s: float, retries: int) -> float | int:
         """Read a parameter.
@@ -107,7 +107,7 @@ class ParameterClient:
             return self._decoded(value_held)
 
     async def _request_value(self, name: str, timeout_s: float, retries: int) -> _Value:
-        payload = _READ_LAYOUT.pack(_BY_NAME, *self._target, name.encode())
+        payload = _READ_LAYOUT.pack(_INDEX_BY_NAME, *self._target, name.encode())
         return await self._exchange("PARAM_REQUEST_READ", payload, name, timeout_s, retries)
 
     async def _exchange(

@@ -73,10 +73,10 @@ def host_and_port(address: Any) -> str:
 PEER_NOTICE = "link.endpoint: "
 """Beginning of each notice about the peer."""
 
-CLAIM_LASTS_S = 5.0
+CLAIM_DURATION_S = 5.0
 """Time without a heartbeat of the peer after which another sender may become the peer, s."""
 
-_CONTROL_LASTS_S = 2.0
+_CONTROL_DURATION_S = 2.0
 """Time after the last setpoint during which only a silent peer is replaced, s."""
 
 HEARTBEAT = 0
@@ -90,8 +90,8 @@ class PeerRule:
 
     A sender becomes the peer by a claim: a HEARTBEAT of the configured system and component that
     comes from an autopilot (not type GCS, not autopilot INVALID). With signing or in lockstep, each
-    accepted frame is a claim, and no claim lapses. Otherwise a claim lapses after `CLAIM_LASTS_S`,
-    except while setpoints are sent and for 2 s after the last one.
+    accepted frame is a claim, and no claim lapses. Otherwise a claim lapses after
+    `CLAIM_DURATION_S`, except while setpoints are sent and for 2 s after the last one.
 
     Args:
         stats: counts the changes of the peer.
@@ -131,14 +131,14 @@ class PeerRule:
         """Note that the peer has repeated its claim."""
         self._claimed_at = self._clock()
 
-    def lapsed(self) -> bool:
+    def claim_lapsed(self) -> bool:
         """Whether another sender may become the peer although the present one still sends."""
         if self._every_frame_claims:
             return False
         now = self._clock()
-        if now - self._last_setpoint() < _CONTROL_LASTS_S:
+        if now - self._last_setpoint() < _CONTROL_DURATION_S:
             return False
-        return now - self._claimed_at > CLAIM_LASTS_S
+        return now - self._claimed_at > CLAIM_DURATION_S
 
     def set_peer(self, sender: str) -> None:
         """Make `sender`, given as HOST:PORT, the peer; count a change and report it to the user."""

@@ -24,7 +24,7 @@ _HASH_BYTES = 6
 _ID_BYTES = slice(7, 10)  # of a version 2 frame
 _PAYLOAD_OFFSET = 10
 _TIMESYNC_ID = 111
-_TIMESYNC = _TIMESYNC_ID.to_bytes(3, "little")
+_TIMESYNC_ID_BYTES = _TIMESYNC_ID.to_bytes(3, "little")
 _MAX_REQUESTS = 16  # TIMESYNC requests whose answers are recognised
 
 WRITE_PERIOD_S = 10.0
@@ -87,25 +87,25 @@ class Signing:
         if len(key) != 32:
             raise SigningError(f"a signing key has 32 bytes, not {len(key)}")
         self._key = key
-        self._link = bytes([link_id])
+        self._link_id = bytes([link_id])
         self.file = file
         kept_stamps, load_error = file.load() if file is not None else (Stamps(), None)
         self._judge = StampJudge(kept_stamps, clock, monotonic_clock)
         self.remarks, self.changed = self._judge.remarks, self._judge.changed
         if load_error is not None:
             self.remarks.append(load_error)
-        self._newest_stamp = kept_stamps.sent
+        self._newest_stamp = kept_stamps.newest_sent
         self._timesync_requests: deque[bytes] = deque(maxlen=_MAX_REQUESTS)
         self._unproven_stamp = 0
 
     def sign(self, frame: bytes) -> bytes:
         """Append the signature to a frame built with `signed=True`."""
         self._newest_stamp = max(self._newest_stamp + 1, self._judge.date())
-        if frame[_ID_BYTES] == _TIMESYNC:
+        if frame[_ID_BYTES] == _TIMESYNC_ID_BYTES:
             tc1, ts1 = _timesync_fields(frame[_PAYLOAD_OFFSET : _PAYLOAD_OFFSET + frame[1]])
             if not any(tc1):
                 self._timesync_requests.append(ts1)
-        tail = self._link + self._newest_stamp.to_bytes(_STAMP_BYTES, "little")
+        tail = self._link_id + self._newest_stamp.to_bytes(_STAMP_BYTES, "little")
         return frame + tail + self._hash(frame + tail)
 
     def check(self, frame: Frame) -> SignatureResult:
@@ -214,4 +214,6 @@ def _with_reserve(stamps: Stamps) -> Stamps:
         stream: tuple(min(stamp + _STAMP_RESERVE, LATEST_TICKS) for stamp in newest)
         for stream, newest in stamps.streams.items()
     }
-    return replace(stamps, sent=min(stamps.sent + _STAMP_RESERVE, LATEST_TICKS), streams=streams)
+    return replace(
+        stamps, newest_sent=min(stamps.newest_sent + _STAMP_RESERVE, LATEST_TICKS), streams=streams
+    )

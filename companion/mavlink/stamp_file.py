@@ -11,7 +11,7 @@ from typing import Any
 
 from companion.files.write_whole import write_whole
 from companion.mavlink.errors import SigningError
-from companion.mavlink.stamps import LATEST_TICKS, Stamps, Stream
+from companion.mavlink.stamps import LATEST_TICKS, SignatureStream, Stamps
 
 _FOLDER = Path("mavlink-companion", "signing")
 _MAX_FILE_BYTES = 4_000_000
@@ -65,7 +65,7 @@ class StampFile:
         text = json.dumps(
             {
                 "date": stamps.date,
-                "sent": stamps.sent,
+                "sent": stamps.newest_sent,
                 "streams": {"/".join(map(str, key)): kept for key, kept in stamps.streams.items()},
             }
         )
@@ -94,7 +94,7 @@ def _parsed(text: bytes) -> Stamps:
     return Stamps(_valid_ticks(kept["date"]), _valid_ticks(kept["sent"]), streams)
 
 
-def _stream(name: str) -> Stream:
+def _stream(name: str) -> SignatureStream:
     system, component, link = (int(part) for part in name.split("/"))
     return system, component, link
 

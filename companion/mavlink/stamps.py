@@ -26,7 +26,7 @@ _MAX_AHEAD = 5 * 365 * _DAY
 LATEST_TICKS = 2**48 - 2 * _MAX_AHEAD
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
 
-Stream = tuple[int, int, int]
+SignatureStream = tuple[int, int, int]
 """System, component and link id."""
 
 SET_CLOCK = "set this computer's clock (NTP, or by hand)"
@@ -48,9 +48,9 @@ class Stamps:
 
     date: int = 0
     """This program's date when the stamps were written."""
-    sent: int = 0
+    newest_sent: int = 0
     """The newest stamp that was sent."""
-    streams: dict[Stream, tuple[int, ...]] = field(default_factory=dict)
+    streams: dict[SignatureStream, tuple[int, ...]] = field(default_factory=dict)
     """The newest stamps accepted on each stream: one near this program's date, and one far ahead of
     it, if the vehicle proved that date (see `StampJudge`)."""
 
@@ -97,7 +97,8 @@ class StampJudge:
         self._start_monotonic = monotonic_clock()
         self._ahead_limit = self._start_date + _DAY
         self._kept_streams = kept_stamps.streams
-        self._newest_by_stream: dict[tuple[Stream, bool], int] = {}  # the bool as in `_newest`
+        # The bool has the same meaning as in `_newest`.
+        self._newest_by_stream: dict[tuple[SignatureStream, bool], int] = {}
         self._newest = {False: 0, True: 0}  # of all streams; True: of stamps far ahead of the date
         self._date_proven = False
 
@@ -114,7 +115,9 @@ class StampJudge:
         # Once a stamp near the date was accepted, no other stamp changes the date.
         return is_far_ahead and not self._date_proven and not self._newest[False]
 
-    def judge(self, stream: Stream, stamp: int, *, answers_timesync: bool) -> SignatureResult:
+    def judge(
+        self, stream: SignatureStream, stamp: int, *, answers_timesync: bool
+    ) -> SignatureResult:
         """Judge a stamp; only a good one is remembered.
 
         Args:
@@ -153,7 +156,7 @@ class StampJudge:
         self._newest[ahead] = max(self._newest[ahead], stamp)
         return SignatureResult.GOOD
 
-    def streams(self) -> dict[Stream, tuple[int, ...]]:
+    def streams(self) -> dict[SignatureStream, tuple[int, ...]]:
         """The newest stamps of each stream that was heard in this run; see `Stamps.streams`."""
         heard = dict(self._newest_by_stream)  # a copy: another thread calls this
         newest = {}
@@ -165,7 +168,7 @@ class StampJudge:
             newest[stream] = tuple(stamp for stamp in stamps if stamp)
         return newest
 
-    def _lower_bound(self, stream: Stream, ahead: bool, date: int) -> int:
+    def _lower_bound(self, stream: SignatureStream, ahead: bool, date: int) -> int:
         """Lower bound of the next stamp of this stream, exclusive, ticks."""
         heard = self._newest_by_stream.get((stream, ahead))
         if heard is not None:
@@ -173,7 +176,7 @@ class StampJudge:
         newest = self._newest[ahead] if ahead else max(self._newest[ahead], date)
         return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
 
-    def _kept_stamp(self, stream: Stream, ahead: bool) -> int:
+    def _kept_stamp(self, stream: SignatureStream, ahead: bool) -> int:
         """The newest stamp of a stream on disk, ticks; 0 without one.
 
         Args:

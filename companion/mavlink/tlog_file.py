@@ -8,7 +8,14 @@ from collections.abc import Iterator, Set
 from pathlib import Path
 
 from companion.mavlink.errors import LogError
-from companion.mavlink.framing import SIGNATURE_LENGTH, SIGNED, V1, V2, Frame, FrameScanner
+from companion.mavlink.framing import (
+    SIGNATURE_LENGTH,
+    SIGNED_FLAG,
+    V1_MAGIC,
+    V2_MAGIC,
+    Frame,
+    FrameScanner,
+)
 from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS, Message, decode
 
 _STAMP_BYTES = 8
@@ -40,9 +47,9 @@ def _records(path: Path) -> Iterator[bytes]:
     start = _STAMP_BYTES
     while start + 3 <= len(data):
         magic, size, flags = data[start : start + 3]
-        if magic == V2:
-            end = start + _V2_OVERHEAD + size + (SIGNATURE_LENGTH if flags & SIGNED else 0)
-        elif magic == V1:
+        if magic == V2_MAGIC:
+            end = start + _V2_OVERHEAD + size + (SIGNATURE_LENGTH if flags & SIGNED_FLAG else 0)
+        elif magic == V1_MAGIC:
             end = start + _V1_OVERHEAD + size
         elif start == _STAMP_BYTES:
             break

@@ -12,7 +12,7 @@ import logging
 from companion.mavlink.errors import LinkError
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.transport.base import Lost, Receiver, Tap, Transport
+from companion.mavlink.transport.base import LostCallback, Receiver, Tap, Transport
 from companion.mavlink.transport.endpoint import Endpoint
 from companion.mavsdk_link.transport import MavsdkTransport
 from companion.vehicle.link import Link
@@ -43,7 +43,7 @@ class MavsdkLink(Link):
         if settings.lockstep or settings.signing is not None:
             raise LinkError("MAVSDK can neither fly in lockstep nor sign; use link.backend: direct")
 
-        async def opener(_endpoint: Endpoint, receiver: Receiver, _lost: Lost) -> Transport:
+        async def opener(_endpoint: Endpoint, receiver: Receiver, _lost: LostCallback) -> Transport:
             return MavsdkTransport(settings, receiver.receive)
 
         super().__init__(settings, tap, opener, notice)

@@ -19,10 +19,10 @@ from mavsdk.logging import log_subscribe
 from mavsdk.mavsdk import Configuration, Mavsdk
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.framing import V2
+from companion.mavlink.framing import V2_MAGIC
 from companion.mavlink.loop import unwatch, watch
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.transport.base import Receive
+from companion.mavlink.transport.base import ReceiveCallback
 from companion.mavlink.transport.endpoint import (
     Endpoint,
     SerialPort,
@@ -60,7 +60,7 @@ def connection_url(endpoint: str) -> str:
     return f"{scheme}://{where.host}:{where.port}"
 
 
-_MOST_WAITING = 1000
+_MOST_WAITING_FRAMES = 1000
 """Largest number of frames that wait for the event loop; if more wait, the oldest are dropped."""
 _SOURCE = slice(5, 7)  # system and component of a MAVLink 2 frame
 _OPEN_FAILURES = {
@@ -85,7 +85,7 @@ class MavsdkTransport:
 
     reconnects = False
 
-    def __init__(self, settings: LinkSettings, receive: Receive) -> None:
+    def __init__(self, settings: LinkSettings, receive: ReceiveCallback) -> None:
         url = connection_url(settings.endpoint)
         log_subscribe(lambda *_: True)  # otherwise MAVSDK logs to standard output
         component = settings.source_component % 255 + 1
@@ -94,7 +94,7 @@ class MavsdkTransport:
         # A listening UDP port knows no address to send to before it has received a frame.
         self._has_peer = not url.startswith(_SCHEMES[UdpIn])
         self._is_open = True
-        self._waiting_frames: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING)
+        self._waiting_frames: deque[tuple[bytes, int]] = deque(maxlen=_MOST_WAITING_FRAMES)
         self._loop = asyncio.get_running_loop()
         self._wakeup = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._mavsdk = Mavsdk(Configuration.create_manual(settings.source_system, component, True))
@@ -141,7 +141,7 @@ class MavsdkTransport:
         os.eventfd_read(self._wakeup)
         while self._waiting_frames:
             frame, received_ns = self._waiting_frames.popleft()
-            if frame[0] != V2 or frame[_SOURCE] != self._mavsdk_source:
+            if frame[0] != V2_MAGIC or frame[_SOURCE] != self._mavsdk_source:
                 self._has_peer = True
                 self._receive(frame, received_ns)
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from companion.drag import Drag, along_axes
+from companion.drag import Drag, axis_drag_deceleration
 from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
@@ -124,7 +124,7 @@ def translation(
     v: list[Any] = ca.vertsplit(velocity)
     deceleration = ca.vertcat(*drag.deceleration((v[0], v[1], v[2])))
     forward: list[Any] = [ca.cos(heading), ca.sin(heading)]
-    along_body = along_axes(conditions.axis_drag, forward[0], forward[1], v[0], v[1])
+    along_body = axis_drag_deceleration(conditions.axis_drag, forward[0], forward[1], v[0], v[1])
     deceleration += ca.vertcat(*along_body, 0.0)
     disturbance = ca.vertcat(conditions.w_n, conditions.w_e, conditions.w_d)
     return ca.vertcat(velocity, lift + weight - deceleration + disturbance)

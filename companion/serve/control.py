@@ -20,7 +20,7 @@ from companion.serve.programs import Program, Programs
 from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, ControlRequest
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.request import RefusedSetpoint, Request
-from companion.serve.setpoints.understand import SETPOINTS, decode_setpoint
+from companion.serve.setpoints.understand import SETPOINT_IDS, decode_setpoint
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
@@ -54,7 +54,7 @@ class ServedControl:
 
     def intercept(self, client: Client, frame: Frame) -> bool:
         """Handle a client's frame, such as a setpoint; return whether it must not be forwarded."""
-        if frame.message_id in SETPOINTS:
+        if frame.message_id in SETPOINT_IDS:
             self._take_setpoint(client, frame)
             return True
         autopilot = self._link.state.autopilot
@@ -64,7 +64,7 @@ class ServedControl:
         if for_autopilot and asks_for_control(frame, autopilot):
             self._take_control_request(client, frame)
             return True
-        flight, owner = self._flights.current, self._ownership.owner
+        flight, owner = self._flights.current_flight, self._ownership.owner
         if flight is None:
             return False
         if steers_in_our_mode(frame, autopilot):
@@ -109,12 +109,12 @@ class ServedControl:
         Raises:
             UnplannableError: no motion leads to the request; the previous one stays in force.
         """
-        flight = self._flights.current
+        flight = self._flights.current_flight
         if flight is not None and not flight.is_ending and self._ownership.owner == owner:
             flight.give(request)
         self._programs.keep(owner, request)
         if flight is not None and flight.is_ending:
-            return refusals.ENDING
+            return refusals.FLIGHT_ENDING
         if flight is None and self._give_control(owner, now):
             self._flights.begin(owner, request, None, from_ground=False)
         return None
@@ -133,7 +133,7 @@ class ServedControl:
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
         if not state.flying:
-            self._component.answer(program.client, refusals.ON_GROUND)
+            self._component.answer(program.client, refusals.VEHICLE_ON_GROUND)
             return False
         if not self._ownership.has_stream(program, now):
             return False
@@ -145,12 +145,19 @@ class ServedControl:
     def _take_control_request(self, client: Client, frame: Frame) -> None:
         """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.sender_of(client, frame)
-        flight, on_ground = self._flights.current, not self._link.state.flying
-        request, refusal = self._programs.newest(owner), self._ownership.request_control(owner, now)
+        flight, on_ground = self._flights.current_flight, not self._link.state.flying
+        request, refusal = (
+            self._programs.newest_request(owner),
+            self._ownership.request_control(owner, now),
+        )
         if refusal is None and flight is not None:
-            refusal = refusals.ENDING if flight.is_ending else None
+            refusal = refusals.FLIGHT_ENDING if flight.is_ending else None
         elif refusal is None:
-            refusal = self._flights.fence_refusal() if request is not None else refusals.FORGOTTEN
+            refusal = (
+                self._flights.fence_refusal()
+                if request is not None
+                else refusals.SETPOINTS_FORGOTTEN
+            )
             if refusal is None and request is not None and on_ground:
                 refusal = self._keeper.takeoff_refusal(request)
         result = ACCEPTED if self._flights.in_control else IN_PROGRESS

@@ -34,7 +34,7 @@ class ServedFlights:
 
     Attributes:
         ownership: decides which client's requests are flown.
-        current: the flight that runs, or None.
+        current_flight: the flight that runs, or None.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class ServedFlights:
         changes: Changes,
     ) -> None:
         self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
-        self.current: ServedFlight | None = None
+        self.current_flight: ServedFlight | None = None
         self._config, self._link, self._component = config, link, component
         self._observer, self._environment = observer, environment
         self._records, self._changes = records, changes
@@ -60,7 +60,7 @@ class ServedFlights:
     @property
     def in_control(self) -> bool:
         """Whether the autopilot obeys setpoints that this program sends for a client."""
-        return self.current is not None and self.current.in_control
+        return self.current_flight is not None and self.current_flight.in_control
 
     @property
     def may_retry(self) -> bool:
@@ -86,7 +86,7 @@ class ServedFlights:
         Raises:
             UnplannableError: no motion leads to the request.
         """
-        self.current = flight = ServedFlight(
+        self.current_flight = flight = ServedFlight(
             str(owner),
             self._config,
             self._link,
@@ -106,8 +106,8 @@ class ServedFlights:
 
     async def close(self, reason: str) -> None:
         """Hand the vehicle back if a client has it; wait until that is done and recorded."""
-        if self.current is not None:
-            self.current.interrupt(reason)
+        if self.current_flight is not None:
+            self.current_flight.interrupt(reason)
         if self._unfinished:
             await asyncio.wait(self._unfinished)
 
@@ -124,9 +124,9 @@ class ServedFlights:
         finally:
             self.ownership.release()
             self._fence.keep(flight.fence_centre)
-            self.current = self._task = None
+            self.current_flight = self._task = None
             if not has_begun:
                 self._retry_time = self._clock() + _RETRY_PAUSE
             await flight.save()
-            if self.current is None and self._config.realtime.freeze_gc:  # between flights
+            if self.current_flight is None and self._config.realtime.freeze_gc:  # between flights
                 gc.collect()

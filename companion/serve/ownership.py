@@ -22,9 +22,9 @@ class ControlState(Enum):
 class _Stream:
     """Arrival times of the last two setpoints of one client."""
 
-    newest: float = -inf
+    newest_arrival: float = -inf
     """Event-loop time at which the newest setpoint arrived, s; −inf: none yet."""
-    previous: float = -inf
+    previous_arrival: float = -inf
     """Event-loop time at which the setpoint before the newest arrived, s; −inf: none yet."""
 
 
@@ -55,7 +55,7 @@ class Ownership:
                 return f"{owner} is in control"
             self.owner = client
         stream = self._streams.setdefault(client, _Stream())
-        stream.previous, stream.newest = stream.newest, now
+        stream.previous_arrival, stream.newest_arrival = stream.newest_arrival, now
         if len(self._streams) > _MAX_CLIENTS:
             self._forget_silent(now)
         return None
@@ -67,7 +67,7 @@ class Ownership:
         """
         self.owner = owner_before
         stream = self._streams[client]
-        stream.newest = stream.previous
+        stream.newest_arrival = stream.previous_arrival
 
     def request_control(self, client: Hashable, now: float) -> str | None:
         """Give control to a client that requests it; return the reason of a refusal, or None."""
@@ -82,12 +82,15 @@ class Ownership:
     def has_stream(self, client: Hashable, now: float) -> bool:
         """Whether a client sends a stream: its last two setpoints came within the timeout."""
         stream = self._streams.get(client, _Stream())
-        return self._is_live(client, now) and stream.newest - stream.previous <= self._timeout
+        return (
+            self._is_live(client, now)
+            and stream.newest_arrival - stream.previous_arrival <= self._timeout
+        )
 
     def begin(self, now: float) -> None:
         """Note that control begins; if the owner is already silent, its hold time starts now."""
         stream = self._streams.setdefault(self.owner, _Stream())
-        stream.newest = max(stream.newest, now - self._timeout)
+        stream.newest_arrival = max(stream.newest_arrival, now - self._timeout)
 
     def release(self) -> None:
         """End the ownership: the owner has released control, or the vehicle has left our mode."""
@@ -97,13 +100,13 @@ class Ownership:
         """State of the control at the event-loop time `now`, s."""
         if self.owner is None:
             return ControlState.FREE
-        overdue = now - self._streams.get(self.owner, _Stream()).newest - self._timeout
+        overdue = now - self._streams.get(self.owner, _Stream()).newest_arrival - self._timeout
         if overdue <= 0.0:
             return ControlState.LIVE
         return ControlState.HOLDING if overdue <= self._hold_time else ControlState.EXPIRED
 
     def _is_live(self, client: Hashable, now: float) -> bool:
-        return now - self._streams.get(client, _Stream()).newest <= self._timeout
+        return now - self._streams.get(client, _Stream()).newest_arrival <= self._timeout
 
     def _forget_silent(self, now: float) -> None:
         self._streams = {

@@ -34,7 +34,7 @@ class Programs:
         while len(self._newest) > _MAX_PROGRAMS:
             del self._newest[next(iter(self._newest))]
 
-    def newest(self, program: Program) -> Request | None:
+    def newest_request(self, program: Program) -> Request | None:
         """The newest request of a program; None if it has sent none, or its request was dropped."""
         return self._newest.get(program)
 

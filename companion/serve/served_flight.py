@@ -179,7 +179,7 @@ class ServedFlight:
             self._send_values(),
             self._assembled.reporter.run(),
         ]
-        tasks = [asyncio.create_task(self._guarded(work)) for work in background]
+        tasks = [asyncio.create_task(self._run_guarded(work)) for work in background]
         try:
             with connected(self._link, self._assembled):
                 return await self._assembled.flight.run()
@@ -187,7 +187,7 @@ class ServedFlight:
             for task in tasks:
                 await cancel(task)
 
-    async def _guarded(self, work: Coroutine[Any, Any, None]) -> None:
+    async def _run_guarded(self, work: Coroutine[Any, Any, None]) -> None:
         """Run a task beside the flight; a fault in it does not end the flight."""
         try:
             await work

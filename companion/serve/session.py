@@ -26,7 +26,7 @@ from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.permission import Permission
 from companion.serve.network.routing import Routing
-from companion.serve.setpoints.understand import SETPOINTS
+from companion.serve.setpoints.understand import SETPOINT_IDS
 from companion.serve.situation import SituationKeeper
 from companion.vehicle.link import Link
 
@@ -97,7 +97,7 @@ class ServeSession:
         settings = (
             realtime_settings(self._config) if self._environment.realtime else RealtimeSettings()
         )
-        with realtime.requested(settings) as grants:
+        with realtime.requested_settings(settings) as grants:
             self.records.grants = grants
             for grant in grants:
                 self._note(str(grant))
@@ -129,8 +129,8 @@ class ServeSession:
         control = None
         if self._config.serve.control:
             keeper = SituationKeeper(link, network)
-            control = self._control(link, component, keeper)
-            network.setpoint_ids = SETPOINTS
+            control = self._make_control(link, component, keeper)
+            network.setpoint_ids = SETPOINT_IDS
             background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
         interceptor = _FrameInterceptor(
             permission, component, control, network.routing, link.settings.target_system
@@ -150,7 +150,7 @@ class ServeSession:
                 await cancel(task)
         return _counters(link, network)
 
-    def _control(
+    def _make_control(
         self, link: Link, component: Component, keeper: SituationKeeper
     ) -> "ServedControl":
         """Make the objects through which clients command the vehicle."""
@@ -203,13 +203,13 @@ class _FrameInterceptor:
         for_another_system = target.system not in (0, self._system)
         target_is_client = self._routing.is_at_client(target, client)
         # A setpoint for another system would reach the vehicle, which may obey it.
-        if for_another_system and (target_is_client or frame.message_id not in SETPOINTS):
+        if for_another_system and (target_is_client or frame.message_id not in SETPOINT_IDS):
             return False
         return self._control.intercept(client, frame)
 
     def on_own_frame(self, client: Client, frame: Frame) -> None:
         """Take a frame addressed only to our component: fly a setpoint, refuse a command."""
-        if frame.message_id not in SETPOINTS or not self.intercept(client, frame):
+        if frame.message_id not in SETPOINT_IDS or not self.intercept(client, frame):
             self._component.on_own_frame(client, frame)
 
 

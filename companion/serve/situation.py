@@ -16,7 +16,7 @@ from companion.mavlink.codec import decode_attitude
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import Message
 from companion.serve.network.network import Network
-from companion.serve.setpoints.request import Origin, Request, Situation, climbs
+from companion.serve.setpoints.request import Origin, Request, Situation, requests_takeoff
 from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
@@ -66,7 +66,7 @@ class SituationKeeper:
         situation = self.situation()
         if not self._link.state.landed or situation is None:
             return "take off first: it is not known whether the vehicle stands on the ground"
-        if climbs(request, situation):
+        if requests_takeoff(request, situation):
             return None
         return "command a height of 1 m or more above the ground, or take off first"
 

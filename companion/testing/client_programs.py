@@ -11,7 +11,7 @@ from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import CRC_EXTRA, Message, dialect
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
-from companion.testing.flying import environment, in_memory
+from companion.testing.flying import config_in_memory, environment
 from companion.testing.vehicle import MockVehicle
 
 _POLL_PERIOD = 0.02
@@ -43,7 +43,7 @@ async def serving(
         RuntimeError: the session ended before its network was open.
     """
     served_config = changed(
-        in_memory(as_config(config), vehicle), {"serve": {"clients": ()}}, "the test"
+        config_in_memory(as_config(config), vehicle), {"serve": {"clients": ()}}, "the test"
     )
     session = ServeSession(served_config, note, None, environment, folder)
     session_task = asyncio.ensure_future(session.run())
@@ -105,7 +105,7 @@ class Program(Client):
         raw = message.pack(self.packer)
         self.packer.seq = (self.packer.seq + 1) & 0xFF
         frames = FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw)
-        self._session.network.received(self, frames)
+        self._session.network.receive_frames(self, frames)
 
     def of(self, name: str) -> list[Message]:
         """The received messages of one type, such as `COMMAND_ACK`."""
@@ -125,6 +125,6 @@ class Program(Client):
 
     def _flush(self) -> None:
         """Decode all frames that are queued for this program."""
-        while self._waiting:
+        while self._queued_frames:
             data, _ = self._dequeue(100_000)
             self.heard += self._parser.parse_buffer(data) or ()

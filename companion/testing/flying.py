@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from companion.api.connection import Configuration, as_config, flying
+from companion.api.connection import Configuration, as_config, connect_configured
 from companion.api.vehicle import Vehicle
 from companion.config import Config
 from companion.config.files import changed
@@ -92,7 +92,7 @@ def session(
     Raises:
         ConfigError: the configuration is wrong.
     """
-    flown_config = in_memory(as_config(config), vehicle)
+    flown_config = config_in_memory(as_config(config), vehicle)
     records = None if folder is None else Path(folder)
     if records is not None:
         records.mkdir(parents=True, exist_ok=True)
@@ -157,13 +157,13 @@ async def connect(
         raise RuntimeError(
             "connect flies on the vehicle's clock: call it inside run(vehicle, main())"
         )
-    flown_config = in_memory(as_config(config), vehicle)
+    flown_config = config_in_memory(as_config(config), vehicle)
     records = None if folder is None else Path(folder)
-    async with flying(flown_config, records, observer, environment) as connected:
+    async with connect_configured(flown_config, records, observer, environment) as connected:
         yield connected
 
 
-def in_memory(config: Config, vehicle: MockVehicle) -> Config:
+def config_in_memory(config: Config, vehicle: MockVehicle) -> Config:
     """The configuration for a vehicle in memory; lockstep is set to match the vehicle.
 
     Raises:

@@ -15,7 +15,7 @@ from sitl_mock.physics.vehicle_step import Plant, PythonPlant
 from sitl_mock.settings import load_settings
 from sitl_mock.simulation import Simulation
 
-Relay = Callable[[bytes], Iterable[bytes]]
+DatagramRelay = Callable[[bytes], Iterable[bytes]]
 """Takes a datagram that was sent; returns the datagrams that arrive in its place."""
 
 _GROUND_STATION = 255, 190
@@ -23,7 +23,7 @@ _GROUND_STATION = 255, 190
 _COMMAND_PARAMETERS = 7
 
 
-def _plant(compiled: bool) -> type[Plant]:
+def _plant_class(compiled: bool) -> type[Plant]:
     """The class that computes the physics, compiled or in plain Python."""
     if not compiled:
         return PythonPlant
@@ -87,10 +87,10 @@ class MockVehicle:
         self.in_lockstep, self.delay_s = all_settings.lockstep.enabled, delay_s
         self.setpoints: list[ReceivedSetpoint] = []
         self.after_step: list[Callable[[], None]] = []
-        self.to_companion: Relay | None = None
-        self.from_companion: Relay | None = None
+        self.to_companion: DatagramRelay | None = None
+        self.from_companion: DatagramRelay | None = None
         self.settings = all_settings
-        self._simulation = Simulation(all_settings, plant=_plant(compiled))
+        self._simulation = Simulation(all_settings, plant=_plant_class(compiled))
         self._exchange = Exchange(all_settings, self._simulation)
         self._exchange.on_message = self._record_setpoint
         self._arrived_datagrams: list[ReceivedDatagram] = []

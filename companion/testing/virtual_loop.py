@@ -6,7 +6,7 @@ from contextvars import Context
 from typing import Protocol, TypeVarTuple
 
 from companion.mavlink.lockstep import LockstepEventLoop, SettlingSelector
-from companion.mavlink.loop import Ready
+from companion.mavlink.loop import ReadyKeys
 
 Arguments = TypeVarTuple("Arguments")
 
@@ -50,22 +50,26 @@ class _VirtualSelector(SettlingSelector):
     """Lets the vehicle advance, instead of waiting, until the program has something to do.
 
     Attributes:
-        scheduled: number of callbacks and timers that were scheduled so far.
+        scheduled_count: number of callbacks and timers that were scheduled so far.
     """
 
     def __init__(self, clock: VirtualClock, world: World) -> None:
         super().__init__()
-        self.scheduled = 0
+        self.scheduled_count = 0
         self._clock, self._world = clock, world
 
-    def wait(self, timeout: float | None) -> Ready:
+    def wait(self, timeout: float | None) -> ReadyKeys:
         if timeout == 0:
             self._world.deliver_due()
         else:
             until = float("inf") if timeout is None else self._clock.now + timeout
-            count_before = self.scheduled
+            count_before = self.scheduled_count
             # Most messages only call functions of the program, and schedule nothing.
-            while self.scheduled == count_before and not self.settling and self._clock.now < until:
+            while (
+                self.scheduled_count == count_before
+                and not self.settling
+                and self._clock.now < until
+            ):
                 self._world.advance(until)
         return []
 
@@ -98,7 +102,7 @@ class VirtualEventLoop(LockstepEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """Schedule a callback; the vehicle waits until it has run."""
-        self._virtual_selector.scheduled += 1
+        self._virtual_selector.scheduled_count += 1
         return super().call_soon(callback, *args, context=context)
 
     def call_soon_threadsafe(
@@ -108,7 +112,7 @@ class VirtualEventLoop(LockstepEventLoop):
         context: Context | None = None,
     ) -> asyncio.Handle:
         """Schedule a callback from another thread; see `call_soon`."""
-        self._virtual_selector.scheduled += 1
+        self._virtual_selector.scheduled_count += 1
         return super().call_soon_threadsafe(callback, *args, context=context)
 
     def call_at(
@@ -122,5 +126,5 @@ class VirtualEventLoop(LockstepEventLoop):
 
         In lockstep the vehicle completes the step that contains this time.
         """
-        self._virtual_selector.scheduled += 1
+        self._virtual_selector.scheduled_count += 1
         return super().call_at(when, callback, *args, context=context)

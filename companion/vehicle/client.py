@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterable, Mapping
 
 from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE, CommandClient
+from companion.mavlink.dispatcher import MessageDispatcher, Unsubscribe
 from companion.mavlink.errors import LinkTimeout, NotConnected
 from companion.mavlink.messages import Message, message_id
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
-from companion.mavlink.router import Router, Unsubscribe
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
@@ -25,7 +25,7 @@ class VehicleClient:
     Args:
         settings: The endpoint, and the ids of the vehicle and of this program.
         outbox: Sends the requests.
-        router: Delivers the messages received.
+        dispatcher: Delivers the messages received.
         stats: Counters of the link.
         clock: Returns the event-loop time, s.
         vehicle_clock: Converts the time stamps of positions.
@@ -40,20 +40,20 @@ class VehicleClient:
         self,
         settings: LinkSettings,
         outbox: Outbox,
-        router: Router,
+        dispatcher: MessageDispatcher,
         stats: LinkStats,
         clock: Callable[[], float],
         vehicle_clock: VehicleClock,
     ) -> None:
         self.settings, self.stats = settings, stats
-        self._outbox, self._router = outbox, router
+        self._outbox, self._dispatcher = outbox, dispatcher
         self._registry = AnswerQueueRegistry()
         texts = TextAssembler()
-        self.state = VehicleState(router, stats, texts, clock, vehicle_clock)
-        read_events(router, texts, clock)
-        self._commands = CommandClient(settings, outbox, router, self._registry, texts)
+        self.state = VehicleState(dispatcher, stats, texts, clock, vehicle_clock)
+        read_events(dispatcher, texts, clock)
+        self._commands = CommandClient(settings, outbox, dispatcher, self._registry, texts)
         self._parameters = ParameterClient(
-            settings, outbox, router, self._registry, lambda: self.autopilot.bytewise_parameters
+            settings, outbox, dispatcher, self._registry, lambda: self.autopilot.bytewise_parameters
         )
 
     @property
@@ -73,7 +73,7 @@ class VehicleClient:
         Raises:
             UnknownMessage: The dialect has no such message.
         """
-        return self._router.subscribe(name, callback)
+        return self._dispatcher.subscribe(name, callback)
 
     def send(self, message: Message) -> bool:
         """Send a pymavlink message now; return False if it could not be sent."""
@@ -106,7 +106,7 @@ class VehicleClient:
             LinkLost: The connection dropped while waiting.
         """
         with AnswerQueue[Message](self._registry) as answers:
-            unsubscribe = self._router.subscribe(name, answers.put)
+            unsubscribe = self._dispatcher.subscribe(name, answers.put)
             try:
                 await self.command(MAV_CMD_REQUEST_MESSAGE, float(message_id(name)))
                 return await answers.next(timeout_s)

@@ -1,4 +1,4 @@
-"""Checks arriving bytes, and passes their frames to the control loop and to the router.
+"""Checks arriving bytes, and passes their frames to the control loop and to the dispatcher.
 
 Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
 subscribers. In lockstep, frames first wait for the beacon (a SYSTEM_TIME) that closes their step,
@@ -15,13 +15,13 @@ from companion.mavlink.codec import (
     decode_attitude,
     decode_beacon,
 )
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.frame_filter import FrameFilter, Notice
 from companion.mavlink.framing import Frame, FrameScanner
 from companion.mavlink.lockstep import LockstepEventLoop
 from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.peer import HEARTBEAT, PeerRule
-from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import FrameCounter, LinkStats
 from companion.mavlink.transport.base import Tap
@@ -30,12 +30,12 @@ from companion.vehicle.records import AttitudeSample
 
 
 class Inbox:
-    """Passes attitude samples to the control loop, and all accepted frames to the router.
+    """Passes attitude samples to the control loop, and all accepted frames to the dispatcher.
 
     Args:
         settings: Ids of the vehicle, and the signing key.
         stats: Counters of the link.
-        router: Takes every accepted frame.
+        dispatcher: Takes every accepted frame.
         tap: Called with every accepted frame, for recordings.
         notice: Called once with each notice about signatures, their time stamps and the peer.
         clock: The vehicle's clock; takes the time stamp of every sample.
@@ -55,13 +55,13 @@ class Inbox:
         self,
         settings: LinkSettings,
         stats: LinkStats,
-        router: Router,
+        dispatcher: MessageDispatcher,
         tap: Tap | None,
         notice: Notice,
         clock: VehicleClock,
         last_setpoint: Callable[[], float] = lambda: -inf,
     ) -> None:
-        self._stats, self._router, self._tap, self._clock = stats, router, tap, clock
+        self._stats, self._dispatcher, self._tap, self._clock = stats, dispatcher, tap, clock
         self._loop = asyncio.get_running_loop()
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
@@ -74,7 +74,7 @@ class Inbox:
         self.lockstep: LockstepClient | None = None
         self._peer_rule = PeerRule(
             stats,
-            self._filter.notice_once,
+            self._filter.notify_once,
             self._loop.time,
             last_setpoint,
             every_frame_claims=settings.signing is not None or settings.lockstep,
@@ -118,7 +118,7 @@ class Inbox:
                 elif not self._filter.is_vehicle(frame):
                     self._call_on_frame(frame)
         except Exception as error:  # from the tap; subscribers are guarded one by one
-            self._router.report(error)
+            self._dispatcher.report(error)
             return False
         return accepted
 
@@ -138,7 +138,7 @@ class Inbox:
             for frame in admitted:
                 self._accept(frame, received_ns)
         except Exception as error:  # from the tap
-            self._router.report(error)
+            self._dispatcher.report(error)
         return True
 
     def may_prove_date(self, sender: str) -> bool:
@@ -154,7 +154,7 @@ class Inbox:
 
     def claim_lapsed(self) -> bool:
         """Whether another sender may become the peer."""
-        return self._peer_rule.lapsed()
+        return self._peer_rule.claim_lapsed()
 
     def note_stranger(self, sender: str) -> None:
         """Tell the user that `sender` was ignored, because the endpoint names only other peers."""
@@ -166,9 +166,9 @@ class Inbox:
 
     def _is_admitted(self, frame: Frame) -> bool:
         if self._filter.admits_source(frame):
-            return self._filter.signature_good(frame)
+            return self._filter.has_good_signature(frame)
         if self.on_foreign is not None:
-            self._router.guard(self.on_foreign, frame)
+            self._dispatcher.guard(self.on_foreign, frame)
         return False
 
     def _accept(self, frame: Frame, received_ns: int) -> None:
@@ -184,7 +184,7 @@ class Inbox:
             self.lockstep.take_beacon(beacon)
 
     def _pass_on(self, frame: Frame, received_ns: int) -> None:
-        """Pass a frame to the tap, the control loop, the counter and the router.
+        """Pass a frame to the tap, the control loop, the counter and the dispatcher.
 
         The control loop comes early because each line before it adds latency.
         """
@@ -195,14 +195,14 @@ class Inbox:
             try:
                 self._take_sample(frame.payload, now, received_ns)
             except Exception as error:  # the frame is still counted and passed to subscribers
-                self._router.report(error)
+                self._dispatcher.report(error)
         self._counter.count(frame.message_id, frame.sequence)
-        self._router.route(frame.message_id, frame.payload)
+        self._dispatcher.dispatch(frame.message_id, frame.payload)
         self._call_on_frame(frame)
 
     def _call_on_frame(self, frame: Frame) -> None:
         if self.on_frame is not None:
-            self._router.guard(self.on_frame, frame)
+            self._dispatcher.guard(self.on_frame, frame)
 
     def _take_sample(self, payload: bytes, now: float, received_ns: int) -> None:
         decoded = decode_attitude(payload)
@@ -220,7 +220,7 @@ class Inbox:
 
     def _call_on_attitude(self, sample: AttitudeSample) -> None:
         if self.on_attitude is not None:
-            self._router.guard(self.on_attitude, sample)
+            self._dispatcher.guard(self.on_attitude, sample)
 
     def _pass_on_held(self) -> None:
         """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 from companion.attitude.types import BodyRates
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import LinkError, LinkTimeout
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.framing import Frame
@@ -13,7 +14,6 @@ from companion.mavlink.lockstep import LockstepEventLoop
 from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import AnswerQueue
-from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import StampWriter
 from companion.mavlink.stats import LinkStats
@@ -66,13 +66,13 @@ class Link(VehicleClient):
         self._loop = asyncio.get_running_loop()
         self._tasks: list[asyncio.Task[None]] = []
         stats = LinkStats()
-        router, outbox = Router(stats), Outbox(settings, stats, tap)
+        dispatcher, outbox = MessageDispatcher(stats), Outbox(settings, stats, tap)
         self.clock = VehicleClock(lockstep=settings.lockstep)
-        super().__init__(settings, outbox, router, stats, self._loop.time, self.clock)
+        super().__init__(settings, outbox, dispatcher, stats, self._loop.time, self.clock)
         self._inbox = Inbox(
-            settings, stats, router, tap, notice, self.clock, lambda: outbox.last_setpoint_at
+            settings, stats, dispatcher, tap, notice, self.clock, lambda: outbox.last_setpoint_at
         )
-        self.timesync = TimeSync(outbox, router, self._loop.time, self.clock)
+        self.timesync = TimeSync(outbox, dispatcher, self._loop.time, self.clock)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
         )
@@ -124,7 +124,7 @@ class Link(VehicleClient):
             UnsupportedAutopilot: This program cannot fly the autopilot.
         """
         with AnswerQueue[None](self._registry) as heard:
-            unsubscribe = self._router.subscribe("HEARTBEAT", lambda _: heard.put(None))
+            unsubscribe = self._dispatcher.subscribe("HEARTBEAT", lambda _: heard.put(None))
             try:
                 async with asyncio.timeout(timeout_s):
                     while self.state.heartbeat is None:
@@ -189,11 +189,11 @@ class Link(VehicleClient):
     @property
     def on_error(self) -> Callable[[Exception], None] | None:
         """Called with an exception that a callback raised; without it such errors are logged."""
-        return self._router.on_error
+        return self._dispatcher.on_error
 
     @on_error.setter
     def on_error(self, callback: Callable[[Exception], None] | None) -> None:
-        self._router.on_error = callback
+        self._dispatcher.on_error = callback
 
     def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         """Send body rates and thrust once, now. It never blocks.
@@ -211,7 +211,7 @@ class Link(VehicleClient):
         Raises:
             InvalidSetpoint: A value is out of range, or not finite; nothing was sent.
         """
-        if self._lockstep is not None and self._lockstep.step_ms == time_boot_ms:
+        if self._lockstep is not None and self._lockstep.open_step_time_ms == time_boot_ms:
             self._outbox.latch(time_boot_ms, rates, thrust)
             return True
         return self._outbox.send_setpoint(time_boot_ms, rates, thrust)
@@ -231,7 +231,7 @@ class Link(VehicleClient):
         """Report the failure of a task to `on_error`: the link needs every one of its tasks."""
         error = None if task.cancelled() else task.exception()
         if isinstance(error, Exception):
-            self._router.report(error)
+            self._dispatcher.report(error)
 
     async def _send_heartbeats(self) -> None:
         """Send heartbeats until cancelled. No setpoint depends on them."""

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from math import inf
 
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.messages import Message
-from companion.mavlink.router import Router
 from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.records import CurrentMode, Heartbeat
 from companion.vehicle.registry import MULTIROTORS, autopilot_for
@@ -20,7 +20,7 @@ class ModeState:
     """The newest heartbeat and mode; each is `None` until its message has come.
 
     Args:
-        router: Delivers HEARTBEAT and CURRENT_MODE.
+        dispatcher: Delivers HEARTBEAT and CURRENT_MODE.
         clock: Returns the event-loop time, s.
 
     Attributes:
@@ -34,7 +34,7 @@ class ModeState:
         unsupported_error: The error to raise if this program cannot fly the autopilot.
     """
 
-    def __init__(self, router: Router, clock: Callable[[], float]) -> None:
+    def __init__(self, dispatcher: MessageDispatcher, clock: Callable[[], float]) -> None:
         self._clock = clock
         self.heartbeat: Heartbeat | None = None
         self.current_mode: CurrentMode | None = None
@@ -43,8 +43,8 @@ class ModeState:
         self.autopilot: Autopilot | None = None
         self.unsupported_error: UnsupportedAutopilot | None = None
         self._base_mode = 0
-        router.subscribe("HEARTBEAT", self._on_heartbeat)
-        router.subscribe("CURRENT_MODE", self._on_current_mode)
+        dispatcher.subscribe("HEARTBEAT", self._on_heartbeat)
+        dispatcher.subscribe("CURRENT_MODE", self._on_current_mode)
 
     @property
     def mode(self) -> str | None:

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.router import Router
 from companion.mavlink.texts import TextAssembler
 from companion.vehicle.ardupilot.autopilot import ArduPilot
 from companion.vehicle.autopilot import Autopilot
@@ -44,12 +44,14 @@ def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
     )
 
 
-def read_events(router: Router, texts: TextAssembler, clock: Callable[[], float]) -> None:
+def read_events(
+    dispatcher: MessageDispatcher, texts: TextAssembler, clock: Callable[[], float]
+) -> None:
     """Turn PX4's events into texts; on some links PX4 sends events instead of STATUSTEXT.
 
     Args:
-        router: delivers EVENT.
+        dispatcher: delivers EVENT.
         texts: takes the texts.
         clock: returns the event-loop time, s.
     """
-    router.subscribe_raw("EVENT", EventReader(texts, clock).take)
+    dispatcher.subscribe_raw("EVENT", EventReader(texts, clock).take)

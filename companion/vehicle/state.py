@@ -6,8 +6,8 @@ from math import isfinite
 
 from companion.attitude import Quaternion, is_unit
 from companion.mavlink.codec import decode_reset_counter
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.messages import Message
-from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
 from companion.vehicle.autopilot import Readiness
@@ -74,14 +74,14 @@ class VehicleState(ModeState, _Values):
 
     def __init__(
         self,
-        router: Router,
+        dispatcher: MessageDispatcher,
         stats: LinkStats,
         texts: TextAssembler,
         clock: Callable[[], float],
         vehicle_clock: VehicleClock,
     ) -> None:
         _Values.__init__(self)
-        ModeState.__init__(self, router, clock)
+        ModeState.__init__(self, dispatcher, clock)
         self._stats, self._assembler = stats, texts
         self._vehicle_clock = vehicle_clock
         self.texts = texts.texts
@@ -98,8 +98,8 @@ class VehicleState(ModeState, _Values):
             "EKF_STATUS_REPORT": self._on_estimator,
             "STATUSTEXT": self._on_text,
         }.items():
-            router.subscribe(name, callback)
-        router.subscribe_raw("ODOMETRY", self._on_odometry)
+            dispatcher.subscribe(name, callback)
+        dispatcher.subscribe_raw("ODOMETRY", self._on_odometry)
 
     def forget(self) -> None:
         """Forget all but heartbeat, autopilot and texts; the rest may be of another vehicle."""

@@ -11,9 +11,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple
 
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.messages import Message, dialect
 from companion.mavlink.outbox import Outbox
-from companion.mavlink.router import Router
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
 
@@ -85,7 +85,7 @@ class TimeSync:
 
     Args:
         outbox: Sends requests and answers.
-        router: Delivers TIMESYNC.
+        dispatcher: Delivers TIMESYNC.
         clock: Returns the event-loop time, s.
         vehicle_clock: Takes each exchange of request and answer.
     """
@@ -93,13 +93,13 @@ class TimeSync:
     def __init__(
         self,
         outbox: Outbox,
-        router: Router,
+        dispatcher: MessageDispatcher,
         clock: Callable[[], float],
         vehicle_clock: VehicleClock,
     ) -> None:
         self._outbox, self._clock, self._vehicle_clock = outbox, clock, vehicle_clock
         self.reset()
-        router.subscribe("TIMESYNC", self._on_timesync)
+        dispatcher.subscribe("TIMESYNC", self._on_timesync)
 
     def reset(self) -> None:
         """Forget all requests and answers, after a reconnect: the vehicle may have restarted."""

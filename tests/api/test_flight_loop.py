@@ -8,7 +8,7 @@ import time
 import pytest
 
 from companion.api.flight_loop import SWITCH_INTERVAL, OwnThreadLoop, SharedLoop, flight_loop
-from companion.api.state import _Wake
+from companion.api.state import _PendingCall
 from companion.safety.actions import FlightEnded
 
 
@@ -137,7 +137,7 @@ def test_news_do_not_queue_up_while_the_program_does_not_run():
             queued.append(callback)
 
     async def main():
-        wake = _Wake(Blocked(), lambda: heard.append(1))
+        wake = _PendingCall(Blocked(), lambda: heard.append(1))
         for _ in range(1000):
             wake()
         assert len(queued) == 1

@@ -74,7 +74,7 @@ def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
                 HelperTasks(None, config, page_socket, None, True, folder), config
             )
             stack.callback(helper.close, "over")
-            page_socket.listening.close()
+            page_socket.listening_socket.close()
             tab = stack.enter_context(chromium())()
             tab.open(f"http://127.0.0.1:{page_socket.port}/")
         session = Session(config, folder if page else None, observer, decline_landing)

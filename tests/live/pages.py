@@ -73,7 +73,7 @@ class Page:
             HelperTasks(None, Config(), self.page_socket, None, True, folder), Config()
         )
         self.helper.note = self.notes.append
-        self.page_socket.listening.close()
+        self.page_socket.listening_socket.close()
         self.url = f"http://127.0.0.1:{self.page_socket.port}/"
         self._over = threading.Event()
         self._thread = threading.Thread(target=asyncio.run, args=(self._serve(),))

@@ -97,7 +97,7 @@ def test_the_door_is_of_this_computer_and_has_a_new_token_each_time():
     assert len(first.token) >= 12
     assert f"127.0.0.1:{first.port}" in first.address_text()
     for page_socket in (first, second):
-        page_socket.listening.close()
+        page_socket.listening_socket.close()
 
 
 def test_a_door_for_other_computers_is_told_with_its_name_and_token():

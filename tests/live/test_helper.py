@@ -20,19 +20,19 @@ def test_a_process_that_does_not_read_costs_the_flight_nothing():
         began = time.perf_counter()
         channel.send({"kind": "status", "number": number, "text": "x" * 500})
         slowest = max(slowest, time.perf_counter() - began)
-    assert channel.open
+    assert channel.is_open
     assert channel.dropped > 1000
     assert slowest < 0.5
     theirs.close()
     assert not channel.send({"kind": "event"})
-    assert not channel.open
+    assert not channel.is_open
 
 
 @pytest.mark.parametrize("size", [200_000, 3_000_000])  # the socket takes 212 kB
 def test_a_message_that_is_too_large_is_dropped(size):
     channel, theirs = Channel.pair()
     assert not channel.send({"text": "x" * size})
-    assert channel.open
+    assert channel.is_open
     assert channel.send({"text": "x"})
     theirs.close()
 
@@ -74,10 +74,10 @@ def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
     async def ask():
         ours, theirs = Channel.pair()
         first = {"config": Config().model_dump(mode="json"), "follows": False}
-        relay = helper_process.Relay(Channel(theirs), first)
+        connection = helper_process.FlightConnection(Channel(theirs), first)
         try:
             with pytest.raises(NoAnswerError, match="the change may have been applied"):
-                await relay.undo("a test")
+                await connection.undo("a test")
         finally:
             asyncio.get_running_loop().remove_reader(theirs.fileno())
             theirs.close()

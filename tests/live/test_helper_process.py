@@ -70,7 +70,7 @@ def test_the_page_is_served_until_the_next_flight_needs_its_port(tmp_path):
         assert (refusal.value.code, refusal.value.read()[:12]) == (403, b"another site")
         assert helper._process.poll() is None
     next_one = open_page_socket(f"127.0.0.1:{url[2]}")
-    next_one.listening.close()
+    next_one.listening_socket.close()
     assert helper._process.wait(20.0) == 0
     assert (tmp_path / "live.log").read_text() == ""
 
@@ -78,7 +78,7 @@ def test_the_page_is_served_until_the_next_flight_needs_its_port(tmp_path):
 @pytest.mark.skipif(find_spec("foxglove") is None, reason="the extra `foxglove` is missing")
 def test_a_stream_that_lost_its_port_is_noted_and_the_flight_goes_on(monkeypatch):
     """Another program takes the port after the check of the command line."""
-    with open_page_socket("127.0.0.1:0").listening as other:
+    with open_page_socket("127.0.0.1:0").listening_socket as other:
         taken = other.getsockname()
         monkeypatch.setattr(
             "companion.cli.helper_process.stream_address", lambda _: argparse.Namespace(

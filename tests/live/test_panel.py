@@ -21,17 +21,17 @@ pytestmark = pytest.mark.skipif(
 TOKEN, CLIMB = "secret", "limits.max_climb_m_s"
 
 
-class Relay:
+class FlightConnection:
     """Answers requests as a flight does, or with `refusal`.
 
     Attributes:
-        first: the first message of the flight.
+        first_message: the first message of the flight.
         asked: values of each change, and "undo".
         refusal: error that answers the next requests, or None.
     """
 
     def __init__(self, store, folder):
-        self.first = {"folder": None if folder is None else str(folder)}
+        self.first_message = {"folder": None if folder is None else str(folder)}
         self.asked, self.refusal = [], None
         self._store, self._start = store, store.config
 
@@ -58,8 +58,8 @@ class Relay:
 class Page:
     """The page as the simulated user sees it."""
 
-    def __init__(self, user, relay, store):
-        self.user, self.relay, self.store = user, relay, store
+    def __init__(self, user, connection, store):
+        self.user, self.connection, self.store = user, connection, store
 
     def element(self, kind, name):
         (found,) = (
@@ -113,10 +113,10 @@ def used(use, folder=None, path="/"):
     async def serve():
         async with user_simulation() as user:
             store = Store(Config())
-            relay = Relay(store, folder)
-            add_page(relay, store, Guard(None, TOKEN))
+            connection = FlightConnection(store, folder)
+            add_page(connection, store, Guard(None, TOKEN))
             await user.open(path)
-            await use(Page(user, relay, store))
+            await use(Page(user, connection, store))
 
     ours = {name: each for name, each in sys.modules.items() if name.split(".")[0] == "companion"}
     try:
@@ -134,11 +134,11 @@ def test_without_the_token_nothing_changes_and_nothing_is_saved_on_this_computer
         await page.click("unlock", "this is not the token")
         await page.click("apply", "refused: give the token first")
         await page.click("save", "saved where the browser saves files")
-        assert page.relay.asked == []
+        assert page.connection.asked == []
         page.type("token, as shown at the start", f" {TOKEN} ")
         await page.click("unlock", "values can be changed in this tab now")
         await page.click("apply", "done 1")
-        assert page.relay.asked == [{"limits": {"max_climb_m_s": 1.5}}]
+        assert page.connection.asked == [{"limits": {"max_climb_m_s": 1.5}}]
 
     used(use, tmp_path)
     assert not list(tmp_path.iterdir())
@@ -157,7 +157,7 @@ def test_only_the_edited_values_are_sent_and_never_twice():
         await page.click("apply", "`limits.max_tilt_deg` has no value")
         page.type("limits.max_tilt_deg", "steep")
         await page.click("apply", "must be a number")
-        assert page.relay.asked == [
+        assert page.connection.asked == [
             {"limits": {"max_climb_m_s": 1.5}},
             {"limits": {"max_tilt_deg": 30.0}},
             {"limits": {"max_tilt_deg": None}},
@@ -178,7 +178,7 @@ def test_each_refusal_is_told():
             (ChangeRefusedError("the flight has ended"), "refused: the flight has ended"),
             (NoAnswerError("no answer"), "no answer"),
         ):
-            page.relay.refusal = refusal
+            page.connection.refusal = refusal
             page.type(CLIMB, "1.5")
             await page.click("apply", said)
         assert page.value(CLIMB) == "1.5"
@@ -189,7 +189,7 @@ def test_each_refusal_is_told():
 def test_another_tabs_change_is_shown_but_not_over_an_edited_field():
     async def use(page):
         page.type("limits.max_tilt_deg", "31")
-        await page.relay.change(
+        await page.connection.change(
             {"limits": {"max_climb_m_s": 1.5, "max_tilt_deg": 30.0}}, "the live page"
         )
         await page.until(lambda: page.value(CLIMB) == "1.5")
@@ -205,7 +205,7 @@ def test_changed_values_are_saved_in_the_folder_or_the_reason_is_told(tmp_path):
         page.type(CLIMB, "1.5")
         await page.click("apply", "done 1")
         await page.click("save", f"saved as {tmp_path / 'changed.yaml'}")
-        page.relay.first["folder"] = str(tmp_path / "gone")
+        page.connection.first_message["folder"] = str(tmp_path / "gone")
         await page.click("save", "changed.yaml was not written: No such file or directory")
 
     used(use, tmp_path, path=f"/?token={TOKEN}")

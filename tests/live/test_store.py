@@ -22,16 +22,16 @@ def test_the_last_30_seconds_are_kept_and_only_new_states_are_given_out(store):
     assert [store.states[0]["time_s"], store.states[-1]["time_s"]] == pytest.approx([9.8, 39.8])
     assert "kind" not in store.states[0]
     assert store.state_count == 200
-    assert [each["time_s"] for each in store.since(198)] == pytest.approx([39.6, 39.8])
-    assert store.since(store.state_count) == []
-    assert store.since(0) == list(store.states)
+    assert [each["time_s"] for each in store.states_since(198)] == pytest.approx([39.6, 39.8])
+    assert store.states_since(store.state_count) == []
+    assert store.states_since(0) == list(store.states)
 
 
 def test_a_second_flight_begins_with_an_empty_plot(store):
     store.take(status(20.0))
     store.take(status(1.0))
     assert [each["time_s"] for each in store.states] == [1.0]
-    assert store.since(1) == [{"time_s": 1.0}]
+    assert store.states_since(1) == [{"time_s": 1.0}]
 
 
 def test_a_phase_is_an_event_at_the_newest_state(store):

@@ -17,9 +17,9 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SetpointEncoder
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import CommandRefused, CommandTimeout, UnknownParameter
 from companion.mavlink.outbox import Outbox
-from companion.mavlink.router import Router
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.vehicle.client import VehicleClient
@@ -142,14 +142,16 @@ class _Player:
         ours = next(source(frame) for _, frame in self._log if source(frame) != VEHICLE)
         settings = LinkSettings("udpout://nowhere:1", 1, 1, *ours)
         stats = LinkStats()
-        router = Router(stats)
+        dispatcher = MessageDispatcher(stats)
         clock = VehicleClock()
-        self._inbox = Inbox(settings, stats, router, None, self.out.notices.append, clock)
+        self._inbox = Inbox(settings, stats, dispatcher, None, self.out.notices.append, clock)
         self._inbox.on_attitude = self.out.samples.append
         outbox = Outbox(settings, stats, None)
         outbox.transport = self._recorder = Recorder()
         self._setpoints = SetpointEncoder(*ours, *VEHICLE, signed=False)
-        self._conversation = VehicleClient(settings, outbox, router, stats, self._loop.time, clock)
+        self._conversation = VehicleClient(
+            settings, outbox, dispatcher, stats, self._loop.time, clock
+        )
         self.out.stats, self.out.state = stats, self._conversation.state
 
     async def _until(self, time):

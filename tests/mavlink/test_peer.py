@@ -126,9 +126,9 @@ def test_a_claim_lapses_on_the_ground_and_not_in_control():
         (107.1, 105.0, True),
     ):
         at.update(now=now, setpoint=setpoint)
-        assert rule.lapsed() is lapsed
+        assert rule.claim_lapsed() is lapsed
     rule.renew()
-    assert not rule.lapsed()
+    assert not rule.claim_lapsed()
 
 
 def test_a_peer_whose_claim_lapsed_gives_way_although_it_still_sends(run):
@@ -238,7 +238,7 @@ async def client(link, *messages):
 
 
 def test_a_silent_tcp_client_does_not_keep_the_vehicle_out(run, monkeypatch):
-    monkeypatch.setattr(tcp_module, "CLAIM_LASTS_S", 0.05)
+    monkeypatch.setattr(tcp_module, "CLAIM_DURATION_S", 0.05)
 
     async def scene():
         async with tcp_server() as (link, _):

@@ -401,7 +401,7 @@ async def damaged(scene):
     def send(_):
         scene.hover()
         for data in (bytes(raw), bytes(raw[:17]), bytes(range(256))):
-            scene.session.network.received(scene.script, scene.script.scan(data))
+            scene.session.network.receive_frames(scene.script, scene.script.scan(data))
 
     await stream(1.0, send)
     return await scene.is_flown()

@@ -93,26 +93,26 @@ def test_a_command_under_another_component_id_is_of_the_program_that_was_heard_l
         programs.keep(Program(client, Address(255, component)), request)
     programs.keep(Program(other, Address(255, 190)), "of another")
     found = programs.sender_of(client, asked)
-    assert programs.newest(found) == "newest"
+    assert programs.newest_request(found) == "newest"
     for number in range(40):
         programs.keep(Program(other, Address(1, number)), "many")
-    assert programs.newest(found) is None
+    assert programs.newest_request(found) is None
 
 
 def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():
     notes, routed = [], []
 
-    def from_client(_, frame):
+    def forward_from_client(_, frame):
         if frame.text == "bad":
             raise ValueError("a fault")
         routed.append(frame.text)
 
     network = object.__new__(Network)
-    network.routing = SimpleNamespace(from_client=from_client)
+    network.routing = SimpleNamespace(forward_from_client=forward_from_client)
     network._faults, network._note_event = set(), notes.append
     network._flush_later, network.setpoint_ids = lambda: None, frozenset()
     frames = [SimpleNamespace(message_id=0, text=text) for text in ("bad", "good", "bad", "good")]
-    network.received(SimpleNamespace(name="script"), frames)
+    network.receive_frames(SimpleNamespace(name="script"), frames)
     assert routed == ["good", "good"]
     (told,) = notes
     assert "a fault" in told

@@ -51,8 +51,8 @@ class Net:
         self.routing.intercept = lambda *_: False
         for client in (self.ground, self.script, self.silent):
             self.routing.attach(client)
-        self.routing.from_client(self.ground, heartbeat(GROUND, 200))
-        self.routing.from_client(self.script, heartbeat(SCRIPT, 200))
+        self.routing.forward_from_client(self.ground, heartbeat(GROUND, 200))
+        self.routing.forward_from_client(self.script, heartbeat(SCRIPT, 200))
         self.clear()
 
     def clear(self):
@@ -109,120 +109,120 @@ def test_a_target_that_was_cut_off_as_zero_is_everybody():
 
 def test_telemetry_goes_to_every_client_and_not_back(net):
     sent = heartbeat(AUTOPILOT)
-    net.routing.from_vehicle(sent)
+    net.routing.forward_from_vehicle(sent)
     assert net.heard() == {"ground", "script", "silent"}
     assert net.ground.heard == [sent.raw]
 
 
 def test_an_answer_goes_only_where_its_target_was_heard(net):
     answer = ACK(400, 0, target_system=255, target_component=190)
-    net.routing.from_vehicle(frame(answer, AUTOPILOT))
+    net.routing.forward_from_vehicle(frame(answer, AUTOPILOT))
     assert net.heard() == {"ground"}
 
 
 def test_an_answer_to_all_components_of_a_system_finds_the_system(net):
     answer = ACK(400, 0, target_system=245, target_component=0)
-    net.routing.from_vehicle(frame(answer, AUTOPILOT))
+    net.routing.forward_from_vehicle(frame(answer, AUTOPILOT))
     assert net.heard() == {"script"}
 
 
 def test_an_answer_to_us_ends_here(net):
     answer = ACK(400, 0, target_system=1, target_component=191)
-    net.routing.from_vehicle(frame(answer, AUTOPILOT))
+    net.routing.forward_from_vehicle(frame(answer, AUTOPILOT))
     assert net.heard() == set()
 
 
 def test_an_answer_to_somebody_unheard_is_dropped_and_counted(net):
     answer = ACK(400, 0, target_system=9, target_component=9)
-    net.routing.from_vehicle(frame(answer, AUTOPILOT))
+    net.routing.forward_from_vehicle(frame(answer, AUTOPILOT))
     assert net.heard() == set()
     assert net.routing.stats.no_route == 1
 
 
 @pytest.mark.parametrize("target", [AUTOPILOT, Address(1, 0), Address(1, 154)])
 def test_a_command_to_the_vehicle_goes_to_the_vehicle_alone(net, target):
-    net.routing.from_client(net.ground, command(target, GROUND))
+    net.routing.forward_from_client(net.ground, command(target, GROUND))
     assert net.heard() == {"vehicle"}
 
 
 def test_a_broadcast_of_a_client_goes_to_all_others(net):
-    net.routing.from_client(net.ground, command(EVERYBODY, GROUND))
+    net.routing.forward_from_client(net.ground, command(EVERYBODY, GROUND))
     assert net.heard() == {"vehicle", "script", "silent"}
 
 
 def test_clients_reach_each_other(net):
-    net.routing.from_client(net.ground, command(SCRIPT, GROUND))
+    net.routing.forward_from_client(net.ground, command(SCRIPT, GROUND))
     assert net.heard() == {"script"}
 
 
 def test_a_camera_that_is_a_client_is_not_looked_for_behind_the_vehicle(net):
-    net.routing.from_client(net.silent, heartbeat(CAMERA))
+    net.routing.forward_from_client(net.silent, heartbeat(CAMERA))
     net.clear()
-    net.routing.from_client(net.ground, command(CAMERA, GROUND))
+    net.routing.forward_from_client(net.ground, command(CAMERA, GROUND))
     assert net.heard() == {"silent"}
 
 
 def test_a_station_behind_the_autopilot_is_heard_and_answered(net):
     far = Address(250, 5)
-    net.routing.from_vehicle(heartbeat(far))
+    net.routing.forward_from_vehicle(heartbeat(far))
     assert net.heard() == {"ground", "script", "silent"}
     net.clear()
-    net.routing.from_client(net.ground, command(far, GROUND))
+    net.routing.forward_from_client(net.ground, command(far, GROUND))
     assert net.heard() == {"vehicle"}
 
 
 def test_a_command_to_us_is_handed_over_and_not_forwarded(net):
     taken = []
     net.routing.on_own_frame = lambda client, got: taken.append((client, got.message_id))
-    net.routing.from_client(net.ground, command(OWN, GROUND))
+    net.routing.forward_from_client(net.ground, command(OWN, GROUND))
     assert (net.heard(), taken) == (set(), [(net.ground, 76)])
 
 
 def test_what_is_intercepted_is_not_forwarded(net):
     net.routing.intercept = lambda _, got: got.message_id == 76
-    net.routing.from_client(net.ground, command(AUTOPILOT, GROUND))
-    net.routing.from_client(net.ground, heartbeat(GROUND))
+    net.routing.forward_from_client(net.ground, command(AUTOPILOT, GROUND))
+    net.routing.forward_from_client(net.ground, heartbeat(GROUND))
     assert len(net.vehicle.heard) == 1
 
 
 @pytest.mark.parametrize("source", [AUTOPILOT, OWN])
 def test_a_client_that_claims_to_be_the_autopilot_or_us_is_not_heard(net, source):
-    net.routing.from_client(net.ground, heartbeat(source))
+    net.routing.forward_from_client(net.ground, heartbeat(source))
     assert net.heard() == set()
     assert net.routing.stats.looped == 1
     assert not net.routing.is_at_client(source, net.silent)
 
 
 def test_our_own_frames_that_the_vehicle_returns_are_dropped(net):
-    net.routing.from_vehicle(heartbeat(OWN))
+    net.routing.forward_from_vehicle(heartbeat(OWN))
     assert net.heard() == set()
 
 
 def test_a_frame_that_comes_back_over_another_client_is_dropped(net):
     sent = heartbeat(GROUND, 7)
-    net.routing.from_client(net.ground, sent)
+    net.routing.forward_from_client(net.ground, sent)
     net.clear()
-    net.routing.from_client(net.script, sent)
-    net.routing.from_vehicle(sent)
+    net.routing.forward_from_client(net.script, sent)
+    net.routing.forward_from_vehicle(sent)
     assert net.heard() == set()
     assert net.routing.stats.looped == 2
 
 
 def test_two_bridged_clients_do_not_make_a_storm(net):
     """Whatever ground hears is sent by script again, and the other way round."""
-    net.routing.from_client(net.ground, heartbeat(GROUND, 9))
+    net.routing.forward_from_client(net.ground, heartbeat(GROUND, 9))
     for _ in range(50):
         for origin, other in ((net.ground, net.script), (net.script, net.ground)):
             heard, other.heard = other.heard, []
             for raw in heard:
-                net.routing.from_client(origin, FrameScanner(CRC_EXTRA).feed(raw)[0])
+                net.routing.forward_from_client(origin, FrameScanner(CRC_EXTRA).feed(raw)[0])
     assert len(net.vehicle.heard) == 1
 
 
 def test_a_sender_without_running_numbers_is_heard_each_time(net):
     for _ in range(5):
         net.now += 1.0
-        net.routing.from_client(net.ground, heartbeat(GROUND, 0))
+        net.routing.forward_from_client(net.ground, heartbeat(GROUND, 0))
     assert len(net.vehicle.heard) == 5
 
 
@@ -232,22 +232,24 @@ def test_a_stream_without_running_numbers_is_never_silent_for_long(net):
     for number in range(100):
         net.now += 0.1
         before = len(net.vehicle.heard)
-        net.routing.from_client(net.ground, heartbeat(GROUND, 0))
+        net.routing.forward_from_client(net.ground, heartbeat(GROUND, 0))
         passed += [number] * (len(net.vehicle.heard) - before)
     assert max(b - a for a, b in pairwise(passed)) <= 3
 
 
 def test_the_same_frame_later_from_another_client_is_no_repetition(net):
-    net.routing.from_client(net.ground, heartbeat(GROUND, 3))
+    net.routing.forward_from_client(net.ground, heartbeat(GROUND, 3))
     net.now += 1.0
-    net.routing.from_client(net.script, heartbeat(GROUND, 3))
+    net.routing.forward_from_client(net.script, heartbeat(GROUND, 3))
     assert len(net.vehicle.heard) == 2
 
 
 def test_a_client_that_left_receives_nothing(net):
     net.routing.detach(net.ground)
-    net.routing.from_vehicle(heartbeat(AUTOPILOT))
-    net.routing.from_vehicle(frame(ACK(1, 0, target_system=255, target_component=190), AUTOPILOT))
+    net.routing.forward_from_vehicle(heartbeat(AUTOPILOT))
+    net.routing.forward_from_vehicle(
+        frame(ACK(1, 0, target_system=255, target_component=190), AUTOPILOT)
+    )
     assert net.heard() == {"script", "silent"}
 
 
@@ -260,7 +262,7 @@ def test_an_unknown_message_is_forwarded_untouched(net):
     raw = unknown(AUTOPILOT)
     (got,) = FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw)
     assert (got.raw, got.message_id, got.system) == (raw, 50_123, 1)
-    net.routing.from_vehicle(got)
+    net.routing.forward_from_vehicle(got)
     assert net.ground.heard == net.script.heard == [raw]
 
 
@@ -283,7 +285,7 @@ def test_signed_and_version_1_frames_are_forwarded_byte_for_byte(net):
     )
     for raw in (signed, old):
         (got,) = FrameScanner(CRC_EXTRA).feed(raw)
-        net.routing.from_vehicle(got)
+        net.routing.forward_from_vehicle(got)
         assert net.ground.heard[-1] == raw
 
 
@@ -295,7 +297,7 @@ def test_no_frame_ever_returns_to_its_origin(net):
         net.now += 0.01
         source, target = random.choice(addresses), random.choice(addresses)
         origin = random.choice((net.ground, net.script, net.silent))
-        net.routing.from_client(origin, command(target, source, number & 0xFF))
+        net.routing.forward_from_client(origin, command(target, source, number & 0xFF))
         assert origin.heard == []
 
 
@@ -303,5 +305,5 @@ def test_until_somebody_judges_them_no_frame_of_a_client_is_forwarded():
     vehicle, client = Ear("vehicle"), Ear("client")
     routing = Routing(vehicle, AUTOPILOT, OWN, lambda: 0.0)
     routing.attach(client)
-    routing.from_client(client, command(AUTOPILOT, GROUND))
+    routing.forward_from_client(client, command(AUTOPILOT, GROUND))
     assert not vehicle.heard

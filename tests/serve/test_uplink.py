@@ -1,7 +1,7 @@
 """Clients' frames on their way to the vehicle."""
 
 from companion.mavlink.transport.endpoint import parse_endpoint
-from companion.serve.network.uplink import UplinkQueue, uplink_rate
+from companion.serve.network.uplink import UplinkQueue, uplink_limits
 
 
 class Line:
@@ -18,7 +18,7 @@ class Line:
 
 
 def test_a_serial_line_keeps_half_of_its_bytes_for_us():
-    rate, burst = uplink_rate(parse_endpoint("serial:///dev/ttyS0:57600"))
+    rate, burst = uplink_limits(parse_endpoint("serial:///dev/ttyS0:57600"))
     assert rate == 2880.0
     assert burst == 280.0
 

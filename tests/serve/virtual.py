@@ -47,7 +47,7 @@ class MemoryClient(testing.Program):
     """A program that says what the tests need, and reads what they look at."""
 
     def _flush(self):
-        while self._waiting:
+        while self._queued_frames:
             data, _ = self._dequeue(100_000)
             self.heard += self._parser.parse_buffer(read(data)) or ()
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.vehicle.autopilot import ControlEntry, Readiness, Role
 from companion.vehicle.registry import AUTOPILOTS, autopilot_for
@@ -75,7 +75,7 @@ def test_a_family_is_complete(autopilot):
     with pytest.raises(KeyError):
         autopilot.set_mode("WARP")
     for name in autopilot.wanted_rates:
-        Router(LinkStats()).subscribe(name, lambda _: None)
+        MessageDispatcher(LinkStats()).subscribe(name, lambda _: None)
     assert {"ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "HOME_POSITION"} <= set(
         autopilot.wanted_rates
     )

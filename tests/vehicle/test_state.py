@@ -6,8 +6,8 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 from pymavlink.dialects.v20 import development
 
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.messages import decode
-from companion.mavlink.router import Router
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextAssembler
 from companion.vehicle.clock import VehicleClock
@@ -18,15 +18,15 @@ from tests.mavlink.fakes import heartbeat
 class Bench:
     def __init__(self):
         self.now, self.stats = 10.0, LinkStats()
-        self.router = Router(self.stats)
+        self.dispatcher = MessageDispatcher(self.stats)
         self.clock = VehicleClock()
         self.state = VehicleState(
-            self.router, self.stats, TextAssembler(), lambda: self.now, self.clock
+            self.dispatcher, self.stats, TextAssembler(), lambda: self.now, self.clock
         )
 
     def take(self, message):
         message.pack(dialect.MAVLink(None))
-        self.router.route(message.get_msgId(), bytes(message.get_payload()))
+        self.dispatcher.dispatch(message.get_msgId(), bytes(message.get_payload()))
         return self.state
 
 
@@ -421,7 +421,7 @@ def test_a_text_without_its_end_is_given_when_the_next_begins(bench):
 
 def test_a_malformed_message_is_counted(bench):
     heard = []
-    bench.router.subscribe("STATUSTEXT", heard.append)
-    bench.router.route(253, b"\x04" + b"\xff" * 50)
+    bench.dispatcher.subscribe("STATUSTEXT", heard.append)
+    bench.dispatcher.dispatch(253, b"\x04" + b"\xff" * 50)
     assert len(heard) == 1  # undecodable letters are replaced, not refused
     assert decode(253, b"\x04" + b"\xff" * 50).severity == 4

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.mavlink.router import Router
+from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.stats import LinkStats
 from companion.vehicle.timesync import TimeSync
 
@@ -16,7 +16,7 @@ class Bench:
         self.now, self.sent, self.exchanges = 100.0, [], []
         outbox = SimpleNamespace(send=self.sent.append)
         clock = SimpleNamespace(take_timesync=lambda *seen: self.exchanges.append(seen))
-        self.timesync = TimeSync(outbox, Router(LinkStats()), lambda: self.now, clock)
+        self.timesync = TimeSync(outbox, MessageDispatcher(LinkStats()), lambda: self.now, clock)
 
     def answer(self, after):
         self.now += after

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from nicegui import Client, app, ui
 
-from companion.live.helper_process import Relay
+from companion.live.helper_process import FlightConnection
 from companion.live.page.guard import Guard
 from companion.live.page.panel import Panel
 from companion.live.page.store import Store
@@ -37,7 +37,7 @@ _PLOTS = (
 )
 
 
-def add_page(relay: Relay, store: Store, guard: Guard) -> None:
+def add_page(connection: FlightConnection, store: Store, guard: Guard) -> None:
     """Add the page, and send new states to all browsers that show it."""
     shared = f"<style>{_file_text('live.css')}</style><script>{_file_text('live.js')}</script>"
     ui.add_head_html(shared, shared=True)
@@ -46,8 +46,12 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
     @ui.page("/")
     def page(client: Client, token: str = "") -> None:
         _add_drawings()
-        Panel(relay, store, guard, unlocked=guard.is_token(token))
-        state = {"fence": store.fence(), "frames": store.since(0), "events": store.events_since(0)}
+        Panel(connection, store, guard, unlocked=guard.is_token(token))
+        state = {
+            "fence": store.fence(),
+            "frames": store.states_since(0),
+            "events": store.events_since(0),
+        }
         sent_counts[client.id] = store.state_count, store.event_count
         client.run_javascript(f"live.begin({json.dumps(state)})")
 
@@ -57,7 +61,7 @@ def add_page(relay: Relay, store: Store, guard: Guard) -> None:
             if counts is None or not client.has_socket_connection:
                 continue
             new = {
-                "frames": store.since(counts[0]),
+                "frames": store.states_since(counts[0]),
                 "events": store.events_since(counts[1]),
                 "fence": store.fence(),
                 "over": store.end_text,

@@ -11,7 +11,7 @@ from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
 from companion.live.channel import NoAnswerError
-from companion.live.helper_process import Relay
+from companion.live.helper_process import FlightConnection
 from companion.live.page.guard import Guard
 from companion.live.page.store import Store
 
@@ -27,8 +27,10 @@ class Panel:
     A tab that was opened with the token begins `unlocked`.
     """
 
-    def __init__(self, relay: Relay, store: Store, guard: Guard, *, unlocked: bool) -> None:
-        self._relay, self._store, self._guard = relay, store, guard
+    def __init__(
+        self, connection: FlightConnection, store: Store, guard: Guard, *, unlocked: bool
+    ) -> None:
+        self._connection, self._store, self._guard = connection, store, guard
         self._unlocked = unlocked
         self._inputs: dict[tuple[str, str], ui.input] = {}
         self._shown: dict[tuple[str, str], str] = {}
@@ -40,7 +42,7 @@ class Panel:
                     self._shown[name] = value_text(key.value)
                     self._inputs[name] = ui.input(
                         f"{key.section}.{key.name}", value=self._shown[name]
-                    ).props(f'dense suffix="{key.unit}" hint="{_range(key.allowed)}"')
+                    ).props(f'dense suffix="{key.unit}" hint="{_range_text(key.allowed)}"')
             with ui.row():
                 ui.button("Apply", on_click=self._apply).props("id=live-apply")
                 self._undo = ui.button("Undo", on_click=self._undo_last).props("id=live-undo")
@@ -69,14 +71,14 @@ class Panel:
         for (section, key), field in self._inputs.items():
             text = str(field.value or "").strip()
             if text != self._shown[section, key]:
-                values.setdefault(section, {})[key] = _parsed(text)
+                values.setdefault(section, {})[key] = _parsed_value(text)
         if not values:
             self._show_message("nothing to apply: no value was changed")
             return
-        await self._ask(self._relay.change(values, _SOURCE))
+        await self._ask(self._connection.change(values, _SOURCE))
 
     async def _undo_last(self) -> None:
-        await self._ask(self._relay.undo(_SOURCE))
+        await self._ask(self._connection.undo(_SOURCE))
 
     async def _ask(self, request: Any) -> None:
         if not self._unlocked:
@@ -95,7 +97,7 @@ class Panel:
         """Send the changed values to the browser; if unlocked, also write them to the folder."""
         text = self._store.changed_yaml()
         ui.download.content(text, _DOWNLOAD_NAME)
-        folder = self._relay.first["folder"]
+        folder = self._connection.first_message["folder"]
         if folder is None or not self._unlocked:
             self._show_message("saved where the browser saves files")
             return
@@ -122,7 +124,7 @@ class Panel:
         self._message.set_text(text)
 
 
-def _range(allowed: str) -> str:
+def _range_text(allowed: str) -> str:
     """The range of a key, for a hint: `allowed` without the words "changeable in flight"."""
     return (
         allowed.replace("changeable in flight within its range", "")
@@ -131,7 +133,7 @@ def _range(allowed: str) -> str:
     )
 
 
-def _parsed(text: str) -> Any:
+def _parsed_value(text: str) -> Any:
     """Convert the text of a field to a number, or to None if it is empty.
 
     Any other text is returned unchanged; the checks of the change refuse it.

@@ -7,45 +7,45 @@ import tempfile
 
 from companion.config import Config
 from companion.live.after_flight import until_unused
-from companion.live.helper_process import Relay
+from companion.live.helper_process import FlightConnection
 from companion.live.page.guard import Guard
 from companion.live.page.store import Store
 
 
-async def serve_page(relay: Relay, listening: socket.socket) -> None:
+async def serve_page(connection: FlightConnection, listening: socket.socket) -> None:
     """Serve the live page of a flight at a listening socket."""
     # NiceGUI keeps its storage in the working directory unless it is told otherwise.
     with tempfile.TemporaryDirectory(prefix="companion-live-") as storage:
         os.environ["NICEGUI_STORAGE_PATH"] = storage
-        await _serve(relay, listening)
+        await _serve(connection, listening)
 
 
-async def _serve(relay: Relay, listening: socket.socket) -> None:
+async def _serve(connection: FlightConnection, listening: socket.socket) -> None:
     import uvicorn  # noqa: PLC0415  after the path of the storage is set
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import Client, ui  # noqa: PLC0415
 
     from companion.live.page.layout import add_page  # noqa: PLC0415
 
-    store = Store(Config.model_validate(relay.first["config"]))
-    relay.listen(store.take)
+    store = Store(Config.model_validate(connection.first_message["config"]))
+    connection.listen(store.take)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    guard = Guard(app, str(relay.first["token"]))
-    add_page(relay, store, guard)
+    guard = Guard(app, str(connection.first_message["token"]))
+    add_page(connection, store, guard)
     ui.run_with(
         app, title="companion live", dark=None, message_history_length=300, reconnect_timeout=30.0
     )
     config = uvicorn.Config(guard, log_level="warning", timeout_graceful_shutdown=1)
     server = uvicorn.Server(config)
     serving = asyncio.create_task(server.serve(sockets=[listening]))
-    ended = asyncio.create_task(relay.over.wait())
+    ended = asyncio.create_task(connection.flight_ended.wait())
     await asyncio.wait({serving, ended}, return_when=asyncio.FIRST_COMPLETED)
     store.end()
 
     def is_open() -> bool:
         return any(client.has_socket_connection for client in Client.instances.values())
 
-    unused = asyncio.create_task(until_unused(int(relay.first["port"]), is_open))
+    unused = asyncio.create_task(until_unused(int(connection.first_message["port"]), is_open))
     await asyncio.wait({unused, serving}, return_when=asyncio.FIRST_COMPLETED)
     unused.cancel()
     server.should_exit = True

@@ -57,7 +57,7 @@ class Store:
         """Note the end of the flight, if its message `end` was not received."""
         self.end_text = self.end_text or "the program that flew has ended"
 
-    def since(self, count: int) -> list[Message]:
+    def states_since(self, count: int) -> list[Message]:
         """The states that came after the first `count` states and are still kept."""
         new_count = min(self.state_count - count, len(self.states))
         return list(self.states)[len(self.states) - new_count :]

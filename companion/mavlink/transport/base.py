@@ -6,7 +6,7 @@ from typing import Protocol
 
 from companion.files.os_errors import reason_of
 
-Receive = Callable[[bytes, int], bool]
+ReceiveCallback = Callable[[bytes, int], bool]
 """Called with bytes and the `perf_counter_ns` of their arrival; returns whether a frame in them was
 accepted.
 """
@@ -23,7 +23,7 @@ class Receiver(Protocol):
         """
 
     def receive(self, data: bytes, received_ns: int) -> bool:
-        """Take bytes from the peer; return whether a frame in them was accepted (`Receive`)."""
+        """Take bytes from the peer; return whether a frame was accepted (`ReceiveCallback`)."""
 
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
         """Take bytes from `sender`, who is not the peer; return whether `sender` becomes the peer.
@@ -46,7 +46,7 @@ class Receiver(Protocol):
         """Note that bytes of `sender`, whom the endpoint does not name as a peer, were ignored."""
 
 
-Lost = Callable[[str], None]
+LostCallback = Callable[[str], None]
 """Called with the reason when the connection is lost."""
 
 Tap = Callable[[float, bytes], None]

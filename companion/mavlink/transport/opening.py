@@ -2,7 +2,7 @@
 
 from collections.abc import Awaitable, Callable
 
-from companion.mavlink.transport.base import Lost, Receiver, Transport
+from companion.mavlink.transport.base import LostCallback, Receiver, Transport
 from companion.mavlink.transport.endpoint import (
     Endpoint,
     SerialPort,
@@ -15,11 +15,11 @@ from companion.mavlink.transport.serial_port import SerialTransport
 from companion.mavlink.transport.tcp import open_tcp_client, open_tcp_server
 from companion.mavlink.transport.udp import open_udp
 
-OpenTransport = Callable[[Endpoint, Receiver, Lost], Awaitable[Transport]]
+OpenTransport = Callable[[Endpoint, Receiver, LostCallback], Awaitable[Transport]]
 """A function like `open_transport`."""
 
 
-async def open_transport(endpoint: Endpoint, receiver: Receiver, lost: Lost) -> Transport:
+async def open_transport(endpoint: Endpoint, receiver: Receiver, lost: LostCallback) -> Transport:
     """Open the transport that the endpoint describes.
 
     Args:

@@ -10,7 +10,7 @@ import serial
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
-from companion.mavlink.transport.base import Lost, Receive
+from companion.mavlink.transport.base import LostCallback, ReceiveCallback
 from companion.mavlink.transport.endpoint import SerialPort
 
 _READ_BYTES = 4096
@@ -45,7 +45,7 @@ class SerialTransport:
 
     reconnects = True
 
-    def __init__(self, endpoint: SerialPort, receive: Receive, lost: Lost) -> None:
+    def __init__(self, endpoint: SerialPort, receive: ReceiveCallback, lost: LostCallback) -> None:
         self._receive, self._lost = receive, lost
         self._loop = asyncio.get_running_loop()
         self._unsent = b""

@@ -5,15 +5,17 @@ import socket
 import time
 
 from companion.mavlink.errors import EndpointError
-from companion.mavlink.peer import CLAIM_LASTS_S, NamedPeers, host_and_port, resolve_peers
-from companion.mavlink.transport.base import OPEN_TIMEOUT_S, Lost, Receiver, why_not_opened
+from companion.mavlink.peer import CLAIM_DURATION_S, NamedPeers, host_and_port, resolve_peers
+from companion.mavlink.transport.base import OPEN_TIMEOUT_S, LostCallback, Receiver, why_not_opened
 from companion.mavlink.transport.endpoint import TcpClient, TcpServer
 
 _MAX_UNSENT_BYTES = 2048
 """Unsent bytes (about 40 setpoints) above which frames are dropped, because they would be late."""
 
 
-async def open_tcp_client(endpoint: TcpClient, receiver: Receiver, lost: Lost) -> "TcpTransport":
+async def open_tcp_client(
+    endpoint: TcpClient, receiver: Receiver, lost: LostCallback
+) -> "TcpTransport":
     """Connect to a listening vehicle.
 
     Raises:
@@ -42,7 +44,9 @@ async def open_tcp_client(endpoint: TcpClient, receiver: Receiver, lost: Lost) -
     return transport
 
 
-async def open_tcp_server(endpoint: TcpServer, receiver: Receiver, lost: Lost) -> "TcpTransport":
+async def open_tcp_server(
+    endpoint: TcpServer, receiver: Receiver, lost: LostCallback
+) -> "TcpTransport":
     """Listen for one vehicle.
 
     Raises:
@@ -74,7 +78,7 @@ class TcpTransport:
     """
 
     def __init__(
-        self, receiver: Receiver, lost: Lost, named_peers: NamedPeers | None = None
+        self, receiver: Receiver, lost: LostCallback, named_peers: NamedPeers | None = None
     ) -> None:
         self._receiver, self._lost = receiver, lost
         self._named_peers = named_peers or NamedPeers()
@@ -121,7 +125,7 @@ class TcpTransport:
     def _may_be_replaced(self) -> bool:
         if self._claimed:
             return self._receiver.claim_lapsed()
-        return self._loop.time() - self._connected_at > CLAIM_LASTS_S
+        return self._loop.time() - self._connected_at > CLAIM_DURATION_S
 
     def take_data(self, connection: asyncio.Transport, data: bytes) -> None:
         """Pass on the bytes that a connection received."""

@@ -38,7 +38,7 @@ class ClientListener(Protocol):
     def detach(self, client: "Client") -> None:
         """Remove a client that has gone."""
 
-    def received(self, client: "Client", frames: Iterable[Frame]) -> None:
+    def receive_frames(self, client: "Client", frames: Iterable[Frame]) -> None:
         """Take the frames that a client has sent."""
 
 
@@ -64,7 +64,7 @@ class Client(ABC):
         self._scanner = FrameScanner(
             CRC_EXTRA, streaming=streaming, stats=LinkStats(), keep_unknown=True
         )
-        self._waiting: deque[bytes] = deque()
+        self._queued_frames: deque[bytes] = deque()
         self._queued_bytes = 0
 
     @property
@@ -77,7 +77,7 @@ class Client(ABC):
         if self._queued_bytes + len(frame) > _MAX_QUEUED_BYTES:
             self.stats.dropped += 1
             return
-        self._waiting.append(frame)
+        self._queued_frames.append(frame)
         self._queued_bytes += len(frame)
 
     def scan(self, data: bytes) -> list[Frame]:
@@ -88,7 +88,7 @@ class Client(ABC):
 
     def flush(self) -> None:
         """Send as many queued frames as possible now, without blocking."""
-        if self._waiting:
+        if self._queued_frames:
             self._flush()
 
     @abstractmethod
@@ -101,17 +101,17 @@ class Client(ABC):
         Returns:
             The bytes of the frames, and the number of frames.
         """
-        frames = [self._waiting.popleft()]
+        frames = [self._queued_frames.popleft()]
         size = len(frames[0])
-        while self._waiting and size + len(self._waiting[0]) <= max_bytes:
-            size += len(self._waiting[0])
-            frames.append(self._waiting.popleft())
+        while self._queued_frames and size + len(self._queued_frames[0]) <= max_bytes:
+            size += len(self._queued_frames[0])
+            frames.append(self._queued_frames.popleft())
         self._queued_bytes -= size
         return b"".join(frames), len(frames)
 
-    def _drop_waiting(self) -> None:
-        self.stats.dropped += len(self._waiting)
-        self._waiting.clear()
+    def _drop_queued_frames(self) -> None:
+        self.stats.dropped += len(self._queued_frames)
+        self._queued_frames.clear()
         self._queued_bytes = 0
 
 
@@ -129,17 +129,17 @@ class FloodDetector:
         self._window_start = 0.0
         self._count = 0
 
-    def count(self, number: int, size: int, now: float) -> bool:
+    def count(self, frame_count: int, byte_count: int, now: float) -> bool:
         """Count received frames or datagrams; return whether this window contains too many.
 
         Args:
-            number: number of frames or datagrams.
-            size: number of bytes.
+            frame_count: number of frames or datagrams.
+            byte_count: number of bytes.
             now: event-loop time, s.
         """
         if now - self._window_start > self.WINDOW:
             self._window_start, self._count = now, 0
-        self._count += max(number, size // self._BYTES_PER_COUNT)
+        self._count += max(frame_count, byte_count // self._BYTES_PER_COUNT)
         return self._count > self._MAX_COUNT
 
     def is_flood(self, now: float) -> bool:

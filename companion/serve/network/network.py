@@ -29,7 +29,7 @@ from companion.serve.network.serial_line import SerialLine
 from companion.serve.network.setpoint_limit import SetpointLimit
 from companion.serve.network.tcp import TcpPort, open_tcp_client, open_tcp_server
 from companion.serve.network.udp import UdpPort, open_udp
-from companion.serve.network.uplink import UplinkQueue, uplink_rate
+from companion.serve.network.uplink import UplinkQueue, uplink_limits
 from companion.vehicle.link import Link
 
 _MAX_FORWARDING_DELAY = 0.004
@@ -74,7 +74,7 @@ class Network:
         settings, self._loop = link.settings, asyncio.get_running_loop()
         clock = self._loop.time
         self._autopilot = Address(settings.target_system, settings.target_component)
-        rate, burst = uplink_rate(parse_endpoint(settings.endpoint))
+        rate, burst = uplink_limits(parse_endpoint(settings.endpoint))
         self.uplink = UplinkQueue(link.forward, rate, burst, clock)
         self.routing = Routing(
             self.uplink,
@@ -92,7 +92,7 @@ class Network:
         self._faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
         self._clients: list[Client] = []
-        self._from_vehicle: list[Frame] = []
+        self._vehicle_frames: list[Frame] = []
         self._timer: asyncio.TimerHandle | None = None
         self._flush_handle: asyncio.Handle | None = None
 
@@ -128,7 +128,7 @@ class Network:
 
     def send(self, frame: bytes) -> None:
         """Send a frame of our own component to every client."""
-        self.routing.to_clients(frame)
+        self.routing.send_to_clients(frame)
         self._flush_later()
 
     def send_to(self, client: Client, frame: bytes) -> None:
@@ -149,7 +149,7 @@ class Network:
             self.uplink.forget(client)
             self._setpoint_limit.forget(client)
 
-    def received(self, client: Client, frames: Iterable[Frame]) -> None:
+    def receive_frames(self, client: Client, frames: Iterable[Frame]) -> None:
         """Take the frames that a client has sent; a frame that causes a fault is dropped."""
         for frame in frames:
             is_setpoint = frame.message_id in self.setpoint_ids
@@ -163,10 +163,10 @@ class Network:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        from_vehicle, self._from_vehicle = self._from_vehicle, []
+        vehicle_frames, self._vehicle_frames = self._vehicle_frames, []
         frames_remain = self.uplink.drain()
-        for frame in from_vehicle:
-            self.routing.from_vehicle(frame)
+        for frame in vehicle_frames:
+            self.routing.forward_from_vehicle(frame)
         for client in self._clients:
             client.flush()
         if frames_remain:
@@ -174,10 +174,10 @@ class Network:
 
     def _queue_frame(self, frame: Frame) -> None:
         """Queue a frame that came over the link; forwarding it now could delay the next sample."""
-        if len(self._from_vehicle) >= _MAX_VEHICLE_FRAMES:
+        if len(self._vehicle_frames) >= _MAX_VEHICLE_FRAMES:
             self.overflowed += 1
             return
-        self._from_vehicle.append(frame)
+        self._vehicle_frames.append(frame)
         if frame.message_id == ATTITUDE_QUATERNION and source_of(frame) == self._autopilot:
             self.attitude_payload, self.attitude_at = frame.payload, self._loop.time()
             if self._flush_handle is None:
@@ -187,7 +187,7 @@ class Network:
 
     def _route(self, client: Client, frame: Frame) -> None:
         try:
-            self.routing.from_client(client, frame)
+            self.routing.forward_from_client(client, frame)
         except Exception as error:
             self._note_fault_once(f"{fault_message(error)}; a frame of {client.name} was dropped")
 

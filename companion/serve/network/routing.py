@@ -73,7 +73,7 @@ class Routing:
         self._vehicle, self._autopilot, self._our_address = vehicle, autopilot, our_address
         self._heard: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
         self._clients: tuple[Client, ...] = ()
-        self._repeats = _Repeats(clock)
+        self._repeats = _RepeatDetector(clock)
 
     def attach(self, client: Client) -> None:
         """Add a client; frames are forwarded to it from now on."""
@@ -89,7 +89,7 @@ class Routing:
         """Whether a target was heard on the channel of a client other than `origin`."""
         return any(self._reaches(each, target) for each in self._clients if each is not origin)
 
-    def from_vehicle(self, frame: Frame) -> None:
+    def forward_from_vehicle(self, frame: Frame) -> None:
         """Forward a frame that came over the link to the vehicle."""
         source = source_of(frame)
         if source != self._autopilot:  # another component, or a station behind the autopilot
@@ -109,7 +109,7 @@ class Routing:
         for client in receivers:
             client.put(frame.raw)
 
-    def from_client(self, client: Client, frame: Frame) -> None:
+    def forward_from_client(self, client: Client, frame: Frame) -> None:
         """Forward a client's frame, unless it is looped, for our component, or intercepted.
 
         A looped frame (`RoutingStats`) is dropped. A frame for our component goes to
@@ -134,7 +134,7 @@ class Routing:
             return
         self._forward(client, frame.raw, target)
 
-    def to_clients(self, frame: bytes) -> None:
+    def send_to_clients(self, frame: bytes) -> None:
         """Send a frame of our own component to every client."""
         for client in self._clients:
             client.put(frame)
@@ -172,7 +172,7 @@ class Routing:
         return target in heard
 
 
-class _Repeats:
+class _RepeatDetector:
     """Detects frames that have come before, on any channel.
 
     Sequence number and checksum distinguish a frame from its sender's next 255 frames. If a sender

@@ -38,7 +38,7 @@ class SerialLine:
         return transport
 
     def _receive(self, data: bytes, _received_ns: int) -> bool:
-        self._clients.received(self._client, self._client.scan(data))
+        self._clients.receive_frames(self._client, self._client.scan(data))
         return True
 
     def _lost(self, _reason: str) -> None:
@@ -68,8 +68,8 @@ class SerialClient(Client):
         self.transport: SerialTransport | None = None
 
     def _flush(self) -> None:
-        while self._waiting and self.transport is not None:
-            if not self.transport.send(self._waiting[0]):
+        while self._queued_frames and self.transport is not None:
+            if not self.transport.send(self._queued_frames[0]):
                 return  # the line is busy; what does not fit into the queue meanwhile is dropped
             self._dequeue(0)
             self.stats.sent += 1

@@ -22,10 +22,10 @@ class _Window:
     """Event-loop time at the beginning of the window, s."""
     count: int = 0
     """Number of setpoints that were handled in the window."""
-    newest: Frame | None = None
+    newest_setpoint: Frame | None = None
     """The newest setpoint that waits for the end of the window, or None."""
     timer: asyncio.TimerHandle | None = None
-    """Timer that passes `newest` on at the end of the window; None: no setpoint waits."""
+    """Timer that passes `newest_setpoint` on at the end of the window; None: no setpoint waits."""
 
 
 class SetpointLimit:
@@ -53,7 +53,7 @@ class SetpointLimit:
         if window.count < _MAX_COUNT:
             window.count += 1
             return True
-        window.newest = frame
+        window.newest_setpoint = frame
         if window.timer is None:
             end = window.begin_time + _WINDOW
             window.timer = self._loop.call_at(end, self._end_window, client, window)
@@ -66,7 +66,7 @@ class SetpointLimit:
             window.timer.cancel()
 
     def _end_window(self, client: Client, window: _Window) -> None:
-        newest = window.newest
+        newest = window.newest_setpoint
         self._windows[client] = _Window(self._loop.time(), count=1)
         if newest is not None:
             self._pass_on(client, newest)

@@ -113,10 +113,10 @@ class TcpPort:
         self._clients.attach(client)
         return client
 
-    def received(self, client: "TcpClient", data: bytes) -> int:
+    def receive_frames(self, client: "TcpClient", data: bytes) -> int:
         """Pass on the frames in the bytes that a client sent; return the number of frames."""
         frames = client.scan(data)
-        self._clients.received(client, frames)
+        self._clients.receive_frames(client, frames)
         return len(frames)
 
     def remove(self, client: "TcpClient") -> None:
@@ -151,7 +151,7 @@ class TcpClient(Client):
     def _flush(self) -> None:
         transport = self._transport
         if transport.is_closing() or transport.get_write_buffer_size() > _MAX_UNSENT_BYTES:
-            self._drop_waiting()
+            self._drop_queued_frames()
         else:
             data, frames = self._dequeue(_MAX_UNSENT_BYTES)
             transport.write(data)
@@ -181,7 +181,7 @@ class _Connection(asyncio.BufferedProtocol):
     def buffer_updated(self, nbytes: int) -> None:
         if self._client is None or self._transport is None:
             return
-        number = self._port.received(self._client, bytes(self._buffer[:nbytes]))
+        number = self._port.receive_frames(self._client, bytes(self._buffer[:nbytes]))
         is_flood = self._flood.count(number, nbytes, self._loop.time())
         if is_flood and not self._transport.is_closing():
             self._transport.pause_reading()

@@ -59,7 +59,7 @@ class UdpPort:
         self._socket, self._clients, self._named_peers = sock, clients, named_peers
         self.local: tuple[str, int] = sock.getsockname()[:2]
         self._loop = asyncio.get_running_loop()
-        self._by_address: dict[Any, UdpClient] = {}
+        self._clients_by_address: dict[Any, UdpClient] = {}
         self._only_address: Any = None
         self._flood = FloodDetector()
         self._resume_timer: asyncio.TimerHandle | None = None
@@ -78,9 +78,9 @@ class UdpPort:
             self._resume_timer.cancel()
         self._loop.remove_reader(self._socket.fileno())
         self._socket.close()
-        for client in self._by_address.values():
+        for client in self._clients_by_address.values():
             self._clients.detach(client)
-        self._by_address.clear()
+        self._clients_by_address.clear()
 
     def send(self, data: bytes, address: Any) -> bool:
         """Send a datagram; return False if the kernel's buffer is full.
@@ -112,13 +112,13 @@ class UdpPort:
         self._loop.add_reader(self._socket.fileno(), self._read)
 
     def _receive(self, data: bytes, address: Any) -> None:
-        client = self._by_address.get(address)
+        client = self._clients_by_address.get(address)
         if client is None:
             if self._only_address is not None or not self._named_peers.admits(address):
                 return
             client = UdpClient(self, address)
             frames = client.scan(data)
-            if not frames or len(self._by_address) >= _MAX_CLIENTS:
+            if not frames or len(self._clients_by_address) >= _MAX_CLIENTS:
                 return
             self._attach(address, client)
         elif client.flood.is_flood(self._loop.time()):
@@ -128,18 +128,18 @@ class UdpPort:
             frames = client.scan(data)
         client.heard_at = self._loop.time()
         client.flood.count(len(frames), len(data), client.heard_at)
-        self._clients.received(client, frames)
+        self._clients.receive_frames(client, frames)
 
     def _attach(self, address: Any, client: "UdpClient | None" = None) -> None:
-        client = self._by_address[address] = client or UdpClient(self, address)
+        client = self._clients_by_address[address] = client or UdpClient(self, address)
         self._clients.attach(client)
 
     def _expire(self) -> None:
         self._expiry_timer = self._loop.call_later(1.0, self._expire)
         now = self._loop.time()
-        for address, client in tuple(self._by_address.items()):
+        for address, client in tuple(self._clients_by_address.items()):
             if address != self._only_address and now - client.heard_at > _SILENCE_TIMEOUT:
-                del self._by_address[address]
+                del self._clients_by_address[address]
                 self._clients.detach(client)
 
 
@@ -160,10 +160,10 @@ class UdpClient(Client):
         self.flood = FloodDetector()
 
     def _flush(self) -> None:
-        while self._waiting:
+        while self._queued_frames:
             datagram, frames = self._dequeue(_MAX_DATAGRAM)
             if self._port.send(datagram, self._address):
                 self.stats.sent += frames
             else:
                 self.stats.dropped += frames
-                self._drop_waiting()
+                self._drop_queued_frames()

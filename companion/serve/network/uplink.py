@@ -14,17 +14,17 @@ _LARGEST_FRAME = 280
 _SERIAL_SHARE = 0.5
 """Share of a serial line that clients may use; our setpoints and requests need the rest."""
 _BITS_PER_BYTE = 10
-_NETWORK_RATE = 500_000.0
+_NETWORK_BYTES_PER_S = 500_000.0
 """Largest rate of clients' bytes on a UDP or TCP link to the vehicle, bytes/s."""
-_NETWORK_BURST = 50_000.0
+_NETWORK_BURST_BYTES = 50_000.0
 
 
-def uplink_rate(endpoint: Endpoint) -> tuple[float, float]:
+def uplink_limits(endpoint: Endpoint) -> tuple[float, float]:
     """Limits of clients' frames to the vehicle: (bytes per second, bytes sent at once)."""
     if isinstance(endpoint, SerialPort):
         rate = _SERIAL_SHARE * endpoint.baud / _BITS_PER_BYTE
         return rate, max(float(_LARGEST_FRAME), 0.01 * rate)
-    return _NETWORK_RATE, _NETWORK_BURST
+    return _NETWORK_BYTES_PER_S, _NETWORK_BURST_BYTES
 
 
 class UplinkQueue:

@@ -80,9 +80,9 @@ class Approach:
             result = Ruckig(axes).calculate(problem, self._trajectory)
         # Ruckig raises ValueError for a result code that its Python enumeration lacks.
         except (RuckigError, RuntimeError, ValueError) as error_of_solver:
-            raise _unplannable(error_of_solver) from error_of_solver
+            raise _unplannable_error(error_of_solver) from error_of_solver
         if int(result) < 0:
-            raise _unplannable(result)
+            raise _unplannable_error(result)
 
     def at(self, time: float) -> AxisState:
         """The error at a time, s; after the end of the motion it stays constant."""
@@ -91,7 +91,7 @@ class Approach:
         return AxisState(tuple(position), tuple(velocity), tuple(acceleration))
 
 
-def _unplannable(reason: object) -> UnplannableError:
+def _unplannable_error(reason: object) -> UnplannableError:
     return UnplannableError(
         f"no motion within the limits leads to this setpoint ({' '.join(str(reason).split())})"
     )

@@ -22,7 +22,7 @@ _LARGEST_RATE = 100.0
 """Largest body rate that is accepted, rad/s."""
 
 
-def attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
+def decode_attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
     """The command of a SET_ATTITUDE_TARGET.
 
     Raises:

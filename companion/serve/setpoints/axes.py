@@ -38,7 +38,7 @@ _MIN_LIMIT_SHARE = 0.25
 """Smallest share of its limits that an axis gets, even if the motion is perpendicular to it."""
 
 
-class Continuity(NamedTuple):
+class JumpLimits(NamedTuple):
     """Largest jumps of a stream that are still followed directly."""
 
     position: float
@@ -53,15 +53,15 @@ class CommandFollower:
     Args:
         limits: limits of motions after a jump, one for each axis. A motion along several axes is
             limited along its direction.
-        continuity: largest jumps that are followed directly.
+        jump_limits: largest jumps that are followed directly.
         timeout: time for which a command repeated unchanged is extrapolated, s. After this time a
             commanded position stands still, and a commanded velocity stays constant.
     """
 
     def __init__(
-        self, limits: Sequence[AxisLimits], continuity: Continuity, timeout: float
+        self, limits: Sequence[AxisLimits], jump_limits: JumpLimits, timeout: float
     ) -> None:
-        self._limits, self._continuity, self._timeout = limits, continuity, timeout
+        self._limits, self._jump_limits, self._timeout = limits, jump_limits, timeout
         self._zero: AxisValues = (0.0,) * len(limits)
         self._newest_demand: AxisDemand | None = None
         self._commanded_at = 0.0
@@ -150,7 +150,7 @@ class CommandFollower:
         acceleration, jerk = self._derivatives(demand, now)
         target = CommandedState(demand.position, velocity, acceleration, jerk, now)
         error = target.error_of(current)
-        if demand.velocity is not None and self._is_continuous(error):
+        if demand.velocity is not None and self._is_within_jump_limits(error):
             approach = None
         else:
             approach = self._plan(error, error.position, now, by_velocity=False)
@@ -169,7 +169,7 @@ class CommandFollower:
     def _plan(
         self, error: AxisState, direction: AxisValues, now: float, *, by_velocity: bool
     ) -> Approach:
-        """Plan a motion of `error` to zero; the limits hold along `direction`, not for each axis."""
+        """Plan a motion of `error` to zero; the limits hold along `direction`, not per axis."""
         length = hypot(*direction)
         limits = [
             each if length == 0.0 else _scaled(each, max(_MIN_LIMIT_SHARE, abs(part) / length))
@@ -203,10 +203,10 @@ class CommandFollower:
         jerk = change_rate(before.acceleration, commanded, interval, LARGEST_JERK)
         return commanded, self._zero if jerk is None else _blend(self._commanded_state.jerk, jerk)
 
-    def _is_continuous(self, error: AxisState) -> bool:
+    def _is_within_jump_limits(self, error: AxisState) -> bool:
         return (
-            hypot(*error.position) <= self._continuity.position
-            and hypot(*error.velocity) <= self._continuity.velocity
+            hypot(*error.position) <= self._jump_limits.position
+            and hypot(*error.velocity) <= self._jump_limits.velocity
         )
 
 

@@ -7,13 +7,13 @@ from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import clamp
 from companion.guidance.reference import Reference, Vector, VehicleMotion
 from companion.serve.setpoints.approach import AxisLimits, AxisState, UnplannableError
-from companion.serve.setpoints.axes import CommandFollower, Continuity
+from companion.serve.setpoints.axes import CommandFollower, JumpLimits
 from companion.serve.setpoints.commanded_state import AxisMotion
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
-_HORIZONTAL_CONTINUITY = Continuity(0.3, 0.6)
-_VERTICAL_CONTINUITY = Continuity(0.3, 0.4)
-_HEADING_CONTINUITY = Continuity(0.2, 1.0)
+_HORIZONTAL_JUMP_LIMITS = JumpLimits(0.3, 0.6)
+_VERTICAL_JUMP_LIMITS = JumpLimits(0.3, 0.4)
+_HEADING_JUMP_LIMITS = JumpLimits(0.2, 1.0)
 _VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
 """Largest vertical acceleration, m/s², and jerk, m/s³: thrust used for climbing is not available
 for tilt."""
@@ -43,7 +43,7 @@ class MotionLimits(NamedTuple):
 
 
 class CommandedMotion:
-    """Turns requests into a reference that jumps by `Continuity` at most.
+    """Turns requests into a reference that jumps by `JumpLimits` at most.
 
     Positions of requests and of the reference are in the same local frame.
     """
@@ -58,10 +58,10 @@ class CommandedMotion:
         )
         yaw = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
         self._horizontal = CommandFollower(
-            (horizontal, horizontal), _HORIZONTAL_CONTINUITY, limits.timeout
+            (horizontal, horizontal), _HORIZONTAL_JUMP_LIMITS, limits.timeout
         )
-        self._vertical = CommandFollower((vertical,), _VERTICAL_CONTINUITY, limits.timeout)
-        self._heading = CommandFollower((yaw,), _HEADING_CONTINUITY, limits.timeout)
+        self._vertical = CommandFollower((vertical,), _VERTICAL_JUMP_LIMITS, limits.timeout)
+        self._heading = CommandFollower((yaw,), _HEADING_JUMP_LIMITS, limits.timeout)
         self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
         self._newest_yaw: tuple[float, float, float] | None = None  # request, heading demand, time

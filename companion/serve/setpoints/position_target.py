@@ -21,7 +21,7 @@ from companion.serve.setpoints.request import (
 )
 
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS = (1, 2, 4), (8, 16, 32), (64, 128, 256)
-_FORCE, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
+_FORCE_BIT, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
 _NO_ACCELERATION = 64 | 128 | 256
 _KNOWN_BITS = 4095
 _HORIZONTAL_AXES, _VERTICAL_AXES = (0, 1), (2,)
@@ -56,7 +56,7 @@ _ABOVE_HOME_FRAMES = (
 _TERRAIN_FRAMES = dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT
 
 
-def local_target(
+def decode_local_target(
     message: Message, situation: Situation, *, body_yaw_is_relative: bool
 ) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_LOCAL_NED.
@@ -85,10 +85,10 @@ def local_target(
     yaw, yaw_rate = _heading(message)
     if frame.is_body and body_yaw_is_relative and yaw is not None:
         yaw += situation.yaw
-    return _request((position, velocity, acceleration), yaw, yaw_rate)
+    return _make_request((position, velocity, acceleration), yaw, yaw_rate)
 
 
-def global_target(message: Message, situation: Situation) -> MotionRequest:
+def decode_global_target(message: Message, situation: Situation) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_GLOBAL_INT.
 
     Raises:
@@ -109,7 +109,7 @@ def global_target(message: Message, situation: Situation) -> MotionRequest:
             None if used is None else value for used, value in zip(position, local, strict=True)
         )
     yaw, yaw_rate = _heading(message)
-    return _request((position, velocity, acceleration), yaw, yaw_rate)
+    return _make_request((position, velocity, acceleration), yaw, yaw_rate)
 
 
 _Values = tuple[float | None, ...]
@@ -118,7 +118,7 @@ _Values = tuple[float | None, ...]
 def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Values]:
     """Position, velocity and acceleration; None for each number that the mask excludes."""
     mask = message.type_mask
-    if mask & _FORCE and mask & _NO_ACCELERATION != _NO_ACCELERATION:
+    if mask & _FORCE_BIT and mask & _NO_ACCELERATION != _NO_ACCELERATION:
         raise RefusedSetpoint("forces are not supported: clear FORCE_SET")
     if mask & ~_KNOWN_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
@@ -174,18 +174,18 @@ def _shift(values: _Values, offset: Vector) -> _Values:
     )
 
 
-def _request(
+def _make_request(
     groups: tuple[_Values, _Values, _Values], yaw: float | None, yaw_rate: float | None
 ) -> MotionRequest:
     return MotionRequest(
-        _demand(groups, _HORIZONTAL_AXES, "horizontal"),
-        _demand(groups, _VERTICAL_AXES, "vertical"),
+        _make_demand(groups, _HORIZONTAL_AXES, "horizontal"),
+        _make_demand(groups, _VERTICAL_AXES, "vertical"),
         yaw,
         yaw_rate,
     )
 
 
-def _demand(
+def _make_demand(
     groups: tuple[_Values, _Values, _Values], axes: tuple[int, ...], name: str
 ) -> AxisDemand:
     position, velocity, acceleration = (_complete_vector(values, axes) for values in groups)

@@ -76,7 +76,7 @@ _MIN_TAKEOFF_HEIGHT, _MIN_TAKEOFF_SPEED = 1.0, 0.1
 """Least commanded height above the vehicle (m) or upward speed (m/s) that requests a take-off."""
 
 
-def climbs(request: Request, situation: Situation) -> bool:
+def requests_takeoff(request: Request, situation: Situation) -> bool:
     """Whether a request makes a vehicle on the ground take off.
 
     Requests of an attitude or of body rates never do.

@@ -3,14 +3,14 @@
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import decode, dialect
 from companion.serve.network.addresses import Address, target_of
-from companion.serve.setpoints.attitude_target import attitude_target
-from companion.serve.setpoints.position_target import global_target, local_target
+from companion.serve.setpoints.attitude_target import decode_attitude_target
+from companion.serve.setpoints.position_target import decode_global_target, decode_local_target
 from companion.serve.setpoints.request import RefusedSetpoint, Request, Situation
 
 _ATTITUDE_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
 _LOCAL_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
 _GLOBAL_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
-SETPOINTS = frozenset({_ATTITUDE_TARGET_ID, _LOCAL_TARGET_ID, _GLOBAL_TARGET_ID})
+SETPOINT_IDS = frozenset({_ATTITUDE_TARGET_ID, _LOCAL_TARGET_ID, _GLOBAL_TARGET_ID})
 """Ids of the messages that command a motion, an attitude or body rates."""
 
 
@@ -27,7 +27,7 @@ def decode_setpoint(
         frame: frame of the setpoint.
         situation: position and yaw of the vehicle.
         targets: the autopilot and our component; a setpoint may be addressed to either.
-        body_yaw_is_relative: see `local_target`.
+        body_yaw_is_relative: see `decode_local_target`.
 
     Raises:
         RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not finite,
@@ -36,10 +36,10 @@ def decode_setpoint(
     _check_target(target_of(frame), *targets)
     message = decode(frame.message_id, frame.payload)
     if frame.message_id == _ATTITUDE_TARGET_ID:
-        return attitude_target(message)
+        return decode_attitude_target(message)
     if frame.message_id == _GLOBAL_TARGET_ID:
-        return global_target(message, situation)
-    return local_target(message, situation, body_yaw_is_relative=body_yaw_is_relative)
+        return decode_global_target(message, situation)
+    return decode_local_target(message, situation, body_yaw_is_relative=body_yaw_is_relative)
 
 
 def _check_target(target: Address, autopilot: Address, our_address: Address) -> None:

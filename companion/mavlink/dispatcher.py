@@ -15,7 +15,7 @@ C = TypeVar("C")
 Unsubscribe = Callable[[], None]
 
 
-class Router:
+class MessageDispatcher:
     """Calls the subscribers of a message, synchronously, in the order of their subscription.
 
     A message without subscribers is not decoded. An exception in a subscriber is reported to
@@ -46,7 +46,7 @@ class Router:
         """
         return _add(self._raw, UNDECODED.get(name) or message_id(name), callback)
 
-    def route(self, number: int, payload: bytes) -> None:
+    def dispatch(self, number: int, payload: bytes) -> None:
         """Pass one message to its subscribers."""
         for raw_callback in tuple(self._raw.get(number, ())):
             self.guard(raw_callback, payload)

@@ -10,7 +10,7 @@ from companion.config.files import changed
 from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
 from companion.live import after_flight, helper_process
-from companion.live.addresses import ask_to_leave, leave_address
+from companion.live.addresses import ask_to_release, release_socket_name
 from companion.live.after_flight import until_unused
 from companion.live.channel import Channel, datagrams
 from companion.live.checks import ChangeChecks
@@ -39,16 +39,16 @@ class Flight:
 
 
 def used(use, first=FIRST):
-    """Calls `use` with a relay and its flight."""
+    """Calls `use` with a connection and its flight."""
 
     async def run():
         ours, theirs = Channel.pair()
         theirs.setblocking(False)
         flight, loop = Flight(ours), asyncio.get_running_loop()
-        relay = helper_process.Relay(Channel(theirs), {**FIRST, **first})
+        connection = helper_process.FlightConnection(Channel(theirs), {**FIRST, **first})
         loop.add_reader(ours.fileno(), flight.serve)
         try:
-            await use(relay, flight)
+            await use(connection, flight)
         finally:
             for end in (ours, theirs):
                 if end.fileno() >= 0:
@@ -59,44 +59,44 @@ def used(use, first=FIRST):
 
 
 def test_a_change_is_checked_and_then_asked_of_the_flight():
-    async def use(relay, flight):
-        assert await relay.change(SLOWER, "a test") == "done"
+    async def use(connection, flight):
+        assert await connection.change(SLOWER, "a test") == "done"
         assert flight.told == [{"kind": "change", "values": SLOWER, "by": "a test", "id": 0}]
         with pytest.raises(ConfigError, match="at most 20"):
-            await relay.change({"planner": {"gain_per_s": 50.0}}, "a test")
+            await connection.change({"planner": {"gain_per_s": 50.0}}, "a test")
         assert len(flight.told) == 1
         flight.answer = {"refusal": "not while landing"}
         with pytest.raises(ChangeRefusedError, match=r"^not while landing$"):
-            await relay.undo("a test")
+            await connection.undo("a test")
 
     used(use)
 
 
 def test_messages_of_the_flight_reach_the_checks_and_the_listeners():
-    async def use(relay, flight):
+    async def use(connection, flight):
         heard = asyncio.Queue()
-        relay.listen(heard.put_nowait)
+        connection.listen(heard.put_nowait)
         now = changed(Config(), SLOWER, "a test").model_dump(mode="json")
         flight.end.send({"kind": "config", "config": now, "can_undo": True})
         flight.end.send({"kind": "drag", "drag": [0.3, 0.0], "source": "learned-aa.json"})
         assert [(await heard.get())["kind"] for _ in range(2)] == ["config", "drag"]
-        assert relay.checks.current.planner.gain_per_s == 4.0
-        assert relay.checks._drag.drag.linear == 0.3
+        assert connection.checks.current.planner.gain_per_s == 4.0
+        assert connection.checks._drag.drag.linear == 0.3
 
     used(use)
 
 
 def test_a_flight_that_has_ended_and_one_that_does_not_read_refuse_in_different_words():
-    async def use(relay, flight):
+    async def use(connection, flight):
         asyncio.get_running_loop().remove_reader(flight.end.fileno())
         for _ in range(5000):
-            relay.note("x" * 500)
+            connection.note("x" * 500)
         with pytest.raises(ChangeRefusedError, match="is too busy to take it; nothing has changed"):
-            await relay.undo("a test")
+            await connection.undo("a test")
         flight.end.close()
-        await relay.over.wait()
+        await connection.flight_ended.wait()
         with pytest.raises(ChangeRefusedError, match="the flight has ended; nothing has changed"):
-            await relay.change(SLOWER, "a test")
+            await connection.change(SLOWER, "a test")
 
     used(use)
 
@@ -127,9 +127,9 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
     monkeypatch.setattr(helper_process, "_ANSWER_TIMEOUT", 0.02)
     monkeypatch.setattr(helper_process, "_CHECK_PERIOD_S", 0.001)
 
-    async def use(relay, flight):
+    async def use(connection, flight):
         flight.answer = answer
-        watching = asyncio.create_task(helper_process.watch(relay, tmp_path / "w.yaml"))
+        watching = asyncio.create_task(helper_process.watch(connection, tmp_path / "w.yaml"))
         await asyncio.sleep(0.3)
         flight.end.close()
         await watching
@@ -155,7 +155,7 @@ def test_an_end_that_broke_counts_as_closed():
 
     channel = Channel(Broken())
     assert list(channel.received_messages()) == [None]
-    assert not channel.open
+    assert not channel.is_open
     assert list(datagrams(Broken(), 1)) == [b""]
 
 
@@ -216,7 +216,7 @@ def test_a_page_leaves_for_the_same_user_only(monkeypatch):
         monkeypatch.setattr(after_flight.os, "getuid", getuid)
         staying = asyncio.create_task(until_unused(port, lambda: True))
         await asyncio.sleep(0.05)
-        answer = await asyncio.to_thread(ask_to_leave, port)
+        answer = await asyncio.to_thread(ask_to_release, port)
         done, _ = await asyncio.wait({staying}, timeout=0.3)
         staying.cancel()
         return answer, bool(done)
@@ -228,5 +228,5 @@ def test_a_page_leaves_for_the_same_user_only(monkeypatch):
 def test_a_page_whose_name_is_taken_stays_all_the_same(monkeypatch):
     monkeypatch.setattr(after_flight, "_LONGEST_TIME_WITHOUT_USERS", 0.0)
     with socket.socket(socket.AF_UNIX) as other:
-        other.bind(leave_address(1))
+        other.bind(release_socket_name(1))
         asyncio.run(asyncio.wait_for(until_unused(1, lambda: False), 5.0))
