@@ -46,15 +46,15 @@ class MessageDispatcher:
         """
         return _add(self._raw, UNDECODED.get(name) or message_id(name), callback)
 
-    def dispatch(self, number: int, payload: bytes) -> None:
+    def dispatch(self, message_id: int, payload: bytes) -> None:
         """Pass one message to its subscribers."""
-        for raw_callback in tuple(self._raw.get(number, ())):
+        for raw_callback in tuple(self._raw.get(message_id, ())):
             self.guard(raw_callback, payload)
-        callbacks = self._decoded.get(number)
+        callbacks = self._decoded.get(message_id)
         if not callbacks:
             return
         try:
-            message = decode(number, payload)
+            message = decode(message_id, payload)
         except (ValueError, TypeError, UnicodeError):
             self._stats.malformed += 1
             return
@@ -79,8 +79,8 @@ class MessageDispatcher:
             _LOG.exception("on_error of the link failed itself")
 
 
-def _add(table: dict[int, list[C]], number: int, callback: C) -> Unsubscribe:
-    callbacks = table.setdefault(number, [])
+def _add(table: dict[int, list[C]], message_id: int, callback: C) -> Unsubscribe:
+    callbacks = table.setdefault(message_id, [])
     callbacks.append(callback)
 
     def unsubscribe() -> None:

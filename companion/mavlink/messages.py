@@ -1,4 +1,4 @@
-"""Messages by name and number, and their payloads decoded and encoded by pymavlink.
+"""Messages by name and id, and their payloads decoded and encoded by pymavlink.
 
 The dialect holds MAVLink common and ArduPilot's estimator status. It lacks CURRENT_MODE, which is
 defined here, and MAVLink's events, whose payloads are passed on undecoded.
@@ -48,10 +48,10 @@ class CurrentModeMessage:
 
 
 _CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMessage}
-"""Message classes by number."""
+"""Message classes by message id."""
 
 UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
-"""Numbers of messages of MAVLink common that pymavlink lacks; their payloads are not decoded."""
+"""Ids of messages of MAVLink common that pymavlink lacks; their payloads are not decoded."""
 
 MESSAGE_IDS: dict[str, int] = {
     message_class.msgname: number for number, message_class in _CLASSES.items()
@@ -70,13 +70,13 @@ _IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     and set(message_class.lengths) == {1}
     and "s" not in message_class.unpacker.format
 }
-"""By message number, functions that put a payload's values in the order of the constructor.
+"""By message id, functions that put a payload's values in the order of the constructor.
 They exist only for messages without arrays and texts, such as most telemetry.
 """
 
 
 def message_id(name: str) -> int:
-    """Number of a message by its name, such as `ATTITUDE_QUATERNION`.
+    """Id of a message by its name, such as `ATTITUDE_QUATERNION`.
 
     Raises:
         UnknownMessage: the dialect has no such message.
@@ -89,13 +89,13 @@ def message_id(name: str) -> int:
         ) from None
 
 
-def decode(number: int, payload: bytes) -> Message:
+def decode(message_id: int, payload: bytes) -> Message:
     """Build the message object from a payload whose checksum was already checked."""
-    message_class = _CLASSES[number]
+    message_class = _CLASSES[message_id]
     size = message_class.unpacker.size
     flat = message_class.unpacker.unpack(payload[:size].ljust(size, b"\0"))
-    if number in _IN_FIELD_ORDER:
-        return message_class(*_IN_FIELD_ORDER[number](flat))
+    if message_id in _IN_FIELD_ORDER:
+        return message_class(*_IN_FIELD_ORDER[message_id](flat))
     fields: list[Any] = []  # in the order of the payload
     index = 0
     for length in message_class.lengths:
