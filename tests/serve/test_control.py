@@ -96,7 +96,7 @@ def test_a_streamed_circle_is_flown_as_it_is(autopilot):
         def send(time):
             commanded = circle(time, centre)
             script.local(ALL, *commanded)
-            flight = session.flights.current
+            flight = session.flights.current_flight
             error = None if flight is None else flight.tracking_error
             errors.extend([error] if time > 4.0 else [])
 

@@ -187,7 +187,7 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_
         return True
 
     async def save():
-        flights.current = next_flight
+        flights.current_flight = next_flight
 
     flights = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
