@@ -29,7 +29,8 @@ class Connections:
         companion: the companion's endpoint.
 
     Raises:
-        ConfigError: a port cannot be used, or a pseudo-terminal or its link cannot be made.
+        ConfigError: a port cannot be used, or a pseudo-terminal or its symbolic link cannot be
+            made.
     """
 
     def __init__(self, settings: MockSettings, simulation: Simulation, exchange: Exchange) -> None:

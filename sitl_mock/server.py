@@ -17,7 +17,7 @@ BEACON_PERIOD_S = 0.2
 """Wall time after which an unanswered later beacon is sent again, s."""
 MAX_LAG_S = 1.0
 """Largest lag behind real time that the server makes up, s. A busy computer causes lags of tenths
-of a second. If they were dropped, the link would seem slower to the companion.
+of a second. If the server did not make them up, the link would seem slower to the companion.
 """
 
 SPIN_S = 0.0005
@@ -186,7 +186,7 @@ class Server:
     def _wait_for_time(self) -> None:
         """Serve the sockets until the next slot is due by the wall clock.
 
-        A lag above `MAX_LAG_S` is dropped, and so is the time of a ``slip_clock`` fault.
+        The server does not make up a lag above `MAX_LAG_S`, or the time of a ``slip_clock`` fault.
         """
         self._origin_wall_s += self._simulation.effects.take_slip()
         speed = self._settings.speed

@@ -62,7 +62,7 @@ class Boot:
     """Tracks the progress of the boot.
 
     Args:
-        state: state of the autopilot, for the time.
+        state: the autopilot's state, which gives the vehicle time.
         notifier: sends the texts and messages of the boot.
         ready_us: vehicle time at which the position estimate is good; the other times of the boot
             are scaled with it.

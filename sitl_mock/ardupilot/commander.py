@@ -30,10 +30,10 @@ class ArduPilotCommander:
     Args:
         state: the autopilot's state.
         parameters: the autopilot's parameters.
-        vehicle: the vehicle, for its battery.
-        control: begins each mode that is entered.
+        vehicle: the simulated vehicle; the failsafe reads its battery.
+        control: controls the vehicle in each mode.
         guided: the task of GUIDED.
-        stream: counts the accepted setpoints.
+        stream: receives the accepted setpoints.
         notifier: sends texts, the home position and changed parameters.
         boot: progress of the boot.
     """
@@ -75,7 +75,7 @@ class ArduPilotCommander:
         return follows_attitude and state.armed and not state.landed
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips all checks but those of boot and crash."""
+        """Arm, and return a MAV_RESULT; ``force`` skips all checks except for boot and crash."""
         state = self._state
         if state.armed:
             return ACCEPTED
@@ -109,7 +109,7 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def request_mode(self, mode: Mode) -> int:
-        """Change the mode, and return a MAV_RESULT; during the boot it has no effect."""
+        """Change the mode, and return a MAV_RESULT; during the boot the mode does not change."""
         state = self._state
         if not self._boot.initialised or mode is state.mode:
             return ACCEPTED

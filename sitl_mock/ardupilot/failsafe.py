@@ -40,7 +40,7 @@ class ArduPilotFailsafe:
     Args:
         state: the autopilot's state.
         parameters: the autopilot's parameters.
-        vehicle: for the battery's voltage.
+        vehicle: the simulated vehicle, which has the battery's voltage.
         announce: sends texts.
         act: enters the mode of a failsafe, or disarms a vehicle that is on the ground.
     """

@@ -22,7 +22,7 @@ ARRIVAL_DECELERATION = 0.55
 ARRIVAL_TOLERANCE_M = 0.1
 """Distance below the take-off height at which a take-off ends, m."""
 _MIN_CLIMB_RATE = 0.1
-"""Smallest climb rate of a take-off, m/s; without it the take-off height is never reached."""
+"""Smallest climb rate of a take-off, m/s; a rate decreasing to 0 would never reach the height."""
 
 
 class GuidedFlight:

@@ -1,4 +1,4 @@
-"""Position hold: a point and a heading are held, a climb rate is followed."""
+"""Position hold: holds a point and a heading, and follows a climb rate."""
 
 from math import nan, radians, sqrt
 
@@ -13,12 +13,12 @@ from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 STOPPING_S = 0.65
-"""Distance from the vehicle to the held point per speed, s (recorded on entering LAND)."""
+"""Ratio of stopping distance to speed when a hold begins, s (recorded on entering LAND)."""
 _CLIMB_RATE_INTEGRAL_GAIN = 1.0
 """Integral gain of the climb rate, 1/s^2; chosen for a steady hover, not measured."""
 _CLIMB_LIMIT = 10.0
-"""Largest climb and descent of the height controller, m/s. It is high, because the callers limit
-the climb rate that they ask for."""
+"""Largest climb rate and sink rate of the height controller, m/s. It is high, because the callers
+limit the climb rate that they request."""
 
 
 class ClimbProfile:
@@ -50,7 +50,7 @@ def approach_speed(distance: float, deceleration: float, max_speed: float) -> fl
 
 
 class PositionHold:
-    """Holds a point, a heading, and a height that a climb rate changes.
+    """Holds a point and a heading, and follows a climb rate.
 
     Args:
         state: the autopilot's state; its ``position_target`` is written here.

@@ -44,7 +44,7 @@ class ArduPilotModeControl:
         self._return = ReturnHome(state, parameters)
 
     def enter(self, mode: Mode) -> None:
-        """Begin a mode at the present estimate."""
+        """Begin a mode from the estimated position, velocity and heading."""
         self._hold.begin()
         if mode is Mode.RTL:
             self._return.begin()

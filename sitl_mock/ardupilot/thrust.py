@@ -1,4 +1,4 @@
-"""ArduCopter's normalised thrust: specific thrust, angle boost, thrust or climb rate of a setpoint.
+"""ArduCopter's normalised thrust: its curve, the angle boost, and the thrust field of setpoints.
 
 Measured on 4.7.0-dev's built-in quadrotor, with GUID_OPTIONS bit 3 set.
 """
@@ -18,9 +18,9 @@ _CURVE = (
     (1.0, 2.745),
 )
 """Points of the curve: (normalised thrust, specific thrust in g). From `HOVER_THRUST` on, the curve
-is a straight line through the origin; from 0.1 on, almost. In circles, figure-eights and steps
-between 0.3 and 0.6, this line is within 0.03 m/s^2 of the simulator's truth. Climbs at a constant
-thrust accelerate less, because their drag grows quickly.
+is a straight line through the origin, and it is close to this line from 0.1 on. In circles,
+figure-eights and steps between 0.3 and 0.6, the line is within 0.03 m/s^2 of the simulator's truth.
+In a climb at constant thrust the vehicle accelerates less, because its drag grows quickly.
 """
 
 

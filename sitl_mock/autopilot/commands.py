@@ -38,7 +38,7 @@ class Commands:
     Args:
         state: the autopilot's state.
         commander: changes arming and modes.
-        builders: message id -> builder, for requests.
+        builders: message id -> builder of the message, for requests.
     """
 
     def __init__(self, state: State, commander: Commander, builders: dict[int, Builder]) -> None:

@@ -42,8 +42,8 @@ class Event(NamedTuple):
     """How an autopilot announces an event: by STATUSTEXT, and by EVENT if it has an id.
 
     ``text`` may have one ``{}`` for a detail; ``severity`` is MAV_SEVERITY; ``event_id`` 0 = text
-    only; ``arguments`` are the packed arguments of EVENT; ``internal`` is the severity in the
-    vehicle's log, None = the same.
+    only; ``arguments`` are the packed arguments of EVENT; ``internal`` is the severity in
+    the vehicle's log, None = the same.
     """
 
     text: str

@@ -113,10 +113,10 @@ class FaultEffects:
 
     Args:
         state: the autopilot's state.
-        vehicle: changed by faults of the estimate and the battery.
-        commander: changed by faults of arming and mode.
-        control: its held position and heading follow an estimator reset.
-        links: changed by faults of messages.
+        vehicle: the simulated vehicle; faults change its estimator and its battery.
+        commander: refuses arming or changes the mode when a fault demands it.
+        control: moves its held position and heading when the estimator resets.
+        links: links whose messages `NanField` faults change.
     """
 
     def __init__(

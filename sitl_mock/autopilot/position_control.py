@@ -62,7 +62,7 @@ class PositionOutput(NamedTuple):
 
 
 class PositionGains(NamedTuple):
-    """Gains (1/s, integrals 1/s^2), tilt limit (rad) and normalised thrusts (0..1)."""
+    """Gains (1/s; integral gains 1/s^2), tilt limit (rad) and normalised thrusts (0..1)."""
 
     horizontal_position: float  # velocity per position error, 1/s
     vertical_position: float
@@ -176,7 +176,7 @@ def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:
     # Tilt about a level axis, then turn about the body's down axis to reach the Euler yaw.
     w = sqrt(max(0.5 * (1.0 + zz), 1e-9))
     tilt = (w, -zy / (2.0 * w), zx / (2.0 * w), 0.0)
-    # The body x axis after both must point along the yaw: solve for `turn` in the horizontal plane.
+    # After both rotations the body x axis must point along the yaw. This gives `turn`.
     # `body_x` and `body_y` are the north and east components of the tilted body axes.
     body_x = (1.0 - 2.0 * tilt[2] * tilt[2], 2.0 * tilt[1] * tilt[2])
     body_y = (2.0 * tilt[1] * tilt[2], 1.0 - 2.0 * tilt[1] * tilt[1])

@@ -73,7 +73,7 @@ class State:
     estimate: Estimate
     time_us: int = 0
     stamp_us: int = 0
-    """Time in telemetry; it differs from ``time_us`` only while a fault freezes the clock."""
+    """Time stamp of telemetry, us; not equal to ``time_us`` while a fault freezes the clock."""
     armed: bool = False
     armed_at_us: int = 0
     mode: Mode = Mode.LOITER

@@ -40,7 +40,7 @@ _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
 
 class Section(BaseModel):
-    """Base of every configuration section: unknown keys are errors, values are constant."""
+    """Base of every configuration section: unknown keys are errors, values cannot be changed."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -126,7 +126,9 @@ def describe_wrong_value(error: ValidationError) -> str:
 
 
 def describe_wrong_member(detail: Any, annotation: Any) -> str:
-    """Return why a value such as a fault is wrong: it is no mapping, or its ``kind`` is unknown.
+    """Return what is wrong with a value that has a ``kind``, such as a fault.
+
+    The value may be no mapping, or its ``kind`` may be missing or unknown.
 
     Args:
         detail: error reported by pydantic.

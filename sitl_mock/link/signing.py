@@ -69,7 +69,7 @@ class Signing:
             ones of their stream (system, component, link id).
         unsigned: number of frames without a signature, whether accepted or not.
         refused: number of frames signed with another key, replayed, or (on a stream not heard
-            before) a minute older than the newest time stamp.
+            before) more than a minute older than the newest time stamp.
 
     Args:
         key: 32 bytes.

@@ -8,10 +8,10 @@ from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.modes import PILOTED_MODES
 
 UNARMABLE_MODES = frozenset({Mode.RTL, Mode.LAND})
-"""Modes in which PX4 cannot be armed, and to which it does not return when it disarms."""
+"""Modes in which PX4 cannot be armed. When PX4 disarms, it does not return to these modes."""
 PREFLIGHT_MARGIN_US = 1_000_000
 """Delay beyond COM_DISARM_PRFLT after which an armed vehicle that has not taken off disarms, us
-(measured: 11 s for 10 s)."""
+(measured: 11 s with COM_DISARM_PRFLT = 10 s)."""
 
 
 class ArmingChecks:

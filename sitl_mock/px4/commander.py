@@ -1,4 +1,4 @@
-"""PX4's rules of arming and modes, by its measured behaviour."""
+"""PX4's rules of arming and modes, as measured."""
 
 import struct
 
@@ -60,7 +60,7 @@ class Px4Commander:
         self._published_status: tuple[bool, Mode, Mode, bool] | None = None
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips all checks but that of a crash."""
+        """Arm, and return a MAV_RESULT; ``force`` skips all checks except for a crash."""
         state = self._state
         if state.armed:
             return ACCEPTED
@@ -101,7 +101,7 @@ class Px4Commander:
         Args:
             mode: requested mode.
             takeoff_z: down position where TAKEOFF ends, m; None = MIS_TAKEOFF_ALT above home.
-            hold: position of LOITER, m NED; None = here.
+            hold: position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         state = self._state
         if state.armed and not self._can_run(mode):
@@ -228,7 +228,7 @@ class Px4Commander:
         return self._state.position_valid or mode not in POSITION_MODES
 
     def _enter_mode(self, mode: Mode, *, hold: Vector | None = None) -> None:
-        """Enter a mode at the present estimate; the intended mode stays."""
+        """Enter a mode without changing the intended mode."""
         self._state.mode = mode
         takeoff_z = self._takeoff_z() if mode is Mode.TAKEOFF else None
         self._control.enter(mode, takeoff_z=takeoff_z, hold=hold)

@@ -28,7 +28,7 @@ class Px4Commands(Commands):
     Args:
         state: the autopilot's state.
         commander: changes arming and modes.
-        builders: message id -> builder, for requests.
+        builders: message id -> builder of the message, for requests.
         origin: origin of the local frame.
     """
 

@@ -40,7 +40,7 @@ class EventLog:
     """Sends events on all links.
 
     Args:
-        state: state of the autopilot, for the time.
+        state: the autopilot's state, which gives the vehicle time.
         links: links to send on.
     """
 
@@ -82,7 +82,7 @@ class EventLog:
     def answer_request(self, request: Message, link: Link) -> None:
         """Answer a REQUEST_EVENT: resend each event, or refuse it with a reason.
 
-        If the requested range is longer than the log, one refusal covers all older events.
+        If the request is for more events than the log holds, one refusal covers the oldest ones.
         """
         first, last = request.first_sequence, request.last_sequence
         count = (last - first & 0xFFFF) + 1

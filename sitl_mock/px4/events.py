@@ -1,7 +1,8 @@
 """PX4's texts and event ids.
 
 An event id is a hash of the event's name. Names and texts come from PX4's source (main, 2026); the
-recorded ids agree. The text of an announcement that is sent as an EVENT as well ends in a tab.
+ids of these names agree with the recorded ids. If an announcement is sent as an EVENT as well, its
+text ends in a tab.
 """
 
 from pymavlink.dialects.v20 import development as dialect

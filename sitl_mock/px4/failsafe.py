@@ -22,7 +22,7 @@ from sitl_mock.px4.modes import PILOTED_MODES, POSITION_MODES, custom_mode
 _NO_MANUAL_CONTROL = 4
 """Value of COM_RC_IN_MODE: no manual control."""
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
-"""Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT: no failsafe in automatic modes, in OFFBOARD."""
+"""Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT that exempt automatic modes and OFFBOARD."""
 _GCS_MARGIN_US = 2_000_000
 """Delay beyond COM_DL_LOSS_T after which the ground station counts as lost, us (measured)."""
 _ACTED_ALREADY = -1
@@ -74,7 +74,7 @@ class Failsafe:
         self._companion_lost = False
 
     def clear(self) -> None:
-        """End any failsafe: a mode was requested, or the vehicle disarmed."""
+        """End any failsafe, because a mode was requested or the vehicle disarmed."""
         self._actions.clear()
         # A lost link that has caused a failsafe causes another one only after it was regained.
         if self._gcs_lost_us is not None:

@@ -12,9 +12,9 @@ from sitl_mock.physics.rigid_body import GRAVITY
 CRAWL_HEIGHT_M = 0.65
 """Height below which LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
-"""Distance from the vehicle to the held point per speed, s."""
+"""Ratio of stopping distance to speed when a mode with a held point begins, s."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
-"""Acceleration demand of a vehicle that stays level without holding its horizontal position."""
+"""Acceleration demand that keeps the vehicle level but holds no horizontal position, m/s^2 NED."""
 
 
 class FlightTasks:
@@ -38,12 +38,12 @@ class FlightTasks:
     def enter(
         self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
     ) -> None:
-        """Begin a mode at the present estimate.
+        """Begin a mode from the estimated position, velocity and heading.
 
         Args:
             mode: the mode to begin.
-            takeoff_z: where TAKEOFF ends, m down; None = as before.
-            hold: position of LOITER, m NED; None = stop here.
+            takeoff_z: down position at which TAKEOFF ends, m; None = unchanged.
+            hold: position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         estimate = self._state.estimate
         self._entered_us = self._state.time_us
@@ -139,9 +139,10 @@ class FlightTasks:
         return land_speed + (max_speed - land_speed) * fraction
 
     def _begin_return(self) -> None:
-        """Choose the return height: by the cone around home, at most RTL_RETURN_ALT.
+        """Choose the return height: that of the cone around home, at most RTL_RETURN_ALT.
 
-        The return height is at least the present one; within NAV_ACC_RAD of home they are equal.
+        The vehicle never descends to this height: it keeps a higher present height, and within
+        NAV_ACC_RAD of home it keeps any height.
         """
         parameters, state = self._parameters, self._state
         home = state.home_ned

@@ -76,7 +76,7 @@ class HealthReport:
     def step(
         self, *, offboard_alive: bool, pilot_present: bool, gcs_alive: bool, gcs_required: bool
     ) -> None:
-        """Send a report if it changed and is due; also step the events (`EventLog.step`).
+        """Call `EventLog.step`, and send a report if it changed and is due.
 
         Args:
             offboard_alive: whether offboard setpoints arrive.

@@ -47,7 +47,7 @@ class Px4ModeControl:
     def enter(
         self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
     ) -> None:
-        """Begin a mode at the present estimate; see `FlightTasks.enter`."""
+        """Begin a mode from the estimated motion and heading; see `FlightTasks.enter`."""
         self._tasks.enter(mode, takeoff_z=takeoff_z, hold=hold)
         self._position.reset()
 

@@ -98,7 +98,7 @@ class Px4:
         return section
 
     def slot_us(self, settings: VehicleSettings) -> int:
-        """Return the slot period of the inner loop rate, us."""
+        """Return the slot period at the configured inner loop rate, us."""
         return SLOT_US[settings.inner_loop_hz]
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:

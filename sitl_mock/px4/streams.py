@@ -20,7 +20,7 @@ MISS_PROBABILITY = 0.22
 one flight, 0.23 in another)."""
 
 VALUE_PERIOD_US = {LOCAL_POSITION_NED: 8000}
-"""Message id -> period of new values, us; unless rates are exact, a value is not sent twice."""
+"""Message id -> period of new values, us; without `exact_rates`, no value is sent twice."""
 
 
 class _Stream:
