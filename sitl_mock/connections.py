@@ -52,7 +52,7 @@ class Connections:
         if self._control is not None:
             self._control.close()
 
-    def ready(self, timeout_s: float) -> list[Endpoint]:
+    def wait_for_input(self, timeout_s: float) -> list[Endpoint]:
         """Wait at most ``timeout_s`` for input; return the endpoints that have some.
 
         Requests on the control channel are answered here.

@@ -74,7 +74,7 @@ class ArduPilotCommands(Commands):
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
         }
 
-    def data_stream(self, message: Message, link: Link) -> None:
+    def request_data_stream(self, message: Message, link: Link) -> None:
         """REQUEST_DATA_STREAM: start or stop a message group on this link; group 0 means all."""
         requested_group = message.req_stream_id
         groups = (

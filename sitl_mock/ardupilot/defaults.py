@@ -176,11 +176,15 @@ RATE_LOOP = _rate_loop()
 def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     """Return the ``mock:`` section, completed by the defaults of ArduCopter's simulator."""
     top_level = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
-    completed = {**top_level, **section}
-    if completed["rate_loop"] == "ardupilot":
-        completed["rate_loop"] = RATE_LOOP
+    completed_section = {**top_level, **section}
+    if completed_section["rate_loop"] == "ardupilot":
+        completed_section["rate_loop"] = RATE_LOOP
     sensors = {"rate_lag_ms": RATE_LAG_MS, "stamp_slips_hz": STAMP_SLIPS_HZ}
     for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY), ("sensors", sensors)):
-        configured = section.get(key, {})
-        completed[key] = {**defaults, **configured} if isinstance(configured, dict) else configured
-    return completed
+        configured_section = section.get(key, {})
+        completed_section[key] = (
+            {**defaults, **configured_section}
+            if isinstance(configured_section, dict)
+            else configured_section
+        )
+    return completed_section

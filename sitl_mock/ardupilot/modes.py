@@ -78,4 +78,4 @@ def arming_problem(
         (state.battery_warning > BatteryWarning.OK, "Battery failsafe on"),
         (gcs_failsafe, "GCS failsafe on"),
     )
-    return next((problem for present, problem in problems if present), None)
+    return next((problem for applies, problem in problems if applies), None)

@@ -11,7 +11,7 @@ from sitl_mock.physics.rigid_body import GRAVITY
 HOVER_THRUST = 0.364
 """Normalised thrust that hovers, 0..1."""
 
-_CURVE = (
+_THRUST_CURVE = (
     (0.0, 0.045),
     (0.1, 0.29),
     (HOVER_THRUST, 1.0),
@@ -26,14 +26,14 @@ In a climb at constant thrust the vehicle accelerates less, because its drag gro
 
 def specific_thrust(thrust: float) -> float:
     """Return the specific thrust of a normalised thrust, m/s^2."""
-    for (low, low_g), (high, high_g) in pairwise(_CURVE):
-        if thrust <= high:
-            fraction = max(0.0, thrust - low) / (high - low)
+    for (low_thrust, low_g), (high_thrust, high_g) in pairwise(_THRUST_CURVE):
+        if thrust <= high_thrust:
+            fraction = max(0.0, thrust - low_thrust) / (high_thrust - low_thrust)
             return GRAVITY * (low_g + fraction * (high_g - low_g))
-    return GRAVITY * _CURVE[-1][1]
+    return GRAVITY * _THRUST_CURVE[-1][1]
 
 
-def angle_boosted(thrust: float, cos_tilt: float) -> float:
+def angle_boosted_thrust(thrust: float, cos_tilt: float) -> float:
     """Return the thrust divided by the cosine of the tilt, as ATC_ANGLE_BOOST does.
 
     Near 90 degrees of tilt and beyond, the thrust decreases to zero.

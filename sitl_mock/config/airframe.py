@@ -7,7 +7,14 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, preset
+from sitl_mock.config.section import (
+    Finite,
+    Fraction,
+    NonNegative,
+    Positive,
+    Section,
+    resolve_preset,
+)
 
 AIRFRAMES: dict[str, dict[str, object]] = {
     "sih": {},
@@ -70,7 +77,7 @@ class AirframeConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _resolve_preset(cls, value: object) -> object:
-        return preset(AIRFRAMES, value, "airframes")
+        return resolve_preset(AIRFRAMES, value, "airframes")
 
 
 class WindConfig(Section):

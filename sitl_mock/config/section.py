@@ -45,7 +45,7 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def preset(presets: Mapping[str, object], value: object, plural: str) -> object:
+def resolve_preset(presets: Mapping[str, object], value: object, plural: str) -> object:
     """Return the preset that a text names; return any other value unchanged.
 
     Args:

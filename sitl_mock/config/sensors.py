@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section, resolve_preset
 
 InnovationGains = tuple[NonNegative, NonNegative]
 """Gains of one state of the filter: for the position innovation, for the velocity innovation."""
@@ -154,4 +154,4 @@ class SensorConfig(Section):
     @field_validator("ekf", mode="before")
     @classmethod
     def _resolve_preset(cls, value: object) -> object:
-        return preset(EKFS, value, "navigation filters")
+        return resolve_preset(EKFS, value, "navigation filters")

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator
 
 from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
-from sitl_mock.config.endpoint import for_vehicle, parse_endpoint
+from sitl_mock.config.endpoint import endpoint_for_vehicle, parse_endpoint
 from sitl_mock.config.faults import Fault
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.config.section import Finite, NonNegative, Positive, Section
@@ -117,7 +117,7 @@ class VehicleSettings(Section):
         return self.model_copy(
             update={
                 "port": self.port + index,
-                "endpoint": for_vehicle(self.endpoint, index),
+                "endpoint": endpoint_for_vehicle(self.endpoint, index),
                 "gcs_port": self.gcs_port + index if self.gcs_port else 0,
                 "control_port": self.control_port + index if self.control_port else 0,
                 "seed": self.seed + index,

@@ -144,7 +144,7 @@ class Px4:
             ),
             builders,
             handlers={
-                "MANUAL_CONTROL": commander.manual_control,
+                "MANUAL_CONTROL": commander.receive_manual_control,
                 "REQUEST_EVENT": events.answer_request,
             },
             position_valid_from_us=POSITION_VALID_SHARE * parts.ready_us,
