@@ -117,13 +117,13 @@ class PositionController:
         acceleration = []
         for axis, (proportional, integral) in enumerate((xy, xy, z)):
             feed_forward = demand.acceleration[axis]
-            total = 0.0 if isnan(feed_forward) else feed_forward
-            error = velocity_setpoint[axis] - velocity[axis]
-            if not isnan(error):
-                new_integral = self._integral[axis] + integral * error * dt
+            component = 0.0 if isnan(feed_forward) else feed_forward
+            velocity_error = velocity_setpoint[axis] - velocity[axis]
+            if not isnan(velocity_error):
+                new_integral = self._integral[axis] + integral * velocity_error * dt
                 self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, new_integral))
-                total += proportional * error + self._integral[axis]
-            acceleration.append(total)
+                component += proportional * velocity_error + self._integral[axis]
+            acceleration.append(component)
         north, east, down = acceleration
         return (north, east, down)
 
@@ -133,13 +133,14 @@ def _velocity_setpoint(gains: PositionGains, demand: PositionDemand, position: V
     position_gains = (gains.horizontal_position, gains.horizontal_position, gains.vertical_position)
     velocity_setpoint = []
     for axis in range(3):
-        error = demand.position[axis] - position[axis]
+        position_error = demand.position[axis] - position[axis]
         feed_forward = demand.velocity[axis]
-        if isnan(error):
+        if isnan(position_error):
             velocity_setpoint.append(feed_forward)
         else:
             velocity_setpoint.append(
-                position_gains[axis] * error + (0.0 if isnan(feed_forward) else feed_forward)
+                position_gains[axis] * position_error
+                + (0.0 if isnan(feed_forward) else feed_forward)
             )
     north, east, down = velocity_setpoint
     speed = hypot(north, east)

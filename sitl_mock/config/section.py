@@ -143,14 +143,14 @@ def describe_wrong_member(detail: Any, annotation: Any) -> str:
         return ""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         annotation = annotation.model_fields[detail["loc"][0]].annotation
-    kinds = [kind for each in _models_of(annotation) for kind in _kinds(each)]
+    kinds = [kind for model in _models_of(annotation) for kind in _kinds(model)]
     known_kinds = f"kinds are {', '.join(kinds)}"
     if detail["type"] == "union_tag_not_found":
         return f" needs a kind; {known_kinds}"
-    tag = detail["ctx"]["tag"]
-    nearest = _nearest(tag, kinds)
+    unknown_kind = detail["ctx"]["tag"]
+    nearest = _nearest(unknown_kind, kinds)
     hint = f"did you mean {nearest}?; " if nearest else ""
-    return f": there is no kind {tag!r:.40}; {hint}{known_kinds}"
+    return f": there is no kind {unknown_kind!r:.40}; {hint}{known_kinds}"
 
 
 def error_path(error: ValidationError) -> list[str]:

@@ -91,8 +91,8 @@ class FlightTasks:
         if mode is Mode.RTL:
             return self._return()
         if mode is Mode.ALTCTL:
-            level = (nan, nan, self._hold_position[2])
-            return PositionDemand(level, NAN_VECTOR, LEVEL_DEMAND_ACCELERATION, self.yaw)
+            level_position = (nan, nan, self._hold_position[2])
+            return PositionDemand(level_position, NAN_VECTOR, LEVEL_DEMAND_ACCELERATION, self.yaw)
         parameters = self._parameters
         return PositionDemand(
             self._hold_position,
@@ -114,9 +114,13 @@ class FlightTasks:
         ramp_begin_us = max(
             self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6
         )
-        ramp = (state.time_us - ramp_begin_us) / (1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1))
-        lowest_rate = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
-        climb_rate = lowest_rate + (speed - lowest_rate) * max(0.0, min(1.0, ramp))
+        ramp_progress = (state.time_us - ramp_begin_us) / (
+            1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1)
+        )
+        zero_thrust_rate = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
+        climb_rate = zero_thrust_rate + (speed - zero_thrust_rate) * max(
+            0.0, min(1.0, ramp_progress)
+        )
         return PositionDemand(
             NAN_VECTOR,
             (nan, nan, -climb_rate),
