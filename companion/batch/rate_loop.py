@@ -109,10 +109,8 @@ def _rate_loop_arrays(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.i
 def _compiled(law: Law) -> Callable[..., Quaternion]:
     """Compile the flight of one vehicle under `law`."""
     compiler = Compiler({})
-    one_law, rotate = (
-        compiler.compile_function(law),
-        compiler.compile_function(after_constant_rates),
-    )
+    one_law = compiler.compile_function(law)
+    rotate = compiler.compile_function(after_constant_rates)
     lag_response, limit = compiler.compile_function(lag_step), compiler.compile_function(clamp)
     products = compiler.compile_function(tilt_products)
     dt = 1.0 / STEP_HZ
@@ -136,11 +134,8 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
             _, ax, ay = products(q[0], q[1], q[2], q[3])
             coefficients[sample, 0], coefficients[sample, 1] = -2.0 * ay, 2.0 * ax
             roll, pitch, yaw = one_law(q, target, steps * dt, constants)
-            commanded_rates[sample, 0], commanded_rates[sample, 1], commanded_rates[sample, 2] = (
-                roll,
-                pitch,
-                yaw,
-            )
+            commanded_rates[sample, 0], commanded_rates[sample, 1] = roll, pitch
+            commanded_rates[sample, 2] = yaw
             for _ in range(steps):
                 slot = k % length
                 commands[slot, 0], commands[slot, 1], commands[slot, 2] = roll, pitch, yaw

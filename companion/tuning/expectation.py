@@ -124,28 +124,14 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         period: time between two position messages, s.
     """
     omega = loop.s.imag
-    by_acceleration, by_velocity = (
-        loop.responses_to_acceleration(),
-        loop.responses_to_velocity_error(),
-    )
+    by_acceleration = loop.responses_to_acceleration()
+    by_velocity = loop.responses_to_velocity_error()
     by_position = loop.responses_to_position_error()
-    gusts = (
-        (
-            by_acceleration,
-            _slow_density(omega, disturbances.gust * loop.drag, disturbances.gust_correlation_time),
-        ),
-    )
+    gust_time, path_time = disturbances.gust_correlation_time, disturbances.path_correlation_time
+    gusts = ((by_acceleration, _slow_density(omega, disturbances.gust * loop.drag, gust_time)),)
     path = (
-        (
-            by_velocity,
-            _slow_density(omega, disturbances.velocity_error, disturbances.path_correlation_time),
-        ),
-        (
-            by_acceleration,
-            _slow_density(
-                omega, disturbances.acceleration_error, disturbances.path_correlation_time
-            ),
-        ),
+        (by_velocity, _slow_density(omega, disturbances.velocity_error, path_time)),
+        (by_acceleration, _slow_density(omega, disturbances.acceleration_error, path_time)),
     )
     noise = (
         (
