@@ -11,7 +11,7 @@ from sitl_mock.ardupilot.thrust import angle_boosted_thrust, specific_thrust
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.physics.quaternion import Vector, from_yaw
-from sitl_mock.physics.vehicle import STILL, ActuatorCommand
+from sitl_mock.physics.vehicle import DISARMED_COMMAND, ActuatorCommand
 
 TOUCHDOWN_THRUST_RATE = 0.43
 """Decrease of the normalised thrust after contact in LAND, 1/s (recorded: landed after 1.6 s)."""
@@ -82,7 +82,7 @@ class ArduPilotModeControl:
         )
         if not state.armed:
             self._hold.begin()
-            command = STILL
+            command = DISARMED_COMMAND
         elif state.landed and not self.taking_off:
             self._hold.begin()
             self._output.thrust = 0.0

@@ -12,7 +12,7 @@ from sitl_mock.autopilot.position_control import (
 from sitl_mock.autopilot.setpoints import OffboardStream, PositionSetpoint
 from sitl_mock.autopilot.state import NAN_VECTOR, Mode, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, yaw
-from sitl_mock.physics.vehicle import STILL, ActuatorCommand
+from sitl_mock.physics.vehicle import DISARMED_COMMAND, ActuatorCommand
 from sitl_mock.px4.flight_tasks import FlightTasks
 from sitl_mock.px4.modes import PILOTED_MODES
 
@@ -71,7 +71,7 @@ class Px4ModeControl:
                 state.position_target = PositionTargetEcho(
                     True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
                 )
-            command = STILL
+            command = DISARMED_COMMAND
         elif state.mode is Mode.OFFBOARD:
             command = self._follow_offboard(dt, fresh=fresh)
         elif state.landed and state.mode is not Mode.TAKEOFF:
