@@ -61,7 +61,7 @@ def test_a_vehicle_that_slews_slowly_gets_a_lower_gain_and_weight():
     quick, slow = (propose(vehicle(20.0, 15.0, slew)).design for slew in (None, 500.0))
     assert slow.gain < 0.9 * quick.gain
     assert slow.position_weight < 0.3 * quick.position_weight
-    assert slow.position_weight < quick.position_weight
+    assert slow.velocity_weight < 0.7 * quick.velocity_weight
 
 
 def test_an_unknown_vehicle_is_refused():
