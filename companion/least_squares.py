@@ -36,8 +36,8 @@ class Solution(NamedTuple):
     each value of `unknown`."""
 
     @property
-    def sum_of_squares(self) -> float:
-        """Sum of the squared residuals."""
+    def rss(self) -> float:
+        """Residual sum of squares."""
         return float(self.residual @ self.residual)
 
 

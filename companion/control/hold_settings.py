@@ -2,7 +2,7 @@
 
 from math import inf, isfinite
 
-from companion.attitude.rate_response import FIRST_ORDER_SHARE
+from companion.attitude.rate_response import FIRST_ORDER_LAG_SHARE
 from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.control.inner_loop import sensible_gain, slower_tilt, tilt_damping, tilt_response
@@ -89,11 +89,11 @@ def slewing_delay(config: Config) -> float:
 def _rate_loop_delay(config: Config) -> float:
     """Delay of the rate loop: dead time plus half the lag, s; infinite if it is not identified.
 
-    A second-order lag is first converted to first order plus dead time (`FIRST_ORDER_SHARE`),
+    A second-order lag is first converted to first order plus dead time (`FIRST_ORDER_LAG_SHARE`),
     because it delays quick commands more.
     """
     lag, dead_time = slower_tilt(config)
-    share = FIRST_ORDER_SHARE if isfinite(tilt_damping(config)) else 1.0
+    share = FIRST_ORDER_LAG_SHARE if isfinite(tilt_damping(config)) else 1.0
     return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.response_known else inf
 
 
