@@ -161,7 +161,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
 
 
 def cut_steps(figures: Figures) -> list[Check]:
-    """A failed check if the tilt limit shortened a step by more than `MAX_LINE_DISTANCE`; or empty."""
+    """A failed check if the tilt limit cut a step by more than `MAX_LINE_DISTANCE`; or empty."""
     response, limit = figures["response"], figures.get("max_tilt_deg")
     target_tilt = response.get("asked_tilt_deg")
     if target_tilt is None or limit is None:  # nothing was measured, or the summary is older
