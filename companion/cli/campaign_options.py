@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Sequence
 
-from companion.cli.options import Commands, add_flag, add_path, whole_number
+from companion.cli.options import Commands, add_flag, add_path, whole_number_parser
 
 _CAMPAIGN, _RUN = "campaign", "run"
 _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
@@ -60,7 +60,7 @@ def _add_cluster_options(command: argparse.ArgumentParser) -> None:
     )
     cluster_or_workers.add_argument(
         "--workers",
-        type=whole_number(1, 1024),
+        type=whole_number_parser(1, 1024),
         metavar="NUMBER",
         help="worker processes on this computer (one for each core)",
     )
@@ -105,7 +105,7 @@ def _add_tune(kinds: Commands) -> None:
     add_path(tune, "--out", "folder for the search (runs/campaigns/NAME-tune)", "FOLDER")
     tune.add_argument(
         "--trials",
-        type=whole_number(1, 100_000),
+        type=whole_number_parser(1, 100_000),
         metavar="NUMBER",
         help="number of trials; replaces tune.trials of the file",
     )

@@ -17,7 +17,7 @@ from companion.cli.options import (
     add_path,
     add_required_config,
     add_set,
-    number,
+    number_parser,
 )
 
 _PACKAGE = "mavlink-companion"
@@ -26,7 +26,7 @@ _PACKAGE = "mavlink-companion"
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the command line; ends the program for `--help`, `--version` and wrong usage.
 
-    Without arguments those of this process are read.
+    If `arguments` is None, the arguments of this process are read.
 
     Returns:
         The options; their attribute `typed` holds the arguments as typed.
@@ -116,7 +116,7 @@ def _add_doctor(commands: Commands) -> None:
     add_endpoint(command)
     command.add_argument(
         "--wait",
-        type=number(0.01, 3600.0),
+        type=number_parser(0.01, 3600.0),
         default=10.0,
         metavar="SECONDS",
         help="longest wait until the vehicle is ready, s (10)",

@@ -14,7 +14,7 @@ from companion.config.suspect_values import suspect_values
 from companion.control.expected_response import expectations
 from companion.demo import check_mock
 from companion.extras import MissingExtraError
-from companion.files.similar_names import MIN_SIMILARITY, nearest
+from companion.files.similar_names import MIN_SIMILARITY, most_similar_name
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.flight.maneuvers import configured_maneuvers
@@ -53,15 +53,15 @@ def _named_keys(config: Config, name: str) -> list[ConfigKey]:
 
 def _suggestions(known: list[ConfigKey], name: str) -> list[str]:
     """Suggestions for an unknown name: the keys that contain it, else the most similar ones."""
-    dotted = {f"{key.section}.{key.name}": key for key in known}
-    containing = [each for each, key in dotted.items() if name in key.name]
+    keys_by_dotted_name = {f"{key.section}.{key.name}": key for key in known}
+    containing = [each for each, key in keys_by_dotted_name.items() if name in key.name]
     if containing:
         return containing
     candidates: dict[str, list[str]] = {key.section: [key.section] for key in known}
-    for each, key in dotted.items():
+    for each, key in keys_by_dotted_name.items():
         candidates[each] = [each]
         candidates.setdefault(key.name, []).append(each)  # several sections may have such a key
-    near = nearest(name, candidates, MIN_SIMILARITY)
+    near = most_similar_name(name, candidates, MIN_SIMILARITY)
     return [] if near is None else candidates[near]
 
 

@@ -96,7 +96,7 @@ def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None
         return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
 
-def _response(config: Config) -> list[Finding]:
+def _response_findings(config: Config) -> list[Finding]:
     """The finding on the expected response: whether the gain is too large for the vehicle."""
     if config.planner_name not in PLANNER_NAMES:
         return []
@@ -133,7 +133,7 @@ class _DoctorRun:
             drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
             maneuvers, refusals = _maneuvers(config, drag)
             evidence = replace(evidence, maneuvers=maneuvers, known_drag=drag)
-            findings = [*refusals, *run_checks(config, evidence), *_response(config)]
+            findings = [*refusals, *run_checks(config, evidence), *_response_findings(config)]
             code = self._report(findings)
             if fix:
                 code = await self._fix(vehicle, evidence, findings, without_asking=without_asking)
@@ -193,7 +193,7 @@ class _DoctorRun:
                 self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
         _, refusals = _maneuvers(config, evidence.known_drag)
-        code = self._report([*refusals, *run_checks(config, evidence), *_response(config)])
+        code = self._report([*refusals, *run_checks(config, evidence), *_response_findings(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code

@@ -28,7 +28,7 @@ def fly(options: argparse.Namespace) -> int:
 
 
 def demo(options: argparse.Namespace) -> int:
-    """Start the bundled vehicle and fly it."""
+    """Start the mock vehicle and fly it."""
     invocation = flying.invocation(options)._replace(config=None)
     path, console = options.config, _console(options)
     summary = flying.fly_bundled(path, options, console, invocation=invocation)

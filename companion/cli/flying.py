@@ -36,8 +36,8 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     """The configuration as changed by the options of the command line and the planner's name.
 
     Raises:
-        ConfigError: options and configuration contradict each other, or the trajectory, or a
-            planner or guidance of another package, cannot be flown.
+        ConfigError: options and configuration contradict each other; the trajectory cannot be
+            flown; or a planner or guidance of another package cannot be used.
         MissingExtraError: an extra that the configuration needs is not installed.
         SigningError: the signing key cannot be used.
     """
@@ -73,10 +73,11 @@ def invocation(options: argparse.Namespace) -> Invocation:
     """The command line of this run, for messages."""
     program = Path(sys.argv[0])
     if program.name != "companion":  # `python -m companion`
-        name = f"{sys.executable} -m companion"
+        program_command = f"{sys.executable} -m companion"
     else:
-        name = "companion" if shutil.which("companion") == str(program) else str(program)
-    return Invocation(name, options.typed, None if options.config is None else str(options.config))
+        program_command = "companion" if shutil.which("companion") == str(program) else str(program)
+    config = None if options.config is None else str(options.config)
+    return Invocation(program_command, options.typed, config)
 
 
 def fly(
@@ -155,7 +156,7 @@ def fly_bundled(
     planner: str | None = None,
     invocation: Invocation | None = None,
 ) -> Summary:
-    """Start the bundled vehicle with the configuration in `path` (None: the shipped one); fly it.
+    """Start the mock vehicle with the configuration in `path` (None: the shipped one) and fly it.
 
     `link.endpoint` selects UDP, TCP or a serial line to the vehicle; free ports are used.
 

@@ -33,7 +33,7 @@ from companion.recording.measurements.summary import Summary
 from companion.recording.tlog import TLOG_FILE
 from companion.vehicle.flight_log import read_flight_log
 
-SHIPPED = Path()
+SHIPPED_CONFIG = Path()
 """Value of `--bundled` without a file: the shipped configuration."""
 _MANEUVER = "identify"
 _PLANNER = "first-order"
@@ -71,19 +71,19 @@ def identify(options: argparse.Namespace) -> int:
         return EXIT_FAILURE
 
 
-def _log_of(given: Path) -> Path:
+def _log_of(given_path: Path) -> Path:
     """The log that `--log` names: a file, or the log in the folder of a flight."""
-    log = given / TLOG_FILE if given.is_dir() else given
+    log = given_path / TLOG_FILE if given_path.is_dir() else given_path
     if log.is_file() and log.suffix != ".mcap":
         return log
-    if given.is_dir():
-        fault, meant = f"holds no {TLOG_FILE}", _suggestion(given)
-    elif not given.exists():
-        fault, meant = "does not exist", _suggestion(given.parent)
+    if given_path.is_dir():
+        fault, meant = f"holds no {TLOG_FILE}", _suggestion(given_path)
+    elif not given_path.exists():
+        fault, meant = "does not exist", _suggestion(given_path.parent)
     else:
-        fault, meant = "is no MAVLink log", _suggestion(given.parent)
+        fault, meant = "is no MAVLink log", _suggestion(given_path.parent)
     raise LogError(
-        f"{given} {fault}: --log takes the folder of a flight, or a MAVLink log such as the "
+        f"{given_path} {fault}: --log takes the folder of a flight, or a MAVLink log such as the "
         f"flight.tlog in it{meant}"
     )
 
@@ -102,7 +102,7 @@ def _suggestion(folder: Path) -> str:
 def _fly_doublets(options: argparse.Namespace, console: FlightConsole) -> Summary:
     options.maneuvers = (_MANEUVER,)
     if options.bundled is not None:
-        path = None if options.bundled == SHIPPED else options.bundled
+        path = None if options.bundled == SHIPPED_CONFIG else options.bundled
         return flying.fly_bundled(path, options, console, _PLANNER)
     config = flying.with_options(load(options.config), options, _PLANNER)
     return flying.fly(config, flight_folder(config.recording.directory), console)

@@ -1,6 +1,6 @@
 """Ctrl-C, SIGTERM and SIGHUP outside a flight: each ends a command, with exit code 1.
 
-A flight and `serve` handle them by themselves (`companion.cli.signals`).
+During a flight and in `serve`, `companion.cli.signals` handles these signals.
 """
 
 from __future__ import annotations
@@ -37,28 +37,28 @@ def signals_with_default_handler() -> list[signal.Signals]:
     ]
 
 
-def leave_at_once(numbers: list[signal.Signals]) -> None:
+def leave_at_once(signals: list[signal.Signals]) -> None:
     """Have these signals end the process without an exception.
 
     During imports an exception could be swallowed or printed.
     """
-    for number in numbers:
+    for number in signals:
         signal.signal(number, _leave)
 
 
-def raise_interrupt(numbers: list[signal.Signals]) -> None:
+def raise_interrupt(signals: list[signal.Signals]) -> None:
     """Have these signals raise KeyboardInterrupt in the main thread.
 
     Closing the event loop of a flight removes all handlers; call this again afterwards.
     """
-    for number in numbers:
+    for number in signals:
         # asyncio ends its tasks in good order only if SIGINT has Python's own handler
         signal.signal(number, _DEFAULT_HANDLERS[number] if number == signal.SIGINT else _interrupt)
 
 
-def restore(numbers: list[signal.Signals]) -> None:
+def restore(signals: list[signal.Signals]) -> None:
     """Give these signals the default handlers of a Python program again."""
-    for number in numbers:
+    for number in signals:
         signal.signal(number, _DEFAULT_HANDLERS[number])
 
 

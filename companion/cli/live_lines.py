@@ -42,7 +42,7 @@ def _activity(status: FlightStatus) -> str:
 
 
 def allowed_time(elapsed: float, timeout: float) -> str:
-    """Text with the time that a phase has lasted and its limit, s."""
+    """Text with two times in s: how long a phase has lasted, and its time limit."""
     return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code. Without arguments those of this process are used."""
+    """Run one command, by default with the arguments of this process; return the exit code."""
     if arguments is None:
         _use_utf8_names()
     our_signals = interrupts.signals_with_default_handler()
@@ -59,9 +59,9 @@ def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:
     """Parse the arguments and import their command; return a function that runs it."""
     # Our matrices are small: a second thread takes twice the CPU time and is slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from companion.cli.text_streams import output_fault, print_anything  # noqa: PLC0415
+    from companion.cli.text_streams import output_fault, transliterate_output  # noqa: PLC0415
 
-    print_anything()
+    transliterate_output()
     from companion.cli.command_line import parse  # noqa: PLC0415
 
     try:

@@ -77,7 +77,7 @@ def add_live(command: argparse.ArgumentParser) -> None:
     )
 
 
-def number(least: float, most: float) -> Callable[[str], float]:
+def number_parser(least: float, most: float) -> Callable[[str], float]:
     """Make a parser for a number within bounds; it refuses NaN."""
 
     def read(text: str) -> float:
@@ -92,7 +92,7 @@ def number(least: float, most: float) -> Callable[[str], float]:
     return read
 
 
-def whole_number(least: int, most: int) -> Callable[[str], int]:
+def whole_number_parser(least: int, most: int) -> Callable[[str], int]:
     """Make a parser for a whole number within bounds."""
 
     def read(text: str) -> int:

@@ -81,7 +81,11 @@ def _is_whole(record: FlightRecord) -> bool:
 
 
 def replay(options: argparse.Namespace) -> int:
-    """Replay a recorded flight; fail if the setpoints differ although its configuration is used."""
+    """Replay a recorded flight.
+
+    With the flight's own configuration, the exit code is 1 if the setpoints differ from the
+    recorded ones.
+    """
     from companion.replay.replay import Replay  # noqa: PLC0415  no other command needs it
     from companion.replay.report import result_lines, write_csv  # noqa: PLC0415
 

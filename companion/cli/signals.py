@@ -1,4 +1,7 @@
-"""Signals in flight: each one hands the vehicle back; only a second Ctrl-C leaves the flight."""
+"""Signals in flight: each makes the program hand the vehicle back.
+
+Only a second Ctrl-C stops the setpoints at once.
+"""
 
 import asyncio
 import signal
@@ -9,7 +12,10 @@ from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
 SECOND_CTRL_C_AFTER = 1.0
-"""Shortest time after the previous Ctrl-C at which another leaves the flight, s: keys bounce."""
+"""Shortest time between two presses of Ctrl-C of which the second stops the setpoints at once, s.
+
+A key may bounce, so an earlier second Ctrl-C is ignored.
+"""
 
 HOW_TO_LEAVE = (
     f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints at once: then the "
@@ -20,8 +26,8 @@ HOW_TO_LEAVE = (
 class SignalHandler:
     """Handles the signals that arrive while a session flies.
 
-    A terminal that closes sends several: the shell and the kernel each send SIGHUP, and SIGTERM may
-    follow. So a repeated SIGHUP or SIGTERM changes nothing. Only a second Ctrl-C ends a hand-back.
+    When a terminal closes, the shell and the kernel each send SIGHUP, and SIGTERM may follow. So a
+    repeated SIGHUP or SIGTERM changes nothing. Only a second Ctrl-C interrupts a hand-back.
     """
 
     def __init__(

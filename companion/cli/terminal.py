@@ -76,15 +76,15 @@ async def read_line() -> str:
 class FlightConsole(Console):
     """A console that shows brackets as they are, and survives a closed pipe.
 
-    Rich would read brackets, as in the name of a folder, as markup, and end the program when the
-    pipe closes.
+    Rich by itself would take brackets, for example in the name of a folder, for markup. It would
+    end the program when the pipe closes.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options, markup=False)
 
     def on_broken_pipe(self) -> None:
-        """Raise `BrokenPipeError` instead of ending the program, as Rich would."""
+        """Raise `BrokenPipeError`. Rich would end the program."""
         raise BrokenPipeError
 
 
@@ -94,8 +94,8 @@ class TerminalObserver:
     def __init__(self, console: Console) -> None:
         self._console = console
         self._printer = _PrintThread()
-        self._live = LiveLines(console.file) if can_redraw(console.file) else None
-        self._newest: FlightStatus | None = None
+        self._live_lines = LiveLines(console.file) if can_redraw(console.file) else None
+        self._newest_status: FlightStatus | None = None
         self._redraw_queued = self._asking = False
         self._drawn_at = -inf
         self._status_printed_at = 0.0
@@ -109,17 +109,17 @@ class TerminalObserver:
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Print periodically what the phase waits for, unless live lines already show it."""
-        if self._live is None and elapsed - self._status_printed_at >= _STATUS_PERIOD:
+        if self._live_lines is None and elapsed - self._status_printed_at >= _STATUS_PERIOD:
             self._status_printed_at = elapsed
             text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
             self._printer.queue_line(lambda: self._print(f"           {text}"))
 
     def status(self, status: FlightStatus) -> None:
         """Redraw the live lines once per `_REDRAW_PERIOD`; a stalled terminal skips states."""
-        self._newest = status
+        self._newest_status = status
         now = time.monotonic()
         if (
-            self._live is None
+            self._live_lines is None
             or self._asking
             or self._redraw_queued
             or now - self._drawn_at < _REDRAW_PERIOD
@@ -156,22 +156,22 @@ class TerminalObserver:
 
     def _draw(self) -> None:
         self._redraw_queued = False
-        status = self._newest
-        if self._live is not None and status is not None and not self._asking:
-            self._live.show(status_lines(status), alarm=bool(status.alarms))
+        status = self._newest_status
+        if self._live_lines is not None and status is not None and not self._asking:
+            self._live_lines.show(status_lines(status), alarm=bool(status.alarms))
 
     def _clear(self) -> None:
-        if self._live is not None:
-            self._live.clear()
+        if self._live_lines is not None:
+            self._live_lines.clear()
 
     def _print(self, text: str, markup: bool = False) -> None:
         """Print a line, above the live lines if there are any."""
-        if self._live is None:
+        if self._live_lines is None:
             self._write(text, markup)
             return
         with self._console.capture() as captured:
             self._write(text, markup)
-        self._live.write_above(captured.get())
+        self._live_lines.write_above(captured.get())
 
     def _write(self, text: str, markup: bool) -> None:
         self._console.print(text, highlight=False, markup=markup, soft_wrap=True)

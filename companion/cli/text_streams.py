@@ -17,7 +17,7 @@ from companion.files.os_errors import reason_of
 _ERROR_HANDLER = "companion.transliterated"
 
 
-def print_anything() -> None:
+def transliterate_output() -> None:
     """Make standard output and error accept any text.
 
     Characters that the encoding lacks are transliterated. Text for a closed stream is discarded.
@@ -73,7 +73,8 @@ def output_fault() -> str | None:
 
     Returns:
         None: nothing is lost. Empty: the reader has stopped, as after `| head`. Otherwise: the
-        reason. Later text is then discarded, or Python would report the failure again at exit.
+        reason. After a failure, later text is discarded, so that Python does not report the
+        failure again at exit.
     """
     failure: OSError | None = getattr(sys.stdout, "failure", None)
     try:

@@ -13,8 +13,8 @@ from companion.cli.options import (
     add_path,
     add_required_config,
     add_set,
-    number,
-    whole_number,
+    number_parser,
+    whole_number_parser,
 )
 from companion.study import registry
 
@@ -92,7 +92,7 @@ def add_benches(commands: Commands) -> None:
         each.add_argument(
             "--rate",
             dest="rate_hz",
-            type=number(1.0, 2000.0),
+            type=number_parser(1.0, 2000.0),
             default=250.0,
             metavar="RATE",
             help="samples per second (250)",
@@ -114,9 +114,8 @@ def add_benches(commands: Commands) -> None:
 def _add_seconds(
     bench: argparse.ArgumentParser, least: float, default: float, meaning: str
 ) -> None:
-    bench.add_argument(
-        "--seconds", type=number(least, 3600.0), default=default, help=f"{meaning} ({default:g})"
-    )
+    parser = number_parser(least, 3600.0)
+    bench.add_argument("--seconds", type=parser, default=default, help=f"{meaning} ({default:g})")
 
 
 def add_study(commands: Commands) -> None:
@@ -136,7 +135,7 @@ def add_study(commands: Commands) -> None:
     add_path(study, "--out", out_help, "DIR", default=Path("study"))
     study.add_argument(
         "--workers",
-        type=whole_number(1, 256),
+        type=whole_number_parser(1, 256),
         metavar="N",
         help="processes for `study all`; default: one for each core",
     )

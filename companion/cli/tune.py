@@ -77,12 +77,12 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
                 f"{vehicle} does not exist; name the file or the flight folder that `companion "
                 "identify` wrote"
             )
-        return _flyable(load(base)), False
+        return _with_hover(load(base)), False
     identified = load(vehicle)
     if base is None:
-        return _flyable(identified), True
+        return _with_hover(identified), True
     identified_keys = identified.model_dump(exclude_unset=True, include=set(_VEHICLE_SECTIONS))
-    return _flyable(changed(load(base), identified_keys, str(vehicle))), True
+    return _with_hover(changed(load(base), identified_keys, str(vehicle))), True
 
 
 def _with_learned_drag(config: Config, source: Path) -> Config:
@@ -93,7 +93,7 @@ def _with_learned_drag(config: Config, source: Path) -> Config:
     return changed(config, learned.as_keys(), str(learned.path))
 
 
-def _flyable(config: Config) -> Config:
+def _with_hover(config: Config) -> Config:
     """The configuration with planner `auto` and maneuver `hover` instead of those of `identify`."""
     return changed(
         config, {"planner": {"name": "auto"}, "flight": {"maneuvers": ("hover",)}}, "tune"
@@ -101,7 +101,7 @@ def _flyable(config: Config) -> Config:
 
 
 def _fly_trials(proposal: Proposal, console: Console) -> dict[str, tuple[TrialResult, TrialResult]]:
-    """Fly each trial flight with the previous configuration and with the proposal."""
+    """Fly each trial flight with the previous configuration and with the proposed one."""
     autopilot = matching_autopilot(proposal.tuned)
     flights = {}
     for trial in TRIAL_FLIGHTS:

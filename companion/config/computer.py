@@ -24,16 +24,17 @@ class LinkConfig(Section):
     target_component: Annotated[int, Field(ge=1, le=255)] = 1
     """Component id of the autopilot."""
     source_system: Annotated[int, Field(ge=1, le=255)] = 1
-    """Our own system id; a companion computer shares its vehicle's."""
+    """Our own system id; a companion computer has the same system id as its vehicle."""
     source_component: Annotated[int, Field(ge=1, le=255)] = 191
     """Our own component id; 191 is MAV_COMP_ID_ONBOARD_COMPUTER."""
     signing_key_file: PathKey | None = None
-    """File whose first line is the signing passphrase, relative to the file that names it. With it
-    we sign every message and refuse unsigned ones."""
+    """File whose first line is the signing passphrase. A relative path starts at the folder of the
+    file that contains this key. With a passphrase we sign all messages and refuse unsigned ones."""
     lockstep: bool = False
     """Run on the mock vehicle's clock, step by step. Never with a real vehicle."""
     attitude_rate_hz: Annotated[float, Field(ge=20.0, le=1000.0)] = 250.0
-    """Rate requested for ATTITUDE_QUATERNION. The control loop runs at the rate that arrives."""
+    """Rate requested for ATTITUDE_QUATERNION. The control loop runs at the rate at which these
+    messages arrive."""
     min_attitude_rate_hz: Annotated[float, Field(ge=10.0, le=1000.0)] = 50.0
     """Refuse to fly at a lower rate of attitudes; in flight, hand back if setpoints are sent at a
     lower rate for 1 s."""

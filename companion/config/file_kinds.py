@@ -46,7 +46,7 @@ def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> Non
         wanted: the kind of file that the user was to give.
 
     Raises:
-        ConfigError: it is another kind of file; the message says what takes that kind.
+        ConfigError: it is another kind of file; the message names the command or key that takes it.
     """
     given = set(keys)
     found = {kind: len(given.intersection(known)) for kind, known in _KEYS.items()}

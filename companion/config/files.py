@@ -14,7 +14,7 @@ from companion.config.root import MOST_INCLUDED
 from companion.config.trajectory_file import is_table
 from companion.files import bounded_yaml, yaml_file
 from companion.files.bounded_yaml import KeyPath
-from companion.files.value_faults import shortened
+from companion.files.value_faults import shortened_text
 from companion.files.yaml_faults import dotted_keys
 from companion.files.yaml_file import ConfigError, Contents, UnreadableFileError
 
@@ -24,8 +24,7 @@ FILE_KEYS: tuple[tuple[str, ...], ...] = (
     ("link", "signing_key_file"),
     ("mock", "signing", "passphrase_file"),
 )
-"""Keys that name a file to read; the path is relative to the file with the key, as for an include.
-"""
+"""Keys that name a file to read. A relative path starts at the folder of the file with the key."""
 _MAX_DEPTH = 4
 """Largest depth of nested includes."""
 
@@ -73,7 +72,7 @@ def _read(path: Path) -> Contents:
             values = values.get(section) if isinstance(values, dict) else None
         name = values.get(key) if isinstance(values, dict) else None
         if isinstance(name, str) and yaml_file.is_path(name):
-            values[key] = str(path.parent / yaml_file.expanded(name))
+            values[key] = str(path.parent / yaml_file.expanded_path(name))
     return contents
 
 
@@ -141,9 +140,9 @@ def _included_paths(path: Path, own: dict[str, Any]) -> list[Path]:
     if not isinstance(names, list) or not all(
         isinstance(name, str) and yaml_file.is_path(name) for name in names
     ):
-        shown = shortened(names)
+        shown = shortened_text(names)
         raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {shown}")
-    return [path.parent / yaml_file.expanded(name) for name in names]
+    return [path.parent / yaml_file.expanded_path(name) for name in names]
 
 
 def _check_part(included: Path, part: dict[str, Any]) -> None:
@@ -156,7 +155,7 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
         if section == _INCLUDE:
             continue
         if section in Config.model_fields and not isinstance(values, dict):
-            shown = shortened(values)
+            shown = shortened_text(values)
             raise ConfigError(f"{included}: `{section}` must hold keys, not {shown}")
 
 
@@ -203,7 +202,7 @@ def parse_assignments(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Parse texts such as `limits.max_tilt_deg=20`, with values in YAML, to changes for `changed`.
 
     Raises:
-        ConfigError: a text does not have this form, there is no such section, or it is `mock`.
+        ConfigError: a text does not have this form, or its section is unknown or `mock`.
     """
     changes: dict[str, dict[str, Any]] = {}
     for text in texts:

@@ -30,17 +30,16 @@ class FlightConfig(Section):
     )
     """Maneuvers in the order in which they are flown."""
     trajectory: PathKey | None = None
-    """File of the maneuver `trajectory`, such as trajectories/figure8.yaml, relative to the file
-    that names it. --trajectory and --set flight.trajectory=FILE are relative to the working
-    folder."""
+    """File of the maneuver `trajectory`, such as trajectories/figure8.yaml. A relative path starts
+    at the folder of the file with this key; after --trajectory and --set, at the working folder."""
     slow_down: bool = False
     """Slow down a trajectory that exceeds the limits, instead of refusing it."""
     slow_down_reserve_m_s2: Annotated[float, Field(ge=0.0, le=10.0)] = 0.5
     """Part of the horizontal acceleration at limits.max_tilt_deg that is kept for feedback and wind
     when a trajectory is slowed down."""
     arm: bool = False
-    """The program arms the vehicle; so does `fly --arm`. Otherwise it waits for the pilot to
-    arm."""
+    """true, or the option --arm: the program arms the vehicle. false: the program waits until the
+    pilot arms it."""
     accept: Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=100)] = ()
     """Names of unsafe findings of `companion doctor` that do not prevent a flight, such as
     COM_OF_LOSS_T. The flight's events list them."""
@@ -60,7 +59,7 @@ class HoverConfig(Section):
     """Maneuver `hover`: stay where control began."""
 
     duration_s: Seconds = 3.0
-    """Duration."""
+    """Duration of the hover."""
 
 
 class StepsConfig(Section):
@@ -71,22 +70,24 @@ class StepsConfig(Section):
     duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.0
     """Duration of the first part of a doublet; the middle part is twice as long."""
     settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
-    """Position hold between doublets."""
+    """Duration of the position hold between doublets."""
 
 
 class CornersConfig(Section):
     """Maneuver `corners`: acceleration steps that never pass level, to compare planners."""
 
     north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
-    """Magnitude of each corner's north coefficient. The tilt's sine is √(north² + east²)."""
+    """Magnitude of each corner's north coefficient: acceleration per specific thrust. The sine of
+    the tilt is √(north² + east²)."""
     east_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
     """Magnitude of each corner's east coefficient. North 0.4 and east 0.5 give the steps in figure
     2 of Xu & Pei."""
     duration_s: Annotated[float, Field(ge=0.3, le=3.0)] = 1.2
-    """Duration of each corner step. A low gain needs longer steps: if a step has not settled, the
-    response to the next one is not straight. Longer steps carry the vehicle farther."""
+    """Duration of each step from corner to corner. A low gain needs longer steps: if the next step
+    begins before the acceleration has settled, the acceleration leaves the straight line between
+    the corners. Longer steps carry the vehicle farther."""
     settle_s: Annotated[float, Field(ge=0.5, le=60.0)] = 3.0
-    """Position hold at the end."""
+    """Duration of the position hold at the end."""
 
 
 class CircleConfig(Section):
@@ -95,7 +96,7 @@ class CircleConfig(Section):
     radius_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 3.0
     """Radius. The circle begins at the vehicle, and its centre lies north of it."""
     speed_m_s: Annotated[float, Field(ge=0.01, le=50.0)] = 2.0
-    """Speed along the circle. It rises and falls smoothly."""
+    """Speed along the circle. It rises smoothly at the beginning and falls smoothly at the end."""
     laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
     """Number of laps, acceleration and braking included."""
 
@@ -118,7 +119,7 @@ class IdentifyConfig(Section):
     climb_duration_s: Annotated[float, Field(ge=0.1, le=1.0)] = 0.25
     """Duration of the first part of a climb doublet. The vehicle rises climb_m_s2 · duration²."""
     settle_s: Annotated[float, Field(ge=1.0, le=60.0)] = 1.5
-    """Position hold before each doublet and at the end."""
+    """Duration of the position hold before each doublet and at the end."""
 
     tilt_rate = Si("tilt_rate_deg_s")
     yaw_rate = Si("yaw_rate_deg_s")

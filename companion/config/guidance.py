@@ -17,8 +17,8 @@ LINEAR = "linear"
 GUIDANCE_NAMES = (LINEAR, "nmpc")
 
 
-def require_known(kind: str, name: str, our_names: tuple[str, ...], group: str) -> None:
-    """Raise `ValueError` unless the name is ours or that of an installed plug-in."""
+def require_known_name(kind: str, name: str, our_names: tuple[str, ...], group: str) -> None:
+    """Raise `ValueError` unless `name` is in `our_names` or a plug-in of `group` has it."""
     if name not in our_names and name not in (installed := plugins.names(group)):
         known = (*our_names, *installed)
         raise ValueError(
@@ -34,9 +34,9 @@ class PlannerConfig(Section):
     ] = AUTO
     """auto: model-following if `vehicle` gives the response of the rate loop, else first-order.
     first-order: Algorithm 1 of Xu & Pei (Sensors 2026, 26(9), 2727). exact: the same without its
-    discretisation error. model-following: stays linear behind the vehicle's own rate loop, needs
-    `vehicle`. quaternion, so3, euler: the paper's comparison laws. A planner of another package
-    is named by its entry point in `companion.planners`.
+    discretisation error. model-following: predicts the vehicle's own rate loop, so that the
+    response stays linear; needs `vehicle`. quaternion, so3, euler: the paper's comparison laws. A
+    planner of another package is named by its entry point in `companion.planners`.
     """
     gain_per_s: Annotated[float, Field(gt=0.0, le=20.0, json_schema_extra=TUNABLE)] = 5.0
     """Gain p: the acceleration approaches its target with the time constant 1/p."""
@@ -47,7 +47,7 @@ class PlannerConfig(Section):
 
     @model_validator(mode="after")
     def _known_name(self) -> "PlannerConfig":
-        require_known("planner", self.name, (AUTO, *PLANNER_NAMES), plugins.PLANNERS)
+        require_known_name("planner", self.name, (AUTO, *PLANNER_NAMES), plugins.PLANNERS)
         return self
 
 
@@ -87,8 +87,8 @@ class GuidanceConfig(Section):
         default=None, json_schema_extra=TUNABLE
     )
     """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T, T as in position_weight_per_s4; in motion, with a quick rate loop and smooth
-    positions, up to 2.4/T."""
+    null: 1.5/T, T as in position_weight_per_s4. With a quick rate loop it rises up to 2.4/T while
+    the vehicle moves and its measured positions have little noise."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of the autopilot's position beyond what its estimator assumes, for example because of a
     wrong GPS delay parameter. Measure it against an independent position.
@@ -115,7 +115,7 @@ class GuidanceConfig(Section):
 
     @model_validator(mode="after")
     def _known_kind(self) -> "GuidanceConfig":
-        require_known("guidance", self.kind, GUIDANCE_NAMES, plugins.GUIDANCE)
+        require_known_name("guidance", self.kind, GUIDANCE_NAMES, plugins.GUIDANCE)
         return self
 
     @property

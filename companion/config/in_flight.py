@@ -13,7 +13,7 @@ from companion.config.root import Config
 from companion.files.yaml_file import ConfigError
 
 Values = Mapping[str, Mapping[str, Any]]
-"""New values by section and key, like a configuration file."""
+"""New values: {section: {key: value}}, as in a configuration file."""
 
 
 class Difference(NamedTuple):
@@ -50,7 +50,7 @@ def changeable_keys() -> dict[tuple[str, str], str]:
 
 
 def differences(before: Config, after: Config) -> Iterator[Difference]:
-    """The keys with different values; a section without keys counts as one key."""
+    """The keys with different values; `mock` and `include` count as one key each."""
     for section in Config.model_fields:
         old, new = getattr(before, section), getattr(after, section)
         if not (isinstance(old, BaseModel) and isinstance(new, BaseModel)):

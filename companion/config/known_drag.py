@@ -43,7 +43,7 @@ class KnownDrag(NamedTuple):
 
     @property
     def assumption(self) -> str:
-        """The assumption about an unconfigured drag, as the end of a sentence; else empty."""
+        """The assumed drag, in parentheses, as the end of a message; empty if configured."""
         if self.drag is None:
             return f" (the drag is not known: assumed up to {_LARGEST_DRAG.linear:g} 1/s)"
         if self.source is not None:

@@ -17,7 +17,8 @@ class LimitsConfig(Section):
     """Limits of what the program commands, and the fence."""
 
     max_tilt_deg: Annotated[float, Field(ge=1.0, le=60.0, json_schema_extra=LOWERABLE)] = 35.0
-    """Largest tilt of a target. A larger target keeps its direction and is shortened."""
+    """Largest tilt of a target. The tilt of a steeper target is reduced to this limit, without a
+    change of its direction."""
     max_tilt_rate_deg_s: Annotated[float, Field(ge=1.0, le=1000.0, json_schema_extra=LOWERABLE)] = (
         90.0
     )
@@ -31,7 +32,7 @@ class LimitsConfig(Section):
     of Xu & Pei, which makes the response slower."""
     recovery_angle_deg: Annotated[float, Field(gt=0.0, le=80.0)] = 75.0
     """Beyond this tilt the planner first rotates the vehicle towards level by the shortest way.
-    quaternion, so3 and euler do not.
+    The planners quaternion, so3 and euler do not.
     """
     min_thrust: Share = 0.1
     """Smallest normalised thrust commanded in flight."""
@@ -77,8 +78,8 @@ class DeadmanConfig(Section):
     """Largest age of data. A setpoint leaves only in answer to fresh data."""
 
     telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
-    """Largest age of an attitude sample that is answered. Without TIMESYNC the age is relative to
-    the sample with the shortest delay.
+    """Largest age of an attitude sample that is answered with a setpoint. Without TIMESYNC the age
+    is relative to the sample with the shortest delay.
     """
     target_stale_ms: Annotated[float, Field(ge=20.0, le=500.0)] = 150.0
     """Largest age of the guidance target. With an older target no sample is answered."""

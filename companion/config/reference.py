@@ -35,7 +35,7 @@ class ConfigKey(NamedTuple):
     """Default of the key, as plain data that YAML can hold."""
     unit: str
     """Unit such as °/s; empty without a unit."""
-    allowed: str
+    allowed_values: str
     """Range or choices, in words; empty if the type allows any value."""
     meaning: str
     """What the key means."""
@@ -68,7 +68,7 @@ def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
         descriptions[section] = {
             name: (
                 unit_of(name),
-                _allowed(schema[name]),
+                _allowed_values(schema[name]),
                 _one_line(field.description or ""),
             )
             for name, field in model.model_fields.items()
@@ -89,7 +89,7 @@ def as_yaml(config_keys: Iterable[ConfigKey]) -> str:
             section = key.section
             lines += ["", *_comment(models[section].__doc__ or "", ""), f"{section}:"]
         lines += _comment(key.meaning, "  ")
-        limits = ", ".join(part for part in (key.unit, key.allowed) if part)
+        limits = ", ".join(part for part in (key.unit, key.allowed_values) if part)
         if key.value != key.default:
             limits += f"; default: {dump_value(key.default)}"
         note = f"  # {limits.removeprefix('; ')}" if limits else ""
@@ -109,14 +109,14 @@ def as_markdown(config_keys: Iterable[ConfigKey]) -> str:
             f"`{key.name}`",
             f"`{dump_value(key.default)}`",
             key.unit,
-            key.allowed,
+            key.allowed_values,
             key.meaning,
         )
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines).strip() + "\n"
 
 
-def _allowed(schema: dict[str, Any]) -> str:
+def _allowed_values(schema: dict[str, Any]) -> str:
     """Range or choices of a key, from its JSON Schema."""
     options = [schema, *schema.get("anyOf", [])]
     words = []

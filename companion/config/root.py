@@ -88,7 +88,7 @@ class Config(Section):
 
     @property
     def fence(self) -> Fence:
-        """The fence of `limits` and `safety`, with `estimate_delay` 0 s."""
+        """The fence that `limits` and `safety` describe; its `estimate_delay` is 0 s."""
         limits, safety = self.limits, self.safety
         return Fence(
             limits.fence_radius_m,

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from companion import plugins
-from companion.config.guidance import require_known
+from companion.config.guidance import require_known_name
 from companion.config.units import Si
 from companion.files.yaml_file import Section
 from companion.guidance.fence import inside
@@ -57,7 +57,8 @@ class SafetyConfig(Section):
     """Action if GPS is lost, if the estimator loses attitude, velocity or position, or if GPS or
     the estimator's status is not reported for 5 s."""
     max_reset_m: Annotated[float, Field(ge=0.01, le=20.0)] = 1.0
-    """Largest sum of the estimator's position jumps in a flight. References move with each jump."""
+    """Largest sum of the estimator's position jumps in a flight. The position references move
+    with each jump."""
     max_reset_deg: Annotated[float, Field(gt=0.0, le=120.0)] = 45.0
     """Largest sum of the estimator's heading jumps in a flight. The limit for jumps of the thrust
     axis (tilt) is half as large.
@@ -97,8 +98,8 @@ class SafetyConfig(Section):
     computer_action: AnyAction = "hand_back"
     """Action if max_missed or max_starved is exceeded for 1.5 s."""
     monitors: Annotated[tuple[MonitorName, ...], Field(max_length=MOST_MONITORS)] = ()
-    """Monitors of other packages that run beside these, named by their entry points in
-    `companion.monitors`. If one fails in flight, the vehicle is handed back."""
+    """Monitors of other packages that run in addition to the built-in ones, named by their entry
+    points in `companion.monitors`. If one fails in flight, the vehicle is handed back."""
 
     max_reset_angle = Si("max_reset_deg")
     tilt_margin = Si("tilt_margin_deg")
@@ -108,7 +109,7 @@ class SafetyConfig(Section):
     @model_validator(mode="after")
     def _consistent(self) -> "SafetyConfig":
         for name in self.monitors:
-            require_known("monitor", name, (), plugins.MONITORS)
+            require_known_name("monitor", name, (), plugins.MONITORS)
         if self.fence_polygon_m and self.fence_polygon_deg:
             raise ValueError("give fence_polygon_m or fence_polygon_deg, not both")
         for corners in (self.fence_polygon_m, self.fence_polygon_deg):

@@ -24,15 +24,15 @@ class ServeConfig(Section):
     """
     trusted: Annotated[tuple[_Name, ...], Field(max_length=100)] = ()
     """IP addresses and serial devices that may command without signing. Clients on this computer
-    may always command; all others only read, unless they sign with the vehicle's key.
+    may always command. All other clients may only read, unless they sign with the vehicle's key.
     """
     control: bool = True
     """Fly the setpoints of clients (extra `serve`). false: pass them on like all other messages."""
     setpoint_timeout_ms: Annotated[float, Field(ge=100.0, le=2000.0)] = 500.0
-    """Longest time between setpoints of a client. After a longer time the vehicle is held."""
+    """Longest time between setpoints of a client. After a longer time the program makes the
+    vehicle hold."""
     hold_s: Annotated[float, Field(ge=0.0, le=600.0)] = 5.0
-    """Time for which the vehicle is held after a client's setpoints stop, before it is handed back.
-    """
+    """Duration of the hold after a client's setpoints stop. After it the vehicle is handed back."""
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=30.0)] = 5.0
     """Largest horizontal speed towards a commanded position. Commanded velocities may be larger."""
     max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 3.0

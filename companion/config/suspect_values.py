@@ -22,22 +22,22 @@ class SuspectValue(NamedTuple):
     """A suspect value of the configuration."""
 
     key: str
-    found: str
+    description: str
     """The present value, as a clause."""
-    because: str
+    consequence: str
     """Why the value is suspect: its consequence, as a clause."""
     fix: str
     """What the user should do."""
 
     def sentence(self) -> str:
         """The message for the user."""
-        return f"{self.found}: {self.because}; {self.fix}"
+        return f"{self.description}: {self.consequence}; {self.fix}"
 
 
 def suspect_values(config: Config) -> Iterator[SuspectValue]:
     """All suspect values of a configuration."""
-    yield from _units(config)
-    yield from _body_rate(config)
+    yield from _mistaken_units(config)
+    yield from _low_body_rate_limit(config)
     if config.vehicle.response_known and config.vehicle.identified is None and config.mock is None:
         yield SuspectValue(
             "vehicle.identified",
@@ -48,8 +48,8 @@ def suspect_values(config: Config) -> Iterator[SuspectValue]:
         )
 
 
-def _body_rate(config: Config) -> Iterator[SuspectValue]:
-    """The body rate limit, if the planner may command rates that trip its safety monitor."""
+def _low_body_rate_limit(config: Config) -> Iterator[SuspectValue]:
+    """`safety.max_body_rate_deg_s`, if the planner may command a rate that reaches it."""
     limits, allowed = config.limits, config.safety.max_body_rate_deg_s
     commanded = hypot(limits.max_tilt_rate_deg_s, limits.max_yaw_rate_deg_s)
     if allowed <= commanded:
@@ -61,7 +61,7 @@ def _body_rate(config: Config) -> Iterator[SuspectValue]:
         )
 
 
-def _units(config: Config) -> Iterator[SuspectValue]:
+def _mistaken_units(config: Config) -> Iterator[SuspectValue]:
     """Values that are probably radians for degrees, seconds for milliseconds, or shares for %."""
     for key in keys(config):
         if isinstance(key.value, bool) or not isinstance(key.value, int | float) or key.value <= 0:

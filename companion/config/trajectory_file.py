@@ -43,7 +43,7 @@ _MOST_ROWS_COMPARED = 2000
 
 
 class CsvShape(Section):
-    """Samples in a CSV file, as Agilicious and others publish them.
+    """Samples in a CSV file, in the formats of Agilicious and other projects.
 
     Columns by name: t,p_x,p_y,p_z,q_w,…,v_x,…,a_lin_x,… or t,x,y,z,yaw,vx,…,ax,… in s, m and rad.
     """
@@ -57,12 +57,13 @@ class CsvShape(Section):
     """
     heading: Literal["file", "fixed", "along"] = "file"
     """file: the table's yaw or quaternion, if it has one. fixed: the heading at the start. along:
-    along the path.
+    facing along the path.
     """
     cutoff_hz: Annotated[float, Field(ge=0.5, le=50.0)] = 5.0
     """Cutoff of the smoothing filter; faster changes are taken as noise or rounding."""
     acceleration_m_s2: Acceleration = 3.0
-    """Acceleration from and to rest where the table begins or ends in motion."""
+    """Acceleration of the ramp that is added where the table begins or ends in motion: from rest to
+    the table's speed, or from this speed to rest."""
 
     def read(self, folder: Path) -> "LoadedTrajectory":
         """The trajectory of this section, with notes on how a table was read.

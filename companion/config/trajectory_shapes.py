@@ -36,7 +36,7 @@ class HoverShape(Section):
     """Hover at the start."""
 
     duration_s: Annotated[float, Field(ge=0.01, le=LONGEST)]
-    """Duration."""
+    """Duration of the hover."""
 
     def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
@@ -114,8 +114,9 @@ class FigureEightShape(_LapShape):
     peak_speed_m_s: Speed
     """Speed at the fastest point: the middle for gerono, the tips for bernoulli."""
     shape: Literal["gerono", "bernoulli"] = "gerono"
-    """gerono: (A sin φ, A sin φ cos φ), A = half_width_m. bernoulli: the same over 1 + cos² φ, with
-    rounder loops. Between acceleration and braking, φ increases at a constant rate."""
+    """gerono: A sin φ along direction_deg, A sin φ cos φ across it; A is half_width_m. bernoulli:
+    both divided by 1 + cos² φ, with rounder loops. Between acceleration and braking, φ increases at
+    a constant rate."""
 
     def trajectory(self) -> Trajectory:
         """The trajectory of this shape."""
@@ -134,7 +135,7 @@ class WaypointsShape(Section):
     """Largest acceleration. The path is flown as fast as acceleration_m_s2 and speed_m_s allow."""
     stops: bool = False
     """true: straight lines between the points, with a stop at each. false: one smooth curve through
-    all points, which leaves these lines; a flight says by how much."""
+    all points, which leaves the straight lines; the flight reports by how much."""
     jerk_m_s3: Jerk = 10.0
     """Largest jerk on straight lines; the smooth curve does not use it."""
     heading: FixedOrAlong = "fixed"

@@ -41,7 +41,11 @@ def seconds(milliseconds: float) -> float:
 
 
 def share(percent: float) -> float:
-    """Percent as a share of 1, divided as in `companion.vehicle.state`: equal values stay equal."""
+    """Percent as a share of 1.
+
+    `companion.vehicle.state` divides a measured percentage in the same way, so a measured value
+    that equals a limit in percent also equals it as a share.
+    """
     return percent / 100.0
 
 

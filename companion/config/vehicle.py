@@ -17,8 +17,8 @@ AccelerationLimit = Annotated[float, Field(gt=0.0, le=100_000.0)]
 class AxisKeys(NamedTuple):
     """Response of one axis of the rate loop, as keys of `vehicle`.
 
-    None has a meaning for each key: `lag_ms` or `dead_time_ms` unknown; no slew limit
-    (`acceleration_limit_deg_s2`); a first-order response (`damping`).
+    A `lag_ms` or `dead_time_ms` of None is unknown. If `acceleration_limit_deg_s2` is None, the
+    rate has no slew limit. If `damping` is None, the response is first order.
     """
 
     lag_ms: float | None
@@ -92,9 +92,9 @@ class VehicleConfig(Section):
 
     @property
     def axes(self) -> "dict[str, AxisKeys]":
-        """The known response of roll, pitch and yaw; null for pitch or yaw: the value of roll.
+        """The response of roll, pitch and yaw.
 
-        Yaw is always first order.
+        A key of pitch or yaw that is null has the value of roll. Yaw is always first order.
         """
         roll = AxisKeys(
             self.lag_ms, self.dead_time_ms, self.acceleration_limit_deg_s2, self.damping
@@ -115,7 +115,7 @@ class VehicleConfig(Section):
 
     @property
     def response(self) -> dict[str, float]:
-        """The response as options of `make_planner`, in SI units, without what is unknown."""
+        """The response as options of `make_planner`, in SI units, without unknown values."""
         options = {"frame_lead": converted(self.yaw_frame_lead_ms, seconds)}
         for name, axis in self.axes.items():
             prefix = "" if name == "roll" else f"{name}_"

@@ -12,11 +12,15 @@ MIN_SIMILARITY_ELSEWHERE = 0.75
 
 def name_hint(written: Any, known: Iterable[str]) -> str:
     """The end of a message that refuses a name: which one was probably meant; else empty."""
-    near = nearest(written, known, MIN_SIMILARITY_ELSEWHERE) if isinstance(written, str) else None
+    near = (
+        most_similar_name(written, known, MIN_SIMILARITY_ELSEWHERE)
+        if isinstance(written, str)
+        else None
+    )
     return f"; did you mean {near}?" if near else ""
 
 
-def nearest(name: str, known: Iterable[str], min_similarity: float) -> str | None:
+def most_similar_name(name: str, known: Iterable[str], min_similarity: float) -> str | None:
     """The most similar known name, or None if none is as similar as `min_similarity`, 0..1."""
     similar = {each: similarity(name, each) for each in known}
     best = max(similar, key=similar.__getitem__, default=None)

@@ -53,7 +53,7 @@ _REQUIREMENTS: Mapping[str, str] = {
 """What a value must be, by the type of pydantic's error; `{…}` is filled in from the error."""
 
 
-def shortened(value: Any) -> str:
+def shortened_text(value: Any) -> str:
     """A value as shown in an error message."""
     text = repr(value)
     return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
@@ -77,7 +77,7 @@ def value_fault(detail: Any, key: str | int) -> str:
     if remedy := _remedy(detail, key):
         return remedy
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    got = f" (got {'a section' if isinstance(value, dict) else shortened(value)})"
+    got = f" (got {'a section' if isinstance(value, dict) else shortened_text(value)})"
     if kind == "value_error":  # of a validator of ours, which says what must be
         got = "" if isinstance(value, dict) else got
         return f": {_own_message(detail)}{got}"
@@ -105,13 +105,13 @@ def _remedy(detail: Any, key: str | int) -> str:
     must_be_number = kind == "value_error" and _own_message(detail).startswith("must be a number")
     if kind in ("float_parsing", "int_parsing") or (must_be_number and isinstance(value, str)):
         text = value if isinstance(value, str) else str(value)
-        return f" must be a number: {_number_advice(str(key), text)} (got {shortened(value)})"
+        return f" must be a number: {_number_advice(str(key), text)} (got {shortened_text(value)})"
     if value is None and kind in ("float_type", "int_type", "string_type", "tuple_type"):
         return " has no value; write one, or take the key out"
     if kind in ("model_type", "dict_type", "model_attributes_type"):
         return (
             " is a section: write its keys on the lines below it, indented by two spaces, each as "
-            f"`key: value` (got {shortened(value)})"
+            f"`key: value` (got {shortened_text(value)})"
         )
     one_value = kind == "tuple_type" and isinstance(value, str | int | float)
     if not one_value or len(str(value)) > _LONGEST_SHOWN:

@@ -11,10 +11,10 @@ from pydantic import BaseModel
 from companion.files.similar_names import (
     MIN_SIMILARITY,
     MIN_SIMILARITY_ELSEWHERE,
-    nearest,
+    most_similar_name,
     similarity,
 )
-from companion.files.value_faults import shortened, value_fault
+from companion.files.value_faults import shortened_text, value_fault
 
 Location = tuple[int | str, ...]
 """Keys and places in lists that lead to a value, as pydantic gives them."""
@@ -83,7 +83,7 @@ def _is_missing_item(detail: Any) -> bool:
     return detail["type"] == "missing" and isinstance(detail["input"], list | tuple)
 
 
-def explained(detail: Any, model: type[BaseModel], former: Mapping[str, str]) -> str:
+def error_sentence(detail: Any, model: type[BaseModel], former: Mapping[str, str]) -> str:
     """The message about an error that pydantic reports, as one sentence.
 
     Args:
@@ -126,7 +126,7 @@ def _length_fault(detail: Any, types: list[Any]) -> str:
         if get_origin(kind) is tuple and Ellipsis not in get_args(kind)
     ]
     if lengths:
-        return f"{count}; it needs {lengths[0]} (got {shortened(value)})"
+        return f"{count}; it needs {lengths[0]} (got {shortened_text(value)})"
     if detail["type"] == "too_short":
         return f"{count}; it needs at least {bounds['min_length']}"
     return f"{count}; it takes at most {bounds['max_length']}"
@@ -171,7 +171,7 @@ def _unknown_key(location: Location, value: Any, model: type[BaseModel]) -> str:
     name = str(location[-1])
     section, _, key = name.partition(".")
     if len(location) == 1 and ((section,), key) in _keys(model):
-        return f"contains a dot; write `{section}: {{{key}: {shortened(value)}}}`"
+        return f"contains a dot; write `{section}: {{{key}: {shortened_text(value)}}}`"
     section_types = _types_at(location[:-1], model)
     section_keys = [key for kind in section_types for key in getattr(kind, "model_fields", ())]
     other_keys = [(key, place) for place, key in _keys(model) if place != location[:-1]]
@@ -179,9 +179,9 @@ def _unknown_key(location: Location, value: Any, model: type[BaseModel]) -> str:
         same_name = [".".join((*place, key)) for key, place in other_keys if key == name]
         if same_name:
             return f"is in the wrong section; write {_joined_by_or(same_name)}"
-    near = nearest(name, section_keys, MIN_SIMILARITY)
+    near = most_similar_name(name, section_keys, MIN_SIMILARITY)
     if not isinstance(value, dict):
-        far = nearest(name, [key for key, _ in other_keys], MIN_SIMILARITY_ELSEWHERE)
+        far = most_similar_name(name, [key for key, _ in other_keys], MIN_SIMILARITY_ELSEWHERE)
         if far and (not near or similarity(name, far) > similarity(name, near)):
             places = [".".join((*place, key)) for key, place in other_keys if key == far]
             return f"is not a known key; did you mean {_joined_by_or(places)}?"

@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.bounded_yaml import MOST_BYTES, KeyPath, YamlError
-from companion.files.yaml_faults import essential_details, explained, types_in
+from companion.files.yaml_faults import error_sentence, essential_details, types_in
 
 Model = TypeVar("Model", bound="Section")
 
@@ -35,7 +35,7 @@ def is_path(text: str) -> bool:
     return text.strip() != "" and "\0" not in text and len(text) <= _LONGEST_PATH
 
 
-def expanded(path: str) -> str:
+def expanded_path(path: str) -> str:
     """A path with `~` replaced by the home folder; no shell does it in a file or after `--set`."""
     return expanduser(path)  # noqa: PTH111  Path.expanduser raises for an unknown user
 
@@ -89,7 +89,7 @@ class Section(BaseModel):
             raise ValueError("must be a number")
         if Path in kinds and not is_path(value):
             raise ValueError("must name a file or a folder")
-        return expanded(value) if Path in kinds else value
+        return expanded_path(value) if Path in kinds else value
 
 
 class ConfigError(Exception):
@@ -214,7 +214,7 @@ def _config_error(
             where = ""
         elif place.file == previous_place.file and place.line:
             where = f"line {place.line}: "
-        faults.append(where + explained(detail, model, model.former_keys))
+        faults.append(where + error_sentence(detail, model, model.former_keys))
         previous_place = place
     more = len(details) - _MOST_FAULTS_SHOWN
     return ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else ""))

@@ -75,7 +75,7 @@ def doubtful_values(config: Config, _: Evidence) -> Iterator[Finding]:
     """Values that are probably a mistake, or not measured on this vehicle."""
     for value in suspect_values(config):
         key = value.key if value.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
-        yield Finding(key, INEFFECTIVE, value.found, value.because, value.fix, value.key)
+        yield Finding(key, INEFFECTIVE, value.description, value.consequence, value.fix, value.key)
 
 
 def tilt_compensation(config: Config, evidence: Evidence) -> Iterator[Finding]:

@@ -1,4 +1,7 @@
-"""The summary in words at the end of a flight: what flew, whether it was good, what to do next."""
+"""The summary in words at the end of a flight.
+
+It says which maneuvers flew, whether all figures are within their limits, and what to do next.
+"""
 
 import shlex
 from collections.abc import Sequence
@@ -36,7 +39,7 @@ class ClosingWords(NamedTuple):
     """The summary of a flight in words."""
 
     headline: str
-    """What flew, and whether it was good."""
+    """Which maneuvers flew, and whether all figures are within their limits; or the early end."""
     lines: tuple[str, ...]
     """The figures and advice behind the headline, or how and why the flight ended early."""
     next_command: str | None
@@ -66,15 +69,15 @@ def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWor
 
 
 def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
-    judged, advice = checks(figures), list(figures["advice"])
-    failed_checks = [check for check in judged if not check.good]
+    flight_checks, advice = checks(figures), list(figures["advice"])
+    failed_checks = [check for check in flight_checks if not check.good]
     names = _joined_by_and([maneuver["name"] for maneuver in figures["maneuvers"]])
     if is_good(figures):
         headline = f"The flight was good: {names}, all within their limits."
     elif failed_checks:
         headline = (
-            f"The flight was not good: {names}, {len(failed_checks)} of {len(judged)} figures "
-            "beyond their limits."
+            f"The flight was not good: {names}, {len(failed_checks)} of {len(flight_checks)} "
+            "figures beyond their limits."
         )
     elif all(LOST_ROWS in text for text in advice):
         headline = f"The flight was good, as far as it could be recorded: {names}."
@@ -82,7 +85,7 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
         headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
     lines = _beyond_limit(failed_checks)
     lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
-    lines += _by_subject([check for check in judged if check.good])
+    lines += _by_subject([check for check in flight_checks if check.good])
     return headline, [*lines, _extent_line(figures)]
 
 
@@ -90,10 +93,10 @@ def _beyond_limit(failed_checks: list[Check]) -> list[str]:
     return [f"! {check.what}: {check.found}; {check.remedy}" for check in failed_checks]
 
 
-def _by_subject(good: Sequence[Check]) -> list[str]:
+def _by_subject(passed_checks: Sequence[Check]) -> list[str]:
     """One line for each `Check.what` of the passed checks, with the figures of these checks."""
     figures_by_subject: dict[str, list[str]] = {}
-    for check in good:
+    for check in passed_checks:
         figures_by_subject.setdefault(check.what, []).append(check.found)
     return [f"  {what}: {'; '.join(words)}" for what, words in figures_by_subject.items()]
 

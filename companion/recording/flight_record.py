@@ -125,22 +125,22 @@ class FlightRecord:
     @cached_property
     def duration(self) -> float:
         """Time from the beginning of the flight to the last row or event, s."""
-        newest = [messages[-1][0] for messages in self.content.messages.values() if messages]
-        return max(newest) * 1e-9 - self.epoch - self.began if newest else 0.0
+        last_times = [messages[-1][0] for messages in self.content.messages.values() if messages]
+        return max(last_times) * 1e-9 - self.epoch - self.began if last_times else 0.0
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
         """The phases of the flight, in order."""
-        found = self._decoded("/phase", 1, 2)
-        return tuple(Phase(time - self.began, *words) for (time,), words in found)
+        messages = self._decoded("/phase", 1, 2)
+        return tuple(Phase(time - self.began, *words) for (time,), words in messages)
 
     @cached_property
     def maneuvers(self) -> tuple[ManeuverMark, ...]:
         """Beginning of each maneuver and end of the last one (name None); `time` on our clock."""
-        found = self._decoded("/maneuver", 2, 1)
+        messages = self._decoded("/maneuver", 2, 1)
         return tuple(
             ManeuverMark(time, vehicle_time, name or None)
-            for (time, vehicle_time), (name,) in found
+            for (time, vehicle_time), (name,) in messages
         )
 
     @cached_property
@@ -156,19 +156,20 @@ class FlightRecord:
     @cached_property
     def alarms(self) -> tuple[AlarmChange, ...]:
         """The alarms of the safety monitors, in order."""
-        found = self._decoded("/alarm", 2, 3)
+        messages = self._decoded("/alarm", 2, 3)
         return tuple(
-            AlarmChange(time - self.began, raised != 0.0, *words) for (time, raised), words in found
+            AlarmChange(time - self.began, raised != 0.0, *words)
+            for (time, raised), words in messages
         )
 
     @cached_property
     def changes(self) -> tuple[ValuesChange, ...]:
         """The changes of configuration values in flight, in order."""
-        found = self._decoded("/change", 2, 1)
+        messages = self._decoded("/change", 2, 1)
         with record_errors(self.folder):
             return tuple(
                 ValuesChange(time, at_once != 0.0, json.loads(values))
-                for (time, at_once), (values,) in found
+                for (time, at_once), (values,) in messages
             )
 
     @cached_property
@@ -180,12 +181,12 @@ class FlightRecord:
         """
         try:
             text = read_text(self.folder / "config.yaml", _LONGEST_CONFIGURATION)
-            found = bounded_yaml.parse(text)
+            configuration = bounded_yaml.parse(text)
         except (FileRefusedError, bounded_yaml.YamlError) as error:
             raise RecordError(f"{self.folder / 'config.yaml'}: {error}") from error
-        if not isinstance(found, dict):
+        if not isinstance(configuration, dict):
             raise RecordError(f"{self.folder / 'config.yaml'}: not a configuration")
-        return found
+        return configuration
 
     def _decoded(
         self, topic: str, numbers: int, texts: int

@@ -61,9 +61,9 @@ class FlightRecorder(BackgroundFile[Entry]):
         self._on_bad_entry, self._stream = on_bad_entry, stream
         super().__init__(path, _MOST_WAITING, on_failure)
 
-    def _make_file(self) -> "_McapEntries":
+    def _make_file(self) -> "_McapEntryFile":
         writer = McapWriter(self.path, self._stream)
-        return _McapEntries(writer, self._epoch, self._count_dropped)
+        return _McapEntryFile(writer, self._epoch, self._count_dropped)
 
     def _count_dropped(self, error: Exception) -> None:
         """Count an entry that cannot be recorded; report the first one."""
@@ -91,7 +91,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.add(now, _write_fields, ("/phase", (now,), (name, waits_for)))
 
     def maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
-        """Record the beginning of a maneuver or the end of the last one (None): `ManeuverMark`."""
+        """Record the beginning of a maneuver (None: end of the last one); see `ManeuverMark`."""
         self.add(time, _write_fields, ("/maneuver", (time, vehicle_time), (name or "",)))
 
     def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:
@@ -137,7 +137,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.add(time, _write_row, (channel, values))
 
 
-class _McapEntries:
+class _McapEntryFile:
     """Writes entries to a `.mcap`; calls `drop` with the reason why an entry cannot be recorded."""
 
     def __init__(self, writer: McapWriter, epoch: float, drop: Callable[[Exception], None]) -> None:

@@ -127,10 +127,10 @@ class Series:
         self._spool = spool
         # Without a folder all rows stay in memory.
         self._file = None if spool.folder is None else SpooledFile(spool.folder)
-        self._full = _CHUNK_ROWS * len(columns)
+        self._chunk_length = _CHUNK_ROWS * len(columns)
         self._chunk = array("d")
-        most = None if self._file is None else -(-rows_in_memory // _CHUNK_ROWS)
-        self._recent: deque[array[float]] = deque(maxlen=most)
+        max_chunks = None if self._file is None else -(-rows_in_memory // _CHUNK_ROWS)
+        self._recent_chunks: deque[array[float]] = deque(maxlen=max_chunks)
         self._put_count = 0
 
     def __len__(self) -> int:
@@ -140,7 +140,7 @@ class Series:
     def add(self, row: list[float]) -> None:
         """Record one row; its length is not checked."""
         self._chunk.fromlist(row)  # takes half as long as `extend`
-        if len(self._chunk) == self._full:
+        if len(self._chunk) == self._chunk_length:
             self._spool_chunk()
 
     def rows(self, since: int = 0) -> NDArray[np.float64]:
@@ -152,7 +152,7 @@ class Series:
         wanted = max(0, len(self) - since) * len(self.columns)
         parts: list[array[float]] = [self._chunk]
         available = len(self._chunk)
-        for chunk in reversed(self._recent):
+        for chunk in reversed(self._recent_chunks):
             if available >= wanted:
                 break
             parts.insert(0, chunk)
@@ -167,6 +167,6 @@ class Series:
     def _spool_chunk(self) -> None:
         chunk, self._chunk = self._chunk, array("d")
         self._put_count += _CHUNK_ROWS
-        self._recent.append(chunk)
+        self._recent_chunks.append(chunk)
         if self._file is not None and not self._spool.put(self._file, chunk.tobytes()):
             self.lost += _CHUNK_ROWS

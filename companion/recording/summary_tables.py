@@ -109,7 +109,10 @@ def _tracking(summary: Summary) -> RenderableType:
         level = (
             ("open loop", f"{maneuver.drift:.2f} m away")
             if maneuver.open_loop
-            else (_with_unit(maneuver.level_rms, "m", 2), _with_unit(maneuver.level_max, "m", 2))
+            else (
+                _with_unit(maneuver.horizontal_rms, "m", 2),
+                _with_unit(maneuver.horizontal_max, "m", 2),
+            )
         )
         heights = _with_unit(maneuver.height_rms, "m", 2), _with_unit(maneuver.height_max, "m", 2)
         table.add_row(maneuver.name, *level, *heights)
@@ -119,12 +122,12 @@ def _tracking(summary: Summary) -> RenderableType:
 def _predictive_words(figures: PredictiveFigures) -> Text:
     """Counts and times of predictive control, in words."""
     times = figures.as_dict()["solve_ms"]
-    words = f"predictive control: {figures.flown_answers} answers flown"
-    if figures.flown_answers:
+    words = f"predictive control: {figures.used_answers} answers flown"
+    if figures.used_answers:
         words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
-    replaced = ", ".join(f"{count} {name}" for name, count in figures.replaced_answers.items())
+    replaced = ", ".join(f"{count} {name}" for name, count in figures.unused_answers.items())
     if replaced:
-        words += f"; linear guidance replaced {sum(figures.replaced_answers.values())}: {replaced}"
+        words += f"; linear guidance replaced {sum(figures.unused_answers.values())}: {replaced}"
     return Text(words)
 
 

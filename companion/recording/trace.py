@@ -56,7 +56,7 @@ class FlightTrace:
         recorder: writes `flight.mcap`; None: the flight is not recorded.
         response: (vehicle time s, w, x, y, z, target north, target east), only during steps.
         tracking: (vehicle time s, reference north, east, down, estimated north, east, down m) while
-            offboard control is active; NaN: the reference is not held along this axis.
+            offboard control is active; NaN: there is no reference along this axis.
         rates: (vehicle time s, arrival on our clock s, commanded roll, pitch, yaw rad/s, thrust
             0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while the
             vehicle's heartbeats show offboard control.

@@ -55,9 +55,9 @@ class RecordedStep(NamedTuple):
 
     inputs: StepInput
     command: GuidanceCommand | None
-    """Command that the step gave to the control loop; None: it gave none."""
+    """Command that the step gave to the control loop; None: no command."""
     reference: Reference | None
-    """Reference that the step followed; None: it had none."""
+    """Reference that the step followed; None: the step had no reference."""
 
 
 class RecordedAction(NamedTuple):
@@ -92,7 +92,7 @@ class ReplayedVehicle:
         self.standing = self.may_idle = False
         self.offset: float | None = None
 
-    def take(self, inputs: StepInput) -> None:
+    def set_inputs(self, inputs: StepInput) -> None:
         """Set the attributes to the inputs of the next guidance step.
 
         A position that was stale in the flight is set to None, so that the replay does not use it.
@@ -105,7 +105,7 @@ class ReplayedVehicle:
         self.offset = inputs.clock_offset
 
     def age(self, vehicle_time: float, now: float) -> float | None:
-        """Always None, unknown: `take` has already left out every position that is stale."""
+        """Always None, unknown: `set_inputs` has already left out every position that is stale."""
         return None
 
 

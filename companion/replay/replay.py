@@ -44,9 +44,9 @@ class ReplayedSample(NamedTuple):
     """Arrival of the sample, s on our clock."""
     vehicle_time: float
     """Time stamp of the sample, s."""
-    recorded: Setpoint | None
+    recorded_setpoint: Setpoint | None
     """Setpoint of the flight; None: no setpoint."""
-    replayed: Setpoint | None
+    replayed_setpoint: Setpoint | None
     """Setpoint of the replay; None: no setpoint."""
     recorded_reason: str
     """"answered", or why the flight did not answer; one of `UNANSWERED_CODES`."""
@@ -55,8 +55,14 @@ class ReplayedSample(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether flight and replay sent equal setpoints to the bit, or none for equal reasons."""
-        return self.recorded == self.replayed and self.recorded_reason == self.replayed_reason
+        """Whether flight and replay gave the same answer.
+
+        Either both sent a setpoint, equal to the bit, or neither sent one, for the same reason.
+        """
+        return (
+            self.recorded_setpoint == self.replayed_setpoint
+            and self.recorded_reason == self.replayed_reason
+        )
 
 
 class Replay:
@@ -144,7 +150,7 @@ class Replay:
 
     def _replay_step(self, entry: RecordedStep) -> None:
         inputs = entry.inputs
-        self._vehicle.take(inputs)
+        self._vehicle.set_inputs(inputs)
         self._now = inputs.time
         self._loop.offboard_active = inputs.flags.offboard_active
         self._recorded_source.step_reference = entry.reference
@@ -212,7 +218,9 @@ def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
 
 
 class _RecordedSource:
-    """Gives guidance the recorded references; its commands are then replaced by the recorded ones.
+    """Gives guidance the recorded references.
+
+    The commands that guidance computes from them are replaced by the recorded commands.
 
     Attributes:
         step_reference: recorded reference of the next step; None: the step had none.

@@ -27,7 +27,7 @@ def result_lines(
 
     The flight began at the time `began` on our clock, s. `follows_record`: see `Replay`.
     """
-    recorded = sum(each.recorded is not None for each in samples)
+    recorded = sum(each.recorded_setpoint is not None for each in samples)
     different = [each for each in samples if not each.same]
     lines = []
     if follows_record:
@@ -45,7 +45,9 @@ def result_lines(
         f"The answers to {len(different)} of {len(samples)} samples differ from those in the"
         f" flight, the first {different[0].received - began:.2f} s after the flight began."
     )
-    both_answered = [each for each in different if each.recorded and each.replayed]
+    both_answered = [
+        each for each in different if each.recorded_setpoint and each.replayed_setpoint
+    ]
     if both_answered:
         lines.append(_largest_differences(both_answered, began))
     return lines + _reason_changes(different)
@@ -54,7 +56,11 @@ def result_lines(
 def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) -> str:
     answers = np.array(  # (N, 2, 4)
         [
-            [(*each.rates, each.thrust) for each in (sample.recorded, sample.replayed) if each]
+            [
+                (*each.rates, each.thrust)
+                for each in (sample.recorded_setpoint, sample.replayed_setpoint)
+                if each
+            ]
             for sample in both_answered
         ]
     )
@@ -69,7 +75,11 @@ def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) 
 
 
 def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
-    """Sentences on samples that only flight or replay answered, or whose reasons differ."""
+    """Sentences on samples whose answers differ in more than the setpoint.
+
+    Only the flight or only the replay answered the sample, or both left it unanswered for different
+    reasons.
+    """
     changes = Counter(
         (each.recorded_reason, each.replayed_reason)
         for each in different
@@ -92,7 +102,10 @@ def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
         file.write(",".join(_COLUMNS) + "\n")
         for each in samples:
             row = [repr(each.received), repr(each.vehicle_time)]
-            answers = ((each.recorded, each.recorded_reason), (each.replayed, each.replayed_reason))
+            answers = (
+                (each.recorded_setpoint, each.recorded_reason),
+                (each.replayed_setpoint, each.replayed_reason),
+            )
             for setpoint, reason in answers:
                 sent = [""] * 4 if setpoint is None else [*setpoint.rates, setpoint.thrust]
                 row += [str(value) for value in sent] + [reason]

@@ -17,7 +17,7 @@ from companion.report.plots import (
     axes,
     limit_lines,
     line,
-    over_time,
+    line_over_time,
     time_axis,
 )
 
@@ -78,7 +78,7 @@ def _step_paths(flight: FlightData) -> Plot:
     for number, run in enumerate(flight.step_runs[:_STEPS_SHOWN]):
         colour = FLIGHT_COLOURS[number % len(FLIGHT_COLOURS)]
         north, east = run.measured.T
-        traces.append(line(f"{number + 1}, {run.compass}", east, north, colour))
+        traces.append(line(f"{number + 1}, {run.compass_point}", east, north, colour))
     layout = axes(x="a_E, east", y="a_N, north")
     layout["yaxis"]["scaleanchor"] = "x"
     note = "Horizontal acceleration per specific thrust. A linear response moves on straight lines."
@@ -92,7 +92,7 @@ def _coefficients(flight: FlightData) -> Iterator[Plot]:
             ("measured", "coefficients", MEASURED_COLOUR),
         )
         traces = [
-            over_time(label, flight.curves[curve_name], column, colour)
+            line_over_time(label, flight.curves[curve_name], column, colour)
             for label, curve_name, colour in shown
             if curve_name in flight.curves
         ]
@@ -104,7 +104,7 @@ def _coefficients(flight: FlightData) -> Iterator[Plot]:
 def _rates(flight: FlightData) -> Iterator[Plot]:
     for column, axis in enumerate(("roll", "pitch", "yaw")):
         traces = [
-            over_time(curve_name, flight.curves[curve_name], column, colour)
+            line_over_time(curve_name, flight.curves[curve_name], column, colour)
             for curve_name, colour in (
                 ("commanded", REFERENCE_COLOUR),
                 ("measured", MEASURED_COLOUR),
@@ -121,10 +121,10 @@ def _rates(flight: FlightData) -> Iterator[Plot]:
 def _thrust(flight: FlightData) -> Plot:
     if "thrust" not in flight.curves:
         return Plot("", "", [])
-    traces = [over_time("sent", flight.curves["thrust"], 0, MEASURED_COLOUR)]
+    traces = [line_over_time("sent", flight.curves["thrust"], 0, MEASURED_COLOUR)]
     if "hover_thrust" in flight.curves:
         learned = flight.curves["hover_thrust"]
-        traces.append(over_time("learned at hover", learned, 0, NEAREST_COLOUR, dash="dash"))
+        traces.append(line_over_time("learned at hover", learned, 0, NEAREST_COLOUR, dash="dash"))
     traces += limit_lines([flight], "thrust")
     layout = time_axis([flight], y="thrust, 0..1")
     return Plot("Thrust", "Normalised collective thrust.", traces, layout, 280)
@@ -134,7 +134,10 @@ def _latency(flight: FlightData) -> Plot:
     curve = flight.curves.get("latency")
     if curve is None or not curve.values.any():  # In lockstep, all latencies are 0.
         return Plot("", "", [])
-    traces = [over_time("latency", curve, 0, MEASURED_COLOUR), *limit_lines([flight], "latency")]
+    traces = [
+        line_over_time("latency", curve, 0, MEASURED_COLOUR),
+        *limit_lines([flight], "latency"),
+    ]
     layout = time_axis([flight], y="latency, ms")
     note = "From the arrival of a sample to its setpoint, in this program."
     return Plot("Latency", note, traces, layout, 280)

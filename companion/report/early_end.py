@@ -26,8 +26,8 @@ class CrossedLimit:
     key: str
     """Configuration key of the limit."""
     levels: tuple[float, ...] = ()
-    """Values of the limit, in the curve's unit. The flight ends if the curve crosses one; "latency"
-    may cross it, but not often."""
+    """Values of the limit, in the curve's unit. The flight ended because the curve was at or beyond
+    one of them for too long, or "latency" too often."""
     outline: tuple[tuple[float, float], ...] = ()
     """Fence around the track, (N, 2) north and east, m; empty for other curves."""
 

@@ -39,7 +39,7 @@ class Curve(NamedTuple):
     time: Floats
     """(N,), time since the flight began, s."""
     values: Floats
-    """(N, columns)."""
+    """(N, columns), the values at each time; `FlightData.curves` lists the columns."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def explain_other_version(*paths: Path) -> Iterator[None]:
         ) from error
 
 
-def recorded(folder: Path) -> FlightData:
+def recorded_flight(folder: Path) -> FlightData:
     """The flight in a folder.
 
     Raises:

@@ -26,7 +26,9 @@ def require_extra() -> None:
         require(module, "report", "a report")
 
 
-def rendered(package: str, template: str, title: str, plots: Sequence[Plot], **shown: Any) -> str:
+def rendered_page(
+    package: str, template: str, title: str, plots: Sequence[Plot], **shown: Any
+) -> str:
     """The text of a page.
 
     Args:

@@ -17,8 +17,8 @@ from companion.report.plots import (
     even_indices,
     limit_lines,
     line,
+    line_over_time,
     numbers,
-    over_time,
     time_axis,
 )
 
@@ -187,7 +187,9 @@ def _largest_error(flights: Sequence[FlightData]) -> float | None:
 def _lines(flights: Sequence[FlightData], curve: str, label: str) -> list[dict[str, Any]]:
     """The first column of a curve over time, one line for each flight that has it."""
     return [
-        over_time(_name(flights, flight, label), flight.curves[curve], 0, _colour(flights, number))
+        line_over_time(
+            _name(flights, flight, label), flight.curves[curve], 0, _colour(flights, number)
+        )
         for number, flight in enumerate(flights)
         if curve in flight.curves
     ]
@@ -198,10 +200,10 @@ def _speed(flights: Sequence[FlightData]) -> Plot:
     for number, flight in enumerate(flights):
         if "motion" in flight.curves:
             motion, colour = flight.curves["motion"], _colour(flights, number)
-            traces.append(over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
+            traces.append(line_over_time(_name(flights, flight, "speed, m/s"), motion, 1, colour))
             tilt = _name(flights, flight, "tilt, °")
             tilt_colour = REFERENCE_COLOUR if len(flights) == 1 else colour
-            traces.append(over_time(tilt, motion, 2, tilt_colour, dash="dot", yaxis="y2"))
+            traces.append(line_over_time(tilt, motion, 2, tilt_colour, dash="dot", yaxis="y2"))
     traces += limit_lines(flights, "speed") + limit_lines(flights, "tilt", yaxis="y2")
     layout = time_axis(flights, y="speed, m/s", y2="tilt, °")
     layout["yaxis2"] |= {"overlaying": "y", "side": "right", "showgrid": False, "tickmode": "auto"}

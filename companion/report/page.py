@@ -8,20 +8,20 @@ from companion.recording.closing_words import ClosingWords, closing_words
 from companion.recording.flight_record import RECORD_FILE
 from companion.report import PAGE
 from companion.report.control_plots import compared_steps, control_plots
-from companion.report.flight_data import FlightData, explain_other_version, recorded
-from companion.report.html_page import rendered, require_extra
+from companion.report.flight_data import FlightData, explain_other_version, recorded_flight
+from companion.report.html_page import rendered_page, require_extra
 from companion.report.motion_plots import motion_plots
 from companion.report.plots import Plot
 from companion.report.tables import (
     Table,
     comparison_tables,
-    configuration,
+    configuration_table,
     events_at_end,
-    extremes,
+    extremes_text,
     flight_tables,
 )
 from companion.report.timeline import timeline
-from companion.report.tlog_data import logged
+from companion.report.tlog_data import logged_flight
 
 
 def read(path: Path) -> FlightData:
@@ -33,7 +33,7 @@ def read(path: Path) -> FlightData:
         LogError: the log cannot be used.
     """
     is_log = path.is_file() and path.name != RECORD_FILE
-    return logged(path) if is_log else recorded(path)
+    return logged_flight(path) if is_log else recorded_flight(path)
 
 
 def write_report(
@@ -60,7 +60,7 @@ def write_report(
         words = None if flight.figures is None else closing_words(flight.figures, None)
         plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
         tables = [*events_at_end(flight), *flight_tables(flight)]
-        page = _page(flight.name, words, [flight], tables, plots, configuration(flight))
+        page = _page(flight.name, words, [flight], tables, plots, configuration_table(flight))
     write_whole(out, page)
     return out
 
@@ -100,7 +100,7 @@ def _page(
     plots: Sequence[Plot],
     settings: Table | None,
 ) -> str:
-    return rendered(
+    return rendered_page(
         "companion.report",
         "page.html.j2",
         title,
@@ -114,5 +114,5 @@ def _page(
         flights=flights,
         tables=tables,
         settings=settings,
-        telemetry_extremes=extremes(flights[0]),
+        telemetry_extremes=extremes_text(flights[0]),
     )

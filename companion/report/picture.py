@@ -11,15 +11,20 @@ from companion.recording.flight_record import RecordError
 from companion.recording.measurements.response import first_order
 from companion.recording.measurements.second_order import nearest_second_order
 from companion.report import PictureError
-from companion.report.flight_data import FlightData, explain_other_version, recorded
+from companion.report.flight_data import FlightData, explain_other_version, recorded_flight
 from companion.report.picture_history import PANEL_HEIGHTS, draw_history
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Readable by the colour-blind.
-_MEASURED, _IDEAL, _NEAREST, _TARGET = "#0072b2", "#d55e00", "#009e73", "#999999"
-_STYLES = ("-", "--", ":")
+_MEASURED_COLOUR, _IDEAL_COLOUR, _NEAREST_COLOUR, _TARGET_COLOUR = (
+    "#0072b2",
+    "#d55e00",
+    "#009e73",
+    "#999999",
+)
+_LINE_STYLES = ("-", "--", ":")
 _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
 _LARGEST_VALID = 1e9
@@ -47,7 +52,7 @@ def draw_flight(folder: Path, out: Path) -> str | None:
     from matplotlib import pyplot as plt  # noqa: PLC0415
 
     with explain_other_version(folder):
-        flight = recorded(folder)
+        flight = recorded_flight(folder)
         _check_numbers(flight, folder)
         panels, history = _panels(flight), "motion" in flight.curves
     if not panels and not history:
@@ -107,11 +112,11 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
     run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)
     along, time = run.direction, run.time - run.time[0]
     nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
-    axes.plot(time, run.target @ along, color=_TARGET, label="target")
+    axes.plot(time, run.target @ along, color=_TARGET_COLOUR, label="target")
     exact = first_order(run, ideal) @ along
-    axes.plot(time, exact, "--", color=_IDEAL, label=f"ideal, 1/p = {ideal:.2g} s")
-    axes.plot(time, run.measured @ along, color=_MEASURED, label="measured")
-    axes.plot(time, model.path(run) @ along, ":", color=_NEAREST, label=nearest)
+    axes.plot(time, exact, "--", color=_IDEAL_COLOUR, label=f"ideal, 1/p = {ideal:.2g} s")
+    axes.plot(time, run.measured @ along, color=_MEASURED_COLOUR, label="measured")
+    axes.plot(time, model.path(run) @ along, ":", color=_NEAREST_COLOUR, label=nearest)
     axes.set(
         title="Response to the first doublet", xlabel="time, s", ylabel="acceleration / thrust"
     )
@@ -124,10 +129,10 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
 def _draw_plane(axes: "Axes", flight: FlightData) -> None:
     """All doublets, north over east coefficient: a linear response moves on straight lines."""
     for number, run in enumerate(flight.step_runs):
-        style = _STYLES[number % len(_STYLES)]
+        style = _LINE_STYLES[number % len(_LINE_STYLES)]
         north, east = run.measured.T
-        axes.plot(east, north, style, color=_MEASURED, label=run.compass)
-        axes.plot(run.target[:, 1], run.target[:, 0], "o", color=_TARGET, markersize=4)
+        axes.plot(east, north, style, color=_MEASURED_COLOUR, label=run.compass_point)
+        axes.plot(run.target[:, 1], run.target[:, 0], "o", color=_TARGET_COLOUR, markersize=4)
     axes.set(title="Straightness of all steps", xlabel="east: $a_E$", ylabel="north: $a_N$")
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(loc="upper right", fontsize="small")
@@ -141,12 +146,12 @@ def _draw_ground(axes: "Axes", flight: FlightData) -> None:
         # On top, and thin: a good flight would hide it.
         axes.plot(
             *(reference[:, 1], reference[:, 0], "--"),
-            color=_IDEAL,
+            color=_IDEAL_COLOUR,
             linewidth=1.0,
             zorder=3,
             label="reference",
         )
-    axes.plot(position[:, 1], position[:, 0], color=_MEASURED, label="flown")
+    axes.plot(position[:, 1], position[:, 0], color=_MEASURED_COLOUR, label="flown")
     axes.set(title="Ground track", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(loc="center", fontsize="small")

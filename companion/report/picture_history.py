@@ -16,8 +16,8 @@ _MARGIN_AFTER_END = 0.02
 """Space on the time axis after the end of the flight, as a share of its duration."""
 _ROOM_FOR_NAMES = 1.5
 """Factor on the height axis, which leaves space for the names of the phases."""
-_LINE, _PHASE, _END = "#0072b2", "#666666", "#cc0000"
-_SHADES = ("#f0e6c8", "#d5e8f0")
+_LINE_COLOUR, _PHASE_COLOUR, _END_COLOUR = "#0072b2", "#666666", "#cc0000"
+_MANEUVER_COLOURS = ("#f0e6c8", "#d5e8f0")
 """Colours of the maneuvers, used in turn."""
 _LONGEST_REASON = 110
 """Largest number of characters of the reason that are drawn."""
@@ -38,14 +38,14 @@ def draw_history(panels: Sequence["Axes"], flight: FlightData) -> None:
     begin, length = float(time[0]), max(float(time[-1] - time[0]), 1.0)
     for axes, (title, name, column) in zip(panels, _PANELS, strict=True):
         for number, span in enumerate(flight.maneuvers):
-            axes.axvspan(span.begin, span.end, color=_SHADES[number % 2], linewidth=0)
+            axes.axvspan(span.begin, span.end, color=_MANEUVER_COLOURS[number % 2], linewidth=0)
         for phase in flight.phases:
-            axes.axvline(phase.begin, color=_PHASE, linewidth=0.6, linestyle=":")
+            axes.axvline(phase.begin, color=_PHASE_COLOUR, linewidth=0.6, linestyle=":")
         if name in flight.curves:
             curve = flight.curves[name]
-            axes.plot(curve.time, curve.values[:, column], color=_LINE, linewidth=1.2)
+            axes.plot(curve.time, curve.values[:, column], color=_LINE_COLOUR, linewidth=1.2)
         if flight.early_end is not None:
-            axes.axvline(flight.early_end.time, color=_END, linewidth=1.5)
+            axes.axvline(flight.early_end.time, color=_END_COLOUR, linewidth=1.5)
         axes.set_ylabel(title)
         axes.grid(alpha=0.3)
         axes.set_xlim(begin, begin + (1.0 + _MARGIN_AFTER_END) * length)
@@ -77,7 +77,7 @@ def _name_maneuvers(axes: "Axes", flight: FlightData) -> None:
             reason = f"{reason[:_LONGEST_REASON]}…"
         axes.set_title(
             _without_formulas(f"ended at {flight.early_end.time:.1f} s: {reason}"),
-            color=_END,
+            color=_END_COLOUR,
             fontsize="medium",
             pad=18,
         )
@@ -109,7 +109,7 @@ def _name_phases(axes: "Axes", phases: Sequence[Span], length: float) -> None:
             ha="left",
             va="top",
             fontsize="x-small",
-            color=_PHASE,
+            color=_PHASE_COLOUR,
         )
 
 

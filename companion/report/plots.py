@@ -20,7 +20,7 @@ FLIGHT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e
 """One colour for each flight of a comparison."""
 _MAX_POINTS = 2000
 """Lines with more points are thinned to about this number, more than the pixels of a screen."""
-_SHADES = ("rgba(230,159,0,0.13)", "rgba(86,180,233,0.13)")
+_MANEUVER_COLOURS = ("rgba(230,159,0,0.13)", "rgba(86,180,233,0.13)")
 """Colours of the maneuvers, used in turn."""
 _SIGNIFICANT_DIGITS = 5
 
@@ -41,7 +41,7 @@ class Plot:
 
 
 def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str, Any]:
-    """A line through all points; for many points use `over_time`, which thins them."""
+    """A line through all points; for many points use `line_over_time`, which thins them."""
     dash = more.pop("dash", "solid")
     return {
         "type": "scatter",
@@ -54,7 +54,9 @@ def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str,
     }
 
 
-def over_time(name: str, curve: Curve, column: int, colour: str, **more: Any) -> dict[str, Any]:
+def line_over_time(
+    name: str, curve: Curve, column: int, colour: str, **more: Any
+) -> dict[str, Any]:
     """A column of a curve over time, thinned so that extremes are kept."""
     indices = kept_indices(curve.values[:, column])
     return line(name, curve.time[indices], curve.values[indices, column], colour, **more)
@@ -154,7 +156,7 @@ def _maneuver_shade(span: Span, number: int) -> dict[str, Any]:
         "x1": span.end,
         "y0": 0,
         "y1": 1,
-        "fillcolor": _SHADES[number % len(_SHADES)],
+        "fillcolor": _MANEUVER_COLOURS[number % len(_MANEUVER_COLOURS)],
         "line": {"width": 0},
         "layer": "below",
     }

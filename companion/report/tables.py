@@ -46,7 +46,7 @@ def events_at_end(flight: FlightData) -> list[Table]:
     return [Table(title, ("time, s", "from", "what happened"), rows)] if rows else []
 
 
-def extremes(flight: FlightData) -> str:
+def extremes_text(flight: FlightData) -> str:
     """Duration, largest height, speed and tilt of a flight, in words; empty without positions."""
     motion = flight.curves.get("motion")
     if motion is None or flight.end_time is None:
@@ -60,7 +60,7 @@ def extremes(flight: FlightData) -> str:
     return f"{flight.end_time:.0f} s" + (f", up to {', '.join(largest)}" if largest else "")
 
 
-def configuration(flight: FlightData) -> Table:
+def configuration_table(flight: FlightData) -> Table:
     """The configuration keys whose values are not the default."""
     rows = [
         (f"{key.section}.{key.name}", _value_text(key.value), _value_text(key.default), key.unit)

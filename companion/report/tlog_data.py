@@ -25,7 +25,7 @@ _MAV_ERROR, _MAV_WARNING = 3, 4
 """Values of MAV_SEVERITY: ERROR and WARNING."""
 
 
-def logged(path: Path) -> FlightData:
+def logged_flight(path: Path) -> FlightData:
     """The flight in a `.tlog`. Times are relative to the autopilot's first attitude or position.
 
     Raises:

@@ -338,15 +338,15 @@ def test_maneuvers_that_cannot_be_flown_are_a_finding(tmp_path):
 def test_of_a_planner_of_another_package_no_response_is_expected():
     config = Config()
     other = config.planner.model_copy(update={"name": "theirs"})
-    assert doctor_command._response(config.model_copy(update={"planner": other})) == []
-    (finding,) = doctor_command._response(config)
+    assert doctor_command._response_findings(config.model_copy(update={"planner": other})) == []
+    (finding,) = doctor_command._response_findings(config)
     assert finding.result is CheckResult.SAFE
     too_quick = changed(
         config,
         {"planner": {"gain_per_s": 15.0}, "vehicle": {"lag_ms": 80.0, "dead_time_ms": 80.0}},
         "t",
     )
-    assert doctor_command._response(too_quick)[0].result is CheckResult.INEFFECTIVE
+    assert doctor_command._response_findings(too_quick)[0].result is CheckResult.INEFFECTIVE
 
 
 def test_ctrl_c_says_that_what_was_set_is_listed(capsys, tmp_path, monkeypatch):

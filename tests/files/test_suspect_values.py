@@ -24,7 +24,7 @@ MOCK = {"mock": {}}
 def test_a_value_in_another_unit_is_doubted(section, key, value, meant):
     (doubt,) = suspect_values(Config.model_validate({**MOCK, section: {key: value}}))
     assert doubt.key == f"{section}.{key}"
-    assert f"{value:g}" in doubt.found
+    assert f"{value:g}" in doubt.description
     assert doubt.fix == f"write {meant} if that was meant"
 
 

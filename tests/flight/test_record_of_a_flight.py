@@ -132,8 +132,8 @@ def test_a_flight_that_a_monitor_ends_says_when_where_and_why(tmp_path):
     end = summary.facts.early_end
     assert (end.phase, end.maneuver, end.monitor) == ("maneuvers", "steps", "body rate")
     steps = summary.maneuvers()[1]
-    assert end.into_maneuver == pytest.approx(steps.duration, abs=0.1)
-    assert end.into_maneuver > 1.0  # the rest before the first step
+    assert end.time_in_maneuver == pytest.approx(steps.duration, abs=0.1)
+    assert end.time_in_maneuver > 1.0  # the rest before the first step
     assert end.since_takeoff == pytest.approx(end.time - summary.facts.takeoff)
     words = closing_words(summary.as_dict(), None)
     assert "safety.max_body_rate_deg_s" in "\n".join(words.lines)
@@ -174,7 +174,7 @@ def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypat
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("companion.recording.recorder._McapEntries.close", full)
+    monkeypatch.setattr("companion.recording.recorder._McapEntryFile.close", full)
     config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
     summary = fly(config, QuickVehicle(), tmp_path)
     written = json.loads((tmp_path / "summary.json").read_text())

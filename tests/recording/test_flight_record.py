@@ -20,7 +20,7 @@ from companion.recording.mcap_file.loop_channels import ACTION, INPUT, SETPOINT,
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
-from companion.recording.recorder import _McapEntries
+from companion.recording.recorder import _McapEntryFile
 from companion.replay.entries import recorded_inputs
 
 ROWS = 50
@@ -338,7 +338,7 @@ def test_a_full_disk_ends_the_record_but_a_bad_entry_does_not():
             written.append("streamed")
 
     written, dropped = [], []
-    file = _McapEntries(Writer(), 0.0, dropped.append)
+    file = _McapEntryFile(Writer(), 0.0, dropped.append)
     bad = ValueError("no such row")
     file.write([(1.0, encode(1), ()), (2.0, encode(bad), ()), (3.0, encode(3), ())])
     assert written == [1, 3, "streamed"]

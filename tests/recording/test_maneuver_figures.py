@@ -45,7 +45,7 @@ def test_each_maneuver_is_measured_by_itself():
     assert [one.name for one in (hover, steps, line)] == ["hover", "steps", "line"]
     assert [one.begin for one in (hover, steps, line)] == [10.0, 20.0, 28.0]
     assert hover.duration == pytest.approx(10.0, abs=0.03)
-    assert (line.level_rms, line.level_max) == pytest.approx((0.2, 0.2))
+    assert (line.horizontal_rms, line.horizontal_max) == pytest.approx((0.2, 0.2))
     assert (line.height_rms, line.speed) == pytest.approx((0.2, 2.0))
     assert line.height_mean == pytest.approx(-0.2)  # at -4.8 it is below -5.0
 
@@ -62,7 +62,7 @@ def test_the_swing_is_measured_but_in_open_loop():
 def test_the_beginning_is_left_out_and_told_apart():
     hover, *_ = measure_maneuvers(ALL, RATES, MARKS, 0.0)
     assert hover.settling_time == SETTLING_TIME
-    assert (hover.level_rms, hover.level_max) == pytest.approx((0.03, 0.03))
+    assert (hover.horizontal_rms, hover.horizontal_max) == pytest.approx((0.03, 0.03))
     assert hover.settling_max == pytest.approx((1.0 + 0.1**2) ** 0.5)
 
 
@@ -74,7 +74,7 @@ def test_of_a_short_maneuver_a_quarter_is_left_out():
 def test_open_loop_has_no_level_error_but_a_drift_and_a_height():
     _, steps, _ = measure_maneuvers(ALL, RATES, MARKS, 0.0)
     assert steps.open_loop
-    assert np.isnan([steps.level_rms, steps.level_max, steps.speed]).all()
+    assert np.isnan([steps.horizontal_rms, steps.horizontal_max, steps.speed]).all()
     assert steps.drift == pytest.approx(0.5 * 7.98)
     assert steps.height_rms == 0.0
     told = steps.as_dict()
@@ -97,5 +97,5 @@ def test_a_thrust_that_another_program_commands_has_no_height_error():
 def test_without_a_height_reference_the_beginning_has_no_distance_either():
     thrust = np.array(rows(0.0, 4.0, lambda _: (1.0, 0.0, nan), lambda _: (0.0, 0.0, -5.0)))
     (one,) = measure_maneuvers(thrust, RATES, [ManeuverMark(0.0, 0.0, "mine")], 0.0)
-    assert one.level_max == 1.0
+    assert one.horizontal_max == 1.0
     assert one.as_dict()["beginning_max_m"] is None

@@ -76,7 +76,7 @@ def test_a_doublet_is_named_by_the_nearest_point_of_the_compass(degrees, words):
     angle = math.radians(degrees)
     way, wind = (math.cos(angle), math.sin(angle)), (0.1, -0.3)
     (run,) = step_runs(trace_of(0.3, directions=[way], wind=wind).response_rows())
-    assert run.compass == words
+    assert run.compass_point == words
     assert run.direction == pytest.approx(way)
 
 

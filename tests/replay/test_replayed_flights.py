@@ -112,7 +112,11 @@ def replays_to_the_bit(folder, summary):
     assert summary.result == "ok", summary.events
     samples = replayed(folder)
     assert [each for each in samples if not each.same] == []
-    assert sum(each.recorded is not None for each in samples) == summary.counts.setpoints > 1000
+    assert (
+        sum(each.recorded_setpoint is not None for each in samples)
+        == summary.counts.setpoints
+        > 1000
+    )
 
 
 MODES = {"px4": "OFFBOARD", "ardupilot": "GUIDED"}

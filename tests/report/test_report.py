@@ -18,7 +18,7 @@ from companion.recording.flight_record import read_flight
 from companion.report import PAGE, flight_data, html_page, page
 from companion.report.control_plots import control_plots
 from companion.report.early_end import early_end
-from companion.report.flight_data import recorded
+from companion.report.flight_data import recorded_flight
 from companion.report.motion_plots import motion_plots
 from companion.report.plots import kept_indices
 from tests.flight.fly import fly, mock_vehicle
@@ -83,7 +83,7 @@ def test_the_page_says_first_whether_the_flight_was_good_and_shows_all_of_it(fol
     assert not re.search(r'(src|href)="', text), "the page needs no network"
     plots = plots_of(path)
     assert {"Track", "Step response", "Tracking error", "Body rate, yaw", "Thrust"} <= set(plots)
-    phases = {phase.name: phase for phase in recorded(folder).phases}
+    phases = {phase.name: phase for phase in recorded_flight(folder).phases}
     sent = plots["Thrust"]["traces"][0]["x"]
     assert sent[0] > phases["checks"].begin + 1.0, "nothing is sent before the stream begins"
     assert sent[-1] < phases["land"].begin + 1.0, "nothing is sent after the hand-back"
@@ -155,7 +155,7 @@ def test_a_failed_flight_shows_where_it_ended_and_the_limit_it_crossed(failed):
 
 
 def test_the_track_in_space_fits_its_picture_also_where_the_vehicle_only_climbs(folder):
-    flight = recorded(folder)
+    flight = recorded_flight(folder)
     climb = np.column_stack([np.zeros(50), np.full(50, 0.01), np.linspace(0.0, 60.0, 50)])
     curves = {"position": flight_data.Curve(np.arange(50.0), climb)}
     plot = next(
@@ -172,7 +172,7 @@ def test_the_track_in_space_fits_its_picture_also_where_the_vehicle_only_climbs(
 
 
 def test_the_last_maneuver_of_a_failed_flight_ends_with_its_phase(failed):
-    flight = recorded(failed)
+    flight = recorded_flight(failed)
     (phase,) = (each for each in flight.phases if each.name == "maneuvers")
     assert flight.maneuvers[-1].end == phase.end < flight.phases[-1].end
 
@@ -203,7 +203,7 @@ def test_each_limit_is_drawn_where_it_is_crossed(folder, monitor, reason, curve,
     found = early_end({"early_end": end, "result": reason}, record, config)
     assert (found.limit.curve, found.limit.key) == (curve, key)
     assert bool(found.limit.outline) == (curve == "track")
-    flight = dataclasses.replace(recorded(folder), early_end=found)
+    flight = dataclasses.replace(recorded_flight(folder), early_end=found)
     drawn = [t["name"] for p in (*motion_plots([flight]), *control_plots(flight)) for t in p.traces]
     assert f"limit: {key}" in drawn
     assert (
@@ -306,7 +306,7 @@ def test_thinning_keeps_the_extremes_and_the_gaps(seed, count, missing):
 
 @pytest.mark.parametrize("gain", [5.0, float("nan")])
 def test_the_ideal_response_is_drawn_where_the_gain_is_known(folder, gain):
-    flight = dataclasses.replace(recorded(folder), gain=gain)
+    flight = dataclasses.replace(recorded_flight(folder), gain=gain)
     drawn = [trace["name"] for plot in control_plots(flight) for trace in plot.traces]
     assert any(name.startswith("nearest model: ") for name in drawn)
     assert ("ideal: first order, 0.2 s" in drawn) == (gain == 5.0)

@@ -11,9 +11,9 @@ from companion.mavlink.errors import LogError
 from companion.report.early_end import early_end
 from companion.report.flight_data import FlightData, Span
 from companion.report.plots import time_axis
-from companion.report.tables import events_at_end, extremes
+from companion.report.tables import events_at_end, extremes_text
 from companion.report.timeline import timeline
-from companion.report.tlog_data import logged
+from companion.report.tlog_data import logged_flight
 
 PX4, POSCTL, OFFBOARD = 12, 3 << 16, 6 << 16
 
@@ -66,7 +66,7 @@ def test_a_log_without_setpoints_shows_motion_modes_and_the_autopilots_words(tmp
         (heartbeat(POSCTL), (7, 1)),
         position(4000, height=5.0, velocity=(0.0, 0.0, 0.0)),
     )
-    flight = logged(path)
+    flight = logged_flight(path)
     assert set(flight.curves) == {"position", "motion"}
     assert flight.curves["motion"].time.tolist() == [1.0, 3.0]
     tilt = np.degrees(np.arccos(np.cos(0.3) * np.cos(0.4)))
@@ -81,7 +81,7 @@ def test_a_log_without_setpoints_shows_motion_modes_and_the_autopilots_words(tmp
     ]
     levels = [event.level for event in flight.events]
     assert levels[0] > levels[1] > levels[2]
-    assert extremes(flight) == "3 s, up to 5.0 m high, 5.0 m/s fast, 28° tilted"
+    assert extremes_text(flight) == "3 s, up to 5.0 m high, 5.0 m/s fast, 28° tilted"
 
 
 def test_a_quaternion_that_is_none_is_left_out(tmp_path):
@@ -94,7 +94,7 @@ def test_a_quaternion_that_is_none_is_left_out(tmp_path):
         quaternion(1000, np.nan, 0.0, 0.0, 0.0),
         quaternion(2000, half, half, 0.0, 0.0),
     )
-    flight = logged(path)
+    flight = logged_flight(path)
     coefficients = flight.curves["coefficients"]
     assert coefficients.time.tolist() == [0.0, 2.0]
     assert coefficients.values == pytest.approx(np.array([[0.0, 0.0], [0.0, 1.0]]), abs=1e-6)
@@ -103,14 +103,16 @@ def test_a_quaternion_that_is_none_is_left_out(tmp_path):
 def test_a_vehicle_on_its_back_is_tilted_by_more_than_90_degrees(tmp_path):
     half = np.radians(150.0) / 2.0
     rolled = quaternion(1000, np.cos(half), np.sin(half), 0.0, 0.0)
-    flight = logged(written(tmp_path / "a.tlog", heartbeat(), rolled, position(1000)))
+    flight = logged_flight(written(tmp_path / "a.tlog", heartbeat(), rolled, position(1000)))
     assert flight.curves["motion"].values[0, 2] == pytest.approx(150.0, abs=1e-3)
 
 
 def test_without_an_attitude_the_tilt_is_unknown(tmp_path):
-    flight = logged(written(tmp_path / "a.tlog", heartbeat(), position(1000), position(2000)))
+    flight = logged_flight(
+        written(tmp_path / "a.tlog", heartbeat(), position(1000), position(2000))
+    )
     assert np.isnan(flight.curves["motion"].values[:, 2]).all()
-    assert extremes(flight) == "1 s, up to 2.0 m high, 5.0 m/s fast"
+    assert extremes_text(flight) == "1 s, up to 2.0 m high, 5.0 m/s fast"
 
 
 @pytest.mark.parametrize(
@@ -124,13 +126,13 @@ def test_without_an_attitude_the_tilt_is_unknown(tmp_path):
 )
 def test_a_log_without_telemetry_of_an_autopilot_is_refused(tmp_path, messages):
     with pytest.raises(LogError, match=r"a\.tlog: has no telemetry of PX4 or ArduPilot"):
-        logged(written(tmp_path / "a.tlog", *messages))
+        logged_flight(written(tmp_path / "a.tlog", *messages))
 
 
 def test_a_flight_without_phases_has_no_timeline_and_no_extremes():
     empty = FlightData("a flight", {})
     assert list(timeline(empty)) == []
-    assert extremes(empty) == ""
+    assert extremes_text(empty) == ""
     assert events_at_end(empty) == []
 
 

@@ -70,7 +70,7 @@ def test_a_replay_makes_the_changes_of_the_flight_and_gives_its_commands_to_the_
     assert config.guidance.position_weight_per_s4 == 120.0
     samples = Replay(read_flight(folder), config).run()
     assert [each for each in samples if not each.same] == []
-    assert sum(each.recorded is not None for each in samples) == summary["setpoints"]
+    assert sum(each.recorded_setpoint is not None for each in samples) == summary["setpoints"]
 
 
 def test_other_programs_read_the_log_of_a_served_flight(flights):

@@ -24,7 +24,7 @@ from companion.extras import require
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
 from companion.report import PAGE
-from companion.report.html_page import rendered, require_extra
+from companion.report.html_page import rendered_page, require_extra
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -100,7 +100,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         first_tables.append(tables.success_by_factor(results, order))
     if by_outcome:
         first_tables.append(tables.sensitivity(by_outcome))
-    return rendered(
+    return rendered_page(
         "companion.campaign.report",
         "campaign.html.j2",
         f"Campaign {results.name}",

@@ -42,7 +42,7 @@ class Panel:
                     self._shown[name] = value_text(key.value)
                     self._inputs[name] = ui.input(
                         f"{key.section}.{key.name}", value=self._shown[name]
-                    ).props(f'dense suffix="{key.unit}" hint="{_range_text(key.allowed)}"')
+                    ).props(f'dense suffix="{key.unit}" hint="{_range_text(key.allowed_values)}"')
             with ui.row():
                 ui.button("Apply", on_click=self._apply).props("id=live-apply")
                 self._undo = ui.button("Undo", on_click=self._undo_last).props("id=live-undo")

@@ -9,7 +9,7 @@ from companion.recording.mcap_file.fields import CDR_HEADER, PACKAGE, MessageTyp
 
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<iI")
-_COUNT = struct.Struct("<I")
+_UINT32 = struct.Struct("<I")
 _NANOSECONDS = 1_000_000_000
 
 _TIME = """MSG: builtin_interfaces/Time
@@ -105,38 +105,38 @@ class CdrMessage:
         """Pad to a multiple of `size` bytes."""
         self._bytes += bytes(-(len(self._bytes) - len(CDR_HEADER)) % size)
 
-    def uint8(self, value: int) -> None:
+    def add_uint8(self, value: int) -> None:
         """Add a uint8."""
         self._bytes.append(value)
 
-    def count(self, number: int) -> None:
+    def add_uint32(self, number: int) -> None:
         """Add a uint32, such as the length of a list."""
         self.align(4)
-        self._bytes += _COUNT.pack(number)
+        self._bytes += _UINT32.pack(number)
 
-    def time(self, time_ns: int) -> None:
+    def add_time(self, time_ns: int) -> None:
         """Add a time in ns since 1970, as `builtin_interfaces/Time`."""
         self.align(4)
         self._bytes += _stamp(time_ns)
 
-    def doubles(self, *values: float) -> None:
+    def add_doubles(self, *values: float) -> None:
         """Add float64 values."""
         self.align(8)
         self._bytes += struct.pack(f"<{len(values)}d", *values)
 
-    def text(self, text: str) -> None:
+    def add_text(self, text: str) -> None:
         """Add a string, with its length in front and a zero at its end."""
         encoded = text.encode("utf-8", "replace") + b"\0"
-        self.count(len(encoded))
+        self.add_uint32(len(encoded))
         self._bytes += encoded
 
 
 def fields_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
     """Encode float64 fields followed by strings, the form of PHASE, MANEUVER, ALARM and CHANGE."""
     message = CdrMessage()
-    message.doubles(*numbers)
+    message.add_doubles(*numbers)
     for text in texts:
-        message.text(text)
+        message.add_text(text)
     return message.bytes()
 
 
@@ -148,9 +148,9 @@ def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ..
     """
     try:
         values = struct.unpack_from(f"<{numbers}d", message, 4)
-        at, strings = 4 + 8 * numbers, []
+        offset, strings = 4 + 8 * numbers, []
         for _ in range(texts):
-            text, at = _string(message, at)
+            text, offset = _string(message, offset)
             strings.append(text)
     except struct.error as error:
         raise ValueError(f"a message is too short: {error}") from error
@@ -160,11 +160,11 @@ def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ..
 def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
     """Encode a message of type LOG at a time in ns since 1970."""
     message = CdrMessage()
-    message.time(time_ns)
-    message.uint8(level)
+    message.add_time(time_ns)
+    message.add_uint8(level)
     for each in (text, name, ""):  # the last one: no source file
-        message.text(each)
-    message.count(0)  # no line of it
+        message.add_text(each)
+    message.add_uint32(0)  # no line of it
     return message.bytes()
 
 
@@ -175,8 +175,8 @@ def log_of(message: bytes) -> tuple[int, str, str]:
         ValueError: the message does not have this form.
     """
     try:
-        text, at = _string(message, 13)
-        name, _ = _string(message, at)
+        text, offset = _string(message, 13)
+        name, _ = _string(message, offset)
         return message[12], text, name
     except (struct.error, IndexError) as error:
         raise ValueError(f"a log message is too short: {error}") from error
@@ -190,9 +190,9 @@ class PoseEncoder:
 
     def __init__(self, *frames: str) -> None:
         message = CdrMessage()
-        message.time(0)
+        message.add_time(0)
         for frame in frames:
-            message.text(frame)
+            message.add_text(frame)
         message.align(8)
         self._names = message.bytes()[len(CDR_HEADER) + _STAMP.size :]
 
@@ -205,10 +205,10 @@ def _stamp(time_ns: int) -> bytes:
     return _STAMP.pack(*divmod(time_ns, _NANOSECONDS))
 
 
-def _string(message: bytes, at: int) -> tuple[str, int]:
-    at += -at % 4
-    (length,) = _COUNT.unpack_from(message, at)
-    begin, end = at + 4, at + 4 + length
+def _string(message: bytes, offset: int) -> tuple[str, int]:
+    offset += -offset % 4
+    (length,) = _UINT32.unpack_from(message, offset)
+    begin, end = offset + 4, offset + 4 + length
     if not 1 <= length <= len(message) - begin:
         raise ValueError(f"a string of {length} bytes in a message of {len(message)}")
     return message[begin : end - 1].decode("utf-8", "replace"), end

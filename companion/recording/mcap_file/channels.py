@@ -1,4 +1,6 @@
-"""All channels of `flight.mcap`. The status channels, once or ten times a second, are defined here.
+"""All channels of `flight.mcap`.
+
+The status channels, with a message once or ten times a second, are defined here.
 
 The columns follow the conventions of `companion.recording.mcap_file.loop_channels`, but `time_s` of
 MOTION counts from the beginning of the flight.

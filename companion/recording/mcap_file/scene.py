@@ -68,50 +68,50 @@ class Entity(NamedTuple):
 def scene_message(time_ns: int, entities: Sequence[Entity]) -> bytes:
     """Encode a message of type SCENE_UPDATE at a time in ns since 1970."""
     message = CdrMessage()
-    message.count(0)  # deletions
-    _each(message, entities, lambda entity: _entity(message, time_ns, entity))
+    message.add_uint32(0)  # deletions
+    _add_list(message, entities, lambda entity: _add_entity(message, time_ns, entity))
     return message.bytes()
 
 
-def _each(message: CdrMessage, items: Sequence[T], add: Callable[[T], None]) -> None:
+def _add_list(message: CdrMessage, items: Sequence[T], add: Callable[[T], None]) -> None:
     """Add a list: its length, and each item."""
-    message.count(len(items))
+    message.add_uint32(len(items))
     for item in items:
         add(item)
 
 
-def _entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
-    def arrow(one: Arrow) -> None:
-        message.doubles(*one.pose, *one[1:5], *one.color)
+def _add_entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
+    def add_arrow(shape: Arrow) -> None:
+        message.add_doubles(*shape.pose, *shape[1:5], *shape.color)
 
-    def box(one: Cube | Cylinder) -> None:
-        scales = () if isinstance(one, Cube) else (1.0, 1.0)
-        message.doubles(*one.pose, *one.size, *scales, *one.color)
+    def add_box(shape: Cube | Cylinder) -> None:
+        scales = () if isinstance(shape, Cube) else (1.0, 1.0)
+        message.add_doubles(*shape.pose, *shape.size, *scales, *shape.color)
 
-    def line(one: Line) -> None:
-        message.uint8(_LINE_LIST if one.separate_pairs else _LINE_STRIP)
-        message.doubles(*AT_ORIGIN, _THICKNESS)
-        message.uint8(_IN_PIXELS)
-        message.count(len(one.points))
-        if one.points:
-            message.doubles(*(value for point in one.points for value in point))
-        message.doubles(*one.color)
+    def add_line(shape: Line) -> None:
+        message.add_uint8(_LINE_LIST if shape.separate_pairs else _LINE_STRIP)
+        message.add_doubles(*AT_ORIGIN, _THICKNESS)
+        message.add_uint8(_IN_PIXELS)
+        message.add_uint32(len(shape.points))
+        if shape.points:
+            message.add_doubles(*(value for point in shape.points for value in point))
+        message.add_doubles(*shape.color)
         for _ in ("colors", "indices"):
-            message.count(0)
+            message.add_uint32(0)
 
-    message.time(time_ns)
-    message.text(entity.frame)
-    message.text(entity.name)
-    message.time(0)  # lifetime: until it is replaced
-    message.uint8(entity.follows)
-    message.count(0)  # metadata
-    _each(message, entity.arrows, arrow)
-    _each(message, entity.cubes, box)
-    message.count(0)  # spheres
-    _each(message, entity.cylinders, box)
-    _each(message, entity.lines, line)
+    message.add_time(time_ns)
+    message.add_text(entity.frame)
+    message.add_text(entity.name)
+    message.add_time(0)  # lifetime: until it is replaced
+    message.add_uint8(entity.follows)
+    message.add_uint32(0)  # metadata
+    _add_list(message, entity.arrows, add_arrow)
+    _add_list(message, entity.cubes, add_box)
+    message.add_uint32(0)  # spheres
+    _add_list(message, entity.cylinders, add_box)
+    _add_list(message, entity.lines, add_line)
     for _ in ("triangles", "texts", "models"):
-        message.count(0)
+        message.add_uint32(0)
 
 
 _LINE_STRIP, _LINE_LIST, _IN_PIXELS, _THICKNESS = 0, 2, 1, 2.0

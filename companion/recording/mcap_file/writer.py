@@ -40,7 +40,11 @@ class McapWriter:
         self._batch = None if stream is None else Batch(stream)
 
     def message(self, topic: str, time_ns: int, data: bytes) -> None:
-        """Add a message; `time_ns` counts from 1970, or in vehicle time from the vehicle's boot."""
+        """Add a message.
+
+        `time_ns` counts from 1970. If the flight runs in vehicle time, it counts from the vehicle's
+        boot.
+        """
         if self._batch is not None:
             self._batch.add(topic, time_ns, data)
         self._writer.add_message(self._ids[topic], time_ns, data, time_ns)
@@ -64,7 +68,9 @@ class McapWriter:
         os.fsync(self._file.fileno())
 
     def close(self, *, complete: bool = True) -> None:
-        """Close the file; if `complete`, write its index first. No index marks a file as cut off.
+        """Close the file; if `complete`, write its index first.
+
+        A reader takes a file without an index for one that was cut off.
 
         Raises:
             OSError: the disk is full, or failed.

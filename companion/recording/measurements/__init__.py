@@ -1,9 +1,9 @@
-"""Measurements of a flight: tracking, steps, dead time, and the verdict.
+"""Measurements of a flight: tracking, steps, dead time, and whether they are within their limits.
 
 summary           all figures of a flight: `Summary`, `--json`
-recorded_summary  the same from a record, also of a flight that was killed
+recorded_summary  the figures of a recorded flight, also of one that was killed
 maneuver_figures, swing  errors of each maneuver; whether the vehicle swings
-response, second_order   the response to steps, beside linear models
+response, second_order   the response to steps, compared with linear models
 dead_time, flight_facts  measured dead time; phases, end and circumstances
-verdict           each figure beside its limit
+verdict           compares each figure with its limit
 """

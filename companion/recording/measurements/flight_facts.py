@@ -18,7 +18,7 @@ class EarlyEnd:
     maneuver: str | None = None
     """The maneuver that ran, or the last one before the vehicle held; None: another phase ran, or
     no maneuver had begun."""
-    into_maneuver: float | None = None
+    time_in_maneuver: float | None = None
     """Time from the beginning of `maneuver` to the end of the flight, or to the hold, s; None: no
     maneuver."""
     monitor: str | None = None
@@ -31,7 +31,7 @@ class EarlyEnd:
             "since_takeoff_s": _rounded(self.since_takeoff),
             "phase": self.phase,
             "maneuver": self.maneuver,
-            "into_maneuver_s": _rounded(self.into_maneuver),
+            "into_maneuver_s": _rounded(self.time_in_maneuver),
             "monitor": self.monitor,
         }
 

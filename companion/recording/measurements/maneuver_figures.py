@@ -17,7 +17,7 @@ SETTLING_TIME = 2.0
 """Time left out at the beginning of a maneuver, s: the previous one still has an effect then."""
 _LARGEST_SHARE = 0.25
 """Largest share of a maneuver's duration that is left out at its beginning."""
-_AT_REST = 0.05
+_MAX_SPEED_AT_REST = 0.05
 """A reference that is never faster than this is at rest, m/s."""
 
 
@@ -25,8 +25,8 @@ _AT_REST = 0.05
 class ManeuverFigures:
     """Tracking figures of one maneuver; NaN: not measured.
 
-    `level` means horizontal (north and east). In open loop there is no reference position:
-    `level_rms` and `level_max` are NaN, and `drift` says how far the vehicle moved away.
+    Horizontal errors are in the north-east plane. In open loop there is no reference position:
+    `horizontal_rms` and `horizontal_max` are NaN, and `drift` says how far the vehicle moved away.
     """
 
     name: str
@@ -38,9 +38,9 @@ class ManeuverFigures:
     """Whether a part of the maneuver is open loop."""
     settling_time: float
     """Time at the beginning of the maneuver that RMS and largest errors leave out, s."""
-    level_rms: float
+    horizontal_rms: float
     """RMS of the horizontal error, m."""
-    level_max: float
+    horizontal_max: float
     """Largest horizontal error, m."""
     height_rms: float
     """RMS of the height error, m."""
@@ -63,8 +63,8 @@ class ManeuverFigures:
             "begin_s": self.begin,
             "duration_s": self.duration,
             "beginning_left_out_s": self.settling_time,
-            "level_rms_m": self.level_rms,
-            "level_max_m": self.level_max,
+            "level_rms_m": self.horizontal_rms,
+            "level_max_m": self.horizontal_max,
             "height_rms_m": self.height_rms,
             "height_max_m": self.height_max,
             "height_mean_m": self.height_mean,
@@ -146,7 +146,7 @@ def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) ->
     if figures.duration - figures.settling_time >= SHORTEST_PART:
         begin += figures.settling_time
     part = rates[(rates[:, 0] >= begin) & (rates[:, 0] <= end)]
-    return measure_swing(part[:, 0], part[:, 1:], at_rest=figures.speed <= _AT_REST)
+    return measure_swing(part[:, 0], part[:, 1:], at_rest=figures.speed <= _MAX_SPEED_AT_REST)
 
 
 def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
@@ -165,8 +165,8 @@ def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         duration,
         open_loop,
         settling_time,
-        level_rms=nan if open_loop else rms(level[~is_settling]),
-        level_max=nan if open_loop else largest(level[~is_settling]),
+        horizontal_rms=nan if open_loop else rms(level[~is_settling]),
+        horizontal_max=nan if open_loop else largest(level[~is_settling]),
         height_rms=rms(settled_height),
         height_max=largest(np.abs(settled_height)),
         height_mean=float(settled_height.mean()) if len(settled_height) else nan,

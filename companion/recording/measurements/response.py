@@ -35,13 +35,13 @@ class StepResponse:
     """Time constant of the first-order model that fits the east coefficient best, s; NaN: no step
     goes east or west."""
     step_size: float
-    """Largest commanded change of the coefficients, relative to those at the beginning of the run;
-    in wind the vehicle is not level there."""
+    """Largest commanded change of the coefficients, relative to their values before the steps; in
+    wind these values are not 0."""
     target_tilt: float
     """Largest tilt of a target, rad, before the tilt limit of the planner."""
     cross_axis_max: float
-    """Straightness: largest distance of the coefficients from the straight line of a step, which
-    leads to its target."""
+    """Straightness: largest distance of the coefficients from the straight line to the target of
+    their step."""
     model_deviation_max: float
     """Largest distance of the coefficients c from the ideal model ċ = p·(c_d − c)."""
     second_order: SecondOrderModel
@@ -62,7 +62,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
     return StepResponse(
         time_constant_north_s=_time_constant(runs, 0, 1.0 / gain),
         time_constant_east_s=_time_constant(runs, 1, 1.0 / gain),
-        step_size=max(run.size for run in runs),
+        step_size=max(run.largest_change for run in runs),
         target_tilt=asin(min(1.0, max(largest_norm(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(
@@ -132,7 +132,7 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     axis_runs = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs
-        if np.abs(run.changes[:, axis]).max() > _MIN_SHARE * run.size
+        if np.abs(run.changes[:, axis]).max() > _MIN_SHARE * run.largest_change
     ]
     if not axis_runs:
         return nan
@@ -140,8 +140,8 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     steps = [run.steps() for run in axis_runs]
     measured = np.concatenate([run.measured for run in axis_runs])
 
-    def residuals(unknown: Floats) -> tuple[Floats, Floats]:
-        tau = float(np.exp(unknown[0]))
+    def residuals(log_time_constant: Floats) -> tuple[Floats, Floats]:
+        tau = float(np.exp(log_time_constant[0]))
         paths = np.concatenate([_first_order(each, tau) for each in steps])
         return np.empty(0), (measured - paths).ravel()
 

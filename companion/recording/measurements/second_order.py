@@ -41,7 +41,7 @@ class StepRun(NamedTuple):
         return since
 
     @property
-    def size(self) -> float:
+    def largest_change(self) -> float:
         """Length of the largest of the `changes`."""
         return largest_norm(self.changes)
 
@@ -52,7 +52,7 @@ class StepRun(NamedTuple):
         return first / max(float(np.hypot(*first)), 1e-9)
 
     @property
-    def compass(self) -> str:
+    def compass_point(self) -> str:
         """The nearest of the eight points of the compass to `direction`, such as "north-west"."""
         north, east = self.direction
         return _COMPASS[round(4.0 * float(np.arctan2(east, north)) / np.pi) % 8]
@@ -87,9 +87,9 @@ _LAG_RANGE, _DAMPING_RANGE, _DEAD_TIME_RANGE = (0.02, 4.0), (0.2, 10.0), (0.0, 0
 """Ranges in which 2ζ/ω (s), ζ and the dead time (s) are searched. ζ = 10 is almost first order."""
 _TRIED_LAGS, _TRIED_DAMPINGS = np.geomspace(0.05, 1.0, 5), (0.7, 1.5)
 _TRIED_DEAD_TIMES = (0.0, 0.04, 0.1, 0.2)
-_BEFORE_EFFECT = 0.03
-"""Time after the first change of the target in which it is assumed to have no effect, s. The rows
-in this time give the coefficients and the speed from which the model starts."""
+_TIME_WITHOUT_EFFECT = 0.03
+"""Time after the first change of the target in which the change is assumed to have no effect, s.
+The rows in this time give the coefficients and their rate of change at the start of the model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +106,8 @@ class SecondOrderModel:
     def path(self, run: StepRun) -> Floats:
         """(n, 2) coefficients of the model at the rows of `run`.
 
-        The path starts with the measured coefficients and speed, and keeps this speed until the
-        first target has an effect.
+        The path starts with the measured coefficients and their measured rate of change. It keeps
+        this rate until the first target has an effect.
         """
         return self.path_at_rows(RunData.of(run))
 
@@ -146,7 +146,7 @@ class RunData(NamedTuple):
     time: Floats
     """(m,), times of the rows since the first row of the run, s."""
     start: Floats
-    """(2, 2), coefficients and their speed (1/s), measured before the first step acts."""
+    """(2, 2), coefficients and their rate of change (1/s), measured before the first step acts."""
     change_times: Floats
     """(s,), time of each change of the target since the first row of the run, s; the first is 0."""
     targets: Floats
@@ -156,7 +156,7 @@ class RunData(NamedTuple):
     def of(cls, run: StepRun, thinning: int = 1) -> "RunData":
         """The data of a run at every `thinning`-th row."""
         since, steps = run.time - run.time[0], run.steps()
-        early = since <= _BEFORE_EFFECT
+        early = since <= _TIME_WITHOUT_EFFECT
         columns = np.column_stack((np.ones(int(early.sum())), since[early]))
         start, _ = project(columns, run.measured[early])
         changes = np.array([step.time[0] for step in steps]) - run.time[0]
@@ -169,8 +169,8 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
     thinned = [RunData.of(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])
 
-    def residuals(unknown: Floats) -> tuple[Floats, Floats]:
-        fit = _second_order_model(unknown)
+    def residuals(parameters: Floats) -> tuple[Floats, Floats]:
+        fit = _second_order_model(parameters)
         paths = np.concatenate([fit.path_at_rows(data) for data in thinned])
         return np.empty(0), (measured - paths).ravel()
 
@@ -185,7 +185,7 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
     return _second_order_model(minimise(residuals, start, lowest, highest).unknown)
 
 
-def _second_order_model(unknown: Floats) -> SecondOrderModel:
+def _second_order_model(parameters: Floats) -> SecondOrderModel:
     """The model from (log 2ζ/ω, log ζ, dead time), which are less correlated than ω and ζ."""
-    damping = exp(unknown[1])
-    return SecondOrderModel(2.0 * damping / exp(unknown[0]), damping, float(unknown[2]))
+    damping = exp(parameters[1])
+    return SecondOrderModel(2.0 * damping / exp(parameters[0]), damping, float(parameters[2]))

@@ -60,19 +60,19 @@ class LoopCounts:
 class PredictiveFigures:
     """Counts and times of predictive control."""
 
-    flown_answers: int
+    used_answers: int
     """Number of answers of the solver that guidance used."""
-    replaced_answers: dict[str, int]
+    unused_answers: dict[str, int]
     """Number of answers of the solver that guidance did not use, by reason."""
     computing_seconds: tuple[float, ...]
     """Computing time in the solver's process of each answer that was used, s."""
 
     def as_dict(self) -> dict[str, Any]:
         """The figures as JSON, in milliseconds."""
-        seconds, flown = self.computing_seconds, self.flown_answers
+        seconds, flown = self.computing_seconds, self.used_answers
         p50, p99 = np.percentile(seconds, (50, 99)) if seconds else (math.nan, math.nan)
         times = {"p50": 1e3 * float(p50), "p99": 1e3 * float(p99)}
-        return {"flown": flown, "troubles": self.replaced_answers, "solve_ms": without_nan(times)}
+        return {"flown": flown, "troubles": self.unused_answers, "solve_ms": without_nan(times)}
 
 
 @dataclass(frozen=True)
@@ -170,8 +170,8 @@ class Summary:
             "events": [{"time_s": round(time, 3), "text": text} for time, text in self.events],
             "log": None if self.log is None else str(self.log),
         }
-        judged = [check._asdict() for check in checks(figures)]
-        return {**figures, "verdict": {"good": is_good(figures), "checks": judged}}
+        check_dicts = [check._asdict() for check in checks(figures)]
+        return {**figures, "verdict": {"good": is_good(figures), "checks": check_dicts}}
 
     def as_json(self) -> str:
         """`as_dict` on one line."""

@@ -1,9 +1,9 @@
 """Detects whether a vehicle swings: an oscillation of roll and pitch with a short period.
 
 Body rates are integrated to angles. A moving mean removes slow motion, because wind and slow
-corrections are not a swing. The autocorrelation of the rest shows what repeats. On the mock
-vehicles, in hovers of 3 to 8 s, gusts of 1 to 2 m/s reach 0.71 at most and mostly less than 0.4;
-weights of the position hold that are 2.5 times too large reach 0.8 to 1.
+corrections are not a swing. The autocorrelation of the rest shows what repeats. In hovers of 3 to
+8 s of the mock vehicles, gusts of 1 to 2 m/s gave an autocorrelation of at most 0.71, mostly less
+than 0.4. Weights of the position hold that were 2.5 times too large gave 0.8 to 1.
 """
 
 from math import nan
@@ -71,9 +71,11 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
     # Too few samples, or their clock jumped.
     if step > _LONGEST_SAMPLE_PERIOD or count > 2 * len(time):
         return NOT_MEASURED
-    even = np.arange(time[0], time[-1], step)
-    turned = np.column_stack([np.interp(even, time, column) for column in rates.T]) * step
-    angles = np.cumsum(turned, axis=0)
+    even_times = np.arange(time[0], time[-1], step)
+    angle_steps = (
+        np.column_stack([np.interp(even_times, time, column) for column in rates.T]) * step
+    )
+    angles = np.cumsum(angle_steps, axis=0)
     for _ in range(rule.passes):
         angles = _without_slow_motion(angles, round(0.5 * rule.window / step))
     rms = float(np.sqrt(np.mean(np.sum(angles**2, axis=1))))
@@ -96,8 +98,8 @@ def _without_slow_motion(angles: Floats, half: int) -> Floats:
     """Angles (N, 2) less their moving mean over `2 half + 1` steps: (N − 2 half, 2)."""
     width = 2 * half + 1
     sums = np.cumsum(np.vstack([np.zeros((1, 2)), angles]), axis=0)
-    quick: Floats = angles[half : len(angles) - half] - (sums[width:] - sums[:-width]) / width
-    return quick
+    fast_motion: Floats = angles[half : len(angles) - half] - (sums[width:] - sums[:-width]) / width
+    return fast_motion
 
 
 def _autocorrelation(angles: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Whether a flight was good: compares the figures of `--json` with their limits."""
+"""Compares the figures of `--json` with their limits, and tells whether a flight was good."""
 
 from collections.abc import Iterator, Mapping
 from math import radians, sin
@@ -98,7 +98,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
 
 
 def _horizontal_remedy(speed: float) -> str:
-    """The remedy for a maneuver that was too far from its path, by its largest speed, m/s."""
+    """The remedy for a maneuver too far from its path; `speed` is its largest speed, m/s."""
     first = "fly it slower" if speed > 0.0 else "fly in less wind"
     return f"{first}; against wind and drag see guidance and `companion identify`"
 
@@ -161,7 +161,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
 
 
 def cut_steps(figures: Figures) -> list[Check]:
-    """A failed check if the tilt limit cut a step by more than `MAX_LINE_DISTANCE`; else empty."""
+    """A failed check if the tilt limit cut a step by more than `MAX_LINE_DISTANCE`; or empty."""
     response, limit = figures["response"], figures.get("max_tilt_deg")
     target_tilt = response.get("asked_tilt_deg")
     if target_tilt is None or limit is None:  # nothing was measured, or the summary is older
