@@ -130,7 +130,7 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
 
 
 def _reason(key: str, swept: SweptValues, result: CheckedResult, before: Any) -> str:
-    """Text about a key: the value `before` the search (None: not set), and the best values found."""
+    """Text about a key: the value `before` the search (None: unset), and the best values found."""
     before_text = "not set before" if before is None else f"before {_value_text(before)}"
     near_values = [
         candidate.values[key] for candidate in result.results.near_best if key in candidate.values
