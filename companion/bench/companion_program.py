@@ -1,4 +1,4 @@
-"""A program that answers samples like `companion fly`: link, control loop, planner, thrust."""
+"""A program that answers samples with link, control loop, planner and thrust of `companion fly`."""
 
 import asyncio
 import sys

@@ -1,4 +1,4 @@
-"""The lower bound of latency: each datagram is answered at once by one of the size of a setpoint.
+"""The lower bound of latency: echoes each datagram at once, with the size of a setpoint.
 
 The program blocks on its socket, and decodes and computes nothing. Python cannot be faster.
 """

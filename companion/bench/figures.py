@@ -16,7 +16,7 @@ ROUND_S = 1.0
 
 
 def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> dict[str, Any]:
-    """Measure every program for `seconds`, in interleaved rounds; return its figures by key.
+    """Measure each program for `seconds`, in interleaved rounds; return all figures by key.
 
     Raises:
         BenchmarkError: A program ended, or answered no sample in time.
@@ -27,12 +27,12 @@ def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> di
             for measured_sender in senders.values():
                 measured_sender.send_for(rate_hz, seconds / rounds)
                 for sender in senders.values():
-                    sender.heartbeat()
+                    sender.send_heartbeat()
     return {key: _figures_of(sender) for key, sender in senders.items()}
 
 
 def print_table(title: str, names: Mapping[str, str], figures: Mapping[str, Any]) -> None:
-    """Print a row for each program: its title in `names`, its figures in `figures`, by its key."""
+    """Print a row for each program; `names` holds its title and `figures` its figures, by key."""
     table = Table(title=title)
     for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
         table.add_column(heading, justify="right" if heading else "left")
@@ -53,21 +53,21 @@ def _figures_of(sender: Sender) -> dict[str, Any]:
     Raises:
         BenchmarkError: no sample was answered in time.
     """
-    ordered = sorted(sender.round_trips_ns)
-    if not ordered:
+    sorted_times_ns = sorted(sender.round_trips_ns)
+    if not sorted_times_ns:
         raise BenchmarkError(
             f"{sender.name} answered none of {sender.sent_samples} samples in time"
         )
     return {
-        "p50_us": _quantile_us(ordered, 0.50),
-        "p99_us": _quantile_us(ordered, 0.99),
-        "max_us": _quantile_us(ordered, 1.0),
+        "p50_us": _quantile_us(sorted_times_ns, 0.50),
+        "p99_us": _quantile_us(sorted_times_ns, 0.99),
+        "max_us": _quantile_us(sorted_times_ns, 1.0),
         "cpu_percent": round(100.0 * sender.cpu_ns / sender.wall_ns, 2),
         "samples": sender.sent_samples,
-        "unanswered": sender.sent_samples - len(ordered),
+        "unanswered": sender.sent_samples - len(sorted_times_ns),
     }
 
 
-def _quantile_us(ordered: list[int], quantile: float) -> float:
-    index = min(len(ordered) - 1, int(quantile * len(ordered)))
-    return round(ordered[index] / 1000.0, 1)
+def _quantile_us(sorted_times_ns: list[int], quantile: float) -> float:
+    index = min(len(sorted_times_ns) - 1, int(quantile * len(sorted_times_ns)))
+    return round(sorted_times_ns[index] / 1000.0, 1)

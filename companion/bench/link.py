@@ -16,7 +16,7 @@ from companion.bench.process import BenchmarkedProgram
 from companion.bench.sender import (
     TIME_MODULUS,
     Sender,
-    Stamp,
+    StampReader,
     stamp_by_time,
     stamp_by_yaw_rate,
 )
@@ -34,8 +34,8 @@ class _Program(NamedTuple):
     """Name to show to users."""
     module: str
     """Module of `companion.bench` that is run."""
-    stamp: Stamp = stamp_by_time
-    """Finds the time stamp of the sample in a setpoint."""
+    read_stamp: StampReader = stamp_by_time
+    """Reads from a setpoint the time stamp of its sample."""
     modulus: int = TIME_MODULUS
     """Value at which the time stamps in setpoints wrap, ms."""
 
@@ -85,7 +85,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 def _start(program: _Program) -> Sender:
     benchmarked_program = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
-    return Sender(benchmarked_program, program.stamp, program.modulus)
+    return Sender(benchmarked_program, program.read_stamp, program.modulus)
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:

@@ -1,7 +1,7 @@
 """`companion bench planner`: the time of one step of a planner, in a flight and in a batch.
 
 Times are the shortest of many short repeats without garbage collection, so that other load on the
-computer hardly counts. Two baselines are measured in between, under the same conditions: a bare
+computer hardly counts. Between these repeats two baselines are measured in the same way: a bare
 Python call, and a copy of the same arrays.
 """
 
@@ -20,9 +20,9 @@ from companion.attitude import LAW_NAMES, Limits, Target, make_planner
 from companion.attitude.planner import LawPlanner
 from companion.extras import pip_command
 
-BATCHES = (1, 1_000, 10_000)
+BATCH_SIZES = (1, 1_000, 10_000)
 """Numbers of vehicles in the batches whose single step is timed."""
-VEHICLES = 1_000
+VEHICLE_COUNT = 1_000
 """Number of vehicles in the simulated batch, at `RATE_HZ` samples per second."""
 RATE_HZ = 1_000.0
 
@@ -73,7 +73,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     compiled = batch.can_compile()
     cases = [*_flight_cases(), *_batch_cases(compiled), _advance_case(compiled)]
     groups = _shortest_ns(cases, seconds)
-    flight, batches = groups["flight"], {str(count): groups[str(count)] for count in BATCHES}
+    flight, batches = groups["flight"], {str(count): groups[str(count)] for count in BATCH_SIZES}
     step = groups["advance"]["first-order"]
     figures = {
         "compiled": compiled,
@@ -84,10 +84,10 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
         "batch_ns": {count: _rounded(group) for count, group in batches.items()},
         "batch_ratio": {count: _ratios(group) for count, group in batches.items()},
         "simulated": {
-            "vehicles": VEHICLES,
+            "vehicles": VEHICLE_COUNT,
             "rate_hz": RATE_HZ,
             "step_ns": round(step, 2),
-            "seconds_per_second": round(1e9 / (step * VEHICLES * RATE_HZ), 3),
+            "seconds_per_second": round(1e9 / (step * VEHICLE_COUNT * RATE_HZ), 3),
         },
     }
     if not as_json:
@@ -118,7 +118,7 @@ def _first_argument(q: Any, target: Any, dt: float) -> Any:
 
 def _batch_cases(compiled: bool) -> list[_Case]:
     cases = []
-    for count in BATCHES:
+    for count in BATCH_SIZES:
         fleet = _fleet(count)
         values: dict[str, Any] = {"q": fleet.q, "targets": fleet.targets, "compiled": compiled}
         copy = Timer("q.copy(), targets.copy()", globals=values)
@@ -131,11 +131,11 @@ def _batch_cases(compiled: bool) -> list[_Case]:
 
 
 def _advance_case(compiled: bool) -> _Case:
-    q, targets = _fleet(VEHICLES)
+    q, targets = _fleet(VEHICLE_COUNT)
     planner = _planner("first-order")
     steps = _STEPS if compiled else _STEPS_IN_PYTHON
     timer = Timer(lambda: batch.advance(planner, q, targets, 1.0 / RATE_HZ, steps, compiled))
-    return _Case("advance", "first-order", timer, VEHICLES * steps)
+    return _Case("advance", "first-order", timer, VEHICLE_COUNT * steps)
 
 
 def _planner(name: str) -> LawPlanner:
@@ -186,10 +186,10 @@ def _show(figures: dict[str, Any]) -> None:
         "and targets",
     )
     table.add_column("", no_wrap=True)
-    for heading in ("flight", "new target", *(f"of {count:,}" for count in BATCHES)):
+    for heading in ("flight", "new target", *(f"of {count:,}" for count in BATCH_SIZES)):
         table.add_column(heading, justify="right", no_wrap=True)
     columns = [(figures[f"{key}_ns"], figures[f"{key}_ratio"]) for key in ("flight", "new_target")]
-    columns += [(figures["batch_ns"][str(n)], figures["batch_ratio"][str(n)]) for n in BATCHES]
+    columns += [(figures["batch_ns"][str(n)], figures["batch_ratio"][str(n)]) for n in BATCH_SIZES]
     for key in ("baseline", *LAW_NAMES):
         table.add_row(key, *(_cell(ns[key], ratio.get(key)) for ns, ratio in columns))
     simulated = figures["simulated"]
@@ -197,8 +197,9 @@ def _show(figures: dict[str, Any]) -> None:
     console.print(table)
     console.print(
         f"One core simulates {simulated['seconds_per_second']:.3g} s of flight per second: "
-        f"{VEHICLES:,} vehicles at {RATE_HZ:g} Hz, first-order, {simulated['step_ns']:.3g} ns for a"
-        " step and its rotation (batch.advance checks its arrays once, batch.rates at every call).",
+        f"{VEHICLE_COUNT:,} vehicles at {RATE_HZ:g} Hz, first-order,"
+        f" {simulated['step_ns']:.3g} ns for a step and its rotation (batch.advance"
+        " checks its arrays once, batch.rates at every call).",
         highlight=False,
     )
     if not figures["compiled"]:

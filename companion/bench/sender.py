@@ -13,8 +13,8 @@ from pymavlink.dialects.v20 import common as dialect
 
 from companion.bench.process import BenchmarkedProgram, BenchmarkError
 
-Stamp = Callable[[bytes], int]
-"""Function from the bytes of a setpoint to the time stamp of its sample, ms, which may wrap."""
+StampReader = Callable[[bytes], int]
+"""Reads from the bytes of a setpoint the time stamp of its sample, ms. The time stamp may wrap."""
 TIME_MODULUS = 2**32
 """Value at which `time_boot_ms` wraps, ms."""
 _SETPOINT_BYTES = 51
@@ -42,7 +42,7 @@ class Sender:
 
     Args:
         program: The program that answers; `close` stops it.
-        stamp: Finds the time stamp in a setpoint.
+        read_stamp: Reads from a setpoint the time stamp of its sample.
         modulus: Value at which the time stamps in setpoints wrap, ms.
         extra_messages: Messages that follow each sample, each in a datagram of its own.
 
@@ -56,12 +56,12 @@ class Sender:
     def __init__(
         self,
         program: BenchmarkedProgram,
-        stamp: Stamp = stamp_by_time,
+        read_stamp: StampReader = stamp_by_time,
         modulus: int = TIME_MODULUS,
         extra_messages: Sequence[Any] = (),
     ) -> None:
         self._extra_messages = extra_messages
-        self._program, self._stamp, self._modulus = program, stamp, modulus
+        self._program, self._read_stamp, self._modulus = program, read_stamp, modulus
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", 0))
         self._socket.setblocking(False)
@@ -89,7 +89,7 @@ class Sender:
         self._program.stop()
         self._socket.close()
 
-    def heartbeat(self) -> None:
+    def send_heartbeat(self) -> None:
         """Send the heartbeat of an armed PX4 vehicle in offboard mode."""
         self._send_message(
             dialect.MAVLink_heartbeat_message(
@@ -114,7 +114,7 @@ class Sender:
                 )
             if time.monotonic() > heartbeat_due:
                 heartbeat_due = time.monotonic() + 0.5
-                self.heartbeat()
+                self.send_heartbeat()
             self._send_sample()
             answered = self._listen_until(time.perf_counter_ns() + 20_000_000)
 
@@ -125,7 +125,7 @@ class Sender:
             BenchmarkError: The program ended.
         """
         self._program.check_running()
-        self.heartbeat()
+        self.send_heartbeat()
         due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
         self._sent_ns.clear()
         self._recording = True
@@ -176,7 +176,7 @@ class Sender:
                 continue  # no answer yet, or the program has not started yet
             now = time.perf_counter_ns()
             if len(data) == _SETPOINT_BYTES and data[7] == _SETPOINT_ID:
-                sent_ns = self._sent_ns.pop(self._stamp(data) % self._modulus, None)
+                sent_ns = self._sent_ns.pop(self._read_stamp(data) % self._modulus, None)
                 matched = matched or sent_ns is not None
                 if sent_ns is not None and self._recording:
                     self.round_trips_ns.append(now - sent_ns)

@@ -29,10 +29,10 @@ class Campaign:
     """A campaign: what to fly, and the files that the flights read."""
 
     file: CampaignFile
-    """Content of the campaign file. Trajectories in its `sweep` are paths of texts in `files`."""
+    """Content of the campaign file. A trajectory in its `sweep` is a path, a key of `files`."""
     base: Config
     """Configuration that the swept keys change; the keys of `set` are already applied. Its
-    `flight.trajectory`, if any, is the path of a text in `files`."""
+    `flight.trajectory`, if any, is a key of `files`."""
     files: Mapping[str, str] = field(default_factory=dict)
     """The text of each file that a flight reads, by its path in the campaign's folder."""
     file_path: str = "the campaign"

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from companion.campaign.swept import Swept
+from companion.campaign.swept import SweptValues
 from companion.files.yaml_file import PathKey, Section
 
 
-def _require_plain(name: str) -> str:
-    """Check that a name can begin the name of a folder, and return it."""
+def _require_folder_name(name: str) -> str:
+    """Return `name`; raise ValueError if a folder's name cannot begin with `name`."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
         raise ValueError(
             "must begin with a letter or a digit, and have only these, `-` and `_` after it"
@@ -19,7 +19,9 @@ def _require_plain(name: str) -> str:
     return name
 
 
-CampaignName = Annotated[str, Field(min_length=1, max_length=60), AfterValidator(_require_plain)]
+CampaignName = Annotated[
+    str, Field(min_length=1, max_length=60), AfterValidator(_require_folder_name)
+]
 ScenarioName = Annotated[str, Field(min_length=1, max_length=60)]
 Ending = Literal["ground", "ok", "landed", "held", "pilot"]
 FaultPhase = Literal["stream", "arm", "takeoff", "offboard", "maneuvers", "hand back", "land"]
@@ -51,8 +53,8 @@ class FaultScenario(Section):
     inject: Annotated[tuple[dict[str, Any], ...], Field(min_length=1, max_length=10)]
     """Entries as in `mock.faults`, without `at_s` and `after_offboard_s`. All begin together."""
     phase: FaultPhase = "maneuvers"
-    """Phase of the flight in which the faults begin. If a flight has no phase stream, its faults
-    begin in the phase arm instead. The factor fault.phase replaces this key."""
+    """Phase of the flight in which the faults begin. The faults of a flight without the
+    phase `stream` begin in the phase `arm` instead. The factor fault.phase replaces this key."""
     after_s: Annotated[float, Field(ge=0.0, le=3600.0)] | None = None
     """Time from the beginning of the phase to the faults. The factor fault.after_s replaces this
     key. null: 0 s in stream and arm, 0.8 s in takeoff, 1.3 s in offboard, 0.3 s in maneuvers and
@@ -62,16 +64,16 @@ class FaultScenario(Section):
         | dict[FaultPhase, Annotated[tuple[Ending, ...], Field(min_length=1)]]
     ) = ("ok",)
     """Permitted endings of the flight (docs/safety.md): a list for all phases, or a list for each
-    phase. ground: the vehicle never left the ground. ok: as without the fault. landed: our program
-    landed the vehicle and says why. held: the autopilot flies on, by our command or its own
-    failsafe. pilot: the pilot has taken over."""
+    phase. ground: the vehicle never left the ground. ok: the flight ended as without the fault.
+    landed: our program landed the vehicle and says why. held: the autopilot still flies the
+    vehicle, by our command or by its own failsafe. pilot: the pilot has taken over."""
 
     def delay(self, phase: str) -> float:
         """Time from the beginning of a phase to the fault, s."""
         return _DEFAULT_AFTER_S[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
-        """The permitted endings in a phase; empty if the campaign file names none."""
+        """Permitted endings of a flight whose fault begins in `phase`; empty: none are named."""
         if isinstance(self.ends, dict):
             return {str(name): endings for name, endings in self.ends.items()}.get(phase, ())
         return self.ends
@@ -87,21 +89,23 @@ class CampaignLimits(Section):
     """Largest number of cases. null: 2000 flights, or 100000 vehicles of batch kinematics."""
     max_hours: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
     """Longest estimated duration of the campaign. A campaign with at most two cases for each worker
-    is not checked against it."""
+    is not checked against this limit."""
     flight_s: Annotated[float, Field(ge=1.0, le=36_000.0)] = 600.0
-    """Longest flight, s of vehicle time from boot. A longer one is ended then, and is not good."""
+    """Longest flight, s of vehicle time from boot. A longer flight is ended at this
+    time, and its `ok` in the results is false."""
 
 
 class Tune(Section):
     """The search of `companion campaign tune`. Running the campaign ignores this section."""
 
-    search: Annotated[dict[str, Swept], Field(min_length=1, max_length=30)]
+    search: Annotated[dict[str, SweptValues], Field(min_length=1, max_length=30)]
     """Searched keys of the program: dotted, each with uniform, loguniform or choice."""
     trials: Annotated[int, Field(ge=1, le=100_000)] = 100
     """Number of candidates that are tried; `--trials` replaces it."""
     envelope_m: Annotated[float, Field(gt=0.0, le=1000.0)] | None = 1.0
     """A flight counts as inside the envelope if it reaches its end and its largest true distance
-    from the reference (`position_max_m` of the results) is at most this. null: any distance."""
+    from the reference (`position_max_m` of the results) is at most this distance. null:
+    any distance."""
     inside_share: Annotated[float, Field(gt=0.0, le=1.0)] = 0.999
     """Smallest share of the flights that must stay inside the envelope, 0..1."""
     check_samples: Annotated[int, Field(ge=2, le=10_000)] = 8
@@ -110,7 +114,7 @@ class Tune(Section):
 
     @field_validator("search")
     @classmethod
-    def _searchable(cls, search: dict[str, Swept]) -> dict[str, Swept]:
+    def _check_search(cls, search: dict[str, SweptValues]) -> dict[str, SweptValues]:
         for key, swept in search.items():
             if not (swept.uniform or swept.loguniform or swept.choice):
                 raise ValueError(f"{key}: give uniform, loguniform or choice")
@@ -150,9 +154,10 @@ class CampaignFile(Section):
     set: Annotated[dict[str, Any], Field(default_factory=dict, max_length=200)]
     """Keys that differ from `config` in every case, dotted: limits.max_tilt_deg,
     mock.wind.gust_m_s."""
-    sweep: Annotated[dict[str, Swept], Field(default_factory=dict, max_length=50)]
-    """Swept keys, dotted, of the program and of the mock vehicle (`mock.`). Also fault,
-    fault.phase and fault.after_s, and files for flight.trajectory, relative to this file."""
+    sweep: Annotated[dict[str, SweptValues], Field(default_factory=dict, max_length=50)]
+    """Swept keys, dotted, of the program and of the mock vehicle (`mock.`). The
+    factors fault, fault.phase and fault.after_s are possible, too. The values of flight.trajectory
+    are paths of files, relative to this file."""
     faults: Annotated[
         dict[ScenarioName, FaultScenario], Field(default_factory=dict, max_length=100)
     ]
@@ -163,14 +168,14 @@ class CampaignFile(Section):
 
     @field_validator("config", mode="before")
     @classmethod
-    def _file_or_keys(cls, value: Any) -> Any:
+    def _require_file_or_keys(cls, value: Any) -> Any:
         """Refuse what is neither a path nor keys, in one message; pydantic would write several."""
         if not isinstance(value, str | Path | dict):
             raise ValueError("must name a file, or hold the keys of a configuration")
         return value
 
     @model_validator(mode="after")
-    def _consistent(self) -> "CampaignFile":
+    def _check_consistency(self) -> "CampaignFile":
         if self.sampling == "sobol" and self.samples & (self.samples - 1):
             power = 1 << self.samples.bit_length()
             raise ValueError(

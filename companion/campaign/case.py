@@ -35,7 +35,7 @@ class Case:
     """Value of each factor, by its name, as stored in the results."""
     config: Config
     """Configuration of the program, and in its section `mock` that of the mock vehicle. If a
-    trajectory is flown, `flight.trajectory` is the path of a text in `files`."""
+    trajectory is flown, `flight.trajectory` is a key of `files`."""
     fault: Fault | None
     """Fault scenario; None: no fault."""
     files: Mapping[str, str]

@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 WORKER_DEATHS_TO_GIVE_UP = 3
-"""Number of dead workers, on which it ran or was queued, after which a unit of work is given up.
+"""Number of dead workers after which a unit of work is given up.
 
-An existing cluster follows its own setting, `distributed.scheduler.allowed-failures`."""
+A dead worker counts if it ran the unit, or had the unit in its queue. An existing cluster
+follows its own setting, `distributed.scheduler.allowed-failures`."""
 _CONNECTION_LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_TIMEOUT_S = 10.0
 _CLOSE_TIMEOUT_S = 5.0

@@ -79,7 +79,7 @@ def planned_cases(file: CampaignFile) -> Iterator[PlannedCase]:
 def seed_of(campaign_seed: int, number: int) -> int:
     """Seed of a case, 0 to 2⁶³ − 1; the same on every computer.
 
-    `number` is that of the case, or of its sample if samples share their seed.
+    `number` is the number of the case or, with `same_seeds`, the number of its sample.
     """
     digest = hashlib.sha256(f"{campaign_seed}:{number}".encode()).digest()
     return int.from_bytes(digest[:8], "big") & _LARGEST_SEED

@@ -12,9 +12,9 @@ from companion.files.yaml_file import ConfigError
 
 MOST_CASES = {"flights": 2000, "batch": 100_000}
 """Largest number of cases by kind of campaign, where `limits.max_cases` is null."""
-_MEASURED_FLIGHTS = 3
+_MOST_MEASURED_FLIGHTS = 3
 """Largest number of flights whose time is measured."""
-_MEASURED_VEHICLES = 64
+_MOST_MEASURED_VEHICLES = 64
 """Largest number of vehicles in the measured batch.
 
 They share one planner, because compiling a planner takes 2 s."""
@@ -23,16 +23,17 @@ They share one planner, because compiling a planner takes 2 s."""
 def case_time(kind: str, cases: Sequence[Case]) -> float:
     """Measure the mean wall time that a case takes in this process, s, on some of the cases.
 
-    A first run, which imports and compiles, is not measured. For flights it is 1 s of vehicle time.
+    A first run, which imports and compiles, is not measured. For flights this
+    first run takes 1 s of vehicle time.
     """
     if kind == "batch":
         planner = cases[0].config.planner_name
         timed_cases = [case for case in cases if case.config.planner_name == planner][
-            :_MEASURED_VEHICLES
+            :_MOST_MEASURED_VEHICLES
         ]
         run_cases(kind, timed_cases)
     else:
-        indices = sorted({0, len(cases) // 2, len(cases) - 1})[:_MEASURED_FLIGHTS]
+        indices = sorted({0, len(cases) // 2, len(cases) - 1})[:_MOST_MEASURED_FLIGHTS]
         timed_cases = [cases[index] for index in indices]
         run_cases(kind, [replace(timed_cases[0], flight_s=1.0)])
     began = perf_counter()

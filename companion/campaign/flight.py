@@ -23,7 +23,7 @@ INTERNAL_ERROR = "internal error: "
 """Prefix of the result of a case in which the program itself failed."""
 _STEPS_PER_TRUTH_ROW = 5
 """Steps of the mock vehicle from one recorded row of its true motion to the next."""
-_WATCHED_AFTERWARDS_S = 10.0
+_MAX_TIME_AFTER_END_S = 10.0
 """Longest time for which a vehicle that is still armed is simulated after the program ended, s."""
 _PILOT_MODES = (  # of PX4 and ArduPilot
     "POSCTL",
@@ -92,7 +92,7 @@ class CaseFlight:
         truth_at_end = vehicle.state()
         flight_s = vehicle.time
         vehicle.after_step.clear()
-        while vehicle.state()["armed"] and vehicle.time < flight_s + _WATCHED_AFTERWARDS_S:
+        while vehicle.state()["armed"] and vehicle.time < flight_s + _MAX_TIME_AFTER_END_S:
             vehicle.step()
         truth_afterwards = vehicle.state()
         return self._outcomes(
@@ -111,8 +111,9 @@ class CaseFlight:
         """The outcomes of the flight.
 
         `truth_at_end` is the true state when the program ended, `flight_s` s after boot.
-        `truth_afterwards` is that when the vehicle disarmed, or `_WATCHED_AFTERWARDS_S` after the
-        program's end. `fault_begun`: whether the phase in which the fault begins was reached.
+        `truth_afterwards` is the true state when the vehicle disarmed, or `_MAX_TIME_AFTER_END_S`
+        after the program's end. `fault_begun`: whether the phase in which the fault begins was
+        reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = truth_afterwards["crashed"], self._case.fault
@@ -192,7 +193,7 @@ def _ending(state: Truth, result: str) -> str:
 def _with_paths_in(config: Config, files_folder: Path) -> Config:
     """The configuration with its trajectory and its `recording.directory` in `files_folder`.
 
-    `recording.directory` is a new folder there, so no values of earlier flights are used.
+    `recording.directory` is a new folder there, so no values learned in earlier flights are used.
     """
     path = config.flight.trajectory
     return replace_unchecked(

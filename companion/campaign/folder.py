@@ -23,7 +23,7 @@ from companion.files.yaml_file import ConfigError
 CAMPAIGNS_FOLDER = Path("runs", "campaigns")
 """Folder of the campaigns' folders, relative to the working folder."""
 CAMPAIGN_FILE_NAME = "campaign.yaml"
-"""Name of the file with the campaign's configuration and all defaults, in its folder."""
+"""Name of the file in a campaign's folder that holds the configuration and all defaults."""
 _DESCRIPTION, _LOCK = "campaign.json", ".lock"
 _LARGEST_FILE_BYTES = 1_000_000
 _SIZE_LIMITS = ("max_cases", "max_hours")  # keys of the section `limits`
@@ -73,7 +73,7 @@ def make(folder: Path, campaign: Campaign, description: Description) -> None:
                 f"{folder}: holds files, but no campaign; name another folder with --out, or empty "
                 "this one"
             )
-        (folder / store.RESULTS).mkdir(parents=True, exist_ok=True)
+        (folder / store.RESULTS_FOLDER).mkdir(parents=True, exist_ok=True)
         for name, text in campaign.files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(folder / name, text)
@@ -116,7 +116,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
         VersionError: the campaign was begun by another version.
     """
     description = read_description(folder)
-    _require_same(folder, campaign)
+    _require_same_campaign(folder, campaign)
     if differences := difference(description.versions, versions()):
         raise VersionError(
             f"{folder} was begun by another version: this one has {differences}. Results of two "
@@ -126,7 +126,7 @@ def resume(folder: Path, campaign: Campaign) -> Description:
     return description
 
 
-def _require_same(folder: Path, campaign: Campaign) -> None:
+def _require_same_campaign(folder: Path, campaign: Campaign) -> None:
     """Refuse a folder with another campaign; only the limits on the campaign's size may differ."""
     path = folder / CAMPAIGN_FILE_NAME
     try:
@@ -173,7 +173,7 @@ def lock(folder: Path) -> Iterator[None]:
     """Lock the folder, so that no other process runs the same campaign.
 
     Raises:
-        ConfigError: another process has locked the folder, or it cannot be written.
+        ConfigError: another process has locked the folder, or the folder cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

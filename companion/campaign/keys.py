@@ -7,7 +7,7 @@ from companion.config import Config
 from companion.files.yaml_file import ConfigError, validated
 from companion.testing.settings import complete_mock, mock_with
 
-_WITHOUT_EFFECT = (
+_KEYS_WITHOUT_EFFECT = (
     "flight.arm",
     "link.backend",
     "link.endpoint",
@@ -41,7 +41,7 @@ def check_key(key: str, base: Config, where: str) -> None:
     section, dot, name = key.partition(".")
     if not (dot and section and name):
         raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, such as limits.max_tilt_deg")
-    if any(f"{key}.".startswith(f"{other}.") for other in _WITHOUT_EFFECT):
+    if any(f"{key}.".startswith(f"{other}.") for other in _KEYS_WITHOUT_EFFECT):
         raise ConfigError(
             f"{where}: `{key}` has no effect in a campaign, or the campaign sets it itself"
         )

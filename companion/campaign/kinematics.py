@@ -37,7 +37,8 @@ from companion.recording.measurements.verdict import MAX_LINE_DISTANCE
 def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
     """Simulate cases one after the other; return a row for each, in order.
 
-    `ok` is true if every step stayed as close to its straight line as a good flight must.
+    `ok` is true if in every step the acceleration coefficients stayed close to the straight line
+    from start to target, within the bound that flights must keep.
 
     Raises:
         ConfigError: a case cannot be flown in a batch; see `check_case`.
@@ -168,7 +169,7 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
 
 
 class _Pattern(NamedTuple):
-    """A maneuver from its first open-loop step to the end of the last, level between the steps."""
+    """The open-loop steps of a maneuver and the level parts between them, by sample number."""
 
     samples: int
     parts: tuple[tuple[int, int, Coefficients], ...]

@@ -19,7 +19,7 @@ from companion.campaign.campaign_file import (
     FaultPhase,
 )
 from companion.campaign.keys import check_key, replace_unchecked, with_keys
-from companion.campaign.swept import Swept
+from companion.campaign.swept import SweptValues
 from companion.config import Config, trajectory_file
 from companion.config.file_kinds import FileKind, require_kind
 from companion.config.files import load as load_config
@@ -59,12 +59,12 @@ class _CampaignReader:
         """Check all keys, collect the trajectory files, and return the campaign."""
         file, base = self._file, self._base()
         for key in file.set:
-            check_key(key, base, self._at("set", key))
+            check_key(key, base, self._place_text("set", key))
         for name, swept in file.sweep.items():
             for key in () if name in FAULT_FACTORS else swept.changed_keys(name):
-                check_key(key, base, self._at("sweep", name))
+                check_key(key, base, self._place_text("sweep", name))
         for key in () if file.tune is None else file.tune.search:
-            check_key(key, base, self._at("tune", "search", key))
+            check_key(key, base, self._place_text("tune", "search", key))
         self._check_faults()
         changes = dict(file.set)
         named_keys = file.swept_keys | changes.keys()
@@ -77,11 +77,11 @@ class _CampaignReader:
         except ConfigError as error:
             raise ConfigError(f"{self._path}: {error}") from error
         base = self._flyable_config(base)
-        sweep = {name: self._with_files(name, swept) for name, swept in file.sweep.items()}
+        sweep = {name: self._with_copied_files(name, swept) for name, swept in file.sweep.items()}
         file = file.model_copy(update={"sweep": sweep, "set": {}})
         return Campaign(file, base, self._files, str(self._path))
 
-    def _at(self, *where: str) -> str:
+    def _place_text(self, *where: str) -> str:
         """File, line and section of a key, for messages; `where` are the parts of its path."""
         return f"{place_of(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
 
@@ -108,7 +108,7 @@ class _CampaignReader:
         copy = None if path is None else self._copy_trajectory(path)
         return replace_unchecked(base, flight={"arm": True, "trajectory": copy})
 
-    def _with_files(self, name: str, swept: Swept) -> Swept:
+    def _with_copied_files(self, name: str, swept: SweptValues) -> SweptValues:
         """The factor, with each path of a trajectory file replaced by that of its copy."""
         if TRAJECTORY not in swept.changed_keys(name):
             return swept

@@ -36,7 +36,7 @@ OUTCOME_LABELS = {
     "flight_s": "flight time",
 }
 """Label of each outcome of a flight that is a number; an outcome that was not measured is null."""
-_SATURATED_FROM = 0.99
+_SATURATION_SHARE = 0.99
 """A setpoint counts as saturated if its rate or thrust is at least this share of the upper limit,
 or its thrust is at most the lower limit divided by this share."""
 
@@ -130,9 +130,9 @@ def control_effort(
         return {}
     rates, thrust, limits = np.hypot(rows[:, 0], rows[:, 1]), rows[:, 3], config.limits
     is_saturated = (
-        (rates >= _SATURATED_FROM * limits.max_tilt_rate)
-        | (thrust >= _SATURATED_FROM * limits.max_thrust)
-        | (thrust * _SATURATED_FROM <= limits.min_thrust)
+        (rates >= _SATURATION_SHARE * limits.max_tilt_rate)
+        | (thrust >= _SATURATION_SHARE * limits.max_thrust)
+        | (thrust * _SATURATION_SHARE <= limits.min_thrust)
     )
     return {
         "rate_rms_rad_s": float(np.sqrt(np.mean(rates**2))),

@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from distributed import Client
 
 DONE, FAILED = 0, 1  # exit codes
-_UNMEASURED_CASES = 2
+_UNMEASURED_CASES_PER_WORKER = 2
 """With at most this number of cases for each worker, the wall time of a case is not measured."""
-_MOST_SHOWN = 3
+_MOST_SHOWN_LINES = 3
 """Largest number of lost units, of internal errors, and of reasons that are printed."""
 
 
@@ -123,7 +123,7 @@ class _Run:
             estimate.check_size(campaign, estimate.case_time(kind, first_case), workers)
         cases = list(campaign.cases())
         check_cases(kind, cases)
-        if len(cases) <= _UNMEASURED_CASES * workers:
+        if len(cases) <= _UNMEASURED_CASES_PER_WORKER * workers:
             return None
         case_s = estimate.case_time(kind, cases)
         if not self._options.yes:
@@ -163,17 +163,17 @@ class _Run:
     def _report_end(self, progress: engine.Progress, description: Description) -> int:
         """Report how the run ended; return the exit code."""
         say = self._console.print
-        for sentence in progress.given_up_units[:_MOST_SHOWN]:
+        for sentence in progress.given_up_units[:_MOST_SHOWN_LINES]:
             say(f"not flown: {sentence}")
         if progress.flown_cases < description.cases:
             count = len(progress.given_up_units)
             return self._report_stop(f"{count} unit{'s were' if count > 1 else ' was'} given up")
         errors = engine.internal_errors(self._folder, self._campaign.file)
-        for error, count in errors.most_common(_MOST_SHOWN):
+        for error, count in errors.most_common(_MOST_SHOWN_LINES):
             say(f"{count} of the {self._noun} ended by an {error}")
         results = Results.read(self._folder)
         say(f"{results.good.sum()} of {progress.flown_cases} {self._noun} were good.")
-        for reason, count in results.failures().most_common(_MOST_SHOWN):
+        for reason, count in results.failures().most_common(_MOST_SHOWN_LINES):
             say(f"  {count} not good: {reason}")
         if results.as_documented.size:
             documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size

@@ -16,9 +16,9 @@ from companion.files.yaml_file import ConfigError
 if TYPE_CHECKING:
     import pyarrow as pa
 
-RESULTS = "results"
+RESULTS_FOLDER = "results"
 """Folder of the units' Parquet files, in the folder of a campaign."""
-METADATA = b"companion.campaign"
+METADATA_KEY = b"companion.campaign"
 """Key in the metadata of the Parquet schema; its value is JSON with `name`, `kind`, `factors`."""
 _OUTCOMES = {
     "flights": (
@@ -58,7 +58,7 @@ def schema(file: CampaignFile) -> "pa.Schema":
     contents = {"name": file.name, "kind": file.kind, "factors": factor_metadata}
     return pa.schema(
         [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, kind in columns],
-        metadata={METADATA: json.dumps(contents).encode()},
+        metadata={METADATA_KEY: json.dumps(contents).encode()},
     )
 
 
@@ -95,7 +95,7 @@ def write_unit(
     rows: Sequence[Mapping[str, Value]],
     timing: Mapping[str, Any],
 ) -> None:
-    """Write the rows of a unit of work, in order; when this returns, they are on the disk.
+    """Write the rows of a unit of work, in order. They are on the disk when the function returns.
 
     `timing` (wall times and worker) gets a file of its own, because it differs between runs.
 
@@ -113,12 +113,12 @@ def write_unit(
 
 def unit_path(folder: Path, number: int) -> Path:
     """The Parquet file of a unit."""
-    return folder / RESULTS / f"unit-{number:05d}.parquet"
+    return folder / RESULTS_FOLDER / f"unit-{number:05d}.parquet"
 
 
 def finished_units(folder: Path) -> frozenset[int]:
     """The numbers of the units whose results are on the disk."""
-    paths = (folder / RESULTS).glob("unit-*.parquet")
+    paths = (folder / RESULTS_FOLDER).glob("unit-*.parquet")
     return frozenset(int(path.stem.removeprefix("unit-")) for path in paths)
 
 
@@ -133,9 +133,9 @@ def read(folder: Path) -> "pa.Table":
     numbers = sorted(finished_units(folder))
     if not numbers:
         raise ConfigError(f"{folder}: there are no results of a campaign")
-    message = f"{folder / RESULTS}: its files are not of one campaign"
+    message = f"{folder / RESULTS_FOLDER}: its files are not of one campaign"
     units = [read_unit(folder, number) for number in numbers]
-    if any(not (unit.schema.metadata or {}).get(METADATA) for unit in units):
+    if any(not (unit.schema.metadata or {}).get(METADATA_KEY) for unit in units):
         raise ConfigError(message)
     try:
         return pa.concat_tables(units).sort_by("case")
@@ -161,5 +161,5 @@ def read_unit(folder: Path, number: int) -> "pa.Table":
 
 def metadata(results: "pa.Table") -> dict[str, Any]:
     """Name, kind and factors of the campaign that a table of results belongs to."""
-    contents: dict[str, Any] = json.loads((results.schema.metadata or {})[METADATA])
+    contents: dict[str, Any] = json.loads((results.schema.metadata or {})[METADATA_KEY])
     return contents

@@ -19,7 +19,7 @@ _DISTRIBUTIONS = ("uniform", "loguniform", "normal", "choice")
 _MOST_VALUES = 1000
 
 
-class Swept(Section):
+class SweptValues(Section):
     """The values of a swept key. A list in place of this section means the same as `values`.
 
     Exactly one of `values`, `range`, `uniform`, `loguniform`, `normal` and `choice` is given.
@@ -50,7 +50,7 @@ class Swept(Section):
 
     @model_validator(mode="before")
     @classmethod
-    def _list_alone(cls, value: Any) -> Any:
+    def _accept_bare_list(cls, value: Any) -> Any:
         if isinstance(value, list | tuple):
             return {"values": value}
         if isinstance(value, dict | cls):
@@ -59,7 +59,7 @@ class Swept(Section):
 
     @field_validator("values", "choice")
     @classmethod
-    def _plain_values(cls, values: Sequence[Any] | None) -> Sequence[Any] | None:
+    def _require_plain_values(cls, values: Sequence[Any] | None) -> Sequence[Any] | None:
         for value in values or ():
             items = value if isinstance(value, list | tuple) else [value]
             if any(isinstance(item, dict | list | tuple) for item in items):
@@ -72,7 +72,7 @@ class Swept(Section):
         return values
 
     @model_validator(mode="after")
-    def _consistent(self) -> "Swept":
+    def _check_consistency(self) -> "SweptValues":
         kinds = [kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None]
         if len(kinds) != 1:
             raise ValueError(f"give exactly one of {', '.join((*_GRID, *_DISTRIBUTIONS))}")

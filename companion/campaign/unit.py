@@ -99,7 +99,7 @@ def _worker_address() -> str:
 def size_of_units(cases: int, case_s: float, workers: int) -> int:
     """The number of cases in a unit of work, if a case takes `case_s` s of wall time.
 
-    0 workers, while the first is awaited, count as 1.
+    `workers` is 0 while the first worker is awaited, and then counts as 1.
     """
     size_by_time = int(LONGEST_UNIT_S / max(case_s, 1e-6))
     size_by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))

@@ -35,7 +35,7 @@ def versions() -> Versions:
 
 
 def source_digest() -> str:
-    """SHA-256 of all source code that a case may run, its first `_DIGEST_LENGTH` hex digits."""
+    """The first `_DIGEST_LENGTH` hex digits of the SHA-256 of all code that cases may run."""
     sha256 = hashlib.sha256()
     base = Path(__file__).parents[2]
     for path in _sources(base):

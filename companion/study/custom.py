@@ -29,7 +29,7 @@ from companion.study.measures import (
     settling_time,
     signed_distance_from_line,
 )
-from companion.study.methods import LIMIT, METHOD_BY_PLANNER, Method, planner_of
+from companion.study.methods import LIMIT_STYLE, METHOD_BY_PLANNER, Method, planner_of
 from companion.study.outcome import Cell, Job, Outcome, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
 
@@ -142,7 +142,7 @@ def _fly(case: Case, method: Method, rate_hz: float) -> Response:
 def _reference(case: Case, rate_hz: float) -> Floats:
     """(samples + 1, 2) coefficients of the first-order reference.
 
-    With `rate_limit: paper` the speed of the reference is limited by equation 33.
+    With `rate_limit: paper` equation 33 of the paper limits how fast the reference moves.
     """
     model = FirstOrderReference(case.gain_per_s, case.planner_limits().coefficient_speed)
     return case.step(rate_hz).reference(model)
@@ -189,12 +189,15 @@ def _figure(case: Case, responses: Responses) -> Figure:
             from_straight_line,
             step.time,
             signed_distance_from_line(response)[:, worst_heading[m]],
-            m.line,
+            m.line_style,
         )
         draw_line(
-            from_reference, step.time, deviation(response, reference)[:, worst_heading[m]], m.line
+            from_reference,
+            step.time,
+            deviation(response, reference)[:, worst_heading[m]],
+            m.line_style,
         )
-        draw_line(rate, step.time[:-1], response.tilt_rate[:, worst_heading[m]], m.line)
+        draw_line(rate, step.time[:-1], response.tilt_rate[:, worst_heading[m]], m.line_style)
     from_straight_line.set(title="Distance from the line", xlabel="time, s", ylabel="to its right")
     from_reference.set(
         title="Distance from the reference", xlabel="time, s", ylabel="|c − reference|"
@@ -202,6 +205,6 @@ def _figure(case: Case, responses: Responses) -> Figure:
     label_tilt_rate(rate, "Tilt rate commanded")
     limit = case.planner_limits().max_tilt_rate
     if limit is not None:
-        rate.axhline(limit, **LIMIT)
+        rate.axhline(limit, **LIMIT_STYLE)
     north.legend()
     return figure

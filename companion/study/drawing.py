@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from companion.study.methods import REFERENCE, Line, Method
+from companion.study.methods import REFERENCE_STYLE, LineStyle, Method
 from companion.study.step import Floats
 
 _THINNED_POINTS = 400
-"""Lines are thinned to about this number of points; otherwise a page would be megabytes."""
+"""Smallest number of points of a thinned line; without thinning a page would have megabytes."""
 
 STYLE: Any = {  # Any, because matplotlib types the keys as a literal of 300 names
     "font.size": 9.0,
@@ -34,8 +34,8 @@ def new_figure(
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def draw_line(axes: Axes, x: Floats, y: Floats, line: Line, label: str = "") -> None:
-    """Draw a line, thinned to fewer than about two times `_THINNED_POINTS` points."""
+def draw_line(axes: Axes, x: Floats, y: Floats, line: LineStyle, label: str = "") -> None:
+    """Draw a line, thinned to fewer than two times `_THINNED_POINTS` points if it has more."""
     stride = max(1, len(x) // _THINNED_POINTS)
     keep = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
     axes.plot(x[keep], y[keep], **line, label=label or None)
@@ -54,7 +54,7 @@ def draw_response(
     """
     for method, label, c in curves:
         for axes, values in ((north, c[:, 0]), (east, c[:, 1])):
-            draw_line(axes, time, values, method.line, label)
+            draw_line(axes, time, values, method.line_style, label)
     label_response(north, east)
 
 
@@ -73,8 +73,8 @@ def draw_reference(
     north: Axes, east: Axes, time: Floats, reference: Floats, label: str = "first-order reference"
 ) -> None:
     """Draw the (n, 2) coefficients of a reference model over the curves."""
-    draw_line(north, time, reference[:, 0], REFERENCE, label)
-    draw_line(east, time, reference[:, 1], REFERENCE, label)
+    draw_line(north, time, reference[:, 0], REFERENCE_STYLE, label)
+    draw_line(east, time, reference[:, 1], REFERENCE_STYLE, label)
 
 
 def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: Floats) -> None:
@@ -86,22 +86,24 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: F
         ends: (2, 2), start and target.
     """
     for method, label, c in curves:
-        draw_line(axes, c[:, 1], c[:, 0], method.line, label)
-    axes.plot(ends[:, 1], ends[:, 0], **REFERENCE)
+        draw_line(axes, c[:, 1], c[:, 0], method.line_style, label)
+    axes.plot(ends[:, 1], ends[:, 0], **REFERENCE_STYLE)
     axes.plot(*ends[0, ::-1], "o", color="black", markersize=4)
     axes.plot(*ends[1, ::-1], "*", color="black", markersize=8)
     axes.set(title="Path (● start, ★ target)", xlabel="$a_E$", ylabel="$a_N$")
 
 
-def note_magnification(axes: Axes, axis: str, span: float, other: str, other_span: float) -> None:
-    """Write below the title of a panel how many times larger the scale of one axis is.
+def note_magnification(
+    axes: Axes, axis: str, span: float, other_axis: str, other_span: float
+) -> None:
+    """Write below the title of a panel how many times one axis is magnified compared with another.
 
     Args:
         axes: the panel.
         axis: name of the axis.
         span: range of values that the axis shows.
-        other: name of the axis that it is compared with.
+        other_axis: name of the axis that it is compared with.
         other_span: range of values that the other axis shows.
     """
     factor = other_span / span
-    axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{factor:.0f} of {other}")
+    axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{factor:.0f} of {other_axis}")

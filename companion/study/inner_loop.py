@@ -109,8 +109,8 @@ class InnerLoop:
     def rate_time_63(self) -> float:
         """Time until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint in hover, s.
 
-        The time includes all delays, and can be compared with 1/p of a planner. It must be shorter
-        than `ROLL_STEP_S`.
+        The time includes all delays, and can be compared with 1/p of a planner with gain p.
+        It must be shorter than `ROLL_STEP_S`.
         """
         target_rate = ROLL_STEP.roll * (1.0 - exp(-1.0))
         flight = self.fly(

@@ -1,4 +1,4 @@
-"""Measures of a response, such as its cross-track, and the second-order model fitted to it."""
+"""Measures of a response, such as its cross-track error, and a second-order model fitted to it."""
 
 from math import exp, log
 from typing import NamedTuple
@@ -13,8 +13,8 @@ from companion.study.step import Floats, Response, Step
 FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second order: ζ")
 """Titles of `DelayedSecondOrder.cells`."""
 
-_THINNING = 10
-"""Number of samples from one to the next to which the second-order model is fitted."""
+_FIT_STRIDE = 10
+"""The second-order model is fitted to every sample whose index is a multiple of this number."""
 _AT_REST = Coefficients(0.0, 0.0)
 _LOWER_BOUNDS = np.array([log(0.1), log(0.01), 0.0])
 """Lower bounds of log ω (ω in rad/s), log ζ and the dead time (s) in the fit."""
@@ -52,7 +52,7 @@ def cross_track(response: Response) -> Floats:
 def settling_time(response: Response, share: float = 0.05) -> Floats:
     """(headings,) time from which the distance to the target stays within `share` of the step, s.
 
-    The time is inf if the response ends outside.
+    The time is inf if the response ends outside this distance.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     offset = response.coefficients - target[:, None]
@@ -113,7 +113,7 @@ def fit_second_order(step: Step, path: Floats) -> DelayedSecondOrder:
         step: the step that was flown.
         path: (samples + 1, 2) coefficients.
     """
-    time, measured = step.time[::_THINNING], path[::_THINNING]
+    time, measured = step.time[::_FIT_STRIDE], path[::_FIT_STRIDE]
 
     def residual(unknown: Floats) -> tuple[Floats, Floats]:
         return np.empty(0), (measured - second_order_path(step, _fit_from(unknown), time)).ravel()

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, cast
 from companion.attitude import Limits, make_planner
 from companion.attitude.planner import LawPlanner
 
-Line = dict[str, Any]
+LineStyle = dict[str, Any]
 """Keyword arguments of a line in matplotlib."""
 
 
@@ -28,15 +28,15 @@ class Method(NamedTuple):
     """Line width, points."""
 
     @property
-    def line(self) -> Line:
+    def line_style(self) -> LineStyle:
         """Keyword arguments for a line of this method."""
         style = (0, self.dashes) if self.dashes else "-"
         return {"color": self.colour, "linestyle": style, "linewidth": self.width}
 
 
-LIMIT: Line = {"color": "#666666", "linestyle": "-", "linewidth": 0.8}
+LIMIT_STYLE: LineStyle = {"color": "#666666", "linestyle": "-", "linewidth": 0.8}
 """Line style of a limit."""
-REFERENCE: Line = {"color": "black", "linestyle": (0, (1, 1.5)), "linewidth": 1.4}
+REFERENCE_STYLE: LineStyle = {"color": "black", "linestyle": (0, (1, 1.5)), "linewidth": 1.4}
 """Line style of a reference model."""
 
 QUATERNION = Method("quaternion", "quaternion", "#E69F00", width=3.4)
@@ -44,13 +44,13 @@ SO3 = Method("so3", "so3", "#009E73", (5, 2), 2.4)
 EULER = Method("euler", "euler", "#D55E00", (7, 2, 1.5, 2), 1.8)
 PROPOSED = Method("first-order", "first-order", "#0072B2", width=1.3)
 PAPER_LIMIT = Method("first-order", "first-order, paper's limit", "#56B4E9", (3, 1.2), 2.0)
-FOLLOWING = Method("model-following", "model-following", "#332288", width=2.2)
+MODEL_FOLLOWING_METHOD = Method("model-following", "model-following", "#332288", width=2.2)
 EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
 PAPER_METHODS = (QUATERNION, SO3, EULER, PROPOSED)
 """The methods of the paper's comparison, in drawing order: wide lines first."""
 METHOD_BY_PLANNER = {method.planner: method for method in (*PAPER_METHODS, EXACT)}
-"""The method of every planner without memory, by name of the planner, in drawing order."""
+"""The method of every planner that keeps no state, by name of the planner, in drawing order."""
 
 
 def planner_of(
@@ -59,5 +59,5 @@ def planner_of(
     limits: Limits = Limits(),  # noqa: B008  (frozen)
     yaw_gain: float = 2.0,
 ) -> LawPlanner:
-    """The planner of a method, except `FOLLOWING`; it is the same code that flies a vehicle."""
+    """The planner of any method but model-following; flights use the same code."""
     return cast(LawPlanner, make_planner(method.planner, gain, yaw_gain, limits))

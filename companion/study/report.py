@@ -30,7 +30,7 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
 
 
 def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
-    """Write the page; the figures of `write_outcome` must be in its folder.
+    """Write the page; the figures of `write_outcome` must be in the page's folder.
 
     Raises:
         OSError: the page cannot be written, or a figure is missing.

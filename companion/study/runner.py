@@ -76,7 +76,7 @@ def _run_named(out: Path, name: str, tick: Tick) -> Outcome:
     """In a worker process, run a study that takes no case, and write its files.
 
     The returned outcome has an empty figure, because figures are too large to pass between
-    processes; the file has the real one.
+    processes. The written files have the complete figure.
     """
     outcome = _run(_make_job(registry.STUDIES[name], None), out, tick)
     return replace(outcome, figure=Figure())

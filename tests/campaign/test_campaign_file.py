@@ -8,7 +8,7 @@ import pytest
 from companion.campaign import estimate, folder, loading
 from companion.campaign.design import few_samples_warning, planned_cases, seed_of
 from companion.campaign.estimate import duration_text
-from companion.campaign.swept import Swept
+from companion.campaign.swept import SweptValues
 from companion.cli.main import main
 from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError
@@ -103,7 +103,7 @@ def test_distributions_have_their_quantiles(tmp_path, sampling):
 
 
 def test_choices_come_equally_often():
-    swept = Swept(choice=("a", "b", "c", "d"))
+    swept = SweptValues(choice=("a", "b", "c", "d"))
     assert [swept.quantile(share) for share in (0.0, 0.2499, 0.25, 0.6, 0.9999)] == list("aabcd")
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from companion.campaign import folder, loading, store
 from companion.campaign.report import page
-from companion.campaign.report.page import _few_samples, run
+from companion.campaign.report.page import _few_samples_warning, run
 from companion.campaign.report.results import Results
 from companion.campaign.report.statistics import levels, pareto_front, share_of
 from companion.files.yaml_file import ConfigError
@@ -170,7 +170,7 @@ def test_only_sampled_factors_can_have_too_few_samples(sampled, warnings):
     """A grid of 20 values is no sample, whatever its length."""
     factors, columns = {"a": {"sampled": sampled}}, {"a": np.arange(20.0)}
     results = SimpleNamespace(factors=factors, columns=columns)
-    assert len(list(_few_samples(results))) == warnings
+    assert len(list(_few_samples_warning(results))) == warnings
 
 
 def test_reasons_are_counted_whatever_numbers_are_in_them():

@@ -11,7 +11,7 @@ from companion.campaign.tune import candidates
 from companion.campaign.tune.candidates import (
     cases,
     configured_values,
-    starts,
+    start_candidates,
     tune_section,
     unseen_campaign,
 )
@@ -147,7 +147,7 @@ def test_a_flight_that_ended_early_is_no_error_but_is_told(tmp_path):
     flown, ended = [row_of(case) for case in campaign(tmp_path).cases()], None
     ended = flown[0] | {"result": "the fence was left"}
     score = score_of([*flown[:2], ended, flown[3]], 1.0)
-    assert score.inside == (True, True, False, True)
+    assert score.is_inside == (True, True, False, True)
     assert Score.from_attributes(json.loads(json.dumps(score.as_attributes()))) == score
     comparison = compare(score, score_of(flown, 1.0), 4)
     assert comparison.samples == 3
@@ -160,7 +160,7 @@ def test_a_flight_that_ended_early_is_no_error_but_is_told(tmp_path):
 @pytest.mark.slow
 def test_the_search_also_starts_with_what_companion_tune_proposes(tmp_path):
     made = campaign(tmp_path)
-    found = list(starts(made, tune_section(made)))
+    found = list(start_candidates(made, tune_section(made)))
     assert [start.name for start in found] == ["the configuration", "companion tune"]
     assert found[1].values["planner.gain_per_s"] != 5.0
 
@@ -174,7 +174,7 @@ def test_a_first_flight_teaches_a_vehicle_that_is_40_percent_off(tmp_path):
     known = learned_config(made)
     assert known.vehicle.lag_ms + known.vehicle.dead_time_ms == pytest.approx(1.4 * 87.0, rel=0.1)
     assert known.guidance.drag_per_s == pytest.approx(1.4, rel=0.15)
-    found = list(starts(made, tune_section(made), known))
+    found = list(start_candidates(made, tune_section(made), known))
     assert [start.name for start in found] == [
         "the configuration",
         "a first flight",

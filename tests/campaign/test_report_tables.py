@@ -14,7 +14,7 @@ from companion.campaign.flight import _ending, _FaultInjector
 from companion.campaign.report import page, plots, tables
 from companion.campaign.report.results import Results
 from companion.campaign.report.sensitivity import Influence, influences
-from companion.campaign.report.statistics import choices
+from companion.campaign.report.statistics import choice_groups
 from tests.campaign.test_campaign_file import load
 
 SAMPLED = {"sampled": True}
@@ -156,11 +156,11 @@ def test_the_pareto_plot_needs_two_points_and_marks_the_front():
 
 def test_very_many_choices_are_thinned_out():
     told = {"ok": [True] * 1000, "limits.max_tilt_deg": list(np.arange(1000.0))}
-    found = choices(results(told, ["limits.max_tilt_deg"]))
+    found = choice_groups(results(told, ["limits.max_tilt_deg"]))
     assert [choice.name for choice in found[:2]] == ["case 0", "case 3"]
     assert sum(choice.cases.sum() for choice in found) == len(found) == 334
     twice = {"ok": [True] * 4, "limits.max_tilt_deg": [20.0, 20.0, 30.0, None]}
-    found = choices(results(twice, ["limits.max_tilt_deg"]))
+    found = choice_groups(results(twice, ["limits.max_tilt_deg"]))
     assert [(choice.name, choice.cases.tolist()) for choice in found] == [
         ("limits.max_tilt_deg = null", [False, False, False, True]),
         ("limits.max_tilt_deg = 20", [True, True, False, False]),

@@ -12,13 +12,13 @@ from sqlalchemy.pool import Pool
 
 from companion.campaign import unit
 from companion.campaign.cluster import ClusterError
-from companion.campaign.swept import Swept
+from companion.campaign.swept import SweptValues
 from companion.campaign.tune import candidates, command, first_flight
 from companion.campaign.tune.candidates import (
-    Start,
+    StartCandidate,
+    candidates_near,
     clamped_to_search,
-    starts,
-    starts_near,
+    start_candidates,
     suggested_values,
     tune_section,
 )
@@ -180,21 +180,21 @@ def test_a_vehicle_that_no_proposal_covers_starts_without_one(tmp_path, monkeypa
     made = campaign(tmp_path)
     learned = changed(made.base, {"planner": {"gain_per_s": 7.5}}, "a test")
     monkeypatch.setattr(candidates, "propose", refuse)
-    found = list(starts(made, tune_section(made), learned))
+    found = list(start_candidates(made, tune_section(made), learned))
     assert [start.name for start in found] == ["the configuration", "a first flight"]
     assert found[1].values["planner.gain_per_s"] == 7.5
 
 
 SEARCH = {
-    "planner.name": Swept(choice=("exact", "so3")),
-    "planner.gain_per_s": Swept(uniform=(2.0, 8.0)),
-    "guidance.drag_per_s": Swept(loguniform=(0.2, 2.0)),
+    "planner.name": SweptValues(choice=("exact", "so3")),
+    "planner.gain_per_s": SweptValues(uniform=(2.0, 8.0)),
+    "guidance.drag_per_s": SweptValues(loguniform=(0.2, 2.0)),
 }
 
 
 def test_candidates_near_a_start_stay_in_their_ranges_and_keep_what_is_no_number():
     values = {"planner.name": "so3", "planner.gain_per_s": 7.9, "guidance.drag_per_s": 0.21}
-    found = [start.values for start in starts_near(Start("x", values), SEARCH, 200, 1)]
+    found = [start.values for start in candidates_near(StartCandidate("x", values), SEARCH, 200, 1)]
     assert {each["planner.name"] for each in found} == {"so3"}
     gains = sorted(each["planner.gain_per_s"] for each in found)
     drags = sorted(each["guidance.drag_per_s"] for each in found)
@@ -221,7 +221,7 @@ def test_suggestions_are_rounded_within_their_range():
             assert log == (key == "guidance.drag_per_s")
             return low + 0.98765432 * (high - low)
 
-    ranges = SEARCH | {"limits.max_climb_m_s": Swept(uniform=(0.0, 1.0001))}
+    ranges = SEARCH | {"limits.max_climb_m_s": SweptValues(uniform=(0.0, 1.0001))}
     assert suggested_values(Trial(), ranges) == {
         "planner.name": "so3",
         "planner.gain_per_s": 7.93,

@@ -21,7 +21,7 @@ from companion.study.nmpc.variants import (
     MODELS,
     RATE_HZ,
     STYLES,
-    UNLIMITED,
+    UNLIMITED_MODELS,
     Variant,
 )
 
@@ -76,7 +76,7 @@ def out(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(flights, "FLIGHT_S", 1)
         patch.setattr(flights, "SETTLED_AFTER_S", 0.5)
-        patch.setattr(timing, "_REQUESTS", 20)
+        patch.setattr(timing, "_REQUEST_COUNT", 20)
         patch.setattr("companion.study.nmpc.study.PARTS", 3)
         assert main(["study", "nmpc", "--out", str(folder)]) == 0
     return folder
@@ -160,13 +160,13 @@ def flights_of(milliseconds=None, errors=None, unknown=0.05):
     }
     less = {
         (EIGHT.name, Variant(model, knows_dead_time=False)): Flown(2.0, unknown)
-        for model in UNLIMITED
+        for model in UNLIMITED_MODELS
     }
     return {**known, **less}
 
 
 ALIKE = {model: {"a state": 9.0} for model in MODELS}
-FAR = ALIKE | {model: {"a state": np.inf} for model in UNLIMITED}
+FAR = ALIKE | {model: {"a state": np.inf} for model in UNLIMITED_MODELS}
 QUICK = timing.ProcessTimes(np.full(99, 5.0), np.full(99, 4.0), 0)
 
 
@@ -200,7 +200,7 @@ QUICK = timing.ProcessTimes(np.full(99, 5.0), np.full(99, 4.0), 0)
             QUICK._replace(answer_ms=np.full(9, 11.0)),
             False,
         ),
-        ("answers within 10 ms", flights_of(), ALIKE, QUICK._replace(troubles=1), False),
+        ("answers within 10 ms", flights_of(), ALIKE, QUICK._replace(bad_answer_count=1), False),
     ],
 )
 def test_a_verdict_is_made_of_the_numbers(words, flown, counts, timed, holds):

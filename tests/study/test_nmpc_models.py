@@ -10,7 +10,7 @@ from companion.attitude import Target, make_planner
 from companion.nmpc import Settings
 from companion.nmpc.model import Motion, integrator
 from companion.nmpc.receding_horizon import RecedingHorizon
-from companion.study.nmpc.models import MAKERS
+from companion.study.nmpc.models import MODEL_MAKERS
 from tests.nmpc import rigid
 from tests.nmpc.rigid import POSITION, VELOCITY, H
 from tests.nmpc.test_receding_horizon import (
@@ -23,11 +23,11 @@ from tests.nmpc.test_receding_horizon import (
 )
 
 ATTITUDE_MODELS = ("euler", "quaternion")
-NOT_FLOWN = [name for name in MAKERS if name != "limited"]
+NOT_FLOWN = [name for name in MODEL_MAKERS if name != "limited"]
 
 
 def make_model(name, **changes):
-    return MAKERS[name](Settings(gravity=rigid.GRAVITY, **changes))
+    return MODEL_MAKERS[name](Settings(gravity=rigid.GRAVITY, **changes))
 
 
 @pytest.mark.parametrize("name", ATTITUDE_MODELS)
@@ -128,10 +128,10 @@ def test_the_heading_error_is_the_heading_left(name):
 def test_on_the_reference_the_plan_is_what_the_reference_takes(name):
     # Held Euler yaw is not held heading, where the tilt turns.
     within = 0.1 if name == "euler-reduced" else 0.05
-    assert_plans_what_the_reference_takes(MAKERS[name], heading_within=within)
+    assert_plans_what_the_reference_takes(MODEL_MAKERS[name], heading_within=within)
 
 
 def test_the_proposed_model_knows_no_limit():
-    horizon = RecedingHorizon(Settings(), MAKERS["proposed"])
+    horizon = RecedingHorizon(Settings(), MODEL_MAKERS["proposed"])
     plan = horizon.solve(0.0, at_rest(STEADY), nodes(SETTINGS, STEADY), CONDITIONS)
     assert hypot(plan.north, plan.east) > 1.0

@@ -22,10 +22,10 @@ from companion.files.yaml_file import ConfigError
 from companion.study.track import flights, study
 from companion.study.track.findings import find
 from companion.study.track.flights import PositionError, TrackedFlight
-from companion.study.track.tasks import WINDY, Course, Task, tasks
+from companion.study.track.tasks import WINDY, Task, TrajectoryAtSpeed, tasks
 
 OURS = "model-following"
-BRIEF = Course("figure-eight", 4.0, 1.0)
+BRIEF = TrajectoryAtSpeed("figure-eight", 4.0, 1.0)
 TASKS = (Task(BRIEF, OURS), Task(BRIEF, OURS, lead=False), Task(BRIEF, OURS, wind=WINDY))
 
 
@@ -115,7 +115,7 @@ def test_a_flight_that_fails_has_no_error_to_show(vehicle):
 
 def test_what_cannot_be_flown_ends_the_study_before_more_is_begun():
     ticked = []
-    too_fast = [Task(Course("circle", 50.0, 1.0), planner) for planner in PLANNER_NAMES]
+    too_fast = [Task(TrajectoryAtSpeed("circle", 50.0, 1.0), planner) for planner in PLANNER_NAMES]
     many = [task._replace(wind=wind) for task in too_fast for wind in range(9)]
     with pytest.raises(ConfigError, match=r"limits\.max_tilt_rate_deg_s allows 250"):
         flights.fly_all(many, ticked.append)
@@ -127,7 +127,7 @@ def made_up(**others):
     rank = {planner: n for n, planner in enumerate(PLANNER_NAMES)}
     flown = {}
     for task in tasks():
-        rms = 1e-3 * (20.0 + rank[task.planner] + task.course.speed) + 0.01 * task.wind
+        rms = 1e-3 * (20.0 + rank[task.planner] + task.trajectory.speed) + 0.01 * task.wind
         if task.planner == OURS:
             rms *= 0.5 if task.lead else 5.0
         rms = others.get(str(task), rms)
@@ -202,7 +202,7 @@ def test_the_findings_follow_from_the_numbers():
     assert not verdicts(**{windy: 0.13})[-1]
     beaten = find(made_up(**{"circle, 3 m/s, model-following": 0.0233}))[0].evidence
     assert "circle, 3 m/s: 23.3 mm, first-order 23.0 mm" in beaten
-    assert "on 6 of 7 courses; on 1 another planner is better" in beaten
+    assert "on 6 of 7 trajectories; on 1 another planner is better" in beaten
 
 
 def test_a_flight_that_failed_is_told_as_such_everywhere(tmp_path, monkeypatch, capsys):
@@ -230,7 +230,8 @@ SHORT = """
 import sys
 from companion.cli.main import main
 from companion.study.track import study, tasks
-arcs = [tasks.Task(tasks.Course(tasks.CIRCLE, 2.0, 0.1), name) for name in tasks.PLANNER_NAMES]
+arc = tasks.TrajectoryAtSpeed(tasks.CIRCLE, 2.0, 0.1)
+arcs = [tasks.Task(arc, name) for name in tasks.PLANNER_NAMES]
 study.tasks = lambda: arcs
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))

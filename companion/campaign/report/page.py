@@ -17,8 +17,8 @@ from companion.campaign.cluster import require_packages
 from companion.campaign.folder import CAMPAIGN_FILE_NAME
 from companion.campaign.loading import load
 from companion.campaign.report import plots, tables
-from companion.campaign.report.results import RATES, TRUE_ERROR, Results, label
-from companion.campaign.report.sensitivity import FEWEST, Influence, influences
+from companion.campaign.report.results import RATE_OUTCOME, TRUE_ERROR, Results, label
+from companion.campaign.report.sensitivity import FEWEST_CASES, Influence, influences
 from companion.campaign.report.statistics import levels, share_of
 from companion.extras import require
 from companion.files.write_whole import write_whole
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 
 PARQUET, CSV = "results.parquet", "results.csv"
 _DONE = 0  # exit code
-_GRID_LIKE = 12
+_MOST_GRID_VALUES = 12
 """Largest number of different values with which a sampled factor counts as a grid."""
-_FEW_SAMPLES = 60
+_ENOUGH_SAMPLES = 60
 """Number of different values from which the influences of sampled factors can be told apart."""
 
 
@@ -84,7 +84,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
     """The HTML of the page about a campaign as stored in its folder."""
     by_outcome = {
         name: found_influences
-        for name in (results.error_outcome, RATES, "ok")
+        for name in (results.error_outcome, RATE_OUTCOME, "ok")
         if name == "ok" or results.is_measured(name)
         if (found_influences := influences(results, name))
     }
@@ -106,7 +106,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         f"Campaign {results.name}",
         shown_plots,
         headline=headline(results),
-        good=not results.true_cases("crashed") and bool(_success(results).all()),
+        good=not results.count_true("crashed") and bool(_successes(results).all()),
         lines=[*missing_cases_note(results), *what_to_look_at(results, by_outcome)],
         tables=[table for table in first_tables if table is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
@@ -118,12 +118,12 @@ def headline(results: Results) -> str:
 
     Success is a good flight or, if every case has a fault, an ending as documented for the fault.
     """
-    share = share_of(_success(results))
+    share = share_of(_successes(results))
     success = "with a fault ended as documented" if results.all_faulty else "good"
     return f"{results.name}: {share.case_count} of {share.total} {results.noun} {success}: {share}"
 
 
-def _success(results: Results) -> NDArray[np.bool_]:
+def _successes(results: Results) -> NDArray[np.bool_]:
     """(cases,): whether each case was a success in the sense of `headline`."""
     return results.as_documented if results.all_faulty else results.good
 
@@ -145,7 +145,7 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     `by_outcome` holds the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
-    if crashed_count := results.true_cases("crashed"):
+    if crashed_count := results.count_true("crashed"):
         yield (
             f"{crashed_count} {results.noun} crashed; they stand first in the table of worst cases."
         )
@@ -158,7 +158,7 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     if reasons:
         (reason, count) = reasons.most_common(1)[0]
         yield f"Most frequent reason why a case was not good, {count} times: {reason}."
-    yield from _most_influential(results, by_outcome)
+    yield from _influence_sentences(results, by_outcome)
     if results.error_outcome == TRUE_ERROR:
         yield (
             "Errors are distances of the true vehicle from the reference. A flight does not know "
@@ -167,15 +167,15 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
         )
 
 
-def _most_influential(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
+def _influence_sentences(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
     if results.error_outcome in by_outcome:
         first = by_outcome[results.error_outcome][0]
         error = label(results.error_outcome).partition(",")[0]
-        share = f"{first.share:.0%} ± {first.confidence:.0%}"
+        share = f"{first.sobol_index:.0%} ± {first.confidence:.0%}"
         yield f"{first.factor} explains {share} of the variance of the {error} by itself."
-        yield from _few_samples(results)
+        yield from _few_samples_warning(results)
     elif results.factors:
-        yield f"Sensitivity needs at least {FEWEST} {results.noun} with different outcomes."
+        yield f"Sensitivity needs at least {FEWEST_CASES} {results.noun} with different outcomes."
     worst = min(
         (
             (share_of(results.good[level.cases]), name, level.name)
@@ -191,7 +191,7 @@ def _most_influential(results: Results, by_outcome: dict[str, list[Influence]]) 
         yield f"Success is lowest with {name} = {value}: {lowest}."
 
 
-def _few_samples(results: Results) -> Iterator[str]:
+def _few_samples_warning(results: Results) -> Iterator[str]:
     """A warning if the sampled factors took few different values."""
     distinct = [
         len(np.unique(column))
@@ -199,7 +199,7 @@ def _few_samples(results: Results) -> Iterator[str]:
         if factor["sampled"] and (column := results.columns[name]).dtype == float
     ]
     largest = max(distinct, default=0)
-    if _GRID_LIKE < largest < _FEW_SAMPLES:
+    if _MOST_GRID_VALUES < largest < _ENOUGH_SAMPLES:
         yield (
             f"Only {largest} different samples of the distributions were flown, so the influence "
             "of one sampled factor may show for the others, too; raise `samples`."

@@ -5,9 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from companion.campaign.report.results import RATES, THRUST, Floats, Results, label
+from companion.campaign.report.results import RATE_OUTCOME, THRUST_OUTCOME, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
-from companion.campaign.report.statistics import choices, levels, median, pareto_front, share_of
+from companion.campaign.report.statistics import (
+    choice_groups,
+    levels,
+    median,
+    pareto_front,
+    share_of,
+)
 from companion.report.plots import (
     IDEAL_COLOUR,
     MEASURED_COLOUR,
@@ -31,7 +37,7 @@ _DISTRIBUTIONS = (
 )
 _SHOWN_SHARE = 0.995
 """Quantile at which the axis of a histogram ends; its last bin also holds all larger values."""
-_BINS = 40
+_BIN_COUNT = 40
 """Number of bins of a histogram."""
 
 
@@ -77,7 +83,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
                 "type": "bar",
                 "name": "good" if outcome == "ok" else label(outcome),
                 "x": [influence.factor for influence in found],
-                "y": numbers(np.array([100.0 * influence.share for influence in found])),
+                "y": numbers(np.array([100.0 * influence.sobol_index for influence in found])),
                 "error_y": {
                     "type": "data",
                     "array": numbers(
@@ -100,9 +106,13 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
 def pareto(results: Results) -> Iterator[Plot]:
     """Error against commanded rate, coloured by thrust deviation; the Pareto front is marked."""
     columns = results.columns
-    names = [results.error_outcome, RATES, *([THRUST] if results.is_measured(THRUST) else [])]
+    names = [
+        results.error_outcome,
+        RATE_OUTCOME,
+        *([THRUST_OUTCOME] if results.is_measured(THRUST_OUTCOME) else []),
+    ]
     points, titles = [], []
-    for choice in choices(results):
+    for choice in choice_groups(results):
         part = choice.cases
         values = np.array([median(columns[name][part]) for name in names])
         if np.isfinite(values).all():
@@ -133,7 +143,7 @@ def pareto(results: Results) -> Iterator[Plot]:
         f"case. No other point is better than one on the front in {criteria} at once. Each point "
         "shows its success rate."
     )
-    layout = axes(x=label(RATES), y=label(results.error_outcome))
+    layout = axes(x=label(RATE_OUTCOME), y=label(results.error_outcome))
     yield Plot("Pareto front", note, traces, layout, 420)
 
 
@@ -176,7 +186,7 @@ def distributions(results: Results) -> Iterator[Plot]:
         high = float(np.quantile(values[is_finite], _SHOWN_SHARE))
         if high <= low:
             continue
-        edges = np.linspace(low, high, _BINS + 1)
+        edges = np.linspace(low, high, _BIN_COUNT + 1)
         traces = []
         for good, title, colour in (
             (True, "good", MEASURED_COLOUR),

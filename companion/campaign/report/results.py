@@ -26,9 +26,9 @@ Column = NDArray[Any]
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
 TRUE_ERROR = "position_rms_m"
-ERRORS = (TRUE_ERROR, "model_deviation_max")
+ERROR_OUTCOMES = (TRUE_ERROR, "model_deviation_max")
 """Outcomes that may serve as the campaign's error; the first one that was measured is used."""
-RATES, THRUST = "rate_rms_rad_s", "thrust_rms"
+RATE_OUTCOME, THRUST_OUTCOME = "rate_rms_rad_s", "thrust_rms"
 
 
 def label(name: str) -> str:
@@ -48,7 +48,7 @@ class Results:
     planned_count: int
     """Number of cases of the whole campaign, flown or not."""
     factors: Mapping[str, Any]
-    """Metadata of each factor, by name: `Swept.description`, and its unit."""
+    """Metadata of each factor, by name: `SweptValues.description`, and its unit."""
     table: "pa.Table"
     """All rows, as returned by `store.read`."""
 
@@ -118,14 +118,14 @@ class Results:
 
     @property
     def error_outcome(self) -> str:
-        """Name of the outcome that serves as the campaign's error; see `ERRORS`."""
-        return next((name for name in ERRORS if self.is_measured(name)), ERRORS[-1])
+        """Name of the outcome that serves as the campaign's error; see `ERROR_OUTCOMES`."""
+        return next((name for name in ERROR_OUTCOMES if self.is_measured(name)), ERROR_OUTCOMES[-1])
 
     def is_measured(self, name: str) -> bool:
         """Whether there is a column of numbers with this name, with at least one finite value."""
         column = self.columns.get(name)
         return column is not None and column.dtype == float and bool(np.isfinite(column).any())
 
-    def true_cases(self, name: str) -> int:
+    def count_true(self, name: str) -> int:
         """Number of cases in which a boolean column is true; null counts as false."""
         return sum(value is True for value in self.columns.get(name, ()))

@@ -2,8 +2,8 @@
 
 The first-order Sobol index of a factor is the share of the outcome's variance that would vanish on
 average if the factor were known. It is estimated from given samples: the cases are divided into
-classes of the factor, and the variance between the classes is compared with the whole. The joint
-effect of two factors is in no first-order index.
+bins by the value of the factor, and the variance between the bins is compared with the variance of
+all cases. The joint effect of two factors is in no first-order index.
 """
 
 from typing import NamedTuple
@@ -13,10 +13,10 @@ import numpy as np
 from companion.campaign.report.results import Column, Floats, Results
 from companion.report.plots import even_indices
 
-FEWEST = 100
+FEWEST_CASES = 100
 """Smallest number of cases for useful indices."""
 _MOST_CASES = 5000
-"""Largest number of cases used; if there are more, cases at even distances are taken."""
+"""Largest number of cases used; if there are more, this number of evenly spaced cases is used."""
 _SEED = 1
 
 
@@ -24,17 +24,17 @@ class Influence(NamedTuple):
     """The first-order Sobol index of a factor on an outcome."""
 
     factor: str
-    share: float
-    """The index, 0..1."""
+    sobol_index: float
+    """The first-order Sobol index, 0..1."""
     confidence: float
-    """Half width of its 95 % interval, by bootstrap; NaN where it cannot be found."""
+    """Half width of the index's 95 % interval, by bootstrap; NaN where bootstrap finds none."""
 
 
 def influences(results: Results, outcome: str) -> list[Influence]:
     """The influence of each factor on an outcome (a column of numbers, or `ok`), the largest first.
 
     Factors with a single value are left out. The list is empty if no factor is left, if fewer than
-    `FEWEST` cases were measured, or if the outcome is always the same.
+    `FEWEST_CASES` cases were measured, or if the outcome is always the same.
     """
     values = np.array(results.columns[outcome], dtype=float)
     rows = np.flatnonzero(np.isfinite(values))
@@ -42,7 +42,7 @@ def influences(results: Results, outcome: str) -> list[Influence]:
     values = values[rows]
     columns = {name: _as_numbers(results.columns[name][rows], values) for name in results.factors}
     columns = {name: column for name, column in columns.items() if np.ptp(column) > 0.0}
-    if len(rows) < FEWEST or not columns or not np.ptp(values) > 1e-12:
+    if len(rows) < FEWEST_CASES or not columns or not np.ptp(values) > 1e-12:
         return []
     from SALib.analyze import delta  # noqa: PLC0415  takes a second to import
 
@@ -60,7 +60,7 @@ def influences(results: Results, outcome: str) -> list[Influence]:
             Influence(name, float(index), float(half_width))
             for name, index, half_width in named_indices
         ),
-        key=lambda influence: -influence.share,
+        key=lambda influence: -influence.sobol_index,
     )
 
 
@@ -68,7 +68,7 @@ def _as_numbers(column: Column, values: Floats) -> Floats:
     """A factor (cases,) as numbers, for an outcome (cases,).
 
     Texts and booleans are numbered in the order of their mean outcome. In another order, texts with
-    different outcomes could share a class, and their difference would be lost. A null among numbers
+    different outcomes could share a bin, and their difference would be lost. A null among numbers
     becomes a number below all others.
     """
     if column.dtype == float:

@@ -14,9 +14,9 @@ _MOST_LEVELS = 12
 """Largest number of different values of a factor that are each shown as a level."""
 _RANGE_COUNT = 5
 """Number of ranges that divide a factor with more than `_MOST_LEVELS` different values."""
-_MOST_CHOICES = 300
-"""Largest number of groups of equal values; if there were more, `choices` returns single cases."""
-_NOT_CHOSEN = ("mock.", "fault", "flight.", "vehicle.")
+_MOST_GROUPS = 300
+"""Largest number of groups of equal values; with more, `choice_groups` returns single cases."""
+_UNCHOSEN_PREFIXES = ("mock.", "fault", "flight.", "vehicle.")
 """Prefixes of the factors that a user does not choose."""
 
 
@@ -144,22 +144,22 @@ def pareto_front(goals: Floats) -> NDArray[np.bool_]:
     return front
 
 
-def choices(results: Results) -> list[Group]:
+def choice_groups(results: Results) -> list[Group]:
     """The cases grouped by equal values of the swept keys that a user chooses.
 
-    Those are the keys outside `_NOT_CHOSEN`. If no two cases have equal values, or there are more
-    than `_MOST_CHOICES` groups, each group is a single case. Of many cases only every k-th is
-    returned, so that there are fewer than 2·`_MOST_CHOICES`.
+    Those are the keys outside `_UNCHOSEN_PREFIXES`. If no two cases have equal values, or there are
+    more than `_MOST_GROUPS` groups, each group is a single case. If there are many cases, only
+    every k-th is returned, so that there are fewer than 2·`_MOST_GROUPS`.
     """
-    chosen_keys = [name for name in results.factors if not name.startswith(_NOT_CHOSEN)]
+    chosen_keys = [name for name in results.factors if not name.startswith(_UNCHOSEN_PREFIXES)]
     rows = range(results.count)
     keys = [tuple(_sort_key(results.columns[name][row]) for name in chosen_keys) for row in rows]
     distinct = sorted(set(keys))
-    if len(distinct) > _MOST_CHOICES or len(distinct) == len(keys):
-        step = max(1, len(keys) // _MOST_CHOICES)
+    if len(distinct) > _MOST_GROUPS or len(distinct) == len(keys):
+        stride = max(1, len(keys) // _MOST_GROUPS)
         return [
             Group(f"case {results.columns['case'][row]}", np.arange(results.count) == row)
-            for row in rows[::step]
+            for row in rows[::stride]
         ]
     return [
         Group(

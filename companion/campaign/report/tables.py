@@ -9,7 +9,7 @@ import numpy as np
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.outcomes import OUTCOME_LABELS
-from companion.campaign.report.results import RATES, Floats, Results, label
+from companion.campaign.report.results import RATE_OUTCOME, Floats, Results, label
 from companion.campaign.report.sensitivity import Influence
 from companion.campaign.report.statistics import levels, median, share_of, worst_rows
 from companion.config.reference import keys
@@ -84,7 +84,7 @@ def success_by_factor(results: Results, order: Sequence[str]) -> Table:
     has_faults = "as_documented" in results.columns and "fault" in results.factors
     header = ["factor", "value", results.noun, "good (95 % interval)"]
     header += ["ended as documented (95 % interval)"] if has_faults else []
-    header += [f"median {label(results.error_outcome)}", f"median {label(RATES)}"]
+    header += [f"median {label(results.error_outcome)}", f"median {label(RATE_OUTCOME)}"]
     return Table("Success by factor", tuple(header), rows)
 
 
@@ -104,7 +104,7 @@ def _level_rows(results: Results, name: str) -> Iterator[tuple[str, ...]]:
             )
         row += [
             _median_text(columns[outcome][level.cases])
-            for outcome in (results.error_outcome, RATES)
+            for outcome in (results.error_outcome, RATE_OUTCOME)
         ]
         yield tuple(row)
 
@@ -121,7 +121,7 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Table:
     )
     index_texts = {
         outcome: {
-            influence.factor: f"{influence.share:.0%} ± {influence.confidence:.0%}"
+            influence.factor: f"{influence.sobol_index:.0%} ± {influence.confidence:.0%}"
             for influence in found
         }
         for outcome, found in influences.items()
@@ -140,14 +140,14 @@ def two_factors(results: Results) -> Table | None:
     They are the first two factors with 2 to `_MOST_LEVELS` values; None if there are no two.
     """
     columns = results.columns
-    few_valued = [
+    factors_with_few_values = [
         name
         for name in results.factors
         if 1 < len({str(value) for value in columns[name]}) <= _MOST_LEVELS
     ]
-    if len(few_valued) < 2:
+    if len(factors_with_few_values) < 2:
         return None
-    first, second = few_valued[0], few_valued[1]
+    first, second = factors_with_few_values[0], factors_with_few_values[1]
     second_levels = levels(columns[second])
     rows = []
     for level in levels(columns[first]):
@@ -163,7 +163,7 @@ def two_factors(results: Results) -> Table | None:
 
 
 def all_cases(results: Results) -> Table:
-    """All cases or, if they are more, `_MOST_ROWS` of them at even distances."""
+    """All cases; if there are more than `_MOST_ROWS`, evenly spaced cases."""
     shown = [name for name in results.columns if name not in ("seed", "digest")]
     count = results.count
     shown_rows = even_indices(count, _MOST_ROWS)

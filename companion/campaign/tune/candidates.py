@@ -10,7 +10,7 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.keys import replace_unchecked, with_keys
-from companion.campaign.swept import Swept
+from companion.campaign.swept import SweptValues
 from companion.config import Config
 from companion.config.flight import OPEN_LOOP
 from companion.config.known_drag import drag_prior
@@ -31,7 +31,7 @@ _NEARBY_DEVIATION = 0.15
 With `loguniform` the range is that of the logarithm."""
 
 
-class Start(NamedTuple):
+class StartCandidate(NamedTuple):
     """A candidate with which the search starts."""
 
     name: str
@@ -84,7 +84,7 @@ def unseen_campaign(campaign: Campaign, samples: int) -> Campaign:
     return replace(campaign, file=campaign.file.model_copy(update=update))
 
 
-def suggested_values(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, Any]:
+def suggested_values(trial: "Trial", search: Mapping[str, SweptValues]) -> dict[str, Any]:
     """The values that Optuna suggests for a trial; numbers are rounded to three digits."""
     values: dict[str, Any] = {}
     for key, swept in search.items():
@@ -97,21 +97,23 @@ def suggested_values(trial: "Trial", search: Mapping[str, Swept]) -> dict[str, A
     return values
 
 
-def starts(campaign: Campaign, tune: Tune, learned_config: Config | None = None) -> Iterator[Start]:
-    """The starts: the campaign's configuration, `learned_config`, and a proposal.
+def start_candidates(
+    campaign: Campaign, tune: Tune, learned_config: Config | None = None
+) -> Iterator[StartCandidate]:
+    """The first candidates: the campaign's configuration, `learned_config`, and a proposal.
 
     `learned_config` is the configuration with the values that first flights measured; None: no such
     flights. The proposal is that of `companion tune` for `learned_config` or, without it, for the
     campaign's configuration. There is no proposal if the rate loop is not known.
     """
-    yield Start(
+    yield StartCandidate(
         "the configuration",
         clamped_to_search(_present_values(campaign.base, tune.search), tune.search),
     )
     start_config = learned_config or campaign.base
     present_values = _present_values(start_config, tune.search)
     if learned_config is not None:
-        yield Start("a first flight", clamped_to_search(present_values, tune.search))
+        yield StartCandidate("a first flight", clamped_to_search(present_values, tune.search))
     try:
         changes = propose(replace_unchecked(start_config, planner={"name": "auto"})).changes
     except ConfigError:
@@ -121,14 +123,14 @@ def starts(campaign: Campaign, tune: Tune, learned_config: Config | None = None)
         for section, keys in changes.items()
         for key, value in keys.items()
     }
-    yield Start(
+    yield StartCandidate(
         "companion tune", clamped_to_search({**present_values, **proposed_values}, tune.search)
     )
 
 
-def starts_near(
-    start: Start, search: Mapping[str, Swept], count: int, seed: int
-) -> Iterator[Start]:
+def candidates_near(
+    start: StartCandidate, search: Mapping[str, SweptValues], count: int, seed: int
+) -> Iterator[StartCandidate]:
     """Candidates around a start: each number is moved by a normally distributed share of its range.
 
     The optimum is likelier near a reasonable start than elsewhere in the ranges.
@@ -146,7 +148,7 @@ def starts_near(
             elif swept.uniform is not None:
                 low, high = swept.uniform
                 moved_values[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
-        yield Start(f"near {start.name}", clamped_to_search(moved_values, search))
+        yield StartCandidate(f"near {start.name}", clamped_to_search(moved_values, search))
 
 
 def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
@@ -182,7 +184,7 @@ def configured_values(config: Config, keys: Iterable[str]) -> dict[str, Any]:
     return values
 
 
-def clamped_to_search(values: Values, search: Mapping[str, Swept]) -> dict[str, Any]:
+def clamped_to_search(values: Values, search: Mapping[str, SweptValues]) -> dict[str, Any]:
     """Values clamped to the ranges of the search.
 
     Keys that are not searched are left out, and so are values that are not among a key's choices.

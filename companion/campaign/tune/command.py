@@ -24,7 +24,7 @@ from companion.campaign.running import DONE, FAILED, interruptible, progress_bar
 from companion.campaign.tune.candidates import (
     cases,
     configured_values,
-    starts,
+    start_candidates,
     tune_section,
     unseen_campaign,
 )
@@ -46,7 +46,7 @@ from companion.files.yaml_file import ConfigError
 if TYPE_CHECKING:
     from distributed import Client
 
-RESULT = "tuned.yaml"
+RESULT_FILE_NAME = "tuned.yaml"
 """Name of the result file in the folder of the search."""
 
 
@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     tune = tune_section(campaign)
     search_folder: Path = options.out or folder.CAMPAIGNS_FOLDER / f"{campaign.file.name}-tune"
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    for start in starts(campaign, tune):
+    for start in start_candidates(campaign, tune):
         cases(campaign, start.values)  # refuses a bad value before any work
     with folder.lock(search_folder):
         try:
@@ -164,7 +164,7 @@ def _check_and_write(
     comparison = compare(before, after, tune.check_samples)
     result = CheckedResult(campaign, results, results.best, before, after, comparison)
     path, text = (
-        search_folder / RESULT,
+        search_folder / RESULT_FILE_NAME,
         result_text(result, configured_values(campaign.base, tune.search)),
     )
     for line in summary_lines(result):

@@ -1,4 +1,4 @@
-"""Two flights before the search that measure the vehicle, for one of the starts of the search."""
+"""Two flights before the search that measure the vehicle, for one of the start candidates."""
 
 import tempfile
 from dataclasses import replace
@@ -27,8 +27,8 @@ def learned_config(campaign: Campaign) -> Config:
 
     A flight of `companion identify` measures lag and dead time of the rate loop. The flight of the
     case itself measures the drag. A second-order rate loop is identified only if the search may set
-    `vehicle.damping`, because it changes the meaning of lag and dead time. Values that were not
-    measured stay unchanged.
+    `vehicle.damping`, because lag and dead time have another meaning in that model.
+    Values that were not measured stay unchanged.
 
     Raises:
         ConfigError: the first case cannot be flown.
@@ -64,7 +64,7 @@ def _with_rate_response(config: Config, case: Case, *, second_order: bool) -> Co
 
 
 def _with_drag(config: Config, case: Case) -> Config:
-    """The configuration with the drag measured in a flight of the case; unchanged without one."""
+    """The configuration with the drag measured in a flight of the case, if drag was measured."""
     with tempfile.TemporaryDirectory(prefix="companion-drag-") as parent_folder:
         # A recorded flight keeps what it learned beside its folder.
         CaseFlight(replace(case, fault=None), Path(parent_folder)).fly(

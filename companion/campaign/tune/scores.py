@@ -27,7 +27,7 @@ class Score(NamedTuple):
     estimator_errors: tuple[float, ...]
     """RMS horizontal distance of the estimated from the true position, m; infinite where
     `true_errors` is."""
-    inside: tuple[bool, ...]
+    is_inside: tuple[bool, ...]
     """Whether each case was flown to its end and stayed inside the envelope."""
 
     @property
@@ -38,7 +38,7 @@ class Score(NamedTuple):
     @property
     def inside_share(self) -> float:
         """Share of the cases inside the envelope."""
-        return sum(self.inside) / len(self.inside)
+        return sum(self.is_inside) / len(self.is_inside)
 
     def first(self, count: int) -> "Score":
         """The score on the first `count` cases alone."""
@@ -54,7 +54,7 @@ class Score(NamedTuple):
             name: [error if isfinite(error) else None for error in getattr(self, name)]
             for name in _ERROR_NAMES
         }
-        return {**attributes, "inside": list(self.inside)}
+        return {**attributes, "inside": list(self.is_inside)}
 
     @classmethod
     def from_attributes(cls, attributes: Mapping[str, Any]) -> "Score":

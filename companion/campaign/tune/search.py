@@ -12,10 +12,10 @@ from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
     Values,
+    candidates_near,
     cases,
     clamped_to_search,
-    starts,
-    starts_near,
+    start_candidates,
     suggested_values,
 )
 from companion.campaign.tune.first_flight import learned_config
@@ -35,9 +35,9 @@ STORAGE = "tune.db"
 """Optuna's storage in the folder of the search."""
 _STUDY_NAME = "tune"
 _MOST_STARTS = 3
-"""Largest number of starts of a search."""
+"""Largest number of start candidates of a search."""
 _FEWEST_NEIGHBOURS = 4
-"""Smallest number of candidates that are tried near the last start."""
+"""Smallest number of candidates that are tried near the last start candidate."""
 _FIRST_CASES_DIVISOR = 4
 """Number of all cases of a candidate divided by the number of its first cases.
 
@@ -162,7 +162,7 @@ class Search:
 
     @property
     def _neighbour_count(self) -> int:
-        """Number of candidates near the last start that are tried before Optuna suggests any."""
+        """Number of candidates tried near the last start candidate before Optuna suggests any."""
         return max(_FEWEST_NEIGHBOURS, len(self._tune.search))
 
     def _sampler(self, number: int) -> Any:
@@ -173,11 +173,12 @@ class Search:
         )
 
     def _enqueue_starts(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
-        """Enqueue the starts of a new search, and the candidates near the last one."""
+        """Enqueue the start candidates of a new search, and candidates near the last of them."""
         if not self._study.trials:
-            initial = list(starts(self._campaign, self._tune, learning_flight(self._campaign)))
-            seed, search = self._campaign.file.seed, self._tune.search
-            for start in (*initial, *starts_near(initial[-1], search, self._neighbour_count, seed)):
+            config, search = learning_flight(self._campaign), self._tune.search
+            initial = list(start_candidates(self._campaign, self._tune, config))
+            count, seed = self._neighbour_count, self._campaign.file.seed
+            for start in (*initial, *candidates_near(initial[-1], search, count, seed)):
                 self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted_trial(self) -> "Trial | None":
@@ -231,7 +232,7 @@ class Search:
         0 or less: `inside_share` can still be reached. `score` covers the cases flown so far, and
         `cases_count` is the number of all cases.
         """
-        outside_count = sum(not is_inside for is_inside in score.inside)
+        outside_count = sum(not is_inside for is_inside in score.is_inside)
         return self._tune.inside_share - (cases_count - outside_count) / cases_count
 
     def _is_hopeless(self, score: Score) -> bool:

@@ -1,11 +1,11 @@
-"""Writes the result of a search as YAML, with the reasons as comments, to be included."""
+"""Writes the result of a search as YAML that a configuration can include, with reasons."""
 
 from collections.abc import Iterator, Mapping
 from math import isfinite
 from typing import Any, NamedTuple
 
 from companion.campaign.campaign import Campaign
-from companion.campaign.swept import Swept
+from companion.campaign.swept import SweptValues
 from companion.campaign.tune.candidates import Values
 from companion.campaign.tune.certainty import Comparison
 from companion.campaign.tune.scores import Score
@@ -13,7 +13,7 @@ from companion.campaign.tune.search import Candidate, SearchResults
 from companion.files import bounded_yaml
 
 _EDGE_SHARE = 0.02
-"""Share of its range within which a value counts as at an end of the range."""
+"""A value nearer to an end of its range than this share of the range counts as at the end."""
 
 
 class CheckedResult(NamedTuple):
@@ -90,11 +90,11 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
         yield "The interval contains 1, so the result may not be better: fly more samples."
 
 
-def result_text(result: CheckedResult, present: Mapping[str, Any]) -> str:
+def result_text(result: CheckedResult, previous_values: Mapping[str, Any]) -> str:
     """The text of the result file.
 
-    `present` holds the values of the searched keys before the search, without keys that were not
-    set.
+    `previous_values` holds the values of the searched keys before the search, without keys that
+    were not set.
     """
     tune = result.campaign.file.tune
     assert tune is not None
@@ -102,7 +102,8 @@ def result_text(result: CheckedResult, present: Mapping[str, Any]) -> str:
     lines = [f"# Found by `companion campaign tune` for the campaign {name}.", "#"]
     lines += [f"# {line}" for line in summary_lines(result)]
     reasons = {
-        key: _reason(key, tune.search[key], result, present.get(key)) for key in result.best.values
+        key: _reason(key, tune.search[key], result, previous_values.get(key))
+        for key in result.best.values
     }
     return "\n".join([*lines, *_values_lines(result.best.values, reasons)]) + "\n"
 
@@ -128,8 +129,8 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
         yield from ("", f"{section}:", *lines)
 
 
-def _reason(key: str, swept: Swept, result: CheckedResult, before: Any) -> str:
-    """Text about a key: its value `before` (None: not set), and those of the best candidates."""
+def _reason(key: str, swept: SweptValues, result: CheckedResult, before: Any) -> str:
+    """Text about a key: the value `before` the search (None: unset), and the best values found."""
     before_text = "not set before" if before is None else f"before {_value_text(before)}"
     near_values = [
         candidate.values[key] for candidate in result.results.near_best if key in candidate.values

@@ -23,7 +23,7 @@ from companion.study.lag.flights import (
     Score,
     in_percent,
 )
-from companion.study.methods import FOLLOWING, LIMIT, Line, Method
+from companion.study.methods import LIMIT_STYLE, MODEL_FOLLOWING_METHOD, LineStyle, Method
 from companion.study.step import FIGURE_2, Response
 
 CAPTION = (
@@ -44,12 +44,12 @@ _WORSE_COLOUR = "#A33C00"
 verdict `does not hold` on the page."""
 _CUT_HZ, _CUT_LAG_MS, _CUT_DEAD_TIME_MS = 100.0, 25, 40
 """Sample rate, fixed lag and fixed dead time of the two plots in the second row."""
-_SHADE: Line = {
-    "facecolor": (FOLLOWING.colour, 0.15),
-    "edgecolor": FOLLOWING.colour,
+_SHADE: LineStyle = {
+    "facecolor": (MODEL_FOLLOWING_METHOD.colour, 0.15),
+    "edgecolor": MODEL_FOLLOWING_METHOD.colour,
     "linewidth": 0.6,
 }
-_LAG_ERROR_STYLES: dict[float, Line] = {
+_LAG_ERROR_STYLES: dict[float, LineStyle] = {
     -0.5: {"linestyle": ":", "marker": "v", "markersize": 6.0},
     -0.3: {"linestyle": ":", "marker": "v", "markersize": 3.5},
     0.0: {"linestyle": "-", "marker": "o", "markersize": 3.5},
@@ -70,7 +70,7 @@ def draw_figure(grid: Grid, example: Example, complete: CompleteLoopFlights) -> 
     """Draw the figure that `CAPTION` describes."""
     figure = Figure(figsize=(9.2, 15.5), layout="constrained")
     panels: dict[str, Any] = figure.subplot_mosaic(_PANELS)
-    responses = example.unlimited[_CUT_HZ]
+    responses = example.unlimited_responses[_CUT_HZ]
     _draw_paths(panels["path"], responses)
     _draw_distance(panels["time"], responses)
     dead_times, lags = _grid_values(grid)
@@ -80,7 +80,7 @@ def draw_figure(grid: Grid, example: Example, complete: CompleteLoopFlights) -> 
     _draw_cut(panels["lag"], grid, over_lag, lags, "lag")
     for rate in RATES_HZ:
         _draw_ratios(panels[f"{rate:.0f}"], grid, rate)
-    _draw_errors(panels["example errors"], example.model_following)
+    _draw_errors(panels["example errors"], example.model_following_scores)
     panels["example errors"].set_title(
         f"Wrong lag and dead time, the example, {EXAMPLE_ERRORS_HZ:.0f} Hz"
     )
@@ -103,7 +103,7 @@ def _draw_paths(axes: Axes, responses: dict[Method, Response]) -> None:
 def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
     for method, response in responses.items():
         distance = response.at_heading(0)[:, 1] - FIGURE_2.target.east
-        draw_line(axes, response.step.time, distance, method.line, method.label)
+        draw_line(axes, response.step.time, distance, method.line_style, method.label)
     axes.set(title="Distance from the line", xlabel="time, s", ylabel="$a_E$ + 0.5", xlim=(0, 1.5))
     axes.legend(ncols=2)
 
@@ -122,8 +122,8 @@ def _draw_cut(
     """
     for method in METHODS:
         cross_tracks = [grid[cell].by_method[method].cross_track for cell in cells]
-        axes.plot(values_ms, cross_tracks, marker=".", **method.line)
-    with_true_delays = [grid[cell].model_following[NO_ERROR].cross_track for cell in cells]
+        axes.plot(values_ms, cross_tracks, marker=".", **method.line_style)
+    with_true_delays = [grid[cell].model_following_scores[NO_ERROR].cross_track for cell in cells]
     with_worst_delays = [grid[cell].worst_cross_track for cell in cells]
     axes.fill_between(
         values_ms,
@@ -172,7 +172,7 @@ def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
     errors = [100.0 * error for error in FINE_ERRORS]
     for lag, style in _LAG_ERROR_STYLES.items():
         cross_tracks = [scores[DelayError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
-        line = {"color": FOLLOWING.colour, "linewidth": 1.3, **style}
+        line = {"color": MODEL_FOLLOWING_METHOD.colour, "linewidth": 1.3, **style}
         axes.plot(errors, cross_tracks, label=f"lag {in_percent(lag)}", **line)
     axes.set(
         xlabel="error of the assumed dead time, %", ylabel=_CROSS_TRACK_LABEL, ylim=(0.0, None)
@@ -182,10 +182,10 @@ def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
 
 def _draw_inner_loop_errors(axes: Axes, complete: CompleteLoopFlights) -> None:
     comparison = complete.by_rate[SHOWN_RATE_HZ]
-    _draw_errors(axes, comparison.model_following)
+    _draw_errors(axes, comparison.model_following_scores)
     other = comparison.best_other
-    cross_track = comparison.other_methods[other].cross_track
-    axes.axhline(cross_track, **LIMIT)
+    cross_track = comparison.other_scores[other].cross_track
+    axes.axhline(cross_track, **LIMIT_STYLE)
     axes.annotate(
         f"{other.label}, the best of the others", (50, cross_track), ha="right", va="bottom"
     )
@@ -199,9 +199,9 @@ def _draw_rates(axes: Axes, complete: CompleteLoopFlights) -> None:
     rates, comparisons = list(complete.by_rate), complete.by_rate.values()
     for method in METHODS:
         cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
-        axes.plot(rates, cross_tracks, marker=".", **method.line)
+        axes.plot(rates, cross_tracks, marker=".", **method.line_style)
     with_true_delays = [
-        comparison.model_following[NO_ERROR].cross_track for comparison in comparisons
+        comparison.model_following_scores[NO_ERROR].cross_track for comparison in comparisons
     ]
     with_worst_delays = [comparison.worst_cross_track for comparison in comparisons]
     axes.fill_between(

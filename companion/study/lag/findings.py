@@ -13,7 +13,7 @@ from companion.study.lag.flights import (
     score,
 )
 from companion.study.measures import largest_tilt_rate
-from companion.study.methods import FOLLOWING, PROPOSED, QUATERNION, Method
+from companion.study.methods import MODEL_FOLLOWING_METHOD, PROPOSED, QUATERNION, Method
 from companion.study.outcome import Finding
 
 _ROUNDING = 1e-9
@@ -31,21 +31,21 @@ def find(
         fit_deviations: largest deviation of each method from the second-order model fitted to it.
     """
     return (
-        *_on_the_example(example),
-        _over_the_grid(grid),
-        _wrong_delays_over_the_grid(grid),
-        _too_long_or_too_short(grid, complete),
-        *_with_the_complete_loop(complete, fit_deviations),
+        *_example_findings(example),
+        _grid_finding(grid),
+        _wrong_delays_finding(grid),
+        _long_or_short_delays_finding(grid, complete),
+        *_complete_loop_findings(complete, fit_deviations),
     )
 
 
-def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
-    cross_tracks = {m: score(r).cross_track for m, r in example.unlimited[100.0].items()}
+def _example_findings(example: Example) -> tuple[Finding, Finding, Finding]:
+    cross_tracks = {m: score(r).cross_track for m, r in example.unlimited_responses[100.0].items()}
     best = min(OTHER_METHODS, key=lambda method: cross_tracks[method])
-    worst = max(wrong_score.cross_track for wrong_score in example.model_following.values())
-    rate = max(largest_tilt_rate(response) for response in example.rate_limited.values())
+    worst = max(wrong_score.cross_track for wrong_score in example.model_following_scores.values())
+    rate = max(largest_tilt_rate(response) for response in example.rate_limited_responses.values())
     limited_cross_track = max(
-        score(response).cross_track for response in example.rate_limited.values()
+        score(response).cross_track for response in example.rate_limited_responses.values()
     )
     return (
         Finding(
@@ -60,8 +60,9 @@ def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
             "Behind dead time and lag model-following is the straightest, even with an"
             " assumed lag and dead time wrong by up to 50 %.",
             worst < cross_tracks[best],
-            f"Cross-track {cross_tracks[FOLLOWING]:.2g} with the true lag and dead time, at most"
-            f" {worst:.2g} with wrong ones; the best of the others has {cross_tracks[best]:.2g}.",
+            f"Cross-track {cross_tracks[MODEL_FOLLOWING_METHOD]:.2g} with the true lag and dead"
+            f" time, at most {worst:.2g} with wrong ones; the best of the others has"
+            f" {cross_tracks[best]:.2g}.",
         ),
         Finding(
             "ours",
@@ -73,16 +74,18 @@ def _on_the_example(example: Example) -> tuple[Finding, Finding, Finding]:
     )
 
 
-def _over_the_grid(grid: Grid) -> Finding:
+def _grid_finding(grid: Grid) -> Finding:
     def ratio(cell: GridCell) -> float:
         comparison = grid[cell]
         return (
-            comparison.model_following[NO_ERROR].cross_track
-            / comparison.other_methods[comparison.best_other].cross_track
+            comparison.model_following_scores[NO_ERROR].cross_track
+            / comparison.other_scores[comparison.best_other].cross_track
         )
 
     closest = max(grid, key=ratio)
-    largest = max(comparison.model_following[NO_ERROR].cross_track for comparison in grid.values())
+    largest = max(
+        comparison.model_following_scores[NO_ERROR].cross_track for comparison in grid.values()
+    )
     return Finding(
         "ours",
         "With the true lag and dead time model-following is the straightest over the whole grid.",
@@ -92,7 +95,7 @@ def _over_the_grid(grid: Grid) -> Finding:
     )
 
 
-def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
+def _wrong_delays_finding(grid: Grid) -> Finding:
     worst_cell = max(grid, key=lambda cell: grid[cell].ratio)
     comparison, other = grid[worst_cell], grid[worst_cell].best_other
     worse_cells = [cell for cell, cell_comparison in grid.items() if cell_comparison.ratio >= 1.0]
@@ -109,15 +112,15 @@ def _wrong_delays_over_the_grid(grid: Grid) -> Finding:
         f"Worse than the best other method in {len(worse_cells)} of {len(grid)} cells{where}."
         f" The largest ratio is at {worst_cell}, with {comparison.worst_error}:"
         f" {comparison.worst_cross_track:.2g} against"
-        f" {comparison.other_methods[other].cross_track:.2g} of"
+        f" {comparison.other_scores[other].cross_track:.2g} of"
         f" {other.label}.",
     )
 
 
-def _too_long_or_too_short(grid: Grid, complete: CompleteLoopFlights) -> Finding:
+def _long_or_short_delays_finding(grid: Grid, complete: CompleteLoopFlights) -> Finding:
     short, long = DelayError(-0.5, -0.5), DelayError(0.5, 0.5)
     pairs = [
-        (comparison.model_following[long], comparison.model_following[short])
+        (comparison.model_following_scores[long], comparison.model_following_scores[short])
         for cell, comparison in grid.items()
         if cell.dead_time_ms > 0
     ]
@@ -126,7 +129,7 @@ def _too_long_or_too_short(grid: Grid, complete: CompleteLoopFlights) -> Finding
     straighter_count = sum(
         long_score.cross_track < short_score.cross_track for long_score, short_score in pairs
     )
-    loop_scores = complete.by_rate[SHOWN_RATE_HZ].model_following
+    loop_scores = complete.by_rate[SHOWN_RATE_HZ].model_following_scores
     return Finding(
         "ours",
         "A lag and dead time 50 % too long are better than both 50 % too short.",
@@ -138,7 +141,7 @@ def _too_long_or_too_short(grid: Grid, complete: CompleteLoopFlights) -> Finding
     )
 
 
-def _with_the_complete_loop(
+def _complete_loop_findings(
     complete: CompleteLoopFlights, fit_deviations: dict[Method, float]
 ) -> tuple[Finding, Finding, Finding]:
     by_rate = complete.by_rate
@@ -154,12 +157,13 @@ def _with_the_complete_loop(
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
             all(
-                rate_comparison.model_following[NO_ERROR].cross_track
-                < rate_comparison.other_methods[rate_comparison.best_other].cross_track
+                rate_comparison.model_following_scores[NO_ERROR].cross_track
+                < rate_comparison.other_scores[rate_comparison.best_other].cross_track
                 for rate_comparison in by_rate.values()
             ),
-            f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[FOLLOWING]:.2g}; first-order"
-            f" {cross_tracks[PROPOSED]:.2g}, quaternion {cross_tracks[QUATERNION]:.2g}.",
+            f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[MODEL_FOLLOWING_METHOD]:.2g};"
+            f" first-order {cross_tracks[PROPOSED]:.2g}, quaternion"
+            f" {cross_tracks[QUATERNION]:.2g}.",
         ),
         Finding(
             "ours",
@@ -168,15 +172,15 @@ def _with_the_complete_loop(
             comparison.ratio < 1.0,
             f"The largest ratio is at {worst_rate:.0f} Hz, with {comparison.worst_error}:"
             f" {comparison.worst_cross_track:.2g} against"
-            f" {comparison.other_methods[comparison.best_other].cross_track:.2g} of"
+            f" {comparison.other_scores[comparison.best_other].cross_track:.2g} of"
             f" {comparison.best_other.label}.",
         ),
         Finding(
             "ours",
             "With the complete inner loop the response of model-following is the nearest to second"
             " order with dead time.",
-            fit_deviations[FOLLOWING] < fit_deviations[nearest],
-            f"It stays within {fit_deviations[FOLLOWING]:.2g} of the fitted model; {nearest.label},"
-            f" the next, within {fit_deviations[nearest]:.2g}.",
+            fit_deviations[MODEL_FOLLOWING_METHOD] < fit_deviations[nearest],
+            f"It stays within {fit_deviations[MODEL_FOLLOWING_METHOD]:.2g} of the fitted model;"
+            f" {nearest.label}, the next, within {fit_deviations[nearest]:.2g}.",
         ),
     )

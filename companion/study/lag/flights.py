@@ -1,4 +1,4 @@
-"""Flies every planner with a slow rate loop; model-following assumes its lag and dead time."""
+"""Flies every planner with a slow rate loop; model-following gets true or wrong loop delays."""
 
 from dataclasses import replace
 from itertools import product
@@ -9,13 +9,13 @@ from companion.attitude import Limits, Planner, make_planner
 from companion.study.inner_loop import InnerLoop
 from companion.study.lag_loop import LagLoop
 from companion.study.measures import cross_track, settling_time
-from companion.study.methods import EXACT, FOLLOWING, PAPER_METHODS, Method
+from companion.study.methods import EXACT, MODEL_FOLLOWING_METHOD, PAPER_METHODS, Method
 from companion.study.outcome import Tick
 from companion.study.step import FIGURE_2, Loop, Response, fly_loop
 
 OTHER_METHODS = (*PAPER_METHODS, EXACT)
 """The methods that do not use lag and dead time of the rate loop."""
-METHODS = (*OTHER_METHODS, FOLLOWING)
+METHODS = (*OTHER_METHODS, MODEL_FOLLOWING_METHOD)
 RATES_HZ = (50.0, 100.0, 250.0)
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
 LAGS_MS = (10, 25, 40, 60)
@@ -49,7 +49,7 @@ FINE_ERRORS = (-0.5, -0.3, 0.0, 0.3, 0.5)
 
 
 class RateLoopDelays(NamedTuple):
-    """Lags and dead times of a rate loop, s, named like the options of the planner."""
+    """Lags and dead times of a rate loop, s, named like the options of `model-following`."""
 
     lag: float
     dead_time: float
@@ -80,7 +80,7 @@ class Score(NamedTuple):
     """How straight and how fast a response is."""
 
     cross_track: float
-    """Largest distance of the coefficients (a/T, no unit) from the line from start to target."""
+    """Largest distance of the acceleration coefficients (no unit) from the line start → target."""
     settling_time: float
     """Time from which the distance to the target stays within 5 % of the step, s."""
 
@@ -88,48 +88,53 @@ class Score(NamedTuple):
 class Comparison(NamedTuple):
     """Scores with one rate loop at one sample rate."""
 
-    other_methods: dict[Method, Score]
+    other_scores: dict[Method, Score]
     """Score of each method of `OTHER_METHODS`."""
-    model_following: dict[DelayError, Score]
+    model_following_scores: dict[DelayError, Score]
     """Score of model-following for each error of its assumed lag and dead time, `NO_ERROR`
     included."""
 
     @property
     def by_method(self) -> dict[Method, Score]:
         """Score of every method; model-following assumes the true lag and dead time."""
-        return {**self.other_methods, FOLLOWING: self.model_following[NO_ERROR]}
+        return {**self.other_scores, MODEL_FOLLOWING_METHOD: self.model_following_scores[NO_ERROR]}
 
     @property
     def best_other(self) -> Method:
         """The method of `OTHER_METHODS` with the smallest cross-track error."""
-        return min(self.other_methods, key=lambda method: self.other_methods[method].cross_track)
+        return min(self.other_scores, key=lambda method: self.other_scores[method].cross_track)
 
     @property
     def worst_error(self) -> DelayError:
-        """The error of lag and dead time with which model-following has its largest cross-track."""
-        errors = [error for error in self.model_following if error != NO_ERROR]
-        return max(errors, key=lambda error: self.model_following[error].cross_track)
+        """The error of lag and dead time with the largest cross-track error of model-following."""
+        errors = [error for error in self.model_following_scores if error != NO_ERROR]
+        return max(errors, key=lambda error: self.model_following_scores[error].cross_track)
 
     @property
     def worst_cross_track(self) -> float:
-        """Largest cross-track of model-following with a wrong lag or dead time; see `Score`."""
-        return self.model_following[self.worst_error].cross_track
+        """Largest cross-track error of model-following with a wrong lag or dead time."""
+        return self.model_following_scores[self.worst_error].cross_track
 
     @property
     def ratio(self) -> float:
-        """`worst_cross_track` / cross-track of `best_other`; below 1 model-following is better."""
-        return self.worst_cross_track / self.other_methods[self.best_other].cross_track
+        """`worst_cross_track` divided by the cross-track error of `best_other`.
+
+        Below 1 model-following is better.
+        """
+        return self.worst_cross_track / self.other_scores[self.best_other].cross_track
 
 
 class GridCell(NamedTuple):
     """Conditions of a comparison in the grid: sample rate, dead time and lag of the rate loop."""
 
-    rate_hz: float
+    sample_rate_hz: float
     dead_time_ms: int
     lag_ms: int
 
     def __str__(self) -> str:
-        return f"dead time {self.dead_time_ms} ms, lag {self.lag_ms} ms, {self.rate_hz:.0f} Hz"
+        return (
+            f"dead time {self.dead_time_ms} ms, lag {self.lag_ms} ms, {self.sample_rate_hz:.0f} Hz"
+        )
 
 
 Grid = dict[GridCell, Comparison]
@@ -138,11 +143,11 @@ Grid = dict[GridCell, Comparison]
 class Example(NamedTuple):
     """The results of the flights with `EXAMPLE_LOOP`."""
 
-    unlimited: dict[float, dict[Method, Response]]
+    unlimited_responses: dict[float, dict[Method, Response]]
     """Responses of every method by sample rate (Hz), without limits."""
-    rate_limited: dict[float, Response]
+    rate_limited_responses: dict[float, Response]
     """Responses of model-following with the limit `MAX_TILT_RATE`, by sample rate (Hz)."""
-    model_following: dict[DelayError, Score]
+    model_following_scores: dict[DelayError, Score]
     """Score of model-following for each error of its assumed lag and dead time, at the sample rate
     `EXAMPLE_ERRORS_HZ`."""
 
@@ -188,7 +193,7 @@ def fly_example() -> Example:
     delays = _delays_of(loop)
     return Example(
         {hz: {m: _fly(m, delays, loop, hz) for m in METHODS} for hz in EXAMPLE_RATES_HZ},
-        {hz: _fly(FOLLOWING, delays, loop, hz, limits) for hz in EXAMPLE_RATES_HZ},
+        {hz: _fly(MODEL_FOLLOWING_METHOD, delays, loop, hz, limits) for hz in EXAMPLE_RATES_HZ},
         _scores_with_errors(_error_pairs(FINE_ERRORS), delays, loop, EXAMPLE_ERRORS_HZ),
     )
 
@@ -221,7 +226,8 @@ def _scores_with_errors(
     errors: list[DelayError], delays: RateLoopDelays, loop: Loop, rate_hz: float
 ) -> dict[DelayError, Score]:
     return {
-        error: score(_fly(FOLLOWING, delays.with_error(error), loop, rate_hz)) for error in errors
+        error: score(_fly(MODEL_FOLLOWING_METHOD, delays.with_error(error), loop, rate_hz))
+        for error in errors
     }
 
 
@@ -233,7 +239,7 @@ def _fly(
     limits: Limits = Limits(),  # noqa: B008  (frozen)
 ) -> Response:
     """Fly a method; only model-following uses `delays`, the lag and dead time that it assumes."""
-    options = delays._asdict() if method is FOLLOWING else {}
+    options = delays._asdict() if method is MODEL_FOLLOWING_METHOD else {}
     planner: Planner = make_planner(method.planner, FIGURE_2.gain, limits=limits, **options)
     # One heading is enough: at another one only `euler` responds differently.
     step = replace(FIGURE_2, headings=(0.0,), rate_hz=rate_hz)

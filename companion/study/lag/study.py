@@ -44,7 +44,7 @@ PARTS = len(DEAD_TIMES_MS) * len(LAGS_MS) + 1 + len(RATES_HZ)
 _SCORE_COLUMNS = ("cross-track", "time to 5 %, s")
 
 
-class _Fitted(NamedTuple):
+class _FittedModel(NamedTuple):
     """The second-order model fitted to a response, and the largest deviation from it."""
 
     fit: DelayedSecondOrder
@@ -81,7 +81,7 @@ def run(tick: Tick) -> Outcome:
                 "lag-wrong-knowledge",
                 f"Cross-track of model-following at {EXAMPLE_ERRORS_HZ:.0f} Hz in the example, by"
                 " the error of the assumed lag (rows) and dead time (columns).",
-                example.model_following,
+                example.model_following_scores,
             ),
             _worst_table(grid),
             _fit_table(complete, fitted),
@@ -91,7 +91,7 @@ def run(tick: Tick) -> Outcome:
                 "Cross-track of model-following with the complete inner loop at"
                 f" {SHOWN_RATE_HZ:.0f} Hz, by the error of its lags (rows) and dead times (columns)"
                 " against those fitted to the inner loop.",
-                complete.by_rate[SHOWN_RATE_HZ].model_following,
+                complete.by_rate[SHOWN_RATE_HZ].model_following_scores,
             ),
         ),
         findings=find(
@@ -101,18 +101,20 @@ def run(tick: Tick) -> Outcome:
     )
 
 
-def _fit_model(response: Response) -> _Fitted:
+def _fit_model(response: Response) -> _FittedModel:
     fit = fit_second_order(response.step, response.at_heading(0))
     model = second_order_path(response.step, fit, response.step.time)
-    return _Fitted(fit, float(largest_deviation(response, model)[0]))
+    return _FittedModel(fit, float(largest_deviation(response, model)[0]))
 
 
 def _example_table(example: Example) -> Table:
     """Scores of every method by sample rate, and of model-following with a limited tilt rate."""
     rows: list[tuple[Cell, ...]] = []
-    for rate, responses in example.unlimited.items():
+    for rate, responses in example.unlimited_responses.items():
         labelled_responses = [(method.label, response) for method, response in responses.items()]
-        labelled_responses.append(("model-following, W_M = π/2", example.rate_limited[rate]))
+        labelled_responses.append(
+            ("model-following, W_M = π/2", example.rate_limited_responses[rate])
+        )
         rows += [
             (label, round(rate), *score(response), largest_tilt_rate(response))
             for label, response in labelled_responses
@@ -126,7 +128,7 @@ def _example_table(example: Example) -> Table:
 
 
 def _errors_table(name: str, caption: str, scores: dict[DelayError, Score]) -> Table:
-    """Cross-track by the error of the lag (rows) and of the dead time (columns)."""
+    """Cross-track error by the error of the lag (rows) and of the dead time (columns)."""
     return Table(
         name,
         caption,
@@ -142,12 +144,12 @@ def _errors_table(name: str, caption: str, scores: dict[DelayError, Score]) -> T
 
 
 def _worst_table(grid: Grid) -> Table:
-    """Cross-track of model-following with the worst error, and of the best other method."""
+    """Cross-track errors of model-following with the worst delays, and of the best other method."""
     dead_times = sorted({cell.dead_time_ms for cell in grid})
     rows: list[tuple[Cell, ...]] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
         comparisons = [grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times]
-        best_others = [item.other_methods[item.best_other].cross_track for item in comparisons]
+        best_others = [item.other_scores[item.best_other].cross_track for item in comparisons]
         rows.append(
             (
                 f"{rate:.0f} Hz, {lag} ms",
@@ -169,7 +171,7 @@ def _worst_table(grid: Grid) -> Table:
     )
 
 
-def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _Fitted]) -> Table:
+def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _FittedModel]) -> Table:
     """Score and fitted model of every method at `SHOWN_RATE_HZ`."""
     scores = complete.by_rate[SHOWN_RATE_HZ].by_method
     return Table(
@@ -185,7 +187,7 @@ def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _Fitted]) -> 
 
 
 def _rates_table(complete: CompleteLoopFlights) -> Table:
-    """Cross-track of every method by sample rate, and of model-following with the worst error."""
+    """Cross-track error of every method by sample rate; model-following also with wrong delays."""
     by_rate = complete.by_rate
     rows: list[tuple[Cell, ...]] = [
         (m.label, *(comparison.by_method[m].cross_track for comparison in by_rate.values()))
@@ -215,7 +217,7 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
             "All methods over the grid, model-following with the true lag and dead time.",
             ("method", *cell_columns, *_SCORE_COLUMNS),
             tuple(
-                (method.label, cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *method_score)
+                (method.label, cell.dead_time_ms, cell.lag_ms, cell.sample_rate_hz, *method_score)
                 for cell, comparison in grid.items()
                 for method, method_score in comparison.by_method.items()
             ),
@@ -225,9 +227,9 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
             "model-following over the grid, with a wrong lag and dead time.",
             (*cell_columns, "error of the lag", "error of the dead time", *_SCORE_COLUMNS),
             tuple(
-                (cell.dead_time_ms, cell.lag_ms, cell.rate_hz, *error, *method_score)
+                (cell.dead_time_ms, cell.lag_ms, cell.sample_rate_hz, *error, *method_score)
                 for cell, comparison in grid.items()
-                for error, method_score in comparison.model_following.items()
+                for error, method_score in comparison.model_following_scores.items()
                 if error != NO_ERROR
             ),
         ),
@@ -235,7 +237,7 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
 
 
 def _complete_series(complete: CompleteLoopFlights) -> Table:
-    """Cross-track of model-following for every error at every sample rate."""
+    """Cross-track error of model-following for every delay error at every sample rate."""
     return Table(
         "lag-inner-loop-beliefs",
         "Cross-track of model-following with the complete inner loop, by rate and error.",
@@ -243,6 +245,6 @@ def _complete_series(complete: CompleteLoopFlights) -> Table:
         tuple(
             (rate, *error, method_score.cross_track)
             for rate, comparison in complete.by_rate.items()
-            for error, method_score in comparison.model_following.items()
+            for error, method_score in comparison.model_following_scores.items()
         ),
     )

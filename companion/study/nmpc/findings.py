@@ -15,12 +15,12 @@ from companion.study.nmpc.variants import (
     MODELS,
     RATE_HZ,
     STYLES,
-    UNLIMITED,
+    UNLIMITED_MODELS,
     Variant,
 )
 from companion.study.outcome import Claimant, Finding
 
-_SETTLED_M = 0.1
+_SETTLED_ERROR_M = 0.1
 """A flight has settled if its errors in the last 2 s are at most this, m."""
 _LAST_PERIODS = round(2.0 * RATE_HZ)
 """Number of solver periods in the last 2 s of a flight."""
@@ -31,19 +31,21 @@ _MAX_ANSWER_MS = 10.0
 def find(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Finding, ...]:
     """All findings."""
     return (
-        _solved_faster("paper", ("euler", "quaternion"), flights),
-        _solved_faster("ours", ("euler-reduced",), flights),
-        _cold_starts(counts),
-        _settles("limited", flights),
-        _settles("proposed", flights),
-        _dead_time(flights),
-        _smallest_error(flights),
-        _in_time(times),
+        _solve_time_finding("paper", ("euler", "quaternion"), flights),
+        _solve_time_finding("ours", ("euler-reduced",), flights),
+        _cold_start_finding(counts),
+        _settling_finding("limited", flights),
+        _settling_finding("proposed", flights),
+        _dead_time_finding(flights),
+        _smallest_error_finding(flights),
+        _answer_time_finding(times),
     )
 
 
-def _solved_faster(claimant: Claimant, others: Sequence[ModelName], flights: Flights) -> Finding:
-    """Whether the proposed model is solved faster than `others`, with one or all iterations."""
+def _solve_time_finding(
+    claimant: Claimant, others: Sequence[ModelName], flights: Flights
+) -> Finding:
+    """Whether the proposed model is solved faster than `others`, with one or more iterations."""
     ratios = {
         (model, iterations): _median_ms(model, iterations, flights)
         / _median_ms("proposed", iterations, flights)
@@ -68,9 +70,9 @@ def _median_ms(model: ModelName, iterations: int, flights: Flights) -> float:
     return flights[EIGHT.name, Variant(model, iterations)].solve_ms(50)
 
 
-def _cold_starts(counts: ColdStarts) -> Finding:
+def _cold_start_finding(counts: ColdStarts) -> Finding:
     reached_counts = {m: sum(not isinf(count) for count in counts[m].values()) for m in MODELS}
-    others = max(reached_counts[model] for model in UNLIMITED)
+    others = max(reached_counts[model] for model in UNLIMITED_MODELS)
     reached_text = ", ".join(f"{STYLES[model].label} {reached_counts[model]}" for model in MODELS)
     return Finding(
         "ours",
@@ -80,23 +82,23 @@ def _cold_starts(counts: ColdStarts) -> Finding:
     )
 
 
-def _settles(model: ModelName, flights: Flights) -> Finding:
+def _settling_finding(model: ModelName, flights: Flights) -> Finding:
     flight = flights[CIRCLE.name, Variant(model)]
     last_error = max(flight.errors[-_LAST_PERIODS:])
     return Finding(
         "ours",
         f"From a standing start, {STYLES[model].label} settles on the circle within 4 s.",
-        last_error < _SETTLED_M,
+        last_error < _SETTLED_ERROR_M,
         f"The error is {max(flight.errors):.2g} m at most, and {last_error:.2g} m in the last 2 s"
-        f" of 6 s (bound {_SETTLED_M:g} m).",
+        f" of 6 s (bound {_SETTLED_ERROR_M:g} m).",
     )
 
 
-def _smallest_error(flights: Flights) -> Finding:
+def _smallest_error_finding(flights: Flights) -> Finding:
     comparisons = []
     for task in (CIRCLE, EIGHT):
         errors = {model: flights[task.name, Variant(model)].rms for model in MODELS}
-        other = min((errors[model], STYLES[model].label) for model in UNLIMITED)
+        other = min((errors[model], STYLES[model].label) for model in UNLIMITED_MODELS)
         comparisons.append((task.name, errors["limited"], *other))
     return Finding(
         "ours",
@@ -110,12 +112,12 @@ def _smallest_error(flights: Flights) -> Finding:
     )
 
 
-def _dead_time(flights: Flights) -> Finding:
+def _dead_time_finding(flights: Flights) -> Finding:
     """Whether models that know the dead time have the smaller error on the figure-eight."""
     error_ratios = {
         model: flights[EIGHT.name, Variant(model, knows_dead_time=False)].rms
         / flights[EIGHT.name, Variant(model)].rms
-        for model in UNLIMITED
+        for model in UNLIMITED_MODELS
     }
     ratios_text = ", ".join(
         f"{STYLES[model].label} {error_ratio:.2g} ×" for model, error_ratio in error_ratios.items()
@@ -129,12 +131,12 @@ def _dead_time(flights: Flights) -> Finding:
     )
 
 
-def _in_time(times: ProcessTimes) -> Finding:
+def _answer_time_finding(times: ProcessTimes) -> Finding:
     p99 = float(np.percentile(times.answer_ms, 99))
     return Finding(
         "ours",
         f"The solver process answers within {_MAX_ANSWER_MS:.0f} ms at 50 Hz.",
-        p99 < _MAX_ANSWER_MS and times.troubles == 0,
-        f"p99 of the answer time, data exchange included, {p99:.2g} ms; {times.troubles} of"
+        p99 < _MAX_ANSWER_MS and times.bad_answer_count == 0,
+        f"p99 of the answer time, data exchange included, {p99:.2g} ms; {times.bad_answer_count} of"
         " the answers were late, failed or implausible.",
     )

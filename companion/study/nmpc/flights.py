@@ -24,7 +24,7 @@ from companion.study.nmpc.variants import (
     MAX_YAW_RATE,
     MODELS,
     RATE_HZ,
-    UNLIMITED,
+    UNLIMITED_MODELS,
     YAW_GAIN,
     Task,
     Variant,
@@ -35,14 +35,14 @@ from companion.study.step import Floats
 FLIGHT_S = 6
 SETTLED_AFTER_S = 4.0
 """Time after the beginning of a flight from which its errors count, s."""
-_INPUTS_GIVEN = 8
-"""Number of control inputs in a request to the solver, enough for its dead time and lead."""
+_INPUT_COUNT = 8
+"""Number of past control inputs in a request, enough to predict the motion over the dead time."""
 _PLANNER_HZ = 250
 _STEPS_PER_SAMPLE = STEP_HZ // _PLANNER_HZ
 
 
 class Vehicle:
-    """A point mass with drag, whose attitude is controlled by model-following through a `LagBody`.
+    """A point mass with drag; model-following commands the body rates that its `LagBody` follows.
 
     It begins at rest, level, at the origin.
 
@@ -119,7 +119,7 @@ class Flight:
         self._periods = 0
 
     def step(self) -> None:
-        """Simulate one period: solve, and fly with the answer of the period before."""
+        """Simulate one period: solve, and fly with the answer of the previous period."""
         now, vehicle, flown_input = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
         known_state = VehicleSnapshot(
             now,
@@ -129,7 +129,7 @@ class Flight:
             vehicle.body.rates,
             drag=Drag(DRAG),
         )
-        trajectory_time, inputs = self._task.begin + now, tuple(self._inputs[-_INPUTS_GIVEN:])
+        trajectory_time, inputs = self._task.begin + now, tuple(self._inputs[-_INPUT_COUNT:])
         answer = self._solver.answer(
             Request(self._periods, known_state, trajectory_time, self._start, inputs)
         )
@@ -196,13 +196,13 @@ def fly_all(tick: Tick) -> Flights:
 
 def _new_flights() -> Flights:
     """All flights of the study, before their first period."""
-    unlimited = [
+    unlimited_variants = [
         Variant(model, knows_dead_time=knows_dead_time)
         for knows_dead_time in (True, False)
-        for model in UNLIMITED
+        for model in UNLIMITED_MODELS
     ]
-    real_time = [*unlimited, Variant("limited")]
-    to_tolerance = [Variant(model, MAX_ITERATIONS) for model in MODELS]
-    entries = [(CIRCLE, variant) for variant in real_time]
-    entries += [(EIGHT, variant) for variant in (*real_time, *to_tolerance)]
+    real_time_variants = [*unlimited_variants, Variant("limited")]
+    converging_variants = [Variant(model, MAX_ITERATIONS) for model in MODELS]
+    entries = [(CIRCLE, variant) for variant in real_time_variants]
+    entries += [(EIGHT, variant) for variant in (*real_time_variants, *converging_variants)]
     return {(task.name, variant): Flight(task, variant) for task, variant in entries}

@@ -166,7 +166,7 @@ def quaternion(settings: Settings) -> Model:
     )
 
 
-MAKERS: dict[ModelName, Callable[[Settings], Model]] = {
+MODEL_MAKERS: dict[ModelName, Callable[[Settings], Model]] = {
     "proposed": proposed,
     "limited": coefficient_model,
     "euler": euler,

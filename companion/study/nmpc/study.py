@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from companion.study.drawing import draw_line, new_figure
-from companion.study.methods import REFERENCE
+from companion.study.methods import REFERENCE_STYLE
 from companion.study.nmpc.findings import find
 from companion.study.nmpc.flights import FLIGHT_S, Flights, fly_all
 from companion.study.nmpc.timing import (
@@ -209,11 +209,11 @@ def _draw_figure(flights: Flights) -> Figure:
 def _draw_paths(axes: Axes, flights: Flights) -> None:
     for model in MODELS:
         north, east, _ = np.array(flights[CIRCLE.name, Variant(model)].path).T
-        axes.plot(east, north, **STYLES[model].line)
+        axes.plot(east, north, **STYLES[model].line_style)
     begin = CIRCLE.trajectory.at(CIRCLE.begin).position
     times = CIRCLE.begin + np.linspace(0.0, 2.0 * np.pi, 100)
     reference = np.array([CIRCLE.trajectory.at(float(t)).position for t in times]) - begin
-    axes.plot(reference[:, 1], reference[:, 0], **REFERENCE)
+    axes.plot(reference[:, 1], reference[:, 0], **REFERENCE_STYLE)
     axes.plot(0.0, 0.0, "o", color="black", markersize=4)
     low, high = reference.min(axis=0) - 5.0, reference.max(axis=0) + 5.0
     axes.set(
@@ -230,7 +230,7 @@ def _draw_errors(axes: Axes, flights: Flights, task: Task, title: str) -> None:
     for model in MODELS:
         errors = np.array(flights[task.name, Variant(model)].errors)
         time = (np.arange(len(errors)) + 1) / RATE_HZ
-        draw_line(axes, time, errors, STYLES[model].line, STYLES[model].label)
+        draw_line(axes, time, errors, STYLES[model].line_style, STYLES[model].label)
     axes.set(title=title, xlabel="time, s", ylabel="distance, m")
 
 
@@ -239,7 +239,7 @@ def _draw_times(axes: Axes, flights: Flights) -> None:
         for iterations, width in ((1, 1.0), (MAX_ITERATIONS, 2.5)):
             times = np.sort(flights[EIGHT.name, Variant(model, iterations)].solve_s)
             share = (np.arange(len(times)) + 1) / len(times)
-            axes.plot(1e3 * times, share, **{**STYLES[model].line, "linewidth": width})
+            axes.plot(1e3 * times, share, **{**STYLES[model].line_style, "linewidth": width})
     axes.set(
         title="Processor time of a solve",
         xlabel="time, ms",

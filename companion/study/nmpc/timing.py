@@ -17,7 +17,7 @@ from companion.study.step import Floats
 
 _COLD_ITERATIONS = 60
 """Number of SQP iterations after which a cold start counts as not converged."""
-_REQUESTS = 150
+_REQUEST_COUNT = 150
 """Number of requests with which the solver process is timed."""
 _START_TIMEOUT_S = 30.0
 
@@ -88,7 +88,7 @@ class ProcessTimes(NamedTuple):
     """(n,), time from before a request is packed until its answer is unpacked, ms."""
     computing_ms: Floats
     """(n,), time in `Worker.answer` (prediction, reference and solve), part of `answer_ms`, ms."""
-    troubles: int
+    bad_answer_count: int
     """Number of answers that were late, failed or implausible."""
 
 
@@ -105,7 +105,7 @@ def time_process() -> ProcessTimes:
     )
     try:
         _await_start(solver, troubles)
-        for number in range(_REQUESTS):
+        for number in range(_REQUEST_COUNT):
             sent_at = monotonic()
             solver.request(_request_on_the_eight(number))
             answer = solver.take_answer(1.0)

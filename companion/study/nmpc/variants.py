@@ -8,7 +8,7 @@ from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc import Settings
 from companion.nmpc.worker import Worker
 from companion.study.methods import Method
-from companion.study.nmpc.models import MAKERS, ModelName
+from companion.study.nmpc.models import MODEL_MAKERS, ModelName
 
 GAIN, YAW_GAIN = 5.0, 2.0
 """Gains of the planner, 1/s."""
@@ -34,7 +34,7 @@ STYLES: dict[ModelName, Method] = {
 }
 """Label and line style of each model."""
 MODELS = tuple(STYLES)
-UNLIMITED = tuple(model for model in MODELS if model != "limited")
+UNLIMITED_MODELS = tuple(model for model in MODELS if model != "limited")
 """The models without limits of tilt or rate: those of the paper, and `euler-reduced`."""
 
 
@@ -46,7 +46,7 @@ class Variant(NamedTuple):
     iterations: int = 1
     """Largest number of SQP iterations; 1 is the real-time iteration."""
     knows_dead_time: bool = True
-    """Whether the dead time is compensated by predicting the motion to its end."""
+    """Whether the solver knows the dead time, and so predicts the motion over the dead time."""
 
     @property
     def settings(self) -> Settings:
@@ -67,7 +67,7 @@ class Variant(NamedTuple):
 
     def solver(self, trajectory: Trajectory) -> Worker:
         """The solver of this variant, in the calling process."""
-        return Worker(self.settings, trajectory, MAKERS[self.model])
+        return Worker(self.settings, trajectory, MODEL_MAKERS[self.model])
 
     @property
     def label(self) -> str:
@@ -87,6 +87,6 @@ class Task(NamedTuple):
 
 
 CIRCLE = Task("circle", circle(5.0, Laps(5.0, laps=4.0)), 5.0)
-"""A circle at 5 m/s from its first moment; the vehicle begins at rest."""
+"""A circle whose reference moves at 5 m/s from the beginning; the vehicle begins at rest."""
 EIGHT = Task("eight", gerono_eight(3.0, Laps(5.0, laps=3.0)), 0.0)
 """A figure-eight that begins at rest, like the vehicle."""

@@ -37,7 +37,7 @@ from companion.study.methods import (
 from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
-_SAME_WITHIN = 1e-9
+_EQUALITY_TOLERANCE = 1e-9
 """Difference below which the coefficients at two headings count as the same."""
 _METHODS = (*PAPER_METHODS, EXACT)
 PARTS = len(_METHODS) + 1
@@ -113,7 +113,7 @@ def run(tick: Tick) -> Outcome:
 def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell, ...]]:
     deviations, cross_tracks = largest_deviation(response, reference), cross_track(response)
     settling_times, effect = settling_time(response), heading_effect(response)
-    if effect < _SAME_WITHIN:
+    if effect < _EQUALITY_TOLERANCE:
         return [
             (
                 label,
@@ -155,7 +155,7 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     draw_reference(north, east, time, reference)
     for method in PAPER_METHODS:
         error = deviation(responses[method], reference)[:, shown_heading[method]]
-        draw_line(deviation_panel, time, error, method.line)
+        draw_line(deviation_panel, time, error, method.line_style)
     deviation_panel.set(
         title="Distance from the reference",
         xlabel="time, s",
@@ -196,7 +196,7 @@ def _findings(
             "paper",
             "Heading does not change the response of the proposed, the quaternion and the SO(3)"
             " method.",
-            max(effect[method] for method in (PROPOSED, QUATERNION, SO3)) < _SAME_WITHIN,
+            max(effect[method] for method in (PROPOSED, QUATERNION, SO3)) < _EQUALITY_TOLERANCE,
             "Largest difference of the paths between any two headings: "
             + ", ".join(
                 f"{method.label} {effect[method]:.1g}" for method in (PROPOSED, QUATERNION, SO3)
@@ -207,7 +207,7 @@ def _findings(
             "ours",
             "Heading does not change the response of the quaternion method with the error"
             " q_d ⊗ q⁻¹, as the paper prints it.",
-            heading_effect(printed_response) < _SAME_WITHIN,
+            heading_effect(printed_response) < _EQUALITY_TOLERANCE,
             f"With that error as body rates the paths at two headings differ by up to"
             f" {heading_effect(printed_response):.2g}, and the largest deviation is"
             f" {largest_deviation(printed_response, reference).max():.2g}.",
@@ -215,7 +215,7 @@ def _findings(
         Finding(
             "paper",
             "Heading changes the response of the Euler-angle method.",
-            effect[EULER] > _SAME_WITHIN,
+            effect[EULER] > _EQUALITY_TOLERANCE,
             f"Its largest deviation is {deviations[EULER].min():.2g} at the best heading and"
             f" {deviations[EULER].max():.2g} at the worst.",
         ),

@@ -24,7 +24,7 @@ from companion.study.measures import (
 )
 from companion.study.methods import (
     EULER,
-    LIMIT,
+    LIMIT_STYLE,
     PAPER_LIMIT,
     PROPOSED,
     QUATERNION,
@@ -104,13 +104,16 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     ]
     figure, ((north, east), (rate, plane)) = new_figure(2, 2)
     for method, label, c in curves:
-        draw_line(north, time, c[:, 0], method.line, label)
-        draw_line(east, time, c[:, 1], method.line)
+        draw_line(north, time, c[:, 0], method.line_style, label)
+        draw_line(east, time, c[:, 1], method.line_style)
         draw_line(
-            rate, time[:-1], responses[method].tilt_rate[:, shown_heading[method]], method.line
+            rate,
+            time[:-1],
+            responses[method].tilt_rate[:, shown_heading[method]],
+            method.line_style,
         )
     draw_reference(north, east, time, reference, "reference, equation 33")
-    rate.axhline(MAX_TILT_RATE, **LIMIT)
+    rate.axhline(MAX_TILT_RATE, **LIMIT_STYLE)
     label_response(north, east)
     label_tilt_rate(rate, "Tilt rate and its limit")
     rate.set(xlim=(0.0, 1.2), ylim=(0.0, 1.8))

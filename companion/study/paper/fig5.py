@@ -19,15 +19,15 @@ from companion.study.methods import (
     PAPER_METHODS,
     PROPOSED,
     QUATERNION,
-    REFERENCE,
+    REFERENCE_STYLE,
     SO3,
 )
 from companion.study.outcome import Claimant, Finding, Outcome, Table, Tick
 from companion.study.paper.fig5_flights import (
-    MEASURED,
+    MEASURED_FACTOR,
     METHODS,
     PARTS,
-    QUICK,
+    QUICK_FACTOR,
     LoopFlights,
     Sweep,
     fly_methods,
@@ -40,12 +40,12 @@ __all__ = ["PARTS", "run"]
 _SECOND_ORDER_SHARE = 0.02
 """A response counts as second order if it deviates from the fit by at most this share of the step.
 """
-_SECOND_ORDER_LINE = {**REFERENCE, "color": "#666666", "linestyle": (0, (4, 1.5, 1, 1.5))}
+_SECOND_ORDER_LINE = {**REFERENCE_STYLE, "color": "#666666", "linestyle": (0, (4, 1.5, 1, 1.5))}
 
 
 def run(tick: Tick) -> Outcome:
     """Fly the step of figure 2 with every method through rate loop, rotors and rigid body."""
-    quick, measured = fly_methods(QUICK, tick), fly_methods(MEASURED, tick)
+    quick, measured = fly_methods(QUICK_FACTOR, tick), fly_methods(MEASURED_FACTOR, tick)
     sweep = fly_sweep(tick)
     return Outcome(
         name="fig5",
@@ -55,8 +55,8 @@ def run(tick: Tick) -> Outcome:
             " lag, aerodynamic damping and a rigid body with gyroscopic torque; 8 headings. The"
             " result depends on the speed of that loop. It is flown with two: the bundled vehicle,"
             " which responds as measured on a PX4 (a step of the roll rate reaches 63 % after"
-            f" {1e3 * measured.time_63:.0f} ms), and one with all times {QUICK} times shorter"
-            f" ({1e3 * quick.time_63:.0f} ms)."
+            f" {1e3 * measured.time_63:.0f} ms), and one with all times {QUICK_FACTOR} times"
+            f" shorter ({1e3 * quick.time_63:.0f} ms)."
         ),
         figure=_figure(quick, measured, sweep),
         caption=(
@@ -123,10 +123,10 @@ def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
     step = quick.responses[PROPOSED].step
     for method in PAPER_METHODS:
         error = deviation(quick.responses[method], step.reference())[:, quick.worst_heading(method)]
-        draw_line(deviation_panel, step.time, error, method.line)
+        draw_line(deviation_panel, step.time, error, method.line_style)
         times = 1e3 * np.array(list(sweep))
         values = [cross_tracks[method] for cross_tracks in sweep.values()]
-        cross_track_panel.plot(times, values, marker="o", markersize=4, **method.line)
+        cross_track_panel.plot(times, values, marker="o", markersize=4, **method.line_style)
     deviation_panel.set(
         title=f"Distance from first order, {quick}",
         xlabel="time, s",
@@ -175,8 +175,8 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
     ]
     times = ", ".join(f"{1e3 * t:.0f}" for t in straightest_times)
     return (
-        _straightest("paper", "quick", quick),
-        _straightest("ours", "as slow as measured", measured),
+        _straightness_finding("paper", "quick", quick),
+        _straightness_finding("ours", "as slow as measured", measured),
         Finding(
             "ours",
             "The proposed method is the straightest with every inner loop.",
@@ -199,12 +199,12 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
             )
             + " (required: 0.001).",
         ),
-        _second_order("paper", "quick", quick),
-        _second_order("ours", "as slow as measured", measured),
+        _second_order_finding("paper", "quick", quick),
+        _second_order_finding("ours", "as slow as measured", measured),
     )
 
 
-def _straightest(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
+def _straightness_finding(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
     cross_tracks = {m: loop.cross_track(m) for m in (PROPOSED, QUATERNION, SO3, EULER)}
     return Finding(
         claimant,
@@ -218,7 +218,7 @@ def _straightest(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
     )
 
 
-def _second_order(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
+def _second_order_finding(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
     fit, fit_deviation = loop.fits[PROPOSED], loop.deviation_from_second_order(PROPOSED)
     bound = _SECOND_ORDER_SHARE * hypot(*np.subtract(FIGURE_2.target, FIGURE_2.start))
     return Finding(

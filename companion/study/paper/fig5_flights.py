@@ -18,13 +18,13 @@ from companion.study.step import FIGURE_2, Floats, Response, fly_loop
 
 STEP = replace(FIGURE_2, headings=tuple(k * pi / 4.0 for k in range(-3, 5)))
 METHODS = (*PAPER_METHODS, EXACT)
-QUICK, MEASURED = 5, 1
-"""Speed of the inner loops relative to the mock vehicle, which responds as measured on a PX4."""
-_SWEEP = (10, 5, 3, 2, 1)
-PARTS = 2 * len(METHODS) + len(_SWEEP)
+QUICK_FACTOR, MEASURED_FACTOR = 5, 1
+"""Speeds of the two inner loops relative to the mock vehicle, which responds as a PX4 does."""
+_SWEPT_FACTORS = (10, 5, 3, 2, 1)
+PARTS = 2 * len(METHODS) + len(_SWEPT_FACTORS)
 
 Sweep = dict[float, dict[Method, float]]
-"""Cross-track at heading 0, by `LoopFlights.time_63` of the inner loop (s) and by method."""
+"""Cross-track error at heading 0, by `LoopFlights.time_63` of the inner loop (s) and by method."""
 
 
 class LoopFlights(NamedTuple):
@@ -38,11 +38,11 @@ class LoopFlights(NamedTuple):
     """Second-order model fitted to the response of each method at `worst_heading`."""
 
     def worst_heading(self, method: Method) -> int:
-        """Index of the heading at which a method has its largest cross-track."""
+        """Index of the heading at which a method has its largest cross-track error."""
         return int(cross_track(self.responses[method]).argmax())
 
     def cross_track(self, method: Method) -> float:
-        """Largest cross-track over all headings."""
+        """Largest cross-track error over all headings."""
         return float(cross_track(self.responses[method]).max())
 
     def fitted_path(self, method: Method) -> Floats:
@@ -76,7 +76,7 @@ def fly_methods(factor: int, tick: Tick) -> LoopFlights:
 def fly_sweep(tick: Tick) -> Sweep:
     """Fly every method of the paper with inner loops of several speeds."""
     step, sweep = replace(FIGURE_2, headings=(0.0,)), {}
-    for factor in _SWEEP:
+    for factor in _SWEPT_FACTORS:
         inner_loop = faster_inner_loop(factor)
         time_63 = inner_loop.rate_time_63()
         tick(f"cross-track, {1e3 * time_63:.0f} ms")

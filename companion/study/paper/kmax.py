@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 from companion.attitude import Coefficients
 from companion.attitude.reference_model import rates_along
 from companion.study.drawing import new_figure
-from companion.study.methods import PROPOSED, REFERENCE
+from companion.study.methods import PROPOSED, REFERENCE_STYLE
 from companion.study.outcome import Finding, Outcome, Table, Tick
 from companion.study.step import Floats
 
 TILTS = tuple(radians(angle) for angle in (0.0, 10.0, 20.0, 30.0, 40.0, 45.0, 50.0, 60.0))
-PRINTED = {30: 1.333, 45: 2.0, 60: 4.0}
+PRINTED_K_MAX = {30: 1.333, 45: 2.0, 60: 4.0}
 """K_max as printed in the paper, by tilt in degrees."""
 
 _LARGEST_TILT_SHOWN = radians(60.0)
@@ -27,11 +27,11 @@ class _Row(NamedTuple):
 
     tilt_deg: int
     """Tilt, °."""
-    largest: float
+    largest_k: float
     """Largest K over all directions."""
-    bound: float
+    k_max: float
     """Bound of K by the formula of the paper."""
-    smallest: float
+    smallest_k: float
     """Smallest K over all directions."""
     rate_share: float
     """Mean of the body rate over all directions, divided by its largest value."""
@@ -43,7 +43,7 @@ def scaling_factor(c: Coefficients, direction: float) -> float:
     return roll * roll + pitch * pitch
 
 
-def bound(max_tilt: float) -> float:
+def k_max(max_tilt: float) -> float:
     """Appendix A: K_max = 1/(1 − 2A_M²)² with A_M = sin(max_tilt/2)."""
     return float((1.0 - 2.0 * sin(0.5 * max_tilt) ** 2) ** -2)
 
@@ -61,7 +61,7 @@ def run(tick: Tick) -> Outcome:
         _Row(
             round(degrees(tilt)),
             float(k.max()),
-            bound(tilt),
+            k_max(tilt),
             float(k.min()),
             float(np.sqrt(k).mean() / np.sqrt(k.max())),
         )
@@ -98,23 +98,27 @@ def run(tick: Tick) -> Outcome:
 
 
 def _findings(rows: tuple[_Row, ...], by_tilt: dict[float, Floats]) -> tuple[Finding, ...]:
-    computed_k = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED}
+    computed_k = {angle: float(by_tilt[radians(float(angle))].max()) for angle in PRINTED_K_MAX}
     rate_shares = {row.tilt_deg: row.rate_share for row in rows}
     return (
         Finding(
             "paper",
             "K_max = 1/(1 − 2A_M²)²: 1.333 at 30°, 2 at 45°, 4 at 60°.",
-            all(abs(computed_k[angle] / value - 1.0) < 1e-3 for angle, value in PRINTED.items())
-            and all(abs(row[1] / row[2] - 1.0) < 1e-9 for row in rows),
+            all(
+                abs(computed_k[angle] / value - 1.0) < 1e-3
+                for angle, value in PRINTED_K_MAX.items()
+            )
+            and all(abs(row.largest_k / row.k_max - 1.0) < 1e-9 for row in rows),
             "Computed: " + ", ".join(f"{k:.4g} at {a}°" for a, k in computed_k.items()) + ".",
         ),
         Finding(
             "ours",
             "A movement in any direction needs K_max.",
-            min(row[3] / row[1] for row in rows) > 0.99,
-            f"At {rows[-1][0]}° K is between {rows[-1][3]:.3g} and {rows[-1][1]:.3g},"
-            f" depending on direction. The mean body rate is {100.0 * rate_shares[40]:.0f} % of the"
-            f" largest at 40° of tilt and {100.0 * rate_shares[60]:.0f} % at 60°.",
+            min(row.smallest_k / row.largest_k for row in rows) > 0.99,
+            f"At {rows[-1].tilt_deg}° K is between {rows[-1].smallest_k:.3g} and"
+            f" {rows[-1].largest_k:.3g}, depending on direction. The mean body rate is"
+            f" {100.0 * rate_shares[40]:.0f} % of the largest at 40° of tilt"
+            f" and {100.0 * rate_shares[60]:.0f} % at 60°.",
         ),
     )
 
@@ -135,7 +139,7 @@ def _figure(by_tilt: dict[float, Floats]) -> Figure:
     disc.set(title="K for a movement to the north", xlabel="$a_E$", ylabel="$a_N$", aspect="equal")
     tilts = np.linspace(0.0, _LARGEST_TILT_SHOWN, 121)
     over_tilt.plot(
-        np.degrees(tilts), [bound(t) for t in tilts], label="1/(1 − 2$A_M$²)²", **REFERENCE
+        np.degrees(tilts), [k_max(t) for t in tilts], label="1/(1 − 2$A_M$²)²", **REFERENCE_STYLE
     )
     for extreme, marker, label in ((np.max, "s", "largest"), (np.min, "v", "smallest")):
         over_tilt.plot(
@@ -147,7 +151,11 @@ def _figure(by_tilt: dict[float, Floats]) -> Figure:
             label=f"{label} over the directions",
         )
     over_tilt.plot(
-        list(PRINTED), list(PRINTED.values()), "o", color="black", label="printed in the paper"
+        list(PRINTED_K_MAX),
+        list(PRINTED_K_MAX.values()),
+        "o",
+        color="black",
+        label="printed in the paper",
     )
     over_tilt.set(title="K by tilt", xlabel="tilt, °", ylabel="K", ylim=(0.0, None))
     over_tilt.legend(loc="upper left")

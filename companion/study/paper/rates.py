@@ -87,7 +87,7 @@ def _figure(
     figure, ((over_rate, over_time, plane),) = new_figure(1, 3, width=4.0)
     for method, marker in ((PROPOSED, "o"), (EXACT, "s")):
         values = [largest_deviations[method, hz] for hz in RATES_HZ]
-        over_rate.plot(RATES_HZ, values, marker=marker, label=method.label, **method.line)
+        over_rate.plot(RATES_HZ, values, marker=marker, label=method.label, **method.line_style)
     over_rate.set(
         title="Largest deviation",
         xlabel="sample rate, Hz",
@@ -102,7 +102,7 @@ def _figure(
     slowest = min(RATES_HZ)
     for method in (PROPOSED, EXACT):
         error = deviation(responses[method, slowest], steps[slowest].reference())[:, 0]
-        draw_line(over_time, steps[slowest].time[1:], error[1:], method.line, method.label)
+        draw_line(over_time, steps[slowest].time[1:], error[1:], method.line_style, method.label)
     over_time.set(
         title=f"Deviation at {slowest:.0f} Hz",
         xlabel="time, s",
@@ -112,11 +112,11 @@ def _figure(
     shades = np.linspace(1.0, 0.35, len(RATES_HZ))
     for hz, alpha in zip(reversed(RATES_HZ), shades, strict=True):
         c = responses[PROPOSED, hz].at_heading(0)
-        line = {**PROPOSED.line, "alpha": alpha}
+        line = {**PROPOSED.line_style, "alpha": alpha}
         draw_line(plane, _distance_from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
     exact = responses[EXACT, slowest].at_heading(0)
     draw_line(
-        plane, _distance_from_line(exact), exact[:, 0], EXACT.line, f"exact, {slowest:.0f} Hz"
+        plane, _distance_from_line(exact), exact[:, 0], EXACT.line_style, f"exact, {slowest:.0f} Hz"
     )
     plane.set(title="Paths, enlarged across", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
     plane.set_xlim(right=5.2)

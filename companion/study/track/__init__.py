@@ -1,1 +1,4 @@
-"""The study `track`: position error on trajectories, by planner, speed, lead and wind."""
+"""The study `track`: position error by planner, speed and wind, with and without lead.
+
+Lead (`guidance.lead`) compensates the response of the attitude loop.
+"""

@@ -1,4 +1,4 @@
-"""The flights of the study `track`: the mock vehicle follows a course in lockstep, in memory."""
+"""The flights of the study `track`: the mock vehicle follows trajectories in lockstep."""
 
 import asyncio
 import tempfile
@@ -26,13 +26,13 @@ from companion.testing import fly as fly_in_memory
 
 POSITION_RATE_HZ = 30.0
 MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
-"""Limits of the flights: on the circle at 7 m/s, drag makes 51° of tilt necessary, wind more."""
+"""Limits of the flights. On the circle at 7 m/s drag makes 51° of tilt necessary, and wind more."""
 GUST_SHARE = 1.0 / 3.0
 """Standard deviation of the gusts north and east, as a share of the mean wind."""
-HOLD_S = 2.0
-"""Duration of the hover before the course, s; it keeps the takeover out of the measured part."""
+HOVER_S = 2.0
+"""Duration of the hover before the trajectory, s. The errors are measured after this hover."""
 _HEIGHT_M = 3.0
-_SHORT_PHASES = {
+_QUICK_TAKEOFF_AND_LANDING = {
     "prearm_delay_s": 0.2,
     "parameters": {
         "COM_DISARM_LAND": 0.2,
@@ -49,7 +49,7 @@ _MEASURED_PHASE = "maneuvers"
 
 
 class PositionError(NamedTuple):
-    """Distance from the reference position over a course, m."""
+    """Distance of a position from the reference over a trajectory, m."""
 
     rms: float
     largest: float
@@ -61,7 +61,7 @@ class TrackedFlight(NamedTuple):
     result: str
     """`ok`, or why the flight ended."""
     telemetry_error: PositionError
-    """Distance from the reference of the position that guidance received, m."""
+    """Distance between the position that guidance received and the reference, m."""
     true_error: PositionError
     """Distance of the vehicle's true position from the reference, m."""
     path: Floats
@@ -69,7 +69,7 @@ class TrackedFlight(NamedTuple):
 
     @property
     def ok(self) -> bool:
-        """Whether the course was flown to its end."""
+        """Whether the trajectory was flown to its end."""
         return self.result == "ok"
 
 
@@ -114,20 +114,22 @@ def fly(task: Task) -> TrackedFlight:
     """
     base = load(shipped("mock-px4.yaml"))
     wind = {"speed_m_s": task.wind, "gust_m_s": GUST_SHARE * task.wind}
-    settings = {**(base.mock or {}), **_SHORT_PHASES, "wind": wind}
+    settings = {**(base.mock or {}), **_QUICK_TAKEOFF_AND_LANDING, "wind": wind}
     vehicle = MockVehicle(**settings, compiled=can_compile())
     truth_recorder = TruthRecorder(vehicle)
     with tempfile.TemporaryDirectory(prefix="companion-track-") as folder:
-        course = Path(folder, "course.yaml")
-        course.write_text(bounded_yaml.dump(task.course.file_content))
-        summary = fly_in_memory(_task_config(base, task, course), vehicle, observer=truth_recorder)
+        trajectory_file = Path(folder, "trajectory.yaml")
+        trajectory_file.write_text(bounded_yaml.dump(task.trajectory.file_content))
+        summary = fly_in_memory(
+            _task_config(base, task, trajectory_file), vehicle, observer=truth_recorder
+        )
     if summary.result != "ok":
         infinite_error = PositionError(inf, inf)
         return TrackedFlight(summary.result, infinite_error, infinite_error, np.empty((0, 4)))
     return _measure(summary.trace.tracking_rows(), truth_recorder.rows())
 
 
-def _task_config(base: Config, task: Task, course: Path) -> Config:
+def _task_config(base: Config, task: Task, trajectory_file: Path) -> Config:
     """The shipped configuration with the changes for the task."""
     changes: dict[str, dict[str, Any]] = {
         "link": {"position_rate_hz": POSITION_RATE_HZ},
@@ -140,11 +142,11 @@ def _task_config(base: Config, task: Task, course: Path) -> Config:
         "guidance": {"kind": task.guidance, "lead": task.lead},
         "flight": {
             "maneuvers": ("hover", "trajectory"),
-            "trajectory": course,
+            "trajectory": trajectory_file,
             "takeoff_height_m": _HEIGHT_M,
             "arm": True,
         },
-        "hover": {"duration_s": HOLD_S},
+        "hover": {"duration_s": HOVER_S},
     }
     return changed(base, changes, "study track")
 
@@ -180,17 +182,17 @@ class TruthRecorder(SilentObserver):
 
 
 def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:
-    """Measure the errors on the course: from the end of the hover to the last true position.
+    """Measure the errors on the trajectory: from the end of the hover to the last true position.
 
     Args:
         tracking: rows of `FlightTrace.tracking_rows`.
         truth: rows of `TruthRecorder.rows`.
     """
     time = truth[:, 0]
-    course_rows = tracking[(tracking[:, 0] >= time[0] + HOLD_S) & (tracking[:, 0] <= time[-1])]
-    reference, telemetry = course_rows[:, 1:4], course_rows[:, 4:7]
+    trajectory_rows = tracking[(tracking[:, 0] >= time[0] + HOVER_S) & (tracking[:, 0] <= time[-1])]
+    reference, telemetry = trajectory_rows[:, 1:4], trajectory_rows[:, 4:7]
     true_position = np.column_stack(
-        [np.interp(course_rows[:, 0], time, axis) for axis in truth[:, 1:].T]
+        [np.interp(trajectory_rows[:, 0], time, axis) for axis in truth[:, 1:].T]
     )
     path = np.hstack([reference[:, :2], true_position[:, :2]])
     return TrackedFlight(

@@ -19,14 +19,14 @@ from companion.study.track.flights import (
 )
 from companion.study.track.tasks import (
     CALM,
-    COURSES,
     GUIDANCES,
     HALF_WIDTH_M,
     LINEAR,
     RADIUS_M,
+    TRAJECTORIES,
     WINDY,
-    Course,
     Task,
+    TrajectoryAtSpeed,
     planners,
     tasks,
 )
@@ -73,7 +73,7 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
     """The rows that `--json` prints, one for each flight with lead.
 
     Errors are in m, and null if the flight failed. A row also has the errors of the same flight
-    without lead, if there was one.
+    without lead, if that flight was part of the study.
     """
     rows = []
     for task, flight in flights.items():
@@ -82,8 +82,8 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
         without_lead = flights.get(task._replace(lead=False))
         rows.append(
             {
-                "trajectory": task.course.trajectory,
-                "speed_mps": task.course.speed,
+                "trajectory": task.trajectory.shape,
+                "speed_mps": task.trajectory.speed,
                 "planner": task.planner,
                 "guidance": task.guidance,
                 "wind_mps": task.wind,
@@ -145,8 +145,8 @@ def _flights_table(flights: TrackedFlights) -> Table:
         ),
         tuple(
             (
-                task.course.trajectory,
-                task.course.speed,
+                task.trajectory.shape,
+                task.trajectory.speed,
                 task.planner,
                 task.guidance,
                 task.wind,
@@ -167,23 +167,23 @@ def _planners_table(name: str, caption: str, errors: dict[Task, float]) -> Table
         ("trajectory, guidance", *PLANNER_NAMES),
         tuple(
             (
-                f"{course}, {guidance}",
+                f"{trajectory}, {guidance}",
                 *(
-                    _in_mm(errors[Task(course, planner, guidance)])
+                    _in_mm(errors[Task(trajectory, planner, guidance)])
                     if planner in planners(guidance)
                     else ""
                     for planner in PLANNER_NAMES
                 ),
             )
             for guidance in GUIDANCES
-            for course in COURSES
+            for trajectory in TRAJECTORIES
         ),
     )
 
 
 def _lead_and_wind_table(flights: TrackedFlights) -> Table:
-    def rms(course: Course, planner: str, wind: float, *, lead: bool = True) -> Cell:
-        return _in_mm(flights[Task(course, planner, LINEAR, wind, lead)].telemetry_error.rms)
+    def rms(trajectory: TrajectoryAtSpeed, planner: str, wind: float, *, lead: bool = True) -> Cell:
+        return _in_mm(flights[Task(trajectory, planner, LINEAR, wind, lead)].telemetry_error.rms)
 
     return Table(
         "track-lead-and-wind",
@@ -200,14 +200,14 @@ def _lead_and_wind_table(flights: TrackedFlights) -> Table:
         ),
         tuple(
             (
-                str(course),
-                rms(course, MODEL_FOLLOWING, CALM),
-                rms(course, MODEL_FOLLOWING, CALM, lead=False),
-                rms(course, MODEL_FOLLOWING, WINDY),
-                rms(course, MODEL_FOLLOWING, WINDY, lead=False),
-                rms(course, FIRST_ORDER, WINDY),
+                str(trajectory),
+                rms(trajectory, MODEL_FOLLOWING, CALM),
+                rms(trajectory, MODEL_FOLLOWING, CALM, lead=False),
+                rms(trajectory, MODEL_FOLLOWING, WINDY),
+                rms(trajectory, MODEL_FOLLOWING, WINDY, lead=False),
+                rms(trajectory, FIRST_ORDER, WINDY),
             )
-            for course in COURSES
+            for trajectory in TRAJECTORIES
         ),
     )
 

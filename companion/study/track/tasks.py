@@ -15,10 +15,10 @@ GUIDANCES = (LINEAR, PREDICTIVE)
 _PLANNERS_IN_WIND = (MODEL_FOLLOWING, FIRST_ORDER)
 
 
-class Course(NamedTuple):
+class TrajectoryAtSpeed(NamedTuple):
     """A trajectory at one speed, from rest to rest."""
 
-    trajectory: str
+    shape: str
     """`CIRCLE` or `EIGHT`."""
     speed: float
     """Steady speed on the circle, largest speed on the figure-eight, m/s."""
@@ -26,12 +26,12 @@ class Course(NamedTuple):
     """Number of laps, enough for the vehicle to hold the speed for a while."""
 
     def __str__(self) -> str:
-        return f"{self.trajectory}, {self.speed:g} m/s"
+        return f"{self.shape}, {self.speed:g} m/s"
 
     @property
     def file_content(self) -> dict[str, Any]:
-        """Content of the trajectory file of this course."""
-        if self.trajectory == CIRCLE:
+        """Content of the trajectory file."""
+        if self.shape == CIRCLE:
             return {"circle": {"radius_m": RADIUS_M, "speed_m_s": self.speed, "laps": self.laps}}
         eight = {"half_width_m": HALF_WIDTH_M, "peak_speed_m_s": self.speed, "laps": self.laps}
         return {"figure_eight": eight}
@@ -40,7 +40,7 @@ class Course(NamedTuple):
 class Task(NamedTuple):
     """The conditions of one flight."""
 
-    course: Course
+    trajectory: TrajectoryAtSpeed
     """The trajectory and its speed."""
     planner: str
     """Name of the planner."""
@@ -54,18 +54,18 @@ class Task(NamedTuple):
     def __str__(self) -> str:
         wind = f" in {self.wind:g} m/s of wind" if self.wind else ""
         how = "" if self.guidance == LINEAR else f", {self.guidance}"
-        return f"{self.course}, {self.planner}{how}{'' if self.lead else ', not led'}{wind}"
+        return f"{self.trajectory}, {self.planner}{how}{'' if self.lead else ', not led'}{wind}"
 
 
-CIRCLE_AT_5, EIGHT_AT_5 = Course(CIRCLE, 5.0, 2.0), Course(EIGHT, 5.0, 2.0)
+CIRCLE_AT_5, EIGHT_AT_5 = TrajectoryAtSpeed(CIRCLE, 5.0, 2.0), TrajectoryAtSpeed(EIGHT, 5.0, 2.0)
 CIRCLES = (
-    Course(CIRCLE, 1.0, 0.5),
-    Course(CIRCLE, 3.0, 1.0),
+    TrajectoryAtSpeed(CIRCLE, 1.0, 0.5),
+    TrajectoryAtSpeed(CIRCLE, 3.0, 1.0),
     CIRCLE_AT_5,
-    Course(CIRCLE, 7.0, 3.0),
+    TrajectoryAtSpeed(CIRCLE, 7.0, 3.0),
 )
-EIGHTS = (Course(EIGHT, 1.0, 1.0), Course(EIGHT, 3.0, 1.0), EIGHT_AT_5)
-COURSES = (*CIRCLES, *EIGHTS)
+EIGHTS = (TrajectoryAtSpeed(EIGHT, 1.0, 1.0), TrajectoryAtSpeed(EIGHT, 3.0, 1.0), EIGHT_AT_5)
+TRAJECTORIES = (*CIRCLES, *EIGHTS)
 
 
 def planners(guidance: str) -> tuple[str, ...]:
@@ -74,19 +74,24 @@ def planners(guidance: str) -> tuple[str, ...]:
 
 
 def tasks() -> tuple[Task, ...]:
-    """All flights: every planner in still air, two in wind, one without lead, one with nmpc."""
+    """All flights: every planner in still air, two planners in wind, and one planner without lead.
+
+    With predictive guidance only one planner is flown.
+    """
     calm = [
-        Task(course, planner, guidance)
-        for course in COURSES
+        Task(trajectory, planner, guidance)
+        for trajectory in TRAJECTORIES
         for guidance in GUIDANCES
         for planner in planners(guidance)
     ]
     windy = [
-        Task(course, planner, LINEAR, WINDY) for course in COURSES for planner in _PLANNERS_IN_WIND
+        Task(trajectory, planner, LINEAR, WINDY)
+        for trajectory in TRAJECTORIES
+        for planner in _PLANNERS_IN_WIND
     ]
     without_lead = [
-        Task(course, MODEL_FOLLOWING, LINEAR, wind, lead=False)
-        for course in COURSES
+        Task(trajectory, MODEL_FOLLOWING, LINEAR, wind, lead=False)
+        for trajectory in TRAJECTORIES
         for wind in (CALM, WINDY)
     ]
     return (*calm, *windy, *without_lead)
