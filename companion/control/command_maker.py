@@ -14,7 +14,7 @@ from companion.guidance.linear import Guidance
 
 
 class CommandMaker:
-    """Asks guidance or predictive control for a command; limits the tilt to what thrust can hold.
+    """Asks guidance or predictive control for a command; limits the tilt so that height is held.
 
     Args:
         guidance: makes targets from references.

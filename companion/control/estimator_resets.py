@@ -46,7 +46,7 @@ class EstimatorResets:
     """Finds the jumps, adds them up and counts them.
 
     Attributes:
-        frame: the frame without heading jumps; its `offset` is their sum.
+        frame: the frame without heading jumps; its `offset` is the sum of these jumps, rad.
         shift: sum of the position jumps, m NED.
         corrections: sum of the estimator's gradual heading corrections, rad: heading changes that
             the body rates do not explain, without the jumps; see `StepFrame`.

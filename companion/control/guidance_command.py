@@ -11,7 +11,8 @@ class GuidanceCommand(NamedTuple):
     """One command from guidance; it holds until the next one."""
 
     target: Target
-    """Target of the planner: north and east in the estimator's frame, heading in `frame`."""
+    """Target of the planner: its north and east part is in the estimator's frame, its heading in
+    `frame`."""
     acceleration_down: float
     """Wanted vertical acceleration by thrust and gravity together, positive down, m/s²."""
     made_at: float

@@ -86,7 +86,7 @@ class GuidanceLoop:
         self._recorder = StepRecorder(trace.recorder, state, vehicle_clock)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
-        """Keep an attitude that is a unit quaternion and fits the vehicle's clock."""
+        """Use an attitude from now on, if it is a unit quaternion and fits the vehicle's clock."""
         if sample.misfit is None and is_unit(sample.q):
             self._q = sample.q
             self.estimate.note_attitude(sample)
@@ -134,7 +134,7 @@ class GuidanceLoop:
     def follow(self, source: Source) -> None:
         """Fly `source` from the held pose; after `give_up`, keep holding.
 
-        Without a held pose it begins where the vehicle would stop if it braked now.
+        Without a held pose the source begins where the vehicle would stop if it braked now.
 
         Raises:
             RuntimeError: no pose is held and no position has come yet.

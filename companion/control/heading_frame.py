@@ -28,7 +28,8 @@ class HeadingFrame(NamedTuple):
     def target(self, target: Target) -> Target:
         """Convert a target of guidance to this frame.
 
-        Its horizontal part is in the estimator's frame; its heading is in this frame already.
+        The given target has its horizontal part in the estimator's frame, and its heading in this
+        frame already.
         """
         if self.offset == 0.0:
             return target

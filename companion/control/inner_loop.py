@@ -21,7 +21,7 @@ _TRIAL_INPUT = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
 step from level to 8° of tilt."""
 
 LARGEST_GAIN_TIMES_DELAY = 0.45
-"""Largest sensible gain · (lag + dead time); above it, the response overshoots."""
+"""Largest sensible product of gain and (lag + dead time); above it, the response overshoots."""
 
 
 def planner(config: Config) -> Planner:

@@ -149,7 +149,7 @@ class LoopRecord:
     def stale(self) -> int:
         """Number of samples not answered because data were stale, missing or out of order.
 
-        All reasons count that are no refusal (`Unanswered.is_refusal`).
+        Every reason counts that is not a refusal (`Unanswered.is_refusal`).
         """
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 

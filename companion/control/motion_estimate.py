@@ -70,7 +70,7 @@ class MotionEstimate:
 
     @property
     def _axis_drag(self) -> AxisDrag:
-        """The learned difference of the drag along the body's axes, at the present heading."""
+        """The learned part of the drag that depends on the direction of flight."""
         return AxisDrag(self.drag.axis_coefficient, self._heading)
 
     def retune(self, observer: ObserverSettings, correction: CorrectionSettings) -> None:

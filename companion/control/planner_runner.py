@@ -1,4 +1,4 @@
-"""Runs the planner on each sample: sample period, restarts, and the frame of the attitude."""
+"""Runs the planner on each sample; provides sample period, restarts and the attitude's frame."""
 
 from collections.abc import Callable
 from math import inf

@@ -15,9 +15,9 @@ from companion.guidance.follow import Follow
 from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
 
 _LONGEST_SOLVER_START = 30.0
-"""If the vehicle waits, longest wait for the solver to start, s of wall time."""
+"""Longest wait for the solver to start, s of wall time; used if the vehicle waits for it."""
 _LONGEST_ANSWER_WAIT = 1.0
-"""If the vehicle waits, longest wait for an answer, s of wall time."""
+"""Longest wait for an answer, s of wall time; used if the vehicle waits for the solver."""
 
 
 class FollowedTrajectory(NamedTuple):
@@ -87,7 +87,7 @@ class Predictive:
         vehicle: Vehicle,
         followed: FollowedTrajectory | None,
     ) -> LinearCommand:
-        """The solver's answer for this step if there is one, else `linear`; requests the next one.
+        """The solver's answer for this step, or `linear` if there is none; requests the next.
 
         The solver works in the estimator's frame, whose heading jumps at each reset. The solver's
         target is constant for a period, which its model takes into account.
@@ -150,7 +150,7 @@ class Predictive:
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:
-    """The answer's target, and the downward acceleration (m/s²) of its thrust at its own tilt.
+    """The answer's target, and the downward acceleration (m/s²) by its thrust at the target's tilt.
 
     `HoverThrust` converts this acceleration to the thrust at the present tilt.
     """

@@ -28,8 +28,8 @@ _HALF_ROOT = sqrt(0.5)
 _MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EVERY, _PATHS_EVERY, _BODY_EVERY = 2, 5, 10
-"""Numbers of drawings after which a point is added to the paths, the paths are sent, and the body
-is sent. With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows.
+"""Every how many drawings a point is added to the paths, the paths are sent, and the body is sent.
+With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows.
 
 Everything is sent again and again, because a viewer may join late or jump in the recording.
 """
@@ -87,7 +87,7 @@ class SceneRows:
 
         Args:
             writer: writer of the file.
-            time_ns: ns since 1970; in a file in vehicle time, since the vehicle's boot.
+            time_ns: ns since 1970, or since the vehicle's boot if the file is in vehicle time.
             q: attitude.
             position: position of the vehicle, m ENU.
             reference: position of the reference, m ENU.

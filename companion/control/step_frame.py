@@ -34,8 +34,8 @@ class StepFrame:
     """The frame in which open-loop steps are straight.
 
     Attributes:
-        frame: this frame now; it converts from the estimator's frame. Targets of open-loop steps
-            are in this frame already.
+        frame: this frame at present; it converts from the estimator's frame. Targets of open-loop
+            steps are in this frame already.
         offset_rate: rate of the frame's `offset`, low-passed, rad/s.
     """
 

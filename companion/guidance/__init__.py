@@ -1,6 +1,6 @@
 """Maths of the outer loop: maneuvers, the acceleration that follows them, and the thrust.
 
-All of it is pure, except that `trajectory.csv_file` reads a file.
+Nothing here reads or writes anything, except that `trajectory.csv_file` reads a file.
 """
 
 from companion.guidance.doublets import Doublets

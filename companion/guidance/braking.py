@@ -17,7 +17,7 @@ _NOTICE_TIME = 0.1
 
 
 class AssumedBraking(NamedTuple):
-    """Braking that the fence's monitor assumes; the vehicle must not stop further away than that.
+    """Braking that the fence's monitor assumes; the vehicle must stop within the distance of it.
 
     Attributes:
         reaction: delay before the vehicle brakes, s (`safety.reaction_s`).
@@ -31,8 +31,8 @@ class AssumedBraking(NamedTuple):
 def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> float:
     """Time in which the vehicle brakes from a speed to rest, s; 0 for a vehicle at rest.
 
-    The vehicle stops smoothly. If it would then stop further away than the fence's monitor assumes,
-    it brakes harder.
+    The vehicle stops smoothly. If a smooth stop would need more distance than the fence's monitor
+    assumes, the vehicle brakes harder.
 
     Args:
         speed: horizontal speed, m/s.

@@ -8,7 +8,7 @@ from companion.guidance.maneuvers import check_times_between
 from companion.guidance.reference import Pose, Reference, VerticalMode
 
 _SMALL_SIZE = 0.5
-"""Size of the first doublet of an axis as a share of its second one. From doublets of one size a
+"""Size of the first doublet of an axis, relative to the second one. With doublets of equal size, a
 slew limit could not be told from a lag."""
 _REST_TIME = 0.5
 """Time of zero rates after a doublet of body rates, in which the slowest axis comes to rest, s."""

@@ -30,8 +30,8 @@ _CERTAIN_DEVIATION = 0.1
 """The drag is certain if the standard deviation of linear + quadratic·`top_speed` is below this,
 1/s."""
 _GUSTY_INNOVATION = 2.0
-"""Above this mean of innovation²/variance the drag is not certain: gusts that change faster than
-the filter assumes also move the vehicle, and the filter takes them for drag."""
+"""Above this mean of innovation²/variance the drag is not certain: gusts change faster than the
+filter assumes, and the filter may take their effect for drag."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ class DragEstimate:
             self._forget_window()
 
     def _update_filter(self) -> None:
-        """Update the filter with the means since the last update, one for north, one for east."""
+        """Update the filter with the mean residuals since the last update, north and then east."""
         span = self._span
         self.top_speed = max(self.top_speed, hypot(*self._displacement) / span)
         for wind in (2, 3):

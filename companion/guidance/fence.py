@@ -64,7 +64,7 @@ def height_in_words(height: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A cylinder between a floor and a ceiling, and an optional polygon; both must be kept.
+    """A cylinder between a floor and a ceiling, and an optional polygon; the vehicle stays in both.
 
     Attributes:
         radius: radius of the cylinder about the place where control began, m.

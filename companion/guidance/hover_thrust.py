@@ -157,7 +157,7 @@ class HoverThrust:
         self._battery.note(time, voltage)
 
     def on_ground(self) -> None:
-        """Note that the vehicle is on the ground: pause, and forget the voltage at take-off."""
+        """Note that the vehicle is on the ground: pause learning, forget the take-off voltage."""
         self.pause()
         self._battery.reset()
 

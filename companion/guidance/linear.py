@@ -116,11 +116,11 @@ class Guidance(Protocol):
 
 
 class Trim:
-    """Mean target coefficients of the latest pause of the position hold.
+    """Mean of the planner's target coefficients in the latest pause of the position hold.
 
     In a pause the reference's `horizontal` is `HorizontalMode.ACCELERATION`. The mean balances wind
-    and the error of the estimated attitude. It is added to open-loop coefficients, so that the
-    vehicle accelerates as these ask.
+    and the error of the estimated attitude. It is added to the coefficients of an open-loop
+    command, so that the vehicle has the commanded acceleration in spite of both.
     """
 
     def __init__(self) -> None:
@@ -226,9 +226,10 @@ class LinearGuidance:
     def _coefficients(
         self, reference: Reference, feedback: Horizontal, down: float, inputs: GuidanceInput
     ) -> Coefficients:
-        """Coefficients for the reference's acceleration, its drag, and the feedback (m/s²).
+        """Coefficients for the acceleration of the reference plus `feedback` (m/s²).
 
-        `down` is the vertical acceleration of the command, m/s².
+        The drag at the velocity of the reference is compensated. `down` is the vertical
+        acceleration of the command, m/s².
         """
         drag = inputs.deceleration(reference.velocity_ned)
         north, east = limited(

@@ -9,8 +9,8 @@ from companion.attitude import Coefficients
 from companion.guidance.reference import HorizontalMode, Pose, Reference, TiltCommand
 
 _HOLD_PAUSE = 1.0
-"""Pause of the position hold before open-loop steps, s. Its corrections would disturb the attitude
-from which a step is measured."""
+"""Pause of the position hold before open-loop steps, s. The hold's corrections would disturb the
+attitude from which a step is measured."""
 _CHECK_STEP = 0.01
 """Largest time between two checks of a maneuver, s."""
 
@@ -115,7 +115,8 @@ class Corners:
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
             √(north² + east²). 0.4 and 0.5 give the step of that figure 2.
-        step: duration of each corner, s; the one at which the second round begins lasts twice that.
+        corner_time: duration of each corner, s; the corner at which the second round begins lasts
+            twice as long.
         settle: time of position hold at the end, s.
     """
 

@@ -53,7 +53,10 @@ class ObserverSettings:
     pull_increase: float = 0.0
 
     def pull(self, dt: float, trust: float) -> float:
-        """`position_pull`, 1/s, increased by `trust` and limited for `dt`, as in `gains`."""
+        """`position_pull` increased by `trust`, and limited so that the observer is stable, 1/s.
+
+        The arguments are those of `gains`.
+        """
         return min(self.position_pull + trust * self.pull_increase, _LARGEST_PULL_TIMES_STEP / dt)
 
     def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:

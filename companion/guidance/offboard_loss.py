@@ -3,7 +3,8 @@
 First the autopilot holds the last rates and the last thrust: the thrust axis keeps turning along a
 great circle, while drag slows the vehicle. The part of the rates that is feedback may have any
 direction, so it adds a spread to the result. Then the autopilot's failsafe levels the vehicle, and
-brakes it or lets it drift. `tests/flight/test_killed.py` compares this with the mock vehicles.
+brakes it or lets it drift. `tests/flight/test_killed.py` compares this worst case with
+the mock vehicles.
 """
 
 from math import acos, cos, hypot, pi, sin, sqrt
@@ -16,7 +17,8 @@ from companion.guidance.reference import GRAVITY, Vector
 _INTEGRATION_STEPS = 20
 """Number of integration steps while the rates are held."""
 _FEEDBACK_RATE = 0.15
-"""Largest part of the rates that is feedback on a smooth path, rad/s (mock vehicles: 0.1)."""
+"""Largest body rate that feedback may command on a smooth path, rad/s (measured on mock vehicles:
+0.1)."""
 _FAILSAFE_DELAY = 0.1
 """Delay of the failsafe beyond the time in its parameter, s (PX4: 0.06 to 0.11)."""
 _LEVELLING_RATE = 3.0
@@ -85,13 +87,15 @@ class Reach(NamedTuple):
 class _HeldResult(NamedTuple):
     """Motion of the vehicle from the loss of setpoints until the autopilot stops holding the rates.
 
+    The held rates are planned rates plus unknown rates that feedback has commanded.
+
     Attributes:
-        displacement: displacement without feedback, m NED.
-        velocity: velocity without feedback, m/s NED.
-        feedback_displacement: displacement that feedback adds in the worst direction, m.
-        feedback_speed: speed that feedback adds in the worst direction, m/s.
-        highest: greatest height above the start, without feedback, m.
-        tilt: largest possible tilt, rad.
+        displacement: displacement by the planned rates alone, m NED.
+        velocity: final velocity by the planned rates alone, m/s NED.
+        feedback_displacement: displacement that the feedback rates add in the worst direction, m.
+        feedback_speed: speed that the feedback rates add in the worst direction, m/s.
+        highest: greatest height above the point of the loss, by the planned rates alone, m.
+        tilt: largest possible final tilt, rad.
     """
 
     displacement: Vector
@@ -203,7 +207,10 @@ def _plus_scaled(a: Vector, b: Vector, factor: float) -> Vector:
 
 
 def _after_drag(velocity: Vector, drag: Drag, span: float) -> Vector:
-    """Velocity after `span` s of horizontal drag, m/s NED; the worst case of a fall has no drag."""
+    """Velocity after `span` s of horizontal drag, m/s NED.
+
+    Vertical drag is left out: without it a fall is longest, which is the worst case.
+    """
     north, east, _ = drag.deceleration((velocity[0], velocity[1], 0.0))
     return velocity[0] - north * span, velocity[1] - east * span, velocity[2]
 

@@ -16,14 +16,15 @@ _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
 """Noise of r below which positions count as smooth, and above which as noisy, m/s. The noise of PX4
 and ArduPilot is at most 0.1 m/s; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _LARGEST_CHANGE = 0.08
-"""Before r is filtered, it is limited to this distance from the filtered r, m/s. ArduPilot stamps
-its position in whole milliseconds: at 5 m/s a stamp that is off by 1 ms changes one r by 0.25 m/s.
+"""Each new value of r is clamped to within this distance of the filtered r, m/s. ArduPilot stamps
+its position in whole milliseconds: at 5 m/s an error of 1 ms changes one value of r by 0.25 m/s.
 Real corrections of its estimator change r by 0.02 m/s, with peaks of 0.1 m/s (measured)."""
 _NOISE_TIME = 1.0
 """Time constant with which the noise of r is estimated, s."""
 _MOVING_SPEED = 2.0
 """Speed from which the positions are trusted fully, m/s. At lower speed, position errors are small
-and mostly noise: with less trust a real PX4 hovers with half the body rates, equally exactly."""
+and mostly noise. With less trust a real PX4 hovers as exactly as with full trust, and with half the
+body rates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +49,8 @@ class PositionCorrection:
     """Adds to horizontal positions the correction that the estimator has not made yet.
 
     The autopilot's Kalman filter moves its position by its velocity and towards GPS. The second
-    part, r = ṗ − v, is the filter's gain times the distance to GPS, so that distance is
-    estimator_time·r. If GPS is later than the filter assumes, the position also lags by
+    part, r = ṗ − v, is the filter's gain times the distance to GPS. So the distance to GPS
+    is estimator_time·r. If GPS is later than the filter assumes, the position also lags by
     position_delay·v.
 
     r is computed from two positions a short time apart, which amplifies their noise. Low-pass
@@ -137,7 +138,7 @@ class PositionCorrection:
         self._correction = limited(correction[0], correction[1], settings.largest_correction)
 
     def _filter_window(self, raw: list[float], dt: float) -> float:
-        """Time constant of the low-pass filters, s, from the changes of r between two positions."""
+        """Time constant of the low-pass filters, s, for the new value `raw` of r and its noise."""
         change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
         kept_share = exp(-dt / _NOISE_TIME)
         self._noise = change * change + kept_share * (self._noise - change * change)

@@ -146,7 +146,8 @@ class CommandedSource:
     def _jerk_towards(self, reference: Reference, now: float) -> Vector:
         """Jerk from an earlier reference to this one, m/s³; 0 if it cannot be computed.
 
-        If this reference comes less than `_SHORTEST_JERK_TIME` later, the last jerk is returned.
+        If this reference comes less than `_SHORTEST_JERK_TIME` after the earlier one, the last jerk
+        is returned.
         """
         before, since = self._base, now - self._base_at
         if before is not None and since < _SHORTEST_JERK_TIME:

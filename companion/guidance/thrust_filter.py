@@ -20,7 +20,7 @@ configured `time_constant`."""
 _FIRST_NOISE, _SMALLEST_NOISE, _LARGEST_NOISE = 1.0, 0.05, 100.0
 """Initial variance of a measured specific thrust and its bounds, (m/s²)².
 
-The initial variance is large because the rotors still change from the thrust before takeover.
+The initial variance is large because after takeover the rotors still change to the new thrust.
 """
 
 _NOISE_TIME = 2.0
@@ -32,9 +32,9 @@ _REJECTION_TIME = 1.0
 _LASTING_REJECTION = 0.2
 """Magnitude of the low-pass filter's output from which a rejection resets the variance.
 
-That takes about 0.25 s of rejections. The filter's input is the squared ratio of the innovation to
-its gate, at most 1, with the sign of the innovation: +1 for a rejected measurement that is too
-high, −1 for one that is too low.
+The output reaches it after about 0.25 s of rejections. The filter's input is the squared ratio of
+the innovation to its gate, at most 1, with the sign of the innovation: +1 for a rejected
+measurement that is too high, −1 for one that is too low.
 """
 
 
@@ -47,8 +47,9 @@ class ThrustFilter:
     2017). After a load is picked up or dropped, all measurements would be rejected: if rejections
     last, the variance of the state is reset to its initial value.
 
-    PX4 estimates the hover thrust itself and must linearise: H = −g·u/h². The measurement is linear
-    in k, so the filter converges equally fast from a poor first guess.
+    PX4 estimates the hover thrust instead of k, and must linearise its measurement. Here the
+    measurement is linear in k, so the filter converges from a poor first guess as fast as from a
+    good one.
 
     Args:
         hover: expected share of thrust at hover.
@@ -77,7 +78,7 @@ class ThrustFilter:
 
         Args:
             span: duration of the measurement, s.
-            share: mean share of full thrust, 0..1: the part along the measured axis.
+            share: mean share of full thrust along the measured axis, 0..1.
             specific_thrust: measured mean specific thrust along the same axis, m/s².
             extra_variance: variance to add to the learned variance of the measurements, (m/s²)².
         """

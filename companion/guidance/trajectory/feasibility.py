@@ -12,7 +12,7 @@ from companion.guidance.trajectory.demand import Floats, Motion, demand, require
 from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
-"""Tolerance of limits for rounding, as a share. Some trajectories just meet a limit."""
+"""Relative tolerance of limits for rounding errors. Some trajectories just meet a limit."""
 
 _TO_DEGREES = 180.0 / pi
 
@@ -141,7 +141,7 @@ def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, .
 
 
 def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
-    """Excess over each limit at each time, (m,), as a share of the limit; negative if it is kept.
+    """Relative excess over each limit at each time, (m,); negative where the limit is kept.
 
     The fence is not included, because it is checked for a whole motion.
     """

@@ -63,7 +63,7 @@ _DERIVATIVE_QUANTITIES = (
 
 
 class Frame(Enum):
-    """World frames of published trajectories."""
+    """World frames in which files give positions and yaw."""
 
     ENU = "enu"
     """x east, y north, z up; yaw anticlockwise from east (ROS, REP 103)."""
@@ -124,7 +124,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
 
     Raises:
         TrajectoryError: velocity or acceleration is not the derivative of the position, the samples
-            last too long, or they never move horizontally and have no heading along the path; the
+            last too long, or the heading should follow a path that never moves horizontally; the
             table names another frame than the options, its arrays have other shapes than `Table`
             says or a number that is not finite; an option is out of range.
         ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.

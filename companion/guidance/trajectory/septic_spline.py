@@ -15,7 +15,7 @@ _POLYNOMIAL_DEGREE = 2 * STATE_SIZE - 1
 
 
 def derivative_rows(fractions: Floats, derivative: int) -> Floats:
-    """Derivatives (n, 8) of the order `derivative` of 1, u, … u⁷ at fractions u (n,) of a piece."""
+    """Rows (n, 8) of the derivatives of 1, u, … u⁷ of a given order, at fractions u (n,) of a piece."""
     rows = np.zeros((fractions.size, _POLYNOMIAL_DEGREE + 1))
     for power in range(derivative, _POLYNOMIAL_DEGREE + 1):
         factor = np.prod(np.arange(power - derivative + 1, power + 1))

@@ -51,9 +51,9 @@ _WORTHWHILE_SHARE = 0.98
 _NOTICEABLE_FACTOR = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
-"""Moments are near the slowest if their factor − 1 is at least this share of the largest one."""
+"""Moments are near the slowest if their factor − 1 is at least this share of the slowest's."""
 _FILL_STEP_GAPS = 2.0
-"""Time between the moments that fill a gap, in median gaps."""
+"""Time between the moments that fill a gap, as a multiple of the median gap."""
 
 
 class SlowedPart(NamedTuple):
@@ -62,7 +62,7 @@ class SlowedPart(NamedTuple):
     Attributes:
         begin, end: times in the slowed trajectory, s.
         factor: the largest factor by which the speed is divided.
-        time: time of the largest factor, s; if slowed evenly, that of the worst violation.
+        time: time in the slowed trajectory at which `limit` requires the largest factor, s.
         limit: configuration key of the limit that requires this factor; empty: none was found.
     """
 
@@ -119,7 +119,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
 def _slowed_evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> SlowedPart:
-    """The whole trajectory, slowed by the least factor that is enough; an error if none is."""
+    """The whole trajectory, slowed by the smallest factor that is enough; raises if none is."""
     for violation in broken:
         if not violation.slowing_helps:
             raise TrajectoryError(f"{trajectory.name}: {violation}; {violation.remedy}")
@@ -158,7 +158,7 @@ def _moment_step(length: float) -> float:
 
 
 def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime | None:
-    """The stretch factor among `_WIDTHS` with the shortest flight; None: none keeps the limits."""
+    """The shortest time law of those with pieces of `_WIDTHS`; None: none keeps the limits."""
     needed = _needed_factors(motion, envelope)
     shortest = _MOMENTS_PER_PIECE * _moment_step(length)
     widths = [w for w in _WIDTHS if w >= shortest and length / w >= _FEWEST_PIECES]
@@ -241,7 +241,7 @@ def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[Slow
 
 
 def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """Limit that `moments` exceed most at the original speed; if none, the fence's broken limit."""
+    """Key of the limit that is exceeded most at `moments` in `motion`, else of a broken fence."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:

@@ -129,7 +129,7 @@ def heading_spline(times: Floats, headings: Floats, resting: tuple[bool, bool]) 
 
 
 def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineHeading:
-    """Direction of flight along a spline of positions, interpolated where it hardly moves.
+    """Direction of flight along a spline of positions, interpolated where the speed is too low.
 
     Args:
         spline: spline of the positions, m.

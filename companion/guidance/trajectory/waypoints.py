@@ -132,7 +132,7 @@ def _spline_through(knots: Floats, places: Floats) -> SepticSpline:
 
 
 def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mask (k, 4) of a spline at rest at both ends, with the knots of known value (k,) fixed."""
+    """Mask (k, 4) of fixed states: the values where `values` (k,) is true, rest at both ends."""
     mask = np.zeros((values.size, STATE_SIZE), dtype=bool)
     mask[:, 0] = values
     mask[[0, -1], 1:] = True
@@ -142,7 +142,7 @@ def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _stretch_factor(
     spline: SepticSpline, knots: Floats, speed: float, acceleration: float
 ) -> float:
-    """Factor for the knots with which the spline just meets the speed or the acceleration limit.
+    """Factor that stretches the knots so that the spline just meets one of the two limits.
 
     A minimum-snap spline over knots stretched in time has the same path.
     """
