@@ -56,8 +56,7 @@ class ControlLoop:
         planner: runs the planner.
         record: counters, latest times, and reasons of unanswered samples.
         ask_mode: called once after each gap, to request the mode.
-        is_same_vehicle: called at each sample; returns whether it comes from the vehicle that was
-            checked before the flight.
+        is_same_vehicle: called at each sample; whether the vehicle is the one that was checked.
     """
 
     def __init__(
@@ -187,10 +186,11 @@ class ControlLoop:
         # Checked here, because body rates from guidance bypass the planner's own check.
         if not is_unit(sample.q):
             raise InvalidQuaternionError(f"attitude {sample.q} is no unit quaternion")
+        hover = self._hover_thrust
         thrust = (
-            self._hover_thrust.normalised(command.acceleration_down, sample.q, sample.body_rates)
+            hover.normalised_thrust(command.acceleration_down, sample.q, sample.body_rates)
             if command.thrust is None
-            else self._hover_thrust.within_limits(command.thrust)
+            else hover.within_limits(command.thrust)
         )
         return self.planner.rates(sample, command, period), thrust
 

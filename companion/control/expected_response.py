@@ -99,21 +99,21 @@ def _gain_sentence(gain: float, largest: float) -> str:
 
 def expected_response(config: Config) -> ExpectedResponse:
     """Predict the response by a linear model of planner and rate loop with the tilt rate limit."""
-    step, response = 2.0 * config.steps.coefficient, tilt_response(config)
-    speed = _largest_speed(config)
+    step_size, response = 2.0 * config.steps.coefficient, tilt_response(config)
+    speed = _largest_coefficient_rate(config)
     gain, largest = config.planner.gain_per_s, sensible_gain(config)
     time_constants_without = {
-        _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step, speed),
-        _RATE_LIMIT_KEY: response.step_time(step),
+        _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step_size, speed),
+        _RATE_LIMIT_KEY: response.step_time(step_size),
         **_without_rate_loop_delays(config, response, speed),
     }
     return ExpectedResponse(
         config.steps.coefficient,
-        response.step_time(step, speed),
+        response.step_time(step_size, speed),
         time_constants_without,
         gain,
         None if largest == inf else largest,
-        None if largest == inf else tilt_response(with_gain(config, largest)).step_time(step),
+        None if largest == inf else tilt_response(with_gain(config, largest)).step_time(step_size),
     )
 
 
@@ -123,16 +123,16 @@ def _without_rate_loop_delays(
     """Time constants (s) without the rate loop's lag, and without its dead time; empty: unknown."""
     if not config.vehicle.response_known:
         return {}
-    step = 2.0 * config.steps.coefficient
-    axes = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
-    without_lag = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=axes)})
+    step_size = 2.0 * config.steps.coefficient
+    updates = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
+    without_lag = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=updates)})
     return {
-        _LAG_CAUSE: tilt_response(without_lag).step_time(step, speed),
-        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step, speed),
+        _LAG_CAUSE: tilt_response(without_lag).step_time(step_size, speed),
+        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step_size, speed),
     }
 
 
-def _largest_speed(config: Config) -> float:
+def _largest_coefficient_rate(config: Config) -> float:
     """Rate of change of a coefficient while the vehicle tilts at the tilt rate limit, 1/s.
 
     It is computed where the coefficient is half of `steps.coefficient`.

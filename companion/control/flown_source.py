@@ -38,7 +38,7 @@ class FlownSource:
     def hold(self, braking: Braking) -> None:
         """Brake, and hold the pose where the vehicle stops."""
         self.clear()
-        self.pose, self._braking = Pose(braking.stop, braking.heading), braking
+        self.pose, self._braking = Pose(braking.stopping_point, braking.heading), braking
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
         """Fly `source` from `pose`; `now` is event-loop time, s."""

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from companion.attitude import Quaternion, Target
 from companion.attitude.rotation import turned_about_vertical
-from companion.guidance.reference import rotated
+from companion.guidance.reference import rotate
 
 
 class HeadingFrame(NamedTuple):
@@ -33,5 +33,5 @@ class HeadingFrame(NamedTuple):
         """
         if self.offset == 0.0:
             return target
-        north, east = rotated(target.north, target.east, -self.offset)
+        north, east = rotate(target.north, target.east, -self.offset)
         return target._replace(north=north, east=east)

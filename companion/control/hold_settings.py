@@ -5,9 +5,14 @@ from math import inf, isfinite
 from companion.attitude.rate_response import FIRST_ORDER_SHARE
 from companion.config import Config
 from companion.config.known_drag import drag_prior
-from companion.control.inner_loop import sensible_gain, slower_tilt, tilt_damping, tilt_response
-from companion.guidance import ObserverSettings, Weights, chain_gains
-from companion.guidance.feedback import ChainGains
+from companion.control.inner_loop import (
+    sensible_gain,
+    tilt_damping,
+    tilt_lag_and_dead_time,
+    tilt_response,
+)
+from companion.guidance import ObserverSettings, Weights, horizontal_gains
+from companion.guidance.feedback import HorizontalGains
 from companion.guidance.position_correction import CorrectionSettings
 
 _CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
@@ -17,17 +22,17 @@ _USUAL_RATE_LOOP_DELAY = 0.12
 _STIFF_HOLD_DELAYS = 0.065, 0.08
 """Two delays of the rate loop, s: below the first the hold is stiff, above the second it is normal.
 The delay is dead time + half the lag + half the time to slew to the largest roll-pitch rate."""
-_SHORTEST_DELAY = 0.275
+_SHORTEST_HOLD_DELAY = 0.275
 """Smallest delay T from which weights of the hold are computed, s. A smaller T would give higher
 weights, which amplify the noise of the estimate: the rate loop would always slew, and the vehicle
 would swing."""
-_SECOND_ORDER_SHARE = 0.2
+_SECOND_ORDER_LAG_SHARE = 0.2
 """If the lag is of second order, this share of it is added to the delay T of the hold. The hold
 then has the same stability margins as with a first-order model of PX4's rate loop."""
 _QUICK_OBSERVER_DELAYS = 0.035, 0.06
 """Delays of the rate loop (dead time plus half the lag) between which the observer changes from
 quick to normal, s."""
-_GAIN_RANGE = 5.0, 7.0
+_QUICK_OBSERVER_GAINS = 5.0, 7.0
 """Gains of the planner between which the observer changes from quick to normal, 1/s."""
 _BANDWIDTH_INCREASE = 0.6
 """`ObserverSettings.bandwidth_increase` of a quick observer."""
@@ -65,7 +70,7 @@ def hold_weights(config: Config) -> Weights:
     )
 
 
-def _falling_share(value: float, bounds: tuple[float, float]) -> float:
+def _falling_ramp(value: float, bounds: tuple[float, float]) -> float:
     """Share that is 1 up to the lower bound and 0 from the upper one on; linear in between."""
     lower, upper = bounds
     return min(max(0.0, (upper - value) / (upper - lower)), 1.0)
@@ -77,7 +82,7 @@ def _hold_stiffness(config: Config) -> float:
     A rate loop that slews slowly is late only in large motions. After a large motion a stiff hold
     would oscillate without end, as on the ArduPilot mock with a rate limit of 200 °/s.
     """
-    return _falling_share(_rate_loop_delay(config) + slewing_delay(config), _STIFF_HOLD_DELAYS)
+    return _falling_ramp(_rate_loop_delay(config) + slewing_delay(config), _STIFF_HOLD_DELAYS)
 
 
 def slewing_delay(config: Config) -> float:
@@ -96,7 +101,7 @@ def _rate_loop_delay(config: Config) -> float:
     A second-order lag is first converted to a first-order lag plus dead time (`FIRST_ORDER_SHARE`),
     because it delays quick commands more than a first-order lag of the same length.
     """
-    lag, dead_time = slower_tilt(config)
+    lag, dead_time = tilt_lag_and_dead_time(config)
     share = FIRST_ORDER_SHARE if isfinite(tilt_damping(config)) else 1.0
     return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.response_known else inf
 
@@ -112,9 +117,7 @@ def observer_quickness(config: Config) -> float:
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
-    return _falling_share(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS) * _gain_quickness(
-        config
-    )
+    return _falling_ramp(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS) * _gain_quickness(config)
 
 
 def _gain_quickness(config: Config) -> float:
@@ -123,14 +126,14 @@ def _gain_quickness(config: Config) -> float:
     The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of 7.5 and a quick
     observer.
     """
-    return _falling_share(config.planner.gain_per_s, _GAIN_RANGE)
+    return _falling_ramp(config.planner.gain_per_s, _QUICK_OBSERVER_GAINS)
 
 
 def observer_settings(config: Config) -> ObserverSettings:
     """The settings of the motion observer."""
     (slow, quick), quickness = (
         _POSITION_PULL,
-        _falling_share(_rate_loop_delay(config), _STIFF_HOLD_DELAYS),
+        _falling_ramp(_rate_loop_delay(config), _STIFF_HOLD_DELAYS),
     )
     return ObserverSettings(
         _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
@@ -168,13 +171,13 @@ def attitude_delay(config: Config) -> float:
     excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
     delay = feedback_delay(config) + max(0.0, excess)
     if isfinite(tilt_damping(config)):
-        delay += _SECOND_ORDER_SHARE * slower_tilt(config)[0]
+        delay += _SECOND_ORDER_LAG_SHARE * tilt_lag_and_dead_time(config)[0]
     return delay if config.vehicle.response_known else delay + _USUAL_RATE_LOOP_DELAY
 
 
 def _hold_delay(config: Config) -> float:
     """The delay T that sets weights and wind estimate, s: `attitude_delay`, at least 0.275 s."""
-    return max(_SHORTEST_DELAY, attitude_delay(config))
+    return max(_SHORTEST_HOLD_DELAY, attitude_delay(config))
 
 
 def feedback_delay(config: Config) -> float:
@@ -182,14 +185,14 @@ def feedback_delay(config: Config) -> float:
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 
-def hold_gains(config: Config) -> ChainGains:
+def hold_gains(config: Config) -> HorizontalGains:
     """The gains of the position hold that follow from its weights.
 
     Raises:
         ValueError: no positive and finite gains follow.
     """
     weights = _CALM_WEIGHTS if flies_identify(config) else hold_weights(config)
-    return chain_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
+    return horizontal_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
 
 
 def flies_identify(config: Config) -> bool:

@@ -5,7 +5,7 @@ from math import sin
 from companion.attitude import Quaternion, Target
 from companion.control.telemetry import Telemetry
 from companion.guidance import GRAVITY, HoverThrust
-from companion.guidance.reference import limited
+from companion.guidance.reference import clamp_length
 from companion.guidance.thrust import largest_tilt
 
 _CLEAR_HEIGHT = 1.0
@@ -54,7 +54,7 @@ class HoverLearning:
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""
         largest = sin(self.largest_tilt(acceleration_down))
-        north, east = limited(target.north, target.east, largest)
+        north, east = clamp_length(target.north, target.east, largest)
         return target._replace(north=north, east=east)
 
     def on_ground(self) -> None:

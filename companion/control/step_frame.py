@@ -42,7 +42,7 @@ class StepFrame:
     def __init__(self) -> None:
         self.frame = HeadingFrame()
         self.offset_rate = 0.0
-        self._corrections_at_zero = 0.0  # `corrections` at which the offset is 0
+        self._corrections_at_zero = 0.0  # `heading_corrections` at which the offset is 0
 
     def advance(self, corrections: float, dt: float, *, stepping: bool) -> None:
         """Follow the estimator's corrections during steps; let the offset decay otherwise.

@@ -154,7 +154,7 @@ def _target_row(command: GuidanceCommand) -> tuple[float, ...]:
     return (
         command.made_at,
         *command.target,
-        *(command.later or _NO_TARGET),
+        *(command.later_target or _NO_TARGET),
         command.acceleration_down,
         *(command.body_rates or _NO_VECTOR),
         _nan_if_none(command.thrust),

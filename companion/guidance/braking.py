@@ -42,11 +42,13 @@ def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> 
     if speed < _REST_SPEED:
         return 0.0
     reaction = max(0.0, assumed.reaction - _NOTICE_TIME)
-    longest = 2.0 * reaction + speed / assumed.deceleration
+    longest_time = 2.0 * reaction + speed / assumed.deceleration
     if acceleration <= 0.0:
-        return longest
-    smooth = max(speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _LARGEST_JERK))
-    return min(smooth, longest)
+        return longest_time
+    smooth_time = max(
+        speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _LARGEST_JERK)
+    )
+    return min(smooth_time, longest_time)
 
 
 class Braking(NamedTuple):
@@ -74,7 +76,7 @@ class Braking(NamedTuple):
         return self.begun_at + self.duration
 
     @property
-    def stop(self) -> Vector:
+    def stopping_point(self) -> Vector:
         """Place where the vehicle stops, m NED."""
         return self.at(self.end_time).position_ned
 

@@ -27,7 +27,7 @@ class ClimbBias:
         self._down: float | None = None
         self._speed = 0.0
 
-    def corrected(self, time: float, down: float, speed: float) -> float:
+    def corrected_speed(self, time: float, down: float, speed: float) -> float:
         """Take a vertical position and speed; return the speed without its bias, m/s.
 
         Args:

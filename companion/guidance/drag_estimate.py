@@ -7,7 +7,7 @@ import numpy as np
 
 from companion.attitude.rotation import clamp
 from companion.drag import AxisDrag, Drag
-from companion.guidance.reference import Horizontal, Vector
+from companion.guidance.reference import NorthEast, Vector
 
 _SHORTEST_WINDOW = 0.2
 """Shortest duration of one measurement, s; a longer one suffers less from velocity noise."""
@@ -99,7 +99,7 @@ class DragEstimate:
         return speed > 0.0 and sqrt(max(variance, 0.0)) < _CERTAIN_DEVIATION
 
     def observe(
-        self, dt: float, velocity: Vector, residual: Horizontal, heading: float = 0.0
+        self, dt: float, velocity: Vector, residual: NorthEast, heading: float = 0.0
     ) -> None:
         """Take a measured acceleration; ignored if a number is not finite or `dt` not positive.
 

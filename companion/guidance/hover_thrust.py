@@ -105,7 +105,9 @@ class HoverThrust:
         """Specific thrust at the smallest normalised thrust that is sent, m/s²."""
         return self._to_specific(self._settings.lowest)
 
-    def normalised(self, acceleration_down: float, q: Quaternion, body_rates: BodyRates) -> float:
+    def normalised_thrust(
+        self, acceleration_down: float, q: Quaternion, body_rates: BodyRates
+    ) -> float:
         """Normalised thrust for a wanted vertical acceleration, clamped to `limits`.
 
         Args:

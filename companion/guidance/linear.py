@@ -6,20 +6,20 @@ from typing import NamedTuple, Protocol
 
 from companion.attitude import Coefficients, Target
 from companion.drag import ROUND, AxisDrag, Drag
-from companion.guidance.feedback import ChainGains, HeightGains, acceleration_down
+from companion.guidance.feedback import HeightGains, HorizontalGains, acceleration_down
 from companion.guidance.inner_response import InnerResponse
 from companion.guidance.reference import (
     GRAVITY,
-    Horizontal,
     HorizontalMode,
+    NorthEast,
     Reference,
     ReferenceAt,
     TiltCommand,
     Vector,
     VehicleMotion,
-    limited,
+    clamp_length,
 )
-from companion.guidance.thrust import height_first
+from companion.guidance.thrust import acceleration_within_thrust
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,21 +27,21 @@ class LinearSettings:
     """Settings of linear guidance.
 
     Attributes:
-        gains: gains of the horizontal feedback.
-        height: gains of the height hold.
-        tilt: response of the coefficients to their targets.
-        heading: response of the heading to its target.
-        max_horizontal: largest horizontal acceleration that is commanded, m/s².
+        horizontal_gains: gains of the horizontal feedback.
+        height_gains: gains of the height hold.
+        tilt_response: response of the coefficients to their targets.
+        heading_response: response of the heading to its target.
+        max_horizontal_acceleration: largest horizontal acceleration that is commanded, m/s².
         thrust_lag: lag of the rotors, s.
         period: period of the guidance loop, s; within it the target moves, but the feedback is
             constant.
     """
 
-    gains: ChainGains
-    height: HeightGains
-    tilt: InnerResponse
-    heading: InnerResponse
-    max_horizontal: float
+    horizontal_gains: HorizontalGains
+    height_gains: HeightGains
+    tilt_response: InnerResponse
+    heading_response: InnerResponse
+    max_horizontal_acceleration: float
     thrust_lag: float
     period: float = 0.0
 
@@ -61,14 +61,14 @@ class GuidanceInput(NamedTuple):
 
     now: VehicleMotion
     predicted: VehicleMotion
-    thrust: Horizontal
-    disturbance: Horizontal
+    thrust: NorthEast
+    disturbance: NorthEast
     drag: Drag
     thrust_limits: tuple[float, float]
     axis_drag: AxisDrag = ROUND
 
     @property
-    def acceleration(self) -> Horizontal:
+    def acceleration(self) -> NorthEast:
         """Present horizontal acceleration by thrust, wind and drag, m/s², NED."""
         north, east = self.deceleration(self.now.velocity_ned)
         return (
@@ -76,7 +76,7 @@ class GuidanceInput(NamedTuple):
             self.thrust[1] + self.disturbance[1] - east,
         )
 
-    def deceleration(self, velocity: Vector) -> Horizontal:
+    def deceleration(self, velocity: Vector) -> NorthEast:
         """Horizontal deceleration by drag, m/s², at a velocity in m/s, NED."""
         north, east, _ = self.drag.deceleration(velocity)
         axis_north, axis_east = self.axis_drag.deceleration(velocity[0], velocity[1])
@@ -166,7 +166,7 @@ class LinearGuidance:
     @property
     def acts_after(self) -> float:
         """Mean delay from computing a command until its feedback takes effect, s."""
-        return self._settings.tilt.dead_time + 0.5 * self._settings.period
+        return self._settings.tilt_response.dead_time + 0.5 * self._settings.period
 
     def command(
         self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
@@ -178,10 +178,10 @@ class LinearGuidance:
             time: the present time, s.
             inputs: motion, thrust and disturbance of the vehicle.
         """
-        reference = reference_at(time)
-        ahead = reference_at(time + self._settings.thrust_lag)
-        down = acceleration_down(self._settings.height, reference, inputs.now, ahead, inputs.drag)
-        ends = time, time + self._settings.period
+        reference, settings = reference_at(time), self._settings
+        ahead = reference_at(time + settings.thrust_lag)
+        down = acceleration_down(settings.height_gains, reference, inputs.now, ahead, inputs.drag)
+        ends = time, time + settings.period
         if isinstance(reference.horizontal, TiltCommand):
             north, east = self._trim.coefficients(reference.horizontal)
             target, later = (Target(north, east, *self._heading(reference_at, at)) for at in ends)
@@ -192,14 +192,14 @@ class LinearGuidance:
             return self._coefficients(reference_at(at), feedback, down, inputs)
 
         target, later = (
-            Target(*self._settings.tilt.target(path, at), *self._heading(reference_at, at))
+            Target(*settings.tilt_response.target(path, at), *self._heading(reference_at, at))
             for at in ends
         )
         pausing = reference.horizontal is HorizontalMode.ACCELERATION
         self._trim.take(target, pausing=pausing)
         return LinearCommand(target, later, down)
 
-    def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> Horizontal:
+    def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> NorthEast:
         """Horizontal acceleration that corrects errors and disturbance, m/s².
 
         Args:
@@ -207,9 +207,9 @@ class LinearGuidance:
             later: the reference at the time when the feedback takes effect.
             inputs: motion, thrust and disturbance of the vehicle.
         """
-        settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
+        settings, gains, wind = self._settings, self._settings.horizontal_gains, inputs.disturbance
         if now.horizontal is HorizontalMode.ACCELERATION:
-            return limited(-wind[0], -wind[1], settings.max_horizontal)
+            return clamp_length(-wind[0], -wind[1], settings.max_horizontal_acceleration)
         wanted, drag = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
             position_error = inputs.predicted.position_ned[axis] - later.position_ned[axis]
@@ -221,10 +221,10 @@ class LinearGuidance:
                 - gains.acceleration * (acceleration - now.acceleration_ned[axis])
                 - wind[axis]
             )
-        return limited(wanted[0], wanted[1], settings.max_horizontal)
+        return clamp_length(wanted[0], wanted[1], settings.max_horizontal_acceleration)
 
     def _coefficients(
-        self, reference: Reference, feedback: Horizontal, down: float, inputs: GuidanceInput
+        self, reference: Reference, feedback: NorthEast, down: float, inputs: GuidanceInput
     ) -> Coefficients:
         """Coefficients for the acceleration of the reference plus `feedback` (m/s²).
 
@@ -232,12 +232,12 @@ class LinearGuidance:
         acceleration of the command, m/s².
         """
         drag = inputs.deceleration(reference.velocity_ned)
-        north, east = limited(
+        north, east = clamp_length(
             reference.acceleration_ned[0] + drag[0] + feedback[0],
             reference.acceleration_ned[1] + drag[1] + feedback[1],
-            self._settings.max_horizontal,
+            self._settings.max_horizontal_acceleration,
         )
-        north, east, down = height_first((north, east, down), *inputs.thrust_limits)
+        north, east, down = acceleration_within_thrust((north, east, down), *inputs.thrust_limits)
         # The vertical part of the thrust is g − a_D.
         vertical = GRAVITY - down
         thrust = sqrt(north * north + east * east + vertical * vertical)
@@ -245,4 +245,6 @@ class LinearGuidance:
 
     def _heading(self, reference_at: ReferenceAt, time: float) -> tuple[float, float]:
         """Target heading (rad) and its rate (rad/s) that make the heading follow the reference."""
-        return self._settings.heading.heading_target(lambda at: reference_at(at).heading, time)
+        return self._settings.heading_response.heading_target(
+            lambda at: reference_at(at).heading, time
+        )

@@ -8,7 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.drag import NO_DRAG, Drag
-from companion.guidance.trajectory.demand import Floats, Motion, demand, require_finite, sampled
+from companion.guidance.trajectory.demand import (
+    Floats,
+    Motion,
+    demand,
+    require_finite,
+    sampled_motion,
+)
 from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
@@ -137,7 +143,7 @@ def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, .
         TrajectoryError: the trajectory cannot be computed, or is too long to be checked.
     """
     with computable():
-        return broken_limits(sampled(trajectory), envelope)
+        return broken_limits(sampled_motion(trajectory), envelope)
 
 
 def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:

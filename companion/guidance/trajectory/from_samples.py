@@ -14,7 +14,7 @@ from companion.guidance.trajectory.spline_curve import (
     HEADING_CHECK_STEP,
     SplineCurve,
     heading_spline,
-    smoothed,
+    smoothing_spline,
     tangent_heading,
 )
 from companion.guidance.trajectory.time_laws import SEPTIC_SLOPE, Cruise
@@ -135,11 +135,11 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     to_ned = _TO_NED[options.frame]
     position = (table.position - table.position[0]) @ to_ned.rotation.T
     derivatives = tuple(values @ to_ned.rotation.T for values in table.derivatives)
-    spline = smoothed(table.times, position, options.cutoff, derivatives)
+    spline = smoothing_spline(table.times, position, options.cutoff, derivatives)
     _require_derivatives(spline, table.times, derivatives)
     speeds = [_speed(spline, end) for end in (spline.begin, spline.end)]
     resting = speeds[0] < _REST_SPEED, speeds[1] < _REST_SPEED
-    spline = smoothed(table.times, position, options.cutoff, derivatives, resting)
+    spline = smoothing_spline(table.times, position, options.cutoff, derivatives, resting)
     rise_time, fall_time = [
         0.0
         if is_resting

@@ -73,7 +73,7 @@ def waypoints(
         curve = SplineCurve(spline, longest_step=HEADING_CHECK_STEP)
         heading = tangent_heading(spline, (True, True))
     elif any(angle is not None for angle in headings):
-        heading = given_headings(knots, headings)
+        heading = spline_through_headings(knots, headings)
     return TimedCurve("waypoints", curve, Cruise(spline.end, 1.0), heading)
 
 
@@ -157,7 +157,7 @@ def _sampled(spline: SepticSpline, knots: Floats, count: int = _SAMPLES_PER_SEGM
     return spline.along(np.interp(fine, np.arange(knots.size), knots))
 
 
-def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
+def spline_through_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
     """A spline through the given headings, turning the short way from one to the next.
 
     Args:
