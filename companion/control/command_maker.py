@@ -14,7 +14,7 @@ from companion.guidance.linear import Guidance
 
 
 class CommandMaker:
-    """Asks guidance or predictive control for a command; limits the tilt so that height is held.
+    """Asks guidance or predictive control for a command; limits the tilt so that the height is held.
 
     Args:
         guidance: makes targets from references.
@@ -25,7 +25,7 @@ class CommandMaker:
 
     Attributes:
         guidance: makes targets from references.
-        predictive_control: it flies trajectories instead of `guidance`, or None.
+        predictive_control: flies trajectories instead of `guidance`; None: `guidance` flies them.
     """
 
     def __init__(

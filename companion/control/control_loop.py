@@ -56,7 +56,7 @@ class ControlLoop:
         planner: runs the planner.
         record: counters, latest times, and reasons of unanswered samples.
         ask_mode: called once after each gap, to request the mode.
-        is_same_vehicle: called at each sample; whether the vehicle is the one that was checked.
+        is_same_vehicle: returns, at each sample, whether the vehicle is the one that was checked.
     """
 
     def __init__(

@@ -17,7 +17,7 @@ _NOTICE_TIME = 0.1
 
 
 class AssumedBraking(NamedTuple):
-    """Braking that the fence's monitor assumes; the vehicle must stop within the distance of it.
+    """Braking assumed by the fence's monitor; the vehicle must not need a longer stopping distance.
 
     Attributes:
         reaction: delay before the vehicle brakes, s (`safety.reaction_s`).

@@ -6,7 +6,7 @@ The path stays the same; only its timing changes. Limits are checked at times ca
    moment would keep all limits except the fence.
 2. Find a smooth function of time, the stretch factor (`SlowerTime`), that is nowhere below the
    needed factor. With it the vehicle brakes before a slow part and speeds up after it.
-3. Braking needs acceleration: check again, and raise the stretch factor where a limit is broken.
+3. Braking needs acceleration: check limits again, and raise the stretch factor where one breaks.
 
 If slowing down evenly is as quick, the whole trajectory is slowed down by one factor.
 """
@@ -54,7 +54,7 @@ _WORTHWHILE_SHARE = 0.98
 _NOTICEABLE_FACTOR = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
-"""Moments are near the slowest if their factor − 1 is at least this share of the slowest's."""
+"""Moments with at least this share of the largest (factor − 1) count as near the slowest moment."""
 _FILL_STEP_GAPS = 2.0
 """Time between the moments that fill a gap, as a multiple of the median gap."""
 
@@ -122,7 +122,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
 def _slowed_evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> SlowedPart:
-    """The whole trajectory, slowed by the smallest factor that is enough; raises if none is."""
+    """The whole trajectory, slowed evenly; raises `TrajectoryError` if no factor is enough."""
     for violation in broken:
         if not violation.slowing_helps:
             raise TrajectoryError(f"{trajectory.name}: {violation}; {violation.remedy}")
@@ -215,7 +215,7 @@ def _law_with_pieces(
 
 
 def _largest_of_four(values: Floats, outside: float) -> Floats:
-    """For each coefficient (n + 3,), the largest of four `values` (n,); `outside` past the ends."""
+    """Largest of four `values` (n,) for each coefficient (n + 3,), with `outside` beyond the ends."""
     padded = np.concatenate(([outside] * 3, values, [outside] * 3))
     largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
     return largest
@@ -241,7 +241,7 @@ def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterat
 
 
 def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """Key of the limit that is exceeded most at `moments` in `motion`, else of a broken fence."""
+    """Key of the limit that `motion` exceeds most at `moments`; if none, of the broken fence limit."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:
