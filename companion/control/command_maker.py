@@ -14,7 +14,7 @@ from companion.guidance.linear import Guidance
 
 
 class CommandMaker:
-    """Asks guidance or predictive control for a command; limits the tilt so that the height is held.
+    """Asks guidance or predictive control for a command; limits its tilt so that height is held.
 
     Args:
         guidance: makes targets from references.

@@ -109,16 +109,16 @@ def linear_settings(config: Config) -> LinearSettings:
     if not guidance.lead:
         tilt = heading = IMMEDIATE
     return LinearSettings(
-        horizontal_gains=hold_gains(config),
-        height_gains=HeightGains(
+        gains=hold_gains(config),
+        height=HeightGains(
             height=guidance.height_gain_per_s,
             climb=guidance.climb_gain_per_s,
             max_climb=limits.max_climb_m_s,
             max_descent=limits.max_descent_m_s,
         ),
-        tilt_response=tilt,
-        heading_response=heading,
-        max_horizontal_acceleration=limits.max_horizontal_acceleration,
+        tilt=tilt,
+        heading=heading,
+        max_horizontal=limits.max_horizontal_acceleration,
         thrust_lag=config.thrust.lag,
         period=period,
     )

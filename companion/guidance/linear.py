@@ -27,21 +27,21 @@ class LinearSettings:
     """Settings of linear guidance.
 
     Attributes:
-        horizontal_gains: gains of the horizontal feedback.
-        height_gains: gains of the height hold.
-        tilt_response: response of the coefficients to their targets.
-        heading_response: response of the heading to its target.
-        max_horizontal_acceleration: largest horizontal acceleration that is commanded, m/s².
+        gains: gains of the horizontal feedback.
+        height: gains of the height hold.
+        tilt: response of the coefficients to their targets.
+        heading: response of the heading to its target.
+        max_horizontal: largest horizontal acceleration that is commanded, m/s².
         thrust_lag: lag of the rotors, s.
         period: period of the guidance loop, s; within it the target moves, but the feedback is
             constant.
     """
 
-    horizontal_gains: HorizontalGains
-    height_gains: HeightGains
-    tilt_response: InnerResponse
-    heading_response: InnerResponse
-    max_horizontal_acceleration: float
+    gains: HorizontalGains
+    height: HeightGains
+    tilt: InnerResponse
+    heading: InnerResponse
+    max_horizontal: float
     thrust_lag: float
     period: float = 0.0
 
@@ -166,7 +166,7 @@ class LinearGuidance:
     @property
     def acts_after(self) -> float:
         """Mean delay from computing a command until its feedback takes effect, s."""
-        return self._settings.tilt_response.dead_time + 0.5 * self._settings.period
+        return self._settings.tilt.dead_time + 0.5 * self._settings.period
 
     def command(
         self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
@@ -180,7 +180,7 @@ class LinearGuidance:
         """
         reference, settings = reference_at(time), self._settings
         ahead = reference_at(time + settings.thrust_lag)
-        down = acceleration_down(settings.height_gains, reference, inputs.now, ahead, inputs.drag)
+        down = acceleration_down(settings.height, reference, inputs.now, ahead, inputs.drag)
         ends = time, time + settings.period
         if isinstance(reference.horizontal, TiltCommand):
             north, east = self._trim.coefficients(reference.horizontal)
@@ -192,8 +192,7 @@ class LinearGuidance:
             return self._coefficients(reference_at(at), feedback, down, inputs)
 
         target, later = (
-            Target(*settings.tilt_response.target(path, at), *self._heading(reference_at, at))
-            for at in ends
+            Target(*settings.tilt.target(path, at), *self._heading(reference_at, at)) for at in ends
         )
         pausing = reference.horizontal is HorizontalMode.ACCELERATION
         self._trim.take(target, pausing=pausing)
@@ -207,9 +206,9 @@ class LinearGuidance:
             later: the reference at the time when the feedback takes effect.
             inputs: motion, thrust and disturbance of the vehicle.
         """
-        settings, gains, wind = self._settings, self._settings.horizontal_gains, inputs.disturbance
+        settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.horizontal is HorizontalMode.ACCELERATION:
-            return clamp_length(-wind[0], -wind[1], settings.max_horizontal_acceleration)
+            return clamp_length(-wind[0], -wind[1], settings.max_horizontal)
         wanted, drag = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
             position_error = inputs.predicted.position_ned[axis] - later.position_ned[axis]
@@ -221,7 +220,7 @@ class LinearGuidance:
                 - gains.acceleration * (acceleration - now.acceleration_ned[axis])
                 - wind[axis]
             )
-        return clamp_length(wanted[0], wanted[1], settings.max_horizontal_acceleration)
+        return clamp_length(wanted[0], wanted[1], settings.max_horizontal)
 
     def _coefficients(
         self, reference: Reference, feedback: NorthEast, down: float, inputs: GuidanceInput
@@ -235,7 +234,7 @@ class LinearGuidance:
         north, east = clamp_length(
             reference.acceleration_ned[0] + drag[0] + feedback[0],
             reference.acceleration_ned[1] + drag[1] + feedback[1],
-            self._settings.max_horizontal_acceleration,
+            self._settings.max_horizontal,
         )
         north, east, down = acceleration_within_thrust((north, east, down), *inputs.thrust_limits)
         # The vertical part of the thrust is g − a_D.
@@ -245,6 +244,4 @@ class LinearGuidance:
 
     def _heading(self, reference_at: ReferenceAt, time: float) -> tuple[float, float]:
         """Target heading (rad) and its rate (rad/s) that make the heading follow the reference."""
-        return self._settings.heading_response.heading_target(
-            lambda at: reference_at(at).heading, time
-        )
+        return self._settings.heading.heading_target(lambda at: reference_at(at).heading, time)

@@ -54,7 +54,7 @@ def guidance_feedback(
     by_acceleration, by_position, by_velocity = _observer_responses(s, observer, position_period)
     age = 0.5 * position_period
     delay = np.exp(-s * age)[:, None]
-    prediction = guidance.tilt_response.dead_time + 0.5 * guidance.period
+    prediction = guidance.tilt.dead_time + 0.5 * guidance.period
     # The known acceleration is g·c − drag·v; between two positions its newest value is used.
     inputs = (
         (GRAVITY * by_acceleration, GRAVITY),
@@ -70,7 +70,7 @@ def guidance_feedback(
         predicted_position = position + span * velocity + 0.5 * span * span * (disturbance + known)
         by_tilt = max(known, 0.0)  # drag acts on the observed velocity, not on the measured one
         acceleration = by_tilt - drag * present_velocity + disturbance
-        gains = guidance.horizontal_gains
+        gains = guidance.gains
         command = (
             gains.position * predicted_position
             + gains.velocity * predicted_velocity

@@ -32,11 +32,11 @@ THRUST = 2.0, 18.0  # m/s²
 DRAG = Drag(0.5)
 TILT = InnerResponse(5.0, 0.05, 0.05, follows_model=True)
 SETTINGS = LinearSettings(
-    horizontal_gains=horizontal_gains(Weights(40.0, 8.0), TILT.effective_delay, DRAG.linear),
-    height_gains=HeightGains(1.5, 3.5, 2.0, 1.0),
-    tilt_response=TILT,
-    heading_response=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
-    max_horizontal_acceleration=9.0,
+    gains=horizontal_gains(Weights(40.0, 8.0), TILT.effective_delay, DRAG.linear),
+    height=HeightGains(1.5, 3.5, 2.0, 1.0),
+    tilt=TILT,
+    heading=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
+    max_horizontal=9.0,
     thrust_lag=0.05,
 )
 DT = 0.002
@@ -95,7 +95,7 @@ def flown(settings, reference_at, seconds, wind=REST, start=None, has=ROUND, tol
 def test_a_circle_is_followed_without_lag():
     errors = np.hypot(*flown(SETTINGS, circling, 12.0)[-3000:].T)
     assert errors.max() <= 0.01  # Euler's steps of 2 ms
-    late = replace(SETTINGS, tilt_response=IMMEDIATE)
+    late = replace(SETTINGS, tilt=IMMEDIATE)
     assert np.hypot(*flown(late, circling, 12.0)[-3000:].T).max() >= 0.2
 
 
@@ -144,7 +144,7 @@ def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
     situation = GuidanceInput(motion, motion, thrust, disturbance, DRAG, THRUST)
     target, _, down = LinearGuidance(SETTINGS).command(lambda _: Reference(REST), 0.0, situation)
     a = acceleration(target, down)
-    assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal_acceleration * (1 + 1e-9)
+    assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal * (1 + 1e-9)
     assert abs(down) <= 0.5 * GRAVITY
     assert math.hypot(GRAVITY - down, *a[:2]) <= 18.0 * (1 + 1e-9)
     assert math.hypot(target.north, target.east) < 1.0
@@ -216,7 +216,7 @@ def test_the_heading_is_asked_for_ahead_of_its_response():
 
 
 def test_without_feedback_the_later_target_is_the_one_of_a_period_later():
-    settings = replace(SETTINGS, period=0.02, horizontal_gains=HorizontalGains(0.0, 0.0, 0.0))
+    settings = replace(SETTINGS, period=0.02, gains=HorizontalGains(0.0, 0.0, 0.0))
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
     situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
     guidance = LinearGuidance(settings)

@@ -215,7 +215,7 @@ def _law_with_pieces(
 
 
 def _largest_of_four(values: Floats, outside: float) -> Floats:
-    """Largest of four `values` (n,) for each coefficient (n + 3,), with `outside` beyond the ends."""
+    """Largest of four `values` (n,) for each coefficient (n + 3,); `outside` beyond the ends."""
     padded = np.concatenate(([outside] * 3, values, [outside] * 3))
     largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
     return largest
@@ -241,7 +241,7 @@ def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterat
 
 
 def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """Key of the limit that `motion` exceeds most at `moments`; if none, of the broken fence limit."""
+    """Key of the limit that `motion` exceeds most at `moments`; if none, of the fence limit."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:
