@@ -164,7 +164,7 @@ def test_it_works_in_the_estimators_frame_with_the_heading_resets():
     assert flown == (10.0, 0.1, 0.2, pytest.approx(0.8), pytest.approx(thrust))
     solver.answer = answer(1, 10.02)
     command = predictive.replacement_for(linear, frame, vehicle(10.02), following)
-    assert command.target == command.later_target == Target(0.3, 0.0, pytest.approx(-0.4))
+    assert command.target == command.later == Target(0.3, 0.0, pytest.approx(-0.4))
     assert command.down == pytest.approx(GRAVITY - 12.0 * (1.0 - 0.3**2) ** 0.5)
 
 
