@@ -153,14 +153,14 @@ class StatusLine:
     """Writes one line about the vehicle to standard error, at most four times a second."""
 
     def __init__(self) -> None:
-        self._next = 0.0
+        self._next_show_s = 0.0
 
     def show(self, simulation: Simulation) -> None:
         """Write the line, unless the last one is less than a quarter of a second old."""
         now = time.monotonic()
-        if now < self._next:
+        if now < self._next_show_s:
             return
-        self._next = now + _STATUS_PERIOD_S
+        self._next_show_s = now + _STATUS_PERIOD_S
         state, truth = simulation.state, simulation.vehicle.truth
         north, east, down = truth.position_ned
         roll, pitch, heading = (degrees(angle) for angle in euler(truth.q))

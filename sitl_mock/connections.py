@@ -29,7 +29,8 @@ class Connections:
         companion: the companion's endpoint.
 
     Raises:
-        ConfigError: a port cannot be used, or a pseudo-terminal or its link cannot be made.
+        ConfigError: a port cannot be used, or a pseudo-terminal or its symbolic link cannot be
+            made.
     """
 
     def __init__(self, settings: MockSettings, simulation: Simulation, exchange: Exchange) -> None:
@@ -51,7 +52,7 @@ class Connections:
         if self._control is not None:
             self._control.close()
 
-    def ready(self, timeout_s: float) -> list[Endpoint]:
+    def wait_for_input(self, timeout_s: float) -> list[Endpoint]:
         """Wait at most ``timeout_s`` for input; return the endpoints that have some.
 
         Requests on the control channel are answered here.

@@ -48,7 +48,7 @@ class Exchange:
     def __init__(self, settings: MockSettings, simulation: Simulation) -> None:
         self.on_message: Callable[[Message], None] | None = None
         self._simulation = simulation
-        self._companion = simulation.companion
+        self._companion_link = simulation.companion
         self._pipe_in = DatagramPipe("from_companion", 2 * settings.seed)
         self._pipe_out = DatagramPipe("to_companion", 2 * settings.seed + 1)
         self._lockstep = settings.lockstep.enabled
@@ -60,7 +60,7 @@ class Exchange:
         Returns:
             the lockstep beacon of the new slot, unsigned; None without lockstep.
         """
-        self.deliver(arrived, self._companion)
+        self.deliver(arrived, self._companion_link)
         self._simulation.tick()
         return self._simulation.beacon() if self._lockstep else None
 
@@ -68,11 +68,11 @@ class Exchange:
         """Pass datagrams of a link to the autopilot; the companion's go through the link faults."""
         simulation = self._simulation
         faults = simulation.faults.link_faults
-        if link is self._companion and not self._pipe_in.is_clear(faults):
+        if link is self._companion_link and not self._pipe_in.is_clear(faults):
             datagrams = [datagram for datagram, _ in arrived]
-            passed = self._pipe_in.push(datagrams, faults, simulation.time_us)
-            arrived = [(datagram, decode(datagram)) for datagram in passed]
-        hook = self.on_message if link is self._companion else None
+            passed_datagrams = self._pipe_in.push(datagrams, faults, simulation.time_us)
+            arrived = [(datagram, decode(datagram)) for datagram in passed_datagrams]
+        hook = self.on_message if link is self._companion_link else None
         for _, messages in arrived:
             for message in messages:
                 if hook is not None:
@@ -84,9 +84,9 @@ class Exchange:
 
         The faults of the companion link apply to all but the beacon.
         """
-        frames = link.take()
+        frames = link.take_frames()
         faults = self._simulation.faults.link_faults
-        if link is self._companion and not self._pipe_out.is_clear(faults):
+        if link is self._companion_link and not self._pipe_out.is_clear(faults):
             frames = self._pipe_out.push(frames, faults, self._simulation.time_us)
         if beacon is not None:
             frames.append(link.sign(beacon))

@@ -17,7 +17,7 @@ BEACON_PERIOD_S = 0.2
 """Wall time after which an unanswered later beacon is sent again, s."""
 MAX_LAG_S = 1.0
 """Largest lag behind real time that the server makes up, s. A busy computer causes lags of tenths
-of a second. If they were dropped, the link would seem slower to the companion.
+of a second. If the server did not make them up, the link would seem slower to the companion.
 """
 
 SPIN_S = 0.0005
@@ -106,7 +106,7 @@ class Server:
         self._connections.send_beacon(self._beacon)
         first_bytes_at: float | None = None
         while not self._beacon_answered:
-            self._collect(FIRST_BEACON_PERIOD_S)
+            self._collect_until_answer(FIRST_BEACON_PERIOD_S)
             self._connections.send_beacon(self._beacon)
             now = time.monotonic()
             if first_bytes_at is None and self._companion.has_received:
@@ -120,44 +120,45 @@ class Server:
 
     def _await_answer(self) -> None:
         """Wait for the answer to the latest beacon; after ``patience_s`` continue in real time."""
-        self._collect(BEACON_PERIOD_S)
+        self._collect_until_answer(BEACON_PERIOD_S)
         if self._beacon_answered:
             return
         deadline = time.monotonic() + self._settings.lockstep.patience_s - BEACON_PERIOD_S
         while not self._beacon_answered and time.monotonic() < deadline:
             self._connections.send_beacon(self._beacon)
-            self._collect(BEACON_PERIOD_S)
+            self._collect_until_answer(BEACON_PERIOD_S)
         if not self._beacon_answered:
             self._in_lockstep = False
             self._reset_origin()
 
-    def _collect(self, timeout_s: float) -> None:
+    def _collect_until_answer(self, timeout_s: float) -> None:
         """Collect datagrams until the answer comes or the timeout ends.
 
         The server polls for a moment before it sleeps. This saves two wake-ups a step, which are
         most of the cost of a round trip.
         """
-        began = time.monotonic()
-        self._collect_companion()  # frames already buffered from a byte stream do not wake select
+        began_s = time.monotonic()
+        # Frames already buffered from a byte stream do not wake select.
+        self._collect_companion_datagrams()
         self._poll(0.0)
-        while not self._beacon_answered and time.monotonic() - began < SPIN_S:
-            self._collect_companion()
+        while not self._beacon_answered and time.monotonic() - began_s < SPIN_S:
+            self._collect_companion_datagrams()
             os.sched_yield()  # let another process use this core
         while not self._beacon_answered:
-            remaining_s = began + timeout_s - time.monotonic()
+            remaining_s = began_s + timeout_s - time.monotonic()
             if remaining_s <= 0.0:
                 return
             self._poll(remaining_s)
 
     def _poll(self, timeout_s: float) -> None:
         """Wait at most ``timeout_s`` for input; collect the companion's, handle all other input."""
-        for endpoint in self._connections.ready(timeout_s):
+        for endpoint in self._connections.wait_for_input(timeout_s):
             if endpoint is self._companion:
-                self._collect_companion()
+                self._collect_companion_datagrams()
             else:
                 self._serve(endpoint)
 
-    def _collect_companion(self) -> None:
+    def _collect_companion_datagrams(self) -> None:
         """Read the companion's datagrams up to and including the answer to the latest beacon."""
         while not self._beacon_answered:
             received = self._companion.receive()
@@ -176,7 +177,7 @@ class Server:
     def _await_client(self) -> None:
         """Wait until a client connects, if the endpoint can know that; the vehicle boots then."""
         while not self._companion.connected:
-            self._connections.ready(BEACON_PERIOD_S)
+            self._connections.wait_for_input(BEACON_PERIOD_S)
 
     def _reset_origin(self) -> None:
         """Let the present wall-clock time correspond to the present vehicle time."""
@@ -186,7 +187,7 @@ class Server:
     def _wait_for_time(self) -> None:
         """Serve the sockets until the next slot is due by the wall clock.
 
-        A lag above `MAX_LAG_S` is dropped, and so is the time of a ``slip_clock`` fault.
+        The server does not make up a lag above `MAX_LAG_S`, or the time of a ``slip_clock`` fault.
         """
         self._origin_wall_s += self._simulation.effects.take_slip()
         speed = self._settings.speed
@@ -196,7 +197,7 @@ class Server:
         if remaining_s < -MAX_LAG_S:
             self._reset_origin()
         while True:
-            for endpoint in self._connections.ready(max(0.0, remaining_s)):
+            for endpoint in self._connections.wait_for_input(max(0.0, remaining_s)):
                 self._serve(endpoint)
             remaining_s = due_s - time.monotonic()
             if remaining_s <= 0.0 or self._in_lockstep:

@@ -34,13 +34,13 @@ class MockSettings(VehicleSettings):
     def _known_parameters(
         cls, parameters: dict[str, float], info: ValidationInfo
     ) -> dict[str, float]:
-        known = PERSONALITIES[info.data.get("autopilot", "px4")].parameters
-        names = [parameter.name for parameter in known]
+        known_parameters = PERSONALITIES[info.data.get("autopilot", "px4")].parameters
+        names = [parameter.name for parameter in known_parameters]
         for name in parameters:
             if name not in names:
                 raise ValueError(f"unknown parameter {name}{suggestion(name, names)}")
         try:
-            ParameterTable(known, parameters)
+            ParameterTable(known_parameters, parameters)
         except ParameterRefusedError as error:
             raise ValueError(str(error)) from error
         return parameters
@@ -51,8 +51,12 @@ def _with_ekf(section: dict[str, Any]) -> object:
     sensors = section.get("sensors", {})
     if not isinstance(sensors, dict):
         return sensors
-    completed = {"ekf": section.get("autopilot", "px4"), **sensors}
-    return completed if completed["ekf"] in (None, "none") else {**SENSORS_WITH_FILTER, **completed}
+    completed_sensors = {"ekf": section.get("autopilot", "px4"), **sensors}
+    return (
+        completed_sensors
+        if completed_sensors["ekf"] in (None, "none")
+        else {**SENSORS_WITH_FILTER, **completed_sensors}
+    )
 
 
 def load_settings(
@@ -72,9 +76,9 @@ def load_settings(
     document = Document(None, None) if path is None else _read_document(path)
     section = {} if path is None else _mock_section(document.value, path)
     lockstep = {**section.get("lockstep", {}), **overrides.get("lockstep", {})}
-    merged = {**section, **overrides} | ({"lockstep": lockstep} if lockstep else {})
+    merged_section = {**section, **overrides} | ({"lockstep": lockstep} if lockstep else {})
     try:
-        return MockSettings.model_validate(merged)
+        return MockSettings.model_validate(merged_section)
     except ValidationError as error:
         line = document.line(error_path(error))
         location = source if line is None else f"{source}, line {line}"

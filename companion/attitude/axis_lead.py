@@ -3,7 +3,7 @@
 from math import cos, sin
 
 from companion.attitude.history import PlanHistory
-from companion.attitude.kinematics import into_body
+from companion.attitude.kinematics import rotate_to_heading
 from companion.attitude.rate_response import AxisResponse
 
 ROLL, PITCH = 0, 1
@@ -22,7 +22,7 @@ class AxisLead:
         plans: plans of tilt and heading.
     """
 
-    __slots__ = ("_index", "_lag", "_plan", "_plan_delay", "_plans", "_sigma", "_turn")
+    __slots__ = ("_heading_change", "_index", "_lag", "_plan", "_plan_delay", "_plans", "_sigma")
 
     def __init__(
         self, index: int, axis: AxisResponse, plan_delay: float, plans: PlanHistory
@@ -33,14 +33,14 @@ class AxisLead:
         self._plans = plans
 
     def advance(self) -> None:
-        """Take the plan for `plan_delay` seconds before the time of the newest plan."""
+        """Move on to the plan made for `plan_delay` seconds before the time of the newest plan."""
         plans = self._plans
         planned_for = plans.time - self._plan_delay
         self._plan = plans.tilt.at(planned_for) if self._plan_delay else plans.tilt.newest
-        self._turn = plans.predicted_turn(planned_for, self._plan)
+        self._heading_change = plans.predicted_heading_change(planned_for, self._plan)
 
     def command(self, dt: float, start_heading: float) -> float:
-        """Advance to the next plan; return the rate to send for the `dt` seconds before it, rad/s.
+        """Return the rate to send from this plan to the next one, rad/s; advance to the next plan.
 
         Both plans are rotated into the body axes predicted for the times of the plans.
 
@@ -59,10 +59,10 @@ class AxisLead:
 
     def _planned_rate(self, start_heading: float) -> tuple[float, float]:
         """The planned rate about this body axis, rad/s, and the derivative of that rate, rad/s²."""
-        plan, heading = self._plan, start_heading + self._turn.angle
+        plan, heading = self._plan, start_heading + self._heading_change.angle
         cosine, sine = cos(heading), sin(heading)
-        roll, pitch = into_body(cosine, sine, plan.x_rate, plan.y_rate)
-        roll_slope, pitch_slope = into_body(cosine, sine, plan.x_slope, plan.y_slope)
+        roll, pitch = rotate_to_heading(cosine, sine, plan.x_rate, plan.y_rate)
+        roll_slope, pitch_slope = rotate_to_heading(cosine, sine, plan.x_slope, plan.y_slope)
         if self._index == ROLL:
-            return roll, roll_slope + self._turn.rate * pitch
-        return pitch, pitch_slope - self._turn.rate * roll
+            return roll, roll_slope + self._heading_change.rate * pitch
+        return pitch, pitch_slope - self._heading_change.rate * roll

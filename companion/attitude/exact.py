@@ -5,9 +5,9 @@ from math import asin, atan2, cos, exp, inf, sin, sqrt
 from companion.attitude.kinematics import (
     SMALLEST_A,
     heading_of,
-    into_body,
     law_weight,
     levelling_rates,
+    rotate_to_heading,
     split,
 )
 from companion.attitude.limits import Constants
@@ -68,7 +68,7 @@ def exact(
             max_rate * dt,
             max_yaw_rate * dt,
         )
-        roll, pitch = into_body(b * b - yaw_z * yaw_z, 2.0 * b * yaw_z, r_x, r_y)
+        roll, pitch = rotate_to_heading(b * b - yaw_z * yaw_z, 2.0 * b * yaw_z, r_x, r_y)
         roll *= weight / dt
         pitch *= weight / dt
         yaw = weight / dt * r_z

@@ -31,7 +31,7 @@ class FeedForward:
 
     Attributes:
         plans: the plans of tilt and heading, and when they take effect.
-        frame: heading of ArduPilot's attitude target.
+        target_frame: heading of ArduPilot's attitude target.
         tilt: responses of roll and pitch.
         yaw: response of yaw.
         lag: the larger lag of roll and pitch, s.
@@ -45,7 +45,7 @@ class FeedForward:
         self.yaw = yaw
         self.lag = max(axis.lag for axis in tilt)
         self.dead_time = dead_time = max(axis.dead_time for axis in tilt)
-        self.frame = TargetFrame(response)
+        self.target_frame = TargetFrame(response)
         self._model = ReferenceModel(
             constants,
             model_lag(constants.gain, self.lag),
@@ -85,7 +85,7 @@ class FeedForward:
         model.start_at(c, Coefficients(north, east))
         self._heading.start_at(heading, turn_rate)
         self._body.start(yaw_rate)
-        self.frame.forget()
+        self.target_frame.forget()
         x, y, self._still_rate = model.rates()
         plans = self.plans
         plans.time = 0.0
@@ -126,7 +126,7 @@ class FeedForward:
         self._body.advance(yaw, dt)
         self._still_rate = still_rate
         mean_still_rate = 0.5 * (last_still_rate + still_rate)
-        self.frame.advance(yaw, mean_still_rate, dt)
+        self.target_frame.advance(yaw, mean_still_rate, dt)
         model, body, plans = self._model, self._body, self.plans
         still_angle = plans.tilt.newest.still_angle + mean_still_rate * dt
         slopes = model.rate_slopes(x, y)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 _ROWS_PER_DROP = 64
-"""Number of rows of a `History` that are dropped together once they are older than its `span`."""
+"""Number of rows of a `History` that are dropped together when they are older than `max_delay`."""
 
 
 def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
@@ -63,13 +63,13 @@ class History(Generic[Row]):
     """Rows of a plan, each for one time; the plan between them is interpolated linearly.
 
     Args:
-        span: the longest delay that is looked up, s.
+        max_delay: the longest delay that is looked up, s.
     """
 
-    __slots__ = ("_rows", "_span", "_times")
+    __slots__ = ("_max_delay", "_rows", "_times")
 
-    def __init__(self, span: float) -> None:
-        self._span = span
+    def __init__(self, max_delay: float) -> None:
+        self._max_delay = max_delay
         self._times: list[float] = []
         self._rows: list[Row] = []
 
@@ -78,8 +78,8 @@ class History(Generic[Row]):
 
         For earlier times the row is extrapolated; `slope` is its change per second.
         """
-        earlier = type(row)(*[a - self._span * b for a, b in zip(row, slope, strict=True)])
-        self._times[:] = [time - self._span, time]
+        earlier = type(row)(*[a - self._max_delay * b for a, b in zip(row, slope, strict=True)])
+        self._times[:] = [time - self._max_delay, time]
         self._rows[:] = [earlier, row]
 
     def add(self, time: float, row: Row) -> None:
@@ -87,7 +87,7 @@ class History(Generic[Row]):
         times = self._times
         times.append(time)
         self._rows.append(row)
-        if len(times) > _ROWS_PER_DROP and times[_ROWS_PER_DROP] < time - self._span:
+        if len(times) > _ROWS_PER_DROP and times[_ROWS_PER_DROP] < time - self._max_delay:
             del times[:_ROWS_PER_DROP], self._rows[:_ROWS_PER_DROP]
 
     @property
@@ -102,8 +102,8 @@ class History(Generic[Row]):
         return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
 
 
-class Turn(NamedTuple):
-    """The predicted turn of the body when a plan takes effect.
+class HeadingChange(NamedTuple):
+    """The predicted change of the body's heading when a plan takes effect.
 
     Attributes:
         angle: change of the heading since the start of the plans, rad.
@@ -130,16 +130,24 @@ class PlanHistory:
         yaw: the plan of the heading.
     """
 
-    __slots__ = ("_dead_time", "_turn", "_turn_plan", "_yaw_dead_time", "tilt", "time", "yaw")
+    __slots__ = (
+        "_dead_time",
+        "_heading_change",
+        "_heading_change_plan",
+        "_yaw_dead_time",
+        "tilt",
+        "time",
+        "yaw",
+    )
 
     def __init__(self, dead_time: float, yaw_dead_time: float, longest_period: float) -> None:
         self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
-        span = max(dead_time, yaw_dead_time) + longest_period
+        max_delay = max(dead_time, yaw_dead_time) + longest_period
         self.time = 0.0
-        self.tilt: History[PlannedTilt] = History(span)
-        self.yaw: History[PlannedYaw] = History(span)
-        self._turn_plan: PlannedTilt | None = None
-        self._turn = Turn(0.0, 0.0)  # when `_turn_plan` takes effect
+        self.tilt: History[PlannedTilt] = History(max_delay)
+        self.yaw: History[PlannedYaw] = History(max_delay)
+        self._heading_change_plan: PlannedTilt | None = None
+        self._heading_change = HeadingChange(0.0, 0.0)  # when `_heading_change_plan` takes effect
 
     def add(self, dt: float, tilt: PlannedTilt, yaw: PlannedYaw) -> None:
         """Add a plan for `dt` seconds after the time of the newest plan."""
@@ -152,19 +160,20 @@ class PlanHistory:
         now = self.time + lateness
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
 
-    def predicted_turn(self, planned_for: float, plan: PlannedTilt) -> Turn:
-        """The turn of the body when `plan`, made for the time `planned_for` (s), takes effect.
+    def predicted_heading_change(self, planned_for: float, plan: PlannedTilt) -> HeadingChange:
+        """The heading change when `plan`, made for the time `planned_for` (s), takes effect.
 
         The heading turns at the body's yaw rate minus the yaw rate that keeps the heading still.
         """
-        if plan is not self._turn_plan:  # both axes and the attitude target ask for the newest plan
+        # Both axes and the attitude target ask for the newest plan.
+        if plan is not self._heading_change_plan:
             effect_time = planned_for + self._dead_time
             body_plan = self.yaw.at(effect_time - self._yaw_dead_time)
-            self._turn = Turn(
+            self._heading_change = HeadingChange(
                 body_plan.body_yaw - plan.still_angle, body_plan.body_yaw_rate - plan.still_rate
             )
-            self._turn_plan = plan
-        return self._turn
+            self._heading_change_plan = plan
+        return self._heading_change
 
     def predicted_yaw_change(self, seconds: float) -> float:
         """Predicted yaw of the body, rad, in `seconds` after the newest tilt plan takes effect."""
@@ -187,17 +196,17 @@ class SampleHold:
     Attributes:
         lateness: how much later than expected the newest sample came, s; negative if it was early.
         period: expected sample period, s; 0 before the first sample.
-        step: time by which the plan advances, s.
+        plan_dt: time by which the plan advances, s.
     """
 
-    __slots__ = ("_lateness_share", "_pitch", "_roll", "lateness", "period", "step")
+    __slots__ = ("_lateness_share", "_pitch", "_roll", "lateness", "period", "plan_dt")
 
     def __init__(self) -> None:
         self.restart()
 
     def restart(self) -> None:
         """Forget the rates that were sent and the expected period."""
-        self.period = self.lateness = self.step = self._roll = self._pitch = (
+        self.period = self.lateness = self.plan_dt = self._roll = self._pitch = (
             self._lateness_share
         ) = 0.0
 
@@ -208,7 +217,7 @@ class SampleHold:
         # Bounded, so that the plan always advances.
         change = max(min(lateness, expected), -0.5 * dt / _PERIOD_WEIGHT)
         self.period = period = expected + _PERIOD_WEIGHT * change
-        self.step = period + lateness
+        self.plan_dt = period + lateness
         self._lateness_share = min(lateness / period, 1.0)
 
     def rates(self, roll: float, pitch: float) -> tuple[float, float]:

@@ -69,27 +69,33 @@ def speed_to_rates(
     )
 
 
-def into_body(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float, float]:
+def rotate_to_heading(cosine: float, sine: float, r_x: float, r_y: float) -> tuple[float, float]:
     """Rotate roll and pitch rate from heading 0 to a heading, given by cosine and sine (eq. 28)."""
     return cosine * r_x + sine * r_y, cosine * r_y - sine * r_x
 
 
 def rates_to_speed(
-    w: float, x: float, y: float, z: float, roll: float, pitch: float, yaw: float
+    w: float,
+    x: float,
+    y: float,
+    z: float,
+    roll_rate: float,
+    pitch_rate: float,
+    yaw_rate: float,
 ) -> tuple[float, float, float]:
     """Speed of the coefficients (north, east; 1/s) and of the heading (rad/s) at given body rates.
 
     The inverse of `speed_to_rates`. At body rates ω (rad/s) the thrust axis −R·e_z moves with
     −R·(ω × e_z). The heading turns at the yaw rate minus the yaw rate that keeps the heading still.
     """
-    north = 2.0 * (x * y - w * z) * roll - (1.0 - 2.0 * (y * y + z * z)) * pitch
-    east = (1.0 - 2.0 * (x * x + z * z)) * roll - 2.0 * (x * y + w * z) * pitch
+    north = 2.0 * (x * y - w * z) * roll_rate - (1.0 - 2.0 * (y * y + z * z)) * pitch_rate
+    east = (1.0 - 2.0 * (x * x + z * z)) * roll_rate - 2.0 * (x * y + w * z) * pitch_rate
     a_squared, ax, ay = tilt_products(w, x, y, z)
     inverse_a_squared = 1.0 / a_squared
     _, _, still_rate = speed_to_rates(
         w, z, ax, ay, inverse_a_squared, 1.0 / (2.0 * a_squared - 1.0), east, -north
     )
-    return north, east, yaw - still_rate
+    return north, east, yaw_rate - still_rate
 
 
 def heading_of(a: float, w: float, z: float) -> float:

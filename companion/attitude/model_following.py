@@ -7,7 +7,7 @@ from companion.attitude.first_order import first_order
 from companion.attitude.history import PlannedTilt, PlannedYaw, SampleHold
 from companion.attitude.kinematics import (
     heading_of,
-    into_body,
+    rotate_to_heading,
     speed_to_rates,
     tilt_products,
 )
@@ -36,7 +36,7 @@ class ModelFollowingPlanner:
     the plan in effect now. The gain is p, but at most a quarter of the largest stable gain of the
     slower axis (`rate_response.feedback_gain`). The heading is fed back in the same way.
 
-    ArduPilot takes the rates along the axes of its attitude target instead of the body's;
+    ArduPilot applies the rates along the axes of its attitude target instead of the body's;
     `TargetFrame` gives the rotation into the axes of that target.
 
     Beyond the recovery angle the rates are those of `first-order`; a new plan begins below it.
@@ -89,7 +89,7 @@ class ModelFollowingPlanner:
         self._feed_forward.start(q, body_rates)
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Take the attitude target of ArduPilot, which takes body rates along the target's axes.
+        """Note the attitude target of ArduPilot, which applies body rates along the target's axes.
 
         Args:
             q: attitude target. It is ignored before the plan has started, if it is not a unit
@@ -101,7 +101,7 @@ class ModelFollowingPlanner:
         w, x, y, z = normalised(q)
         a_squared, _, _ = tilt_products(w, x, y, z)
         if 2.0 * a_squared - 1.0 >= self._constants.cos_recovery:
-            self._feed_forward.frame.note_heading(heading_of(sqrt(a_squared), w, z), age)
+            self._feed_forward.target_frame.note_heading(heading_of(sqrt(a_squared), w, z), age)
 
     def rates(
         self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
@@ -144,12 +144,12 @@ class ModelFollowingPlanner:
             unpredicted_yaw_rate = plausible.yaw - yaw_plan.body_yaw_rate
             heading += (forward.dead_time + forward.lag) * unpredicted_yaw_rate
         heading += tilt_plan.still_angle - yaw_plan.body_yaw
-        lead = forward.frame.lead(heading, forward.plans)
+        lead = forward.target_frame.lead(heading, forward.plans)
         roll, pitch, yaw = self._advance(target, heading, feedback_yaw + turn)
         roll, pitch = self._sample_hold.rates(roll, pitch)
-        lead = 0.5 * (lead + forward.frame.lead(heading, forward.plans))
+        lead = 0.5 * (lead + forward.target_frame.lead(heading, forward.plans))
         roll, pitch = roll + feedback_roll, pitch + feedback_pitch
-        roll, pitch = into_body(cos(lead), sin(lead), roll, pitch)
+        roll, pitch = rotate_to_heading(cos(lead), sin(lead), roll, pitch)
         return BodyRates(
             *limit_rates(roll, pitch, yaw, constants.max_tilt_rate, constants.max_yaw_rate)
         )
@@ -165,13 +165,13 @@ class ModelFollowingPlanner:
         hold, forward = self._sample_hold, self._feed_forward
         previous, self._target = self._target, target
         if previous is None or previous == target or hold.lateness < SHORTEST_PERIOD:
-            return forward.advance(target, start_heading, yaw_feedback, hold.step)
-        lateness, remaining = hold.lateness, hold.step - hold.lateness
+            return forward.advance(target, start_heading, yaw_feedback, hold.plan_dt)
+        lateness, remaining = hold.lateness, hold.plan_dt - hold.lateness
         first_roll, first_pitch, _ = forward.advance(
             previous, start_heading, yaw_feedback, lateness
         )
         roll, pitch, yaw = forward.advance(target, start_heading, yaw_feedback, remaining)
-        share = lateness / hold.step
+        share = lateness / hold.plan_dt
         return roll + share * (first_roll - roll), pitch + share * (first_pitch - pitch), yaw
 
     def _feedback(

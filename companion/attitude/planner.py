@@ -39,10 +39,10 @@ class Planner(Protocol):
         ...
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Take an attitude target (ATTITUDE_TARGET), `age` s older than the newest sample.
+        """Note an attitude target (ATTITUDE_TARGET), `age` s older than the newest sample.
 
-        Called only for an autopilot that takes body rates along the axes of this target
-        (ArduPilot). Others take them along the axes of the body.
+        Called only for an autopilot that applies body rates along the axes of its attitude target
+        (ArduPilot). Other autopilots apply body rates along the axes of the body.
         """
         ...
 
@@ -145,9 +145,9 @@ def make_planner(
             the response of the rate loop (`AxisResponse`): `lag` and `dead_time`, s (0.0 for an
             immediate one). It also takes `damping` (default None: first order), `acceleration`,
             rad/s² (default None: no limit), and `RateResponse.frame_lead`, s. With the prefix
-            `pitch_` or `yaw_` the four values of a response are those of that axis (default None:
-            as roll). But there is no `yaw_damping`, and with `pitch_lag` and no `pitch_damping`,
-            pitch is of first order.
+            `pitch_` or `yaw_` the four values of a response can be given for that axis (default
+            None: the value of roll). There is no `yaw_damping`. If `pitch_lag` is given without
+            `pitch_damping`, pitch is of first order.
 
     Raises:
         TypeError: the planner does not take an option, the law does not return three numbers, or

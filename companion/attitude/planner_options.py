@@ -63,15 +63,15 @@ def make_model_following(
         pitch_damping = roll.damping if pitch_lag is None else inf
     response = RateResponse(
         roll,
-        _like_roll(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
-        _like_roll(roll, yaw_lag, yaw_dead_time, yaw_acceleration, inf),
+        _filled_from_roll(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
+        _filled_from_roll(roll, yaw_lag, yaw_dead_time, yaw_acceleration, inf),
         frame_lead,
     )
     constants = constants_of("model-following", gain, yaw_gain, limits, options)
     return ModelFollowingPlanner(constants, response)
 
 
-def _like_roll(
+def _filled_from_roll(
     roll: AxisResponse,
     lag: float | None,
     dead_time: float | None,

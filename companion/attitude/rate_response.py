@@ -8,9 +8,9 @@ _LONGEST_TIME = 1.0
 _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
-FIRST_ORDER_SHARE = 0.63
-"""Lag of the first-order model closest to PX4's second-order response, divided by the lag of that
-response; the rest of the lag acts nearly like a dead time."""
+FIRST_ORDER_LAG_SHARE = 0.63
+"""Ratio of two lags: that of the first-order model closest to PX4's second-order response, and that
+of the response itself. The rest of the response's lag acts nearly like a dead time."""
 SHARE_OF_LARGEST_GAIN = 0.25
 """Largest feedback gain, as a share of the largest stable gain: a gain margin of 4."""
 
@@ -49,7 +49,7 @@ class RateResponse:
     Attributes:
         roll, pitch, yaw: response of each axis.
         frame_lead: time by which ArduPilot's attitude target leads the body in yaw, s; ArduPilot
-            takes body rates along the axes of that target. None: `lead_time` estimates it.
+            applies body rates along the axes of that target. None: `lead_time` estimates it.
 
     Raises:
         ValueError: a time is negative, longer than 1 s or NaN, or a slew limit or damping is not

@@ -7,10 +7,10 @@ from companion.attitude.limits import Constants
 from companion.attitude.reference import Lag
 from companion.attitude.types import Coefficients, Target
 
-_LONGEST_REFERENCE = sin(1.4)
-"""Longest vector of coefficients at which the reference starts. Towards length 1 (90° of tilt) the
+_LARGEST_START_NORM = sin(1.4)
+"""Largest norm of the coefficients at which the reference starts. Towards norm 1 (90° of tilt) the
 body rates grow without bound."""
-_LARGEST_RISE = radians(400.0)
+_LARGEST_RATE_CHANGE = radians(400.0)
 """Largest change of the planned rate v within the lag τ, if the lag is of second order, rad/s.
 
 In PX4's simulation a jump by 270 °/s saturates the motors; 400 °/s spread over τ do not."""
@@ -27,7 +27,8 @@ def rates_along(
 ) -> tuple[float, float, float]:
     """Body rates (rad/s) that move the coefficients at this speed (1/s), with the heading at 0.
 
-    `kinematics.into_body` rotates roll and pitch to another heading; yaw does not depend on it.
+    `kinematics.rotate_to_heading` rotates roll and pitch to another heading; yaw is independent of
+    the heading.
     """
     cosine = sqrt(1.0 - north * north - east * east)
     a_squared = (
@@ -61,7 +62,8 @@ def braking_lead(gain: float, lag: float) -> float:
 def model_response(gain: float, lag: float) -> tuple[float, float]:
     """Gain p' (1/s) and lag τ' (s) of the reference model as τ'·c̈ + ċ = p'·(c_d − c).
 
-    `gain` is p and `lag` is τ of `ReferenceModel`; its braking κ makes p' and τ' smaller.
+    `gain` is p and `lag` is τ of `ReferenceModel`. Its braking lead κ makes p' smaller than p, and
+    τ' smaller than τ.
     """
     braking_factor = 1.0 + gain * braking_lead(gain, lag)
     return gain / braking_factor, lag / braking_factor
@@ -73,9 +75,9 @@ class ReferenceModel:
     The whole vector v is scaled, so a step moves on a straight line. The scale keeps the body rates
     of the motion within the limits. The rates that are sent compensate the lag of the vehicle
     (τ and σ) and stay within the limits too. If the autopilot has a slew limit, v changes no faster
-    than that, and is bounded so that it can fall to 0 at the target. If the lag is of second order,
-    a large step of v would saturate the motors, and the response would not be linear. In that case,
-    if the body rates are limited, v changes by at most `_LARGEST_RISE` within τ.
+    than this limit, and is bounded so that it can fall to 0 at the target. If the lag is of second
+    order, a large step of v would saturate the motors, and the response would not be linear. In
+    that case, if the body rates are limited, v changes by at most `_LARGEST_RATE_CHANGE` within τ.
 
     Args:
         constants: gains and limits.
@@ -124,15 +126,15 @@ class ReferenceModel:
         self._lag = Lag(lag, self._sigma)
         self._acceleration = self._slew_limit
         if self._sigma > 0.0 and constants.max_tilt_rate < inf:
-            self._acceleration = min(self._slew_limit, _LARGEST_RISE / lag)
+            self._acceleration = min(self._slew_limit, _LARGEST_RATE_CHANGE / lag)
         # Near the target v falls by p·v a second.
         largest_v = self._acceleration / constants.gain
         self._tilt_rate_weight = max(constants.tilt_rate_weight, largest_v**-2)
 
     def start_at(self, c: Coefficients, speed: Coefficients) -> None:
-        """Start at these coefficients, shortened to `_LONGEST_REFERENCE`, at this speed (1/s)."""
+        """Start at `c`, shortened to the norm `_LARGEST_START_NORM` at most, with `speed` (1/s)."""
         length = hypot(c.north, c.east)
-        scale = _LONGEST_REFERENCE / length if length > _LONGEST_REFERENCE else 1.0
+        scale = _LARGEST_START_NORM / length if length > _LARGEST_START_NORM else 1.0
         self.north, self.east = scale * c.north, scale * c.east
         self.speed_north, self.speed_east = self._v_north, self._v_east = speed
         self._slope_north = self._slope_east = 0.0
@@ -208,10 +210,10 @@ class ReferenceModel:
         length = hypot(self.north, self.east)
         if length <= self._constants.longest_target:
             return
-        longest = max(self._constants.longest_target, hypot(north, east))
-        if length > longest:
-            self.north *= longest / length
-            self.east *= longest / length
+        max_norm = max(self._constants.longest_target, hypot(north, east))
+        if length > max_norm:
+            self.north *= max_norm / length
+            self.east *= max_norm / length
             self.speed_north = (self.north - north) / dt
             self.speed_east = (self.east - east) / dt
             self._slope_north = self._slope_east = 0.0

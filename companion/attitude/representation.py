@@ -119,8 +119,8 @@ def require_period(dt: float) -> None:
         raise InvalidPeriodError(f"the sample period dt must be positive and finite, not {dt} s")
 
 
-def limited_target(target: Target, longest: float) -> Target:
-    """`target` with coefficients shortened to `longest`, and its heading wrapped to (−π, π].
+def limited_target(target: Target, max_norm: float) -> Target:
+    """`target` with its coefficients shortened to `max_norm`, and its heading wrapped to (−π, π].
 
     Raises:
         InvalidTargetError: `target` is not three or four numbers, or a value is not finite or far
@@ -136,9 +136,9 @@ def limited_target(target: Target, longest: float) -> Target:
         raise InvalidTargetError(f"a target is three or four numbers: {error}") from error
     if not is_usable:
         raise InvalidTargetError(f"target is not finite, or far too large: {target}")
-    if square <= longest * longest and -pi < heading <= pi:
+    if square <= max_norm * max_norm and -pi < heading <= pi:
         return target
-    scale = min(1.0, longest / sqrt(square)) if square > 0.0 else 1.0
+    scale = min(1.0, max_norm / sqrt(square)) if square > 0.0 else 1.0
     return Target(scale * north, scale * east, wrap_angle(heading), heading_rate)
 
 

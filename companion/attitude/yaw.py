@@ -101,7 +101,7 @@ _ROWS_PER_DROP = 128
 
 
 class TargetFrame:
-    """Heading of ArduPilot's attitude target, along whose axes ArduPilot takes body rates.
+    """Heading of ArduPilot's attitude target, along whose axes ArduPilot applies body rates.
 
     A yaw rate turns the attitude target at once, within its slew limit; the body follows 0.2 s
     later. ATTITUDE_TARGET reports the target's heading; `advance` adds the turn by the rates sent
@@ -138,9 +138,9 @@ class TargetFrame:
         self._times[:], self._turns[:] = [0.0], [0.0]
 
     def note_heading(self, heading: float, age: float) -> None:
-        """Take the attitude target's heading (rad), `age` seconds older than the newest sample.
+        """Note the attitude target's heading (rad), `age` seconds older than the newest sample.
 
-        It is ignored if it is older than `OLDEST_ATTITUDE_TARGET` or newer than the newest sample.
+        A heading older than `OLDEST_ATTITUDE_TARGET`, or newer than the newest sample, is ignored.
         """
         if not 0.0 <= age <= OLDEST_ATTITUDE_TARGET:
             return
@@ -178,8 +178,8 @@ class TargetFrame:
         """
         target_heading = self.heading()
         if target_heading is not None:
-            turn = plans.predicted_turn(plans.time, plans.tilt.newest)
-            lead = wrap_angle(target_heading - start_heading - turn.angle)
+            change = plans.predicted_heading_change(plans.time, plans.tilt.newest)
+            lead = wrap_angle(target_heading - start_heading - change.angle)
             if abs(lead) <= LARGEST_LEAD:
                 return lead
         return 0.0 if self._lead_time == 0.0 else plans.predicted_yaw_change(self._lead_time)

@@ -27,7 +27,7 @@ _COMPONENTS = 4
 """Components of a quaternion."""
 
 _BLOCK_SIZE = 336
-"""Vehicles advanced together; the data of a step then fits the first-level cache."""
+"""Number of vehicles that are advanced together; their data then fits the first-level cache."""
 
 _CACHE_LINE = 8  # float64 numbers
 
@@ -178,8 +178,8 @@ def _checked_arguments(
     if index(steps) < 0:
         raise ValueError(f"steps must not be negative, not {steps}")
     if compiled is None:
-        worth_it = q.shape[1] * steps >= COMPILE_FROM
-        compiled = worth_it and can_compile() and _is_plain_function(planner.law)
+        worth_compiling = q.shape[1] * steps >= COMPILE_FROM
+        compiled = worth_compiling and can_compile() and _is_plain_function(planner.law)
     longest_target = planner.constants.longest_target
     if compiled:
         require("numba", "study", "a compiled batch")
@@ -193,7 +193,7 @@ def _checked_arguments(
 
 
 def _is_plain_function(law: Law) -> bool:
-    """Whether a law can be compiled: a function, without variables of a function around it."""
+    """Whether a law can be compiled: a function without closure and default arguments."""
     return isinstance(law, FunctionType) and not (law.__closure__ or law.__defaults__)
 
 
@@ -201,8 +201,8 @@ def _require_plain_function(law: Law) -> None:
     """Refuse a law that cannot be compiled.
 
     Raises:
-        TypeError: the law is no function, has default arguments, or uses variables of the function
-            around it.
+        TypeError: the law is no function, has default arguments, or uses variables of an enclosing
+            function.
     """
     if not _is_plain_function(law):
         raise TypeError(

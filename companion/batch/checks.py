@@ -36,13 +36,13 @@ def as_rows(values: ArrayLike, name: str) -> Array:
 @cache
 def compiled_check() -> Any:
     """`all_fit`, compiled. In numpy the checks would take as long as a compiled law."""
-    return Compiler({}).loop(all_fit)
+    return Compiler({}).compile_loop(all_fit)
 
 
-def all_fit(q: Array, targets: Array, longest: float) -> bool:
+def all_fit(q: Array, targets: Array, max_norm: float) -> bool:
     """Whether no quaternion needs normalising and no target needs limiting, for n vehicles.
 
-    `q` and `targets` are (4, n); `longest` is the largest length of a target's coefficients.
+    `q` and `targets` are (4, n); `max_norm` is the largest norm of a target's coefficients.
     Conditions are joined by `&` and counted, because only a loop without branches is vectorised.
     """
     unfit_count = 0
@@ -51,7 +51,7 @@ def all_fit(q: Array, targets: Array, longest: float) -> bool:
         length_square = targets[0, i] * targets[0, i] + targets[1, i] * targets[1, i]
         fits = (
             (abs(norm_square - 1.0) <= _UNIT_TOLERANCE)
-            & (length_square <= longest * longest)
+            & (length_square <= max_norm * max_norm)
             & (abs(targets[2, i]) < pi)
             & (abs(targets[3, i]) <= LARGEST_HEADING_RATE)
         )
@@ -75,7 +75,7 @@ def unit_quaternions(q: Array) -> Array:
     return q / norm
 
 
-def limited_targets(targets: Array, longest: float) -> Array:
+def limited_targets(targets: Array, max_norm: float) -> Array:
     """`targets` (4, n), each as `limited_target` returns it.
 
     Targets within the limits are copied all at once, the others are limited one by one.
@@ -85,12 +85,12 @@ def limited_targets(targets: Array, longest: float) -> Array:
     """
     north, east, heading, heading_rate = targets
     with np.errstate(over="ignore", invalid="ignore"):  # such a target is refused below
-        fits = north * north + east * east <= longest * longest
+        fits = north * north + east * east <= max_norm * max_norm
     fits &= (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
     limited = targets.copy()
     for i in np.flatnonzero(~fits):
         try:
-            limited[:, i] = limited_target(Target(*targets[:, i].tolist()), longest)
+            limited[:, i] = limited_target(Target(*targets[:, i].tolist()), max_norm)
         except InvalidTargetError as error:
             raise InvalidTargetError(f"vehicle {i}: {error}") from None
     return limited

@@ -26,7 +26,7 @@ class Compiler:
         self._substitutes = substitutes
         self._compiled: dict[Callable[..., Any], Any] = {}
 
-    def function(self, function: Callable[..., Any]) -> Any:
+    def compile_function(self, function: Callable[..., Any]) -> Any:
         """Compile a function for use in compiled code; it must have no closure and no defaults."""
         if function not in self._compiled:
             import numba  # noqa: PLC0415  optional, and slow to import
@@ -36,8 +36,8 @@ class Compiler:
             )
         return self._compiled[function]
 
-    def loop(self, function: Callable[..., Any]) -> Any:
-        """Compile a loop; its closure may contain functions that `function()` returned."""
+    def compile_loop(self, function: Callable[..., Any]) -> Any:
+        """Compile a loop; its closure may contain functions that `compile_function` returned."""
         import numba  # noqa: PLC0415
 
         return numba.njit(function, **_OPTIONS)
@@ -51,7 +51,7 @@ class Compiler:
             if callable(called):
                 called = self._substitutes.get(called, called)
             if isinstance(called, FunctionType):
-                names[name] = self.function(called)
+                names[name] = self.compile_function(called)
         return FunctionType(function.__code__, names, function.__name__)
 
 

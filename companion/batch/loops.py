@@ -1,8 +1,9 @@
 """The loops over vehicles and samples around a law, in Python or compiled.
 
 Compiled inner loops are vectorised. To allow that, they run over whole C-contiguous arrays, from 0
-to the end, and do not write to arrays that they read. The law and the rotation (`turn`) have a loop
-each, because one loop for both needs more registers than a processor has.
+to the end, and do not write to arrays that they read. The law (`apply`) and the rotation
+(`rotate_all`) have a loop each, because one loop for both needs more registers than a processor
+has.
 """
 
 import math
@@ -25,7 +26,7 @@ _ARCTANGENT: Substitutes = {math.atan: series.arctangent}
 _ALL_SERIES: Substitutes = {**_ARCTANGENT, rotation.cos_and_sinc: series.cos_and_sinc}
 
 _Apply = Callable[[Array, Array, Array, float, Constants], None]
-_Turn = Callable[[Array, Array, Array, float], None]
+_RotateAll = Callable[[Array, Array, Array, float], None]
 
 
 class Loops(NamedTuple):
@@ -54,7 +55,7 @@ def _compiler(any_angle: bool) -> Compiler:
 def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
     """Compile the loops of `law`; those for turns of up to 1 rad (not `any_angle`) are faster."""
     compiler = _compiler(any_angle)
-    one_law = compiler.function(law)
+    one_law = compiler.compile_function(law)
 
     def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         for i in range(q.shape[1]):
@@ -62,15 +63,20 @@ def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
             target = targets[0, i], targets[1, i], targets[2, i], targets[3, i]
             rates[0, i], rates[1, i], rates[2, i] = one_law(attitude, target, dt, constants)
 
-    return _sample_loops(compiler.loop(apply), _compiled_turn(any_angle), compiler.loop, any_angle)
+    return _sample_loops(
+        compiler.compile_loop(apply),
+        _compiled_rotation(any_angle),
+        compiler.compile_loop,
+        any_angle,
+    )
 
 
 @cache
-def _compiled_turn(any_angle: bool) -> _Turn:
+def _compiled_rotation(any_angle: bool) -> _RotateAll:
     compiler = _compiler(any_angle)
-    rotate = compiler.function(rotation.after_constant_rates)
+    rotate = compiler.compile_function(rotation.after_constant_rates)
 
-    def turn(q: Array, rates: Array, next_q: Array, dt: float) -> None:
+    def rotate_all(q: Array, rates: Array, next_q: Array, dt: float) -> None:
         for i in range(q.shape[1]):
             attitude = q[0, i], q[1, i], q[2, i], q[3, i]
             body_rates = rates[0, i], rates[1, i], rates[2, i]
@@ -78,7 +84,7 @@ def _compiled_turn(any_angle: bool) -> _Turn:
                 attitude, body_rates, dt
             )
 
-    compiled: _Turn = compiler.loop(turn)
+    compiled: _RotateAll = compiler.compile_loop(rotate_all)
     return compiled
 
 
@@ -92,15 +98,15 @@ def plain_loops(law: Law) -> Loops:
         vehicles = zip(q.T.tolist(), targets.T.tolist(), strict=True)
         rates[...] = np.transpose([one_law(*vehicle, dt, constants) for vehicle in vehicles])
 
-    def turn(q: Array, rates: Array, next_q: Array, dt: float) -> None:
+    def rotate_all(q: Array, rates: Array, next_q: Array, dt: float) -> None:
         vehicles = zip(q.T.tolist(), rates.T.tolist(), strict=True)
         next_q[...] = np.transpose([rotate(*vehicle, dt) for vehicle in vehicles])
 
-    return _sample_loops(apply, turn, lambda loop: loop, any_angle=True)
+    return _sample_loops(apply, rotate_all, lambda loop: loop, any_angle=True)
 
 
 def _sample_loops(
-    apply: _Apply, turn: _Turn, compiled: Callable[[Any], Any], any_angle: bool
+    apply: _Apply, rotate_all: _RotateAll, compiled: Callable[[Any], Any], any_angle: bool
 ) -> Loops:
     """Make the loops over samples from the loops over vehicles.
 
@@ -118,16 +124,16 @@ def _sample_loops(
     ) -> None:
         for _ in range(steps // 2):
             apply(q, targets, rates, dt, constants)
-            turn(q, rates, spare, dt)
+            rotate_all(q, rates, spare, dt)
             apply(spare, targets, rates, dt, constants)
-            turn(spare, rates, q, dt)
+            rotate_all(spare, rates, q, dt)
         if steps % 2:
             apply(q, targets, rates, dt, constants)
-            turn(q, rates, spare, dt)
+            rotate_all(q, rates, spare, dt)
 
     def record(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         for k in range(rates.shape[0]):
             apply(q[k], targets, rates[k], dt, constants)
-            turn(q[k], rates[k], q[k + 1], dt)
+            rotate_all(q[k], rates[k], q[k + 1], dt)
 
     return Loops(apply, compiled(advance), compiled(record), any_angle)

@@ -37,13 +37,13 @@ class StepFlight(NamedTuple):
     Attributes:
         coefficients: (samples, 2), coefficients north and east at the sample.
         targets: (samples, 2), target coefficients at the sample.
-        commanded: (samples, 3), commanded body rates, rad/s.
+        commanded_rates: (samples, 3), commanded body rates, rad/s.
         q: attitude at the end.
     """
 
     coefficients: Array
     targets: Array
-    commanded: Array
+    commanded_rates: Array
     q: Quaternion
 
 
@@ -73,7 +73,7 @@ def fly_steps(
             f"{type(planner).__name__} keeps state; a batch needs a planner without state"
         )
     require("numba", "study", "a compiled batch")
-    coefficients, commanded = np.empty((len(targets), 2)), np.empty((len(targets), 3))
+    coefficients, commanded_rates = np.empty((len(targets), 2)), np.empty((len(targets), 3))
     loops, delays = _rate_loop_arrays(axes)
     fly = _compiled(planner.law)
     q = fly(
@@ -84,9 +84,9 @@ def fly_steps(
         planner.constants,
         steps_per_sample,
         coefficients,
-        commanded,
+        commanded_rates,
     )
-    return StepFlight(coefficients, targets[:, :2], commanded, q)
+    return StepFlight(coefficients, targets[:, :2], commanded_rates, q)
 
 
 def _rate_loop_arrays(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
@@ -109,9 +109,10 @@ def _rate_loop_arrays(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.i
 def _compiled(law: Law) -> Callable[..., Quaternion]:
     """Compile the flight of one vehicle under `law`."""
     compiler = Compiler({})
-    one_law, turn = compiler.function(law), compiler.function(after_constant_rates)
-    lag_response, limit = compiler.function(lag_step), compiler.function(clamp)
-    products = compiler.function(tilt_products)
+    one_law = compiler.compile_function(law)
+    rotate = compiler.compile_function(after_constant_rates)
+    lag_response, limit = compiler.compile_function(lag_step), compiler.compile_function(clamp)
+    products = compiler.compile_function(tilt_products)
     dt = 1.0 / STEP_HZ
 
     def fly(
@@ -122,7 +123,7 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
         constants: Constants,
         steps: int,
         coefficients: Array,
-        commanded: Array,
+        commanded_rates: Array,
     ) -> Quaternion:
         length = delays.max() + 1
         commands = np.zeros((length, 3))  # ring buffer of the newest commands
@@ -133,7 +134,8 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
             _, ax, ay = products(q[0], q[1], q[2], q[3])
             coefficients[sample, 0], coefficients[sample, 1] = -2.0 * ay, 2.0 * ax
             roll, pitch, yaw = one_law(q, target, steps * dt, constants)
-            commanded[sample, 0], commanded[sample, 1], commanded[sample, 2] = roll, pitch, yaw
+            commanded_rates[sample, 0], commanded_rates[sample, 1] = roll, pitch
+            commanded_rates[sample, 2] = yaw
             for _ in range(steps):
                 slot = k % length
                 commands[slot, 0], commands[slot, 1], commands[slot, 2] = roll, pitch, yaw
@@ -146,9 +148,9 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
                         actual[axis], slopes[axis], slewed[axis], dt, lag, sigma, transition
                     )
                     mean_rates[axis] = angle / dt
-                q = turn(q, (mean_rates[0], mean_rates[1], mean_rates[2]), dt)
+                q = rotate(q, (mean_rates[0], mean_rates[1], mean_rates[2]), dt)
                 k += 1
         return q
 
-    compiled: Any = compiler.loop(fly)
+    compiled: Any = compiler.compile_loop(fly)
     return compiled  # type: ignore[no-any-return]

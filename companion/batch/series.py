@@ -22,7 +22,7 @@ def _polynomial_fit(
 ) -> tuple[float, ...]:
     """Coefficients, constant first, of the polynomial through the Chebyshev points of [0, largest].
 
-    The error of this polynomial is within a small factor of that of the best one.
+    The error of this polynomial is at most a small multiple of the error of the best polynomial.
     """
     fit = Chebyshev.interpolate(function, terms - 1, domain=[0.0, largest])
     return tuple(float(c) for c in fit.convert(kind=Polynomial).coef)

@@ -19,7 +19,7 @@ _SHORTEST_LOG, _LONGEST_LOG = log(0.02), log(2.0)
 """Range in which the time constant is searched, as natural logarithms of seconds."""
 _GOLDEN_RATIO = 0.5 * (sqrt(5.0) - 1.0)
 _SEARCH_STEPS = 17
-"""Steps of the golden-section search; the range left is 0.13 % of a time constant."""
+"""Steps of the golden-section search, which narrows the range to 0.13 % of a time constant."""
 _MIN_STEP = 1e-3
 """Smallest target coefficient that counts as a step; a smaller one counts as level."""
 
@@ -55,18 +55,20 @@ def step_figures(flight: StepFlight, gain: float, period: float) -> StepFigures:
         period: time between two samples, s.
     """
     measure, fit = _compiled()
-    figures = measure(flight.coefficients, flight.targets, flight.commanded, 1.0 / gain, period)
+    figures = measure(
+        flight.coefficients, flight.targets, flight.commanded_rates, 1.0 / gain, period
+    )
     return StepFigures(*figures, *fit(flight.coefficients, flight.targets, period))
 
 
 @cache
 def _compiled() -> tuple[Any, Any]:
     compiler = Compiler({})
-    return compiler.function(_four_figures), compiler.function(_time_constants)
+    return compiler.compile_function(_four_figures), compiler.compile_function(_time_constants)
 
 
 def _four_figures(
-    coefficients: Array, targets: Array, commanded: Array, time_constant: float, period: float
+    coefficients: Array, targets: Array, commanded_rates: Array, time_constant: float, period: float
 ) -> tuple[float, float, float, float]:
     """The first four figures of `StepFigures`; `time_constant` is that of the ideal model, s."""
     model_north, model_east = coefficients[0, 0], coefficients[0, 1]
@@ -85,7 +87,7 @@ def _four_figures(
         length = max(sqrt(step_north * step_north + step_east * step_east), 1e-9)
         cross_product = (east - start_east) * step_north - (north - start_north) * step_east
         cross_axis = max(cross_axis, abs(cross_product) / length)
-        rate_square = commanded[k, 0] ** 2 + commanded[k, 1] ** 2
+        rate_square = commanded_rates[k, 0] ** 2 + commanded_rates[k, 1] ** 2
         rate_squares += rate_square
         max_rate_square = max(max_rate_square, rate_square)
     return (

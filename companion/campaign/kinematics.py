@@ -107,7 +107,7 @@ def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -
         "rate_rms_rad_s": figures.rate_rms,
         "rate_max_rad_s": figures.rate_max,
     }
-    is_finite = bool(np.isfinite(flight.commanded).all() and np.isfinite(flight.q).all())
+    is_finite = bool(np.isfinite(flight.commanded_rates).all() and np.isfinite(flight.q).all())
     is_straight = is_finite and figures.cross_axis_max <= MAX_LINE_DISTANCE * longest_target
     result = "ok" if is_straight else "not straight" if is_finite else "not finite"
     return {
@@ -120,7 +120,7 @@ def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -
 
 def _digest(flight: StepFlight) -> str:
     """SHA-256 of all commanded body rates and of the final attitude."""
-    sha256 = hashlib.sha256(np.ascontiguousarray(flight.commanded).data)
+    sha256 = hashlib.sha256(np.ascontiguousarray(flight.commanded_rates).data)
     sha256.update(np.array(flight.q).data)
     return sha256.hexdigest()
 

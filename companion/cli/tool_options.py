@@ -55,7 +55,7 @@ def add_tune(commands: Commands) -> None:
         "within stability margins (7 dB, 31°), by linear analysis of the identified vehicle. Fly "
         "the old and the new values on the mock vehicle. Write the new values, with the reasons as "
         "comments, as YAML for the configuration to include. docs/identify.md explains "
-        "what it computes. Exit code 1: with the new values a course failed or was flown worse; "
+        "what it computes. Exit code 1: with the new values a flight failed or was worse; "
         "the first line says which.",
     )
     source = "vehicle.yaml of `companion identify`, or the folder of its flight"

@@ -20,9 +20,9 @@ from companion.files.yaml_file import ConfigError
 from companion.recording.learned_file import newest_learned
 from companion.recording.tlog import TLOG_FILE
 from companion.tuning import Disturbances, Proposal, propose
-from companion.tuning.flights import COURSES, CourseResult, autopilot_like, fly_course
+from companion.tuning.flights import TRIAL_FLIGHTS, TrialResult, fly_trial, matching_autopilot
 from companion.tuning.noise import measured_disturbances
-from companion.tuning.writing import proposal_text, summary_lines, worse_sentence
+from companion.tuning.writing import proposal_text, summary_lines, worse_flights_warning
 
 _VEHICLE, _CONFIG = "vehicle.yaml", "config.yaml"
 _OUTPUT_NAME = "tuned.yaml"
@@ -44,7 +44,7 @@ def tune(options: argparse.Namespace) -> int:
     if source.is_dir() and log.exists():
         disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
     proposal = propose(config, disturbances)
-    flights = {} if options.no_flights else _fly_courses(proposal, console)
+    flights = {} if options.no_flights else _fly_trials(proposal, console)
     vehicle_source: Path | dict[str, Any]
     if included:
         vehicle_source = Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
@@ -63,7 +63,7 @@ def tune(options: argparse.Namespace) -> int:
     )
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
-    return EXIT_OK if worse_sentence(flights) is None else EXIT_FAILURE
+    return EXIT_OK if worse_flights_warning(flights) is None else EXIT_FAILURE
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:
@@ -100,23 +100,21 @@ def _flyable(config: Config) -> Config:
     )
 
 
-def _fly_courses(
-    proposal: Proposal, console: Console
-) -> dict[str, tuple[CourseResult, CourseResult]]:
-    """Fly each course with the previous configuration and with the proposal."""
-    autopilot = autopilot_like(proposal.tuned)
+def _fly_trials(proposal: Proposal, console: Console) -> dict[str, tuple[TrialResult, TrialResult]]:
+    """Fly each trial flight with the previous configuration and with the proposal."""
+    autopilot = matching_autopilot(proposal.tuned)
     flights = {}
-    for course in COURSES:
-        console.print(f"flying the {course.name} on the {autopilot} mock vehicle…")
-        flights[course.name] = (
-            fly_course(proposal.untuned, course, autopilot),
-            fly_course(proposal.tuned, course, autopilot),
+    for trial in TRIAL_FLIGHTS:
+        console.print(f"flying the {trial.name} on the {autopilot} mock vehicle…")
+        flights[trial.name] = (
+            fly_trial(proposal.untuned, trial, autopilot),
+            fly_trial(proposal.tuned, trial, autopilot),
         )
     return flights
 
 
 def _figures(
-    proposal: Proposal, flights: dict[str, tuple[CourseResult, CourseResult]], output: Path
+    proposal: Proposal, flights: dict[str, tuple[TrialResult, TrialResult]], output: Path
 ) -> dict[str, Any]:
     """The figures for `--json`; a value that a failed flight did not measure is null."""
     expected = {}
@@ -129,7 +127,7 @@ def _figures(
             "error_by_gusts_m": round(each.errors.gusts, 4),
             "error_on_a_path_m": round(each.errors.path, 4),
             "error_by_noise_m": round(each.errors.noise, 4),
-            "settling_s": round(each.settling, 2),
+            "settling_s": round(each.settling_time, 2),
         }
     flown_figures = {
         name: {

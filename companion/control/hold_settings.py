@@ -2,7 +2,7 @@
 
 from math import inf, isfinite
 
-from companion.attitude.rate_response import FIRST_ORDER_SHARE
+from companion.attitude.rate_response import FIRST_ORDER_LAG_SHARE
 from companion.config import Config
 from companion.config.known_drag import drag_prior
 from companion.control.inner_loop import (
@@ -98,11 +98,12 @@ def slewing_delay(config: Config) -> float:
 def _rate_loop_delay(config: Config) -> float:
     """Delay of the rate loop: dead time plus half the lag, s; infinite if it is not identified.
 
-    A second-order lag is first converted to a first-order lag plus dead time (`FIRST_ORDER_SHARE`),
-    because it delays quick commands more than a first-order lag of the same length.
+    A second-order lag is first converted to a first-order lag plus dead time
+    (`FIRST_ORDER_LAG_SHARE`), because it delays quick commands more than a first-order lag of the
+    same length.
     """
     lag, dead_time = tilt_lag_and_dead_time(config)
-    share = FIRST_ORDER_SHARE if isfinite(tilt_damping(config)) else 1.0
+    share = FIRST_ORDER_LAG_SHARE if isfinite(tilt_damping(config)) else 1.0
     return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.response_known else inf
 
 

@@ -18,7 +18,7 @@ from companion.guidance.climb_bias import ClimbBias
 from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
 from companion.guidance.reference import NorthEast
-from companion.nmpc import Vehicle
+from companion.nmpc import VehicleSnapshot
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _LEAST_COS_TILT = 0.2
@@ -149,7 +149,7 @@ class MotionEstimate:
             motion, predicted, thrust, disturbance, drag, thrust_limits, self._axis_drag
         )
 
-    def vehicle(self, now: float, inputs: GuidanceInput) -> Vehicle:
+    def vehicle(self, now: float, inputs: GuidanceInput) -> VehicleSnapshot:
         """State of the vehicle for the solver of predictive control.
 
         Args:
@@ -157,7 +157,7 @@ class MotionEstimate:
             inputs: motion, disturbance and drag at `now`.
         """
         north, east = inputs.disturbance
-        return Vehicle(
+        return VehicleSnapshot(
             now,
             inputs.now.position_ned,
             inputs.now.velocity_ned,

@@ -12,7 +12,7 @@ from companion.attitude import Target
 from companion.control.heading_frame import HeadingFrame
 from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
-from companion.nmpc import Answer, Input, Request, Solver, Start, Trouble, Vehicle
+from companion.nmpc import Answer, ControlInput, Request, Solver, Start, Trouble, VehicleSnapshot
 
 _LONGEST_SOLVER_START = 30.0
 """Longest wait for the solver to start, s of wall time; used if the vehicle waits for it."""
@@ -73,7 +73,7 @@ class PredictiveControl:
         self._period = period
         self._vehicle_waits = vehicle_waits
         self._request_number = 0
-        self._inputs: deque[Input] = deque(maxlen=50)
+        self._inputs: deque[ControlInput] = deque(maxlen=50)
         self._solver = solver(self._report)
 
     def close(self) -> None:
@@ -84,7 +84,7 @@ class PredictiveControl:
         self,
         linear_command: LinearCommand,
         frame: HeadingFrame,
-        vehicle: Vehicle,
+        vehicle: VehicleSnapshot,
         followed: FollowedTrajectory | None,
     ) -> LinearCommand:
         """The solver's answer for this step, or `linear_command`; requests the next answer.
@@ -116,13 +116,15 @@ class PredictiveControl:
     def _answer(self, now: float) -> Answer | None:
         if self._vehicle_waits:
             self._wait_until_ready()
-        answer = self._solver.take(_LONGEST_ANSWER_WAIT if self._vehicle_waits else 0.0)
+        answer = self._solver.take_answer(_LONGEST_ANSWER_WAIT if self._vehicle_waits else 0.0)
         # The answer may be for an earlier step, if guidance has missed steps.
         if answer is None or abs(answer.time - now) > self._period:
             return None
         return answer
 
-    def _request(self, vehicle: Vehicle, followed: FollowedTrajectory, frame: HeadingFrame) -> None:
+    def _request(
+        self, vehicle: VehicleSnapshot, followed: FollowedTrajectory, frame: HeadingFrame
+    ) -> None:
         maneuver, pose = followed.maneuver, followed.pose
         trajectory_time = followed.time - maneuver.turn_duration
         if trajectory_time < 0.0:
@@ -136,7 +138,7 @@ class PredictiveControl:
     def _record_input(self, now: float, target: Target, down: float) -> None:
         lift = GRAVITY - down
         thrust = lift / max(0.2, sqrt(max(0.0, 1.0 - target.north**2 - target.east**2)))
-        self._inputs.append(Input(now, target.north, target.east, target.heading, thrust))
+        self._inputs.append(ControlInput(now, target.north, target.east, target.heading, thrust))
 
     def _wait_until_ready(self) -> None:
         until = monotonic() + _LONGEST_SOLVER_START

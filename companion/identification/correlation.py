@@ -9,7 +9,7 @@ the loop is second-order.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from companion.attitude.rate_response import FIRST_ORDER_SHARE
+from companion.attitude.rate_response import FIRST_ORDER_LAG_SHARE
 from companion.identification.lags import (
     first_order_response,
     held_commands,
@@ -107,7 +107,7 @@ def _centre_frequency(lag: float, damping: float) -> float:
     """Centre frequency of the filter, rad/s."""
     lowest, highest = _CENTRE_FREQUENCIES
     if damping < np.inf:
-        lag *= FIRST_ORDER_SHARE
+        lag *= FIRST_ORDER_LAG_SHARE
     return min(max(_CENTRE_PHASE / max(lag, _GRID_PERIOD), lowest), highest)
 
 

@@ -24,21 +24,21 @@ Floats = NDArray[np.float64]
 
 
 class Model(Protocol):
-    """A linear response of gain 1 with k parameters; `shape` is their logarithms, (k,).
+    """A linear response of gain 1 with k parameters; `log_params` are their logarithms, (k,).
 
     Attributes:
-        lowest: (k,), lower bounds of the shape.
-        highest: (k,), upper bounds of the shape.
+        lower_bounds: (k,), lower bounds of `log_params`.
+        upper_bounds: (k,), upper bounds of `log_params`.
     """
 
-    lowest: Floats
-    highest: Floats
+    lower_bounds: Floats
+    upper_bounds: Floats
 
-    def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
+    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
         """(m,), response at the times `at` (m,), s, from the steady state of the first command."""
         ...
 
-    def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
+    def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
         """(m, k), k independent free responses at (m,) times after the start, s.
 
         The effect of any initial state is a weighted sum of the free responses.
@@ -47,41 +47,41 @@ class Model(Protocol):
 
 
 class FirstOrder:
-    """A first-order lag; its `shape` is (log lag), lag in s."""
+    """A first-order lag; its `log_params` are (log lag), lag in s."""
 
-    lowest, highest = np.log([0.001]), np.log([1.0])
+    lower_bounds, upper_bounds = np.log([0.001]), np.log([1.0])
 
-    def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
+    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return first_order_response(commands, exp(shape[0]), at)
+        return first_order_response(commands, exp(log_params[0]), at)
 
-    def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
+    def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
-        return np.asarray(np.exp(-elapsed / exp(shape[0])))[:, np.newaxis]
+        return np.asarray(np.exp(-elapsed / exp(log_params[0])))[:, np.newaxis]
 
 
 class SecondOrder:
-    """A second-order lag; its `shape` is (log 2ζ/ω, log ζ).
+    """A second-order lag; its `log_params` are (log 2ζ/ω, log ζ).
 
     In a fit, these two parameters are nearly independent, unlike ω and ζ. 2ζ/ω is the delay of the
     response to a ramp, s.
     """
 
-    lowest, highest = np.log([0.002, 0.2]), np.log([1.0, 4.0])
+    lower_bounds, upper_bounds = np.log([0.002, 0.2]), np.log([1.0, 4.0])
 
-    def response(self, shape: Floats, commands: Knots, at: Floats) -> Floats:
+    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return second_order_response(commands, *frequency_damping(shape), at)
+        return second_order_response(commands, *frequency_damping(log_params), at)
 
-    def free_responses(self, shape: Floats, elapsed: Floats) -> Floats:
+    def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
-        return second_order_free_responses(elapsed, *frequency_damping(shape))
+        return second_order_free_responses(elapsed, *frequency_damping(log_params))
 
 
-def frequency_damping(shape: Floats) -> tuple[float, float]:
-    """Natural frequency ω (rad/s) and damping ratio ζ from the `shape` of a `SecondOrder`."""
-    damping = exp(shape[1])
-    return 2.0 * damping / exp(shape[0]), damping
+def frequency_damping(log_params: Floats) -> tuple[float, float]:
+    """Natural frequency ω (rad/s) and damping ratio ζ from the `log_params` of a `SecondOrder`."""
+    damping = exp(log_params[1])
+    return 2.0 * damping / exp(log_params[0]), damping
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +126,8 @@ class SecondOrderFit:
 DEAD_TIME_RANGE = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
 _RAMP_TIMES = 0.01, 0.5
-"""Bounds of the search for the slew limit, as the duration of the largest change of the commands at
-that limit, s."""
+"""Bounds of the search for the slew limit: the time, s, that the largest change of the commands
+takes at that limit."""
 _SAME_COMMAND_SHARE = 0.005
 """Largest difference of commands that count as the same, as a share of the commands' range."""
 
@@ -137,8 +137,8 @@ class DelayedModel:
 
     y(t) = gain·x(t − dead time) + offset + free response of each stretch, where x is the model's
     exact response. Linear regression gives the offset, the initial states, and the gain if it is
-    not given. The other unknowns are searched: the model's shape, the dead time (s), and optionally
-    the logarithm of the slew limit.
+    not given. The other unknowns are searched: the logarithms of the model's parameters, the dead
+    time (s), and optionally the logarithm of the slew limit.
 
     Attributes:
         model: response without dead time, of first or second order.
@@ -154,7 +154,7 @@ class DelayedModel:
         self, record: list[Stretch], model: Model, gain: float | None, thinning: int = 1
     ) -> None:
         self.model, self.gain, self.thinning = model, gain, thinning
-        self._dead_time_index = model.lowest.size
+        self._dead_time_index = model.lower_bounds.size
         span = max(float(np.ptp(stretch.commanded)) for stretch in record)
         self.commands = [
             held_commands(stretch.time, stretch.commanded, _SAME_COMMAND_SHARE * span)
@@ -178,8 +178,10 @@ class DelayedModel:
 
     def response(self, unknown: Floats) -> Floats:
         """(m,), response of the model to the delayed commands."""
-        shape = unknown[: self._dead_time_index]
-        return self._per_stretch(unknown, lambda knots, at: self.model.response(shape, knots, at))
+        log_params = unknown[: self._dead_time_index]
+        return self._per_stretch(
+            unknown, lambda knots, at: self.model.response(log_params, knots, at)
+        )
 
     def delayed_commands(self, unknown: Floats, extra_delay: float = 0.0) -> Floats:
         """(m,), the commands after slew limit, dead time and `extra_delay`, s."""
@@ -199,7 +201,7 @@ class DelayedModel:
         """The best fit, searched from the unknowns `start`."""
         slew_limits = [log(self.largest_change / ramp_time) for ramp_time in reversed(_RAMP_TIMES)]
         bounds = [
-            *zip(self.model.lowest, self.model.highest, strict=True),
+            *zip(self.model.lower_bounds, self.model.upper_bounds, strict=True),
             DEAD_TIME_RANGE,
             slew_limits,
         ]
@@ -211,7 +213,7 @@ class DelayedModel:
         residuals = [self.projection(point)[1] for point in points]
         return points[int(np.argmin([float(residual @ residual) for residual in residuals]))]
 
-    def explained(self, solution: Solution) -> float:
+    def r_squared(self, solution: Solution) -> float:
         """R² of a solution; 0 if the measurements are constant."""
         deviation = self.measured - self.measured.mean()
         return 1.0 - solution.squares / float(deviation @ deviation) if deviation.any() else 0.0
@@ -222,8 +224,8 @@ class DelayedModel:
         A free response begins at the first sample of its stretch. If it began at the first command,
         it would be nearly 0 at the samples, and its weight would be unbounded.
         """
-        shape = unknown[: self._dead_time_index]
-        decays = [self.model.free_responses(shape, times - times[0]) for times in self.times]
+        log_params = unknown[: self._dead_time_index]
+        decays = [self.model.free_responses(log_params, times - times[0]) for times in self.times]
         columns = np.zeros((self.measured.size, 1 + sum(decay.shape[1] for decay in decays)))
         columns[:, 0] = 1.0
         row, column = 0, 1

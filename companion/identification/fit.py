@@ -24,22 +24,22 @@ from companion.least_squares import Solution
 
 Floats = NDArray[np.float64]
 
-LAG_RANGE = exp(FirstOrder.lowest[0]), exp(FirstOrder.highest[0])
+LAG_RANGE = exp(FirstOrder.lower_bounds[0]), exp(FirstOrder.upper_bounds[0])
 """Range in which the lag is searched, s."""
 _TRIED_LAGS = np.geomspace(0.005, 1.0, 7)
 _TRIED_DEAD_TIMES = np.linspace(0.0, 0.48, 25)
 _TRIED_RAMP_TIMES = (0.03, 0.06, 0.12, 0.25)
-"""Starts of the search for a slew limit, as the duration of the largest change of the commands at
-that limit, s."""
+"""Starting points of the search for a slew limit: the time, s, that the largest change of the
+commands takes at that limit."""
 _LAG_SHARES = (0.15, 0.4, 1.0)
 _DEAD_TIME_SHARES = (0.6, 1.0)
-"""Starts of the search with a slew limit: `_LAG_SHARES` of the lag and `_DEAD_TIME_SHARES` of the
-dead time found without a slew limit."""
-_BETTER_SHARE = 0.6
+"""Starting points of the search with a slew limit: `_LAG_SHARES` of the lag and `_DEAD_TIME_SHARES`
+of the dead time that were found without a slew limit."""
+_CLEARLY_BETTER_SHARE = 0.6
 """Share of the simpler model's sum of squares below which a model with more unknowns is used."""
 _TRIED_DAMPINGS = (0.4, 0.7, 1.0)
 _TRIED_DEAD_TIME_SHARES = (0.0, 0.3, 0.6)
-"""Starts of the search for the dead time of a second-order model, as shares of lag + dead time."""
+"""Tried dead times of a second-order model, as shares of the first-order lag + dead time."""
 _EXCITED_SHARE = 0.02
 """Share of the commands' range by which the modelled response must differ from the command at an
 excited sample."""
@@ -83,7 +83,7 @@ class LagFit:
     lag: float
     """Lag, s."""
     gain: float
-    """Measured per commanded value. It is fitted even if lag and dead time are for a given gain."""
+    """Measured value per commanded value; fitted even if lag and dead time are for a given gain."""
     offset: float
     """Measurement at a command of zero."""
     slew: float | None
@@ -95,14 +95,14 @@ class LagFit:
 
 
 def fit_lag(
-    record: list[Stretch], gain: float | None = None, *, may_slew: bool = True
+    record: list[Stretch], gain: float | None = None, *, search_slew_limit: bool = True
 ) -> LagFit | None:
     """The best first-order fit; None if no command changes, or there are fewer than 10 samples.
 
     Args:
         record: commands and measurements.
         gain: given gain, for which lag and dead time are fitted; None: the gain is fitted too.
-        may_slew: whether to search for a slew limit.
+        search_slew_limit: whether to search for a slew limit.
     """
     record = most_excited(record)
     count = sum(stretch.measured.size for stretch in record)
@@ -112,7 +112,7 @@ def fit_lag(
     fine = DelayedModel(record, FirstOrder(), gain, fine_thinning)
     coarse = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
     best = _best_without_slew(fine, _grid_start(coarse))
-    if may_slew:
+    if search_slew_limit:
         best = _with_slew_if_better(best, fine, coarse)
     fit = _lag_fit(fine, best)
     free_gain = fine
@@ -126,10 +126,10 @@ def fit_lag(
 def _with_slew_if_better(best: Solution, fine: DelayedModel, coarse: DelayedModel) -> Solution:
     """The best fit with a slew limit if it is clearly better than `best`, else `best`."""
     coarse_solution = coarse.search(_slewed_start(best, coarse))
-    if coarse_solution.squares > _BETTER_SHARE * coarse.search(best.unknown).squares:
+    if coarse_solution.squares > _CLEARLY_BETTER_SHARE * coarse.search(best.unknown).squares:
         return best
     best_limited = fine.search(coarse_solution.unknown)
-    return best_limited if best_limited.squares < _BETTER_SHARE * best.squares else best
+    return best_limited if best_limited.squares < _CLEARLY_BETTER_SHARE * best.squares else best
 
 
 def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
@@ -155,7 +155,7 @@ def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
 
 
 def _second_order_fit(
-    record: list[Stretch], first_data: DelayedModel, first_order: Solution, thinning: int
+    record: list[Stretch], first_order_model: DelayedModel, first_order: Solution, thinning: int
 ) -> SecondOrderFit | None:
     """The best second-order fit, gain included; None: not clearly better than first order."""
     lag, dead_time, *slew = first_order.unknown.tolist()
@@ -168,9 +168,9 @@ def _second_order_fit(
             for share in _TRIED_DEAD_TIME_SHARES
         ]
     )
-    data = DelayedModel(record, model, None, first_data.thinning)
+    data = DelayedModel(record, model, None, first_order_model.thinning)
     solution = data.search(start)
-    if solution.squares > _BETTER_SHARE * first_order.squares:
+    if solution.squares > _CLEARLY_BETTER_SHARE * first_order.squares:
         return None
     frequency, damping = frequency_damping(solution.unknown)
     quality = _quality(data, solution)
@@ -206,7 +206,7 @@ def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     excited_samples = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
     response_duration = _RESPONSE_DURATION_FACTOR * (lag + data.dead_time(unknown))
     sample_period = float(np.median(np.diff(np.concatenate(data.times))))
-    residuals = analyse_residual(
+    analysis = analyse_residual(
         solution.residual,
         solution.slopes,
         lambda delay: data.delayed_commands(unknown, delay),
@@ -216,10 +216,10 @@ def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     )
     deviation = float(np.std(data.measured))
     return FitQuality(
-        explained=data.explained(solution),
-        misfit=residuals.misfit / deviation if deviation > 0.0 else 0.0,
-        dead_time_error=data.dead_time(residuals.errors),
-        lag_error=lag * float(residuals.errors[0]),
+        explained=data.r_squared(solution),
+        misfit=analysis.misfit / deviation if deviation > 0.0 else 0.0,
+        dead_time_error=data.dead_time(analysis.standard_errors),
+        lag_error=lag * float(analysis.standard_errors[0]),
         span=span,
         excited_samples=excited_samples,
     )

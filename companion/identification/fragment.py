@@ -14,12 +14,12 @@ ConfiguredValues = Mapping[str, Sequence[float | None]]
 _KEY_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _AXIS_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
 _NO_SLEW_LIMIT = 100_000.0
-"""Slew limit written for an axis without one if roll has one, °/s²; null would mean as roll."""
-_SAME_MS = 3.0
+"""Slew limit, °/s², written for an axis without one if roll has one: null means that of roll."""
+_NEGLIGIBLE_TIME_DIFFERENCE_MS = 3.0
 """Largest difference of lag and of dead time at which roll and pitch count as the same, ms."""
-_SAME_SLEW_SHARE = 0.1
+_NEGLIGIBLE_SLEW_DIFFERENCE_SHARE = 0.1
 """Largest relative difference of the slew limits at which roll and pitch count as the same."""
-_SAME_DAMPING = 0.05
+_NEGLIGIBLE_DAMPING_DIFFERENCE = 0.05
 """Largest difference of the damping ratios at which roll and pitch count as the same."""
 _ACCEPTED_DAMPINGS = 0.3, 10.0
 """Smallest and largest damping ratio that `vehicle.damping` accepts."""
@@ -71,7 +71,7 @@ def vehicle_fragment(
             gives a reason for each bad axis.
     """
     kept = kept_axes(vehicle, configured)
-    lines = [_comment(name, response, kept) for name, response in vehicle.axes.items()]
+    lines = [_fit_comment(name, response, kept) for name, response in vehicle.axes.items()]
     thrust = vehicle.thrust
     if thrust is not None and thrust.flaw(gravity) is None:
         lines.append(f"# thrust: {thrust.described()}")
@@ -82,8 +82,8 @@ def vehicle_fragment(
     if allow_second_order:
         axes |= second_order_axes(vehicle)
     identified = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
-    lines += ["vehicle:", *identified, *_tilt_keys(axes["roll"], axes["pitch"])]
-    lines += _axis_keys("yaw", axes["yaw"], axes["roll"].slew)
+    lines += ["vehicle:", *identified, *_tilt_lines(axes["roll"], axes["pitch"])]
+    lines += _axis_lines("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 
 
@@ -127,17 +127,17 @@ def _fitted_values(response: RateResponse) -> AxisValues:
     return AxisValues(1e3 * response.lag, 1e3 * response.dead_time, slew)
 
 
-def _tilt_keys(roll: AxisValues, pitch: AxisValues) -> list[str]:
+def _tilt_lines(roll: AxisValues, pitch: AxisValues) -> list[str]:
     """YAML lines of roll and pitch; if they hardly differ, mean values for roll, null for pitch."""
     if not _nearly_same_axes(roll, pitch):
-        return _axis_keys("roll", roll) + _axis_keys("pitch", pitch, roll.slew)
+        return _axis_lines("roll", roll) + _axis_lines("pitch", pitch, roll.slew)
     mean = AxisValues(
         0.5 * (roll.lag + pitch.lag),
         0.5 * (roll.dead_time + pitch.dead_time),
         _mean(roll.slew, pitch.slew),
         _mean(roll.damping, pitch.damping),
     )
-    return _axis_keys("roll", mean) + [f"  pitch_{key}: null" for key in _AXIS_KEYS]
+    return _axis_lines("roll", mean) + [f"  pitch_{key}: null" for key in _AXIS_KEYS]
 
 
 def _mean(one: float | None, other: float | None) -> float | None:
@@ -146,11 +146,14 @@ def _mean(one: float | None, other: float | None) -> float | None:
 
 def _nearly_same_axes(one: AxisValues, other: AxisValues) -> bool:
     return (
-        max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time)) <= _SAME_MS
+        max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time))
+        <= _NEGLIGIBLE_TIME_DIFFERENCE_MS
         and _nearly_equal(
-            one.slew, other.slew, _SAME_SLEW_SHARE * max(one.slew or 0.0, other.slew or 0.0)
+            one.slew,
+            other.slew,
+            _NEGLIGIBLE_SLEW_DIFFERENCE_SHARE * max(one.slew or 0.0, other.slew or 0.0),
         )
-        and _nearly_equal(one.damping, other.damping, _SAME_DAMPING)
+        and _nearly_equal(one.damping, other.damping, _NEGLIGIBLE_DAMPING_DIFFERENCE)
     )
 
 
@@ -159,7 +162,7 @@ def _nearly_equal(one: float | None, other: float | None, tolerance: float) -> b
     return one == other or (one is not None and other is not None and abs(one - other) <= tolerance)
 
 
-def _axis_keys(name: str, axis: AxisValues, roll_slew: float | None = None) -> list[str]:
+def _axis_lines(name: str, axis: AxisValues, roll_slew: float | None = None) -> list[str]:
     """YAML lines of one axis; a null slew limit would mean `roll_slew`, the slew limit of roll.
 
     Keys without a value are written as null, so that no value of another file remains in effect.
@@ -175,7 +178,7 @@ def _axis_keys(name: str, axis: AxisValues, roll_slew: float | None = None) -> l
     return [f"  {_KEY_PREFIX[name]}{key}: {values[key]}" for key in keys]
 
 
-def _comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:
+def _fit_comment(name: str, response: RateResponse, kept: Mapping[str, AxisValues]) -> str:
     """A YAML comment on the fit of an axis, or on why its configured values are kept."""
     if name in kept:
         return (

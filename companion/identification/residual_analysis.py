@@ -21,12 +21,12 @@ _SAMPLES_PER_DELAY = 8
 """Excited samples needed for each delay of the regression; with fewer it would fit the noise."""
 
 
-class Residuals(NamedTuple):
-    """Result of `analyse_residual`: misfit of a fit, and standard errors of its unknowns."""
+class ResidualAnalysis(NamedTuple):
+    """Misfit of a fit, and standard errors of its unknowns."""
 
     misfit: float
     """RMS of the part that the commands explain, in the unit of the measurements."""
-    errors: Floats
+    standard_errors: Floats
     """(k,), standard errors of the unknowns, in the unit of each."""
 
 
@@ -37,7 +37,7 @@ def analyse_residual(
     response_duration: float,
     excited_samples: int,
     correlated_samples: int,
-) -> Residuals:
+) -> ResidualAnalysis:
     """Split a residual; with fewer than 8 excited samples, all of it counts as noise.
 
     Args:
@@ -58,7 +58,7 @@ def analyse_residual(
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     # The regression takes one degree of freedom for each delay.
     correction = excited_samples / max(excited_samples - delays, 1)
-    return Residuals(
+    return ResidualAnalysis(
         _rms(residual - noise),
         _standard_errors(slopes, noise, correlated_samples) * np.sqrt(correction),
     )

@@ -50,7 +50,7 @@ def vehicle_table(vehicle: IdentifiedVehicle, gravity: float) -> RenderableType:
 
 
 def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple[str, ...]:
-    """Table cells of one axis, from its second-order fit; if that is None, from the first-order."""
+    """Table cells of one axis, from its second-order fit, or from its first-order fit if None."""
     verdict = "good" if response.is_good() else "bad"
     if isnan(response.lag):
         return *(_NO_VALUE,) * 6, verdict

@@ -11,7 +11,7 @@ from companion.identification.record import Stretch, stretches
 _LEAST_EXPLAINED = 0.8
 """Smallest R² of a usable map."""
 _EXCITED_SHARE = 0.2
-"""Share of the commands' range by which an excited command differs from their median."""
+"""Smallest deviation of an excited command from the median command, as a share of their range."""
 _ACCEPTED_HOVER = 0.05, 0.95
 """Range of the normalised thrust at hover that the configuration accepts."""
 _LARGEST_DELAY = 0.5
@@ -109,7 +109,7 @@ def fit_thrust_map(
         ValueError: a time series and its values are not one-dimensional and equally long.
     """
     record = _excited_samples(stretches(time, thrust, measured_time, specific_thrust))
-    fit = fit_lag(record, may_slew=False)
+    fit = fit_lag(record, search_slew_limit=False)
     if fit is None:
         return None
     return ThrustMap(fit.gain, fit.offset, fit.lag, fit.dead_time, fit.quality.explained)

@@ -8,20 +8,20 @@ process, `Worker` answers each request:
 3. `RecedingHorizon` solves the optimal control `problem` of the `coefficient_model`.
 """
 
-from companion.nmpc.messages import Answer, Input, Request, Status, Vehicle
+from companion.nmpc.messages import Answer, ControlInput, Request, Status, VehicleSnapshot
 from companion.nmpc.process import Solver, Trouble
 from companion.nmpc.reference import Start
 from companion.nmpc.settings import Settings, Weights
 
 __all__ = [
     "Answer",
-    "Input",
+    "ControlInput",
     "Request",
     "Settings",
     "Solver",
     "Start",
     "Status",
     "Trouble",
-    "Vehicle",
+    "VehicleSnapshot",
     "Weights",
 ]

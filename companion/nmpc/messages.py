@@ -9,7 +9,7 @@ from companion.drag import NO_DRAG, Drag
 from companion.guidance.trajectory.sample import Vector
 from companion.nmpc.reference import Start
 
-READY = b"ready"
+READY_MESSAGE = b"ready"
 """First message of the solver's process, sent when it can take requests."""
 
 _REQUEST_HEAD = struct.Struct("<q25d")
@@ -17,7 +17,7 @@ _INPUT = struct.Struct("<5d")
 _ANSWER = struct.Struct("<2q9d")
 
 
-class Vehicle(NamedTuple):
+class VehicleSnapshot(NamedTuple):
     """State of the vehicle at the time of a request."""
 
     time: float
@@ -38,11 +38,11 @@ class Vehicle(NamedTuple):
     """Coefficient of `AxisDrag`, 1/m."""
 
 
-class Input(NamedTuple):
+class ControlInput(NamedTuple):
     """A control input, commanded by predictive control or by linear guidance."""
 
     time: float
-    """Time of the command, on the clock of `Vehicle.time`, s."""
+    """Time of the command, on the clock of `VehicleSnapshot.time`, s."""
     north: float
     east: float
     """`north` and `east`: coefficients of the target."""
@@ -57,11 +57,11 @@ class Request(NamedTuple):
 
     number: int
     """Number of the request; its answer has the same number."""
-    vehicle: Vehicle
+    vehicle: VehicleSnapshot
     trajectory_time: float
     """Time since the trajectory began, at `vehicle.time`, s."""
     start: Start
-    inputs: tuple[Input, ...]
+    inputs: tuple[ControlInput, ...]
     """Latest control inputs, in order of time. They must cover the dead time before `vehicle.time`.
     Before the first input, it is assumed to have been in effect. Without any input, attitude and
     vertical speed are assumed to be held."""
@@ -89,7 +89,7 @@ class Answer(NamedTuple):
     computed_at: float
     """Time at which the answer was computed, on the computer's monotonic clock, s."""
     time: float
-    """Time at which to use the answer, on the clock of `Vehicle.time`, s."""
+    """Time at which to use the answer, on the clock of `VehicleSnapshot.time`, s."""
     north: float
     east: float
     """`north` and `east`: coefficients of the target."""
@@ -128,7 +128,7 @@ def pack_request(request: Request) -> bytes:
 def unpack_request(message: bytes) -> Request:
     """Convert bytes to a request."""
     number, trajectory_time, *numbers = _REQUEST_HEAD.unpack_from(message)
-    vehicle = Vehicle(
+    vehicle = VehicleSnapshot(
         numbers[4],
         (numbers[5], numbers[6], numbers[7]),
         (numbers[8], numbers[9], numbers[10]),
@@ -138,7 +138,9 @@ def unpack_request(message: bytes) -> Request:
         Drag(numbers[21], numbers[22]),
         numbers[23],
     )
-    inputs = tuple(Input(*values) for values in _INPUT.iter_unpack(message[_REQUEST_HEAD.size :]))
+    inputs = tuple(
+        ControlInput(*values) for values in _INPUT.iter_unpack(message[_REQUEST_HEAD.size :])
+    )
     return Request(
         number,
         vehicle,

@@ -68,16 +68,17 @@ class Model:
     """Heading and attitude rate of the reference at a node, (k,), in the form that the model needs
     for `heading_error` and `attitude_rate_error`."""
     heading_error: ca.SX
-    """Heading (in studies also yaw) of `state` minus that of `attitude_reference`, rad; a smooth
-    approximation in the quaternion model, 0 in a model of constant yaw."""
+    """Heading of `state` minus that of `attitude_reference`, rad. Models of the studies may use the
+    Euler yaw or a smooth approximation instead; it is empty in a model of constant yaw."""
     attitude_rate_error: ca.SX
-    """Commanded attitude rate minus that of `attitude_reference`: rates of coefficients (1/s) and
-    heading (rad/s), or in studies of the body or of Euler angles, rad/s."""
+    """Commanded attitude rate minus that of `attitude_reference`: rates of the coefficients (1/s)
+    and of the heading (rad/s). Models of the studies may use body rates or rates of Euler angles
+    instead, both in rad/s."""
     target: ca.SX
     """Target for the planner when `control` is applied, (4,): coefficients, tilt-yaw heading and
     specific thrust."""
     bounded_terms: ca.SX
-    """Terms that must be between −1 and 1 at every control."""
+    """Terms that must stay between −1 and 1 in every step of the horizon."""
     state_of: Callable[[Motion], Floats]
     """Function: motion → numbers for `state`."""
     constants_of: Callable[[Conditions, Motion], Floats]

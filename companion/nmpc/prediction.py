@@ -7,7 +7,7 @@ from companion.attitude import wrap_angle
 from companion.attitude.kinematics import heading_of, rates_to_speed, tilt_products
 from companion.attitude.representation import normalised
 from companion.nmpc.coefficient_model import coefficient_model
-from companion.nmpc.messages import Input, Vehicle
+from companion.nmpc.messages import ControlInput, VehicleSnapshot
 from companion.nmpc.model import Conditions, Motion, integrator
 from companion.nmpc.settings import Settings
 
@@ -24,7 +24,7 @@ class TiltedTooFarError(Exception):
     """The tilt is larger than the models allow."""
 
 
-def motion_of(vehicle: Vehicle) -> Motion:
+def motion_of(vehicle: VehicleSnapshot) -> Motion:
     """The state of the vehicle, converted to the `Motion` of the models.
 
     Raises:
@@ -47,7 +47,7 @@ def motion_of(vehicle: Vehicle) -> Motion:
     )
 
 
-def conditions_of(vehicle: Vehicle) -> Conditions:
+def conditions_of(vehicle: VehicleSnapshot) -> Conditions:
     """Wind and drag of the vehicle's state, converted to the `Conditions` of the models."""
     return Conditions(*vehicle.disturbance, *vehicle.drag, vehicle.axis_drag)
 
@@ -64,7 +64,9 @@ class Predictor:
         self._model = coefficient_model(settings)
         self._advance = integrator(self._model)
 
-    def predict(self, vehicle: Vehicle, inputs: Sequence[Input], until: float) -> Motion:
+    def predict(
+        self, vehicle: VehicleSnapshot, inputs: Sequence[ControlInput], until: float
+    ) -> Motion:
         """The motion at the time `until`, s; an input takes effect one dead time after its `time`.
 
         Raises:
@@ -88,17 +90,17 @@ class Predictor:
             raise TiltedTooFarError
         return motion
 
-    def _effect_time(self, command: Input) -> float:
+    def _effect_time(self, command: ControlInput) -> float:
         return command.time + self._settings.dead_time
 
-    def _holding_input(self, time: float, motion: Motion) -> Input:
+    def _holding_input(self, time: float, motion: Motion) -> ControlInput:
         """The control input that holds the attitude and the vertical speed."""
         cos_tilt = (1.0 - motion.north**2 - motion.east**2) ** 0.5
         thrust = self._settings.gravity / cos_tilt
-        return Input(time, motion.north, motion.east, motion.heading, thrust)
+        return ControlInput(time, motion.north, motion.east, motion.heading, thrust)
 
     def _integrate(
-        self, motion: Motion, current: Input, duration: float, constants: list[float]
+        self, motion: Motion, current: ControlInput, duration: float, constants: list[float]
     ) -> Motion:
         """The motion `duration` seconds later, with the control input `current` in effect."""
         heading = motion.heading + wrap_angle(current.heading - motion.heading)

@@ -34,7 +34,7 @@ class Program(NamedTuple):
     The horizon has N steps. Each state x_k has n components, each control u_k m components.
     """
 
-    unknown: ca.SX
+    unknowns: ca.SX
     """Unknowns w: (x_0, u_0, x_1, u_1, …, x_N)."""
     parameters: ca.SX
     """Parameters p, whose numbers `parameters_of` computes."""
@@ -64,22 +64,22 @@ def transcribe(model: Model, settings: Settings) -> Program:
     constants = ca.SX.sym("constants", model.constants.numel())
     nodes = [ca.SX.sym(f"node_{k}", node.numel()) for k in range(settings.steps + 1)]
     x = ca.SX.sym("x_0", model.state.numel())
-    unknown, residual, constraints = [x], [], []
+    unknowns, residual, constraints = [x], [], []
     for k in range(settings.steps):
         u = ca.SX.sym(f"u_{k}", model.control.numel())
         next_x = ca.SX.sym(f"x_{k + 1}", model.state.numel())
-        unknown += [u, next_x]
+        unknowns += [u, next_x]
         residual.append(running_residual(x, u, nodes[k]))
-        constraints.append(advance(x, u, constants, settings.step) - next_x)
+        constraints.append(advance(x, u, constants, settings.step_duration) - next_x)
         constraints.append(bounded(x, u, constants))
         x = next_x
     residual.append(_final_residual(x, nodes[-1], settings))
     return Program(
-        ca.vertcat(*unknown),
+        ca.vertcat(*unknowns),
         ca.vertcat(constants, *nodes),
         ca.vertcat(*residual),
         ca.vertcat(*constraints),
-        *_bounds_of_unknown(model, settings),
+        *_bounds_of_unknowns(model, settings),
         *_bounds_of_constraints(model, settings),
     )
 
@@ -111,7 +111,7 @@ def _running_residual(model: Model, node: ca.SX, settings: Settings) -> ca.SX:
         (weights.thrust, model.control[-1] - node[6]),
     )
     residual: ca.SX = ca.vertcat(
-        *(sqrt(settings.step * weight) * error for weight, error in weighted_errors)
+        *(sqrt(settings.step_duration * weight) * error for weight, error in weighted_errors)
     )
     return residual
 
@@ -126,7 +126,7 @@ def _final_residual(x: ca.SX, node: ca.SX, settings: Settings) -> ca.SX:
     return residual
 
 
-def _bounds_of_unknown(model: Model, settings: Settings) -> tuple[Floats, Floats]:
+def _bounds_of_unknowns(model: Model, settings: Settings) -> tuple[Floats, Floats]:
     free_state = np.full(model.state.numel(), np.inf)
     free_control = np.full(model.control.numel(), np.inf)
     lowest, highest = -free_control, free_control.copy()
@@ -145,10 +145,10 @@ def _bounds_of_constraints(model: Model, settings: Settings) -> tuple[Floats, Fl
 class Solution(NamedTuple):
     """Result of one solve."""
 
-    unknown: Floats
-    """The plan (x_0, u_0, x_1, …, x_N), in the order of `Program.unknown`."""
+    unknowns: Floats
+    """The plan (x_0, u_0, x_1, …, x_N), in the order of `Program.unknowns`."""
     solved: bool
-    """Whether the plan may be flown, provided that it is finite."""
+    """Whether the solver succeeded, or stopped at its largest number of iterations."""
     iterations: int
     """Number of SQP iterations."""
 
@@ -170,7 +170,7 @@ class SqpSolver:
         """Solve from a guess, whose first state is the fixed start of the plan.
 
         Args:
-            guess: first guess, in the order of `Program.unknown`.
+            guess: first guess, in the order of `Program.unknowns`.
             parameters: numbers from `parameters_of`.
         """
         program, state_size = self._program, self._state_size
@@ -193,12 +193,12 @@ class SqpSolver:
 
 def _sqp_function(program: Program, iterations: int) -> ca.Function:
     """CasADi's `sqpmethod` with Gauss–Newton Hessian; a single iteration takes the full step."""
-    jacobian = ca.jacobian(program.residual, program.unknown)
+    jacobian = ca.jacobian(program.residual, program.unknowns)
     objective_factor = ca.SX.sym("lam_f")
     multipliers = ca.SX.sym("lam_g", program.constraints.numel())
     hessian = ca.Function(
         "gauss_newton",
-        [program.unknown, program.parameters, objective_factor, multipliers],
+        [program.unknowns, program.parameters, objective_factor, multipliers],
         [objective_factor * ca.mtimes(jacobian.T, jacobian)],
         ["x", "p", "lam_f", "lam_g"],
         ["hess_gamma_x_x"],
@@ -218,7 +218,7 @@ def _sqp_function(program: Program, iterations: int) -> ca.Function:
         },
     }
     problem = {
-        "x": program.unknown,
+        "x": program.unknowns,
         "p": program.parameters,
         "f": 0.5 * ca.sumsqr(program.residual),
         "g": program.constraints,

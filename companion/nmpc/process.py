@@ -22,7 +22,14 @@ from typing import NamedTuple
 from companion.attitude.kinematics import tilt_products
 from companion.extras import require
 from companion.guidance.trajectory.sample import Trajectory
-from companion.nmpc.messages import READY, Answer, Request, Status, pack_request, unpack_answer
+from companion.nmpc.messages import (
+    READY_MESSAGE,
+    Answer,
+    Request,
+    Status,
+    pack_request,
+    unpack_answer,
+)
 from companion.nmpc.settings import Settings
 from companion.realtime import schedule_as_usual
 
@@ -46,7 +53,7 @@ class Trouble(Enum):
     """The answer has a number that is not finite, or exceeds the limits of tilt or thrust."""
 
 
-Report = Callable[[Trouble, str], None]
+ReportTrouble = Callable[[Trouble, str], None]
 """Called with the kind of trouble and a description."""
 
 
@@ -61,7 +68,7 @@ class _Pending(NamedTuple):
 
 
 class Solver:
-    """Starts the solver's process, sends requests, returns answers that may be flown.
+    """Starts the solver's process, sends requests, returns usable answers.
 
     An answer that is late, failed or implausible is reported and not returned. The end of the
     process is reported at the next call.
@@ -79,7 +86,7 @@ class Solver:
         MissingExtraError: CasADi is not installed.
     """
 
-    def __init__(self, settings: Settings, trajectory: Trajectory, report: Report) -> None:
+    def __init__(self, settings: Settings, trajectory: Trajectory, report: ReportTrouble) -> None:
         require("casadi", "nmpc", "Predictive control")
         self._settings = settings
         self._report = report
@@ -109,7 +116,7 @@ class Solver:
     def ready(self) -> bool:
         """Whether the process has started and takes requests."""
         if not self._ready and self.alive:
-            self._ready = self._receive() == READY
+            self._ready = self._receive() == READY_MESSAGE
         return self._ready and self.alive
 
     def request(self, request: Request) -> None:
@@ -131,8 +138,8 @@ class Solver:
             longest_target = max(sin(self._settings.max_tilt), 2.0 * hypot(ax, ay))
             self._pending = _Pending(request.number, monotonic(), longest_target)
 
-    def take(self, wait: float = 0.0) -> Answer | None:
-        """The answer to the last request if it has arrived and may be flown; else None.
+    def take_answer(self, wait: float = 0.0) -> Answer | None:
+        """The answer to the last request if it has arrived and is usable; else None.
 
         Each answer is returned once.
 
@@ -180,7 +187,7 @@ class Solver:
         return message
 
     def _usable_answer(self, pending: _Pending, answer: Answer) -> Answer | None:
-        """The answer if it may be flown; otherwise report the trouble and return None."""
+        """The answer if it is usable; otherwise report the trouble and return None."""
         elapsed = answer.computed_at - pending.sent_at
         if elapsed > self._settings.deadline:
             self._report(Trouble.LATE, f"request {pending.number} took {1e3 * elapsed:.1f} ms")

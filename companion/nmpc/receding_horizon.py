@@ -14,8 +14,8 @@ from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
 
-class Plan(NamedTuple):
-    """The result of one solve: the first control of the plan, and figures of the solver."""
+class FirstControl(NamedTuple):
+    """First control of a new plan, as a target for the planner, and figures of the solver."""
 
     iterations: int
     """Number of SQP iterations."""
@@ -55,8 +55,8 @@ class RecedingHorizon:
 
     def solve(
         self, time: float, motion: Motion, nodes: Sequence[Node], conditions: Conditions
-    ) -> Plan | None:
-        """Compute a plan that begins at `motion`; None if no plan was found that may be flown.
+    ) -> FirstControl | None:
+        """Compute a plan that begins at `motion`; return its first control, or None without a plan.
 
         Args:
             time: time of `motion`, s. The solve starts from the previous plan, shifted to this
@@ -79,21 +79,21 @@ class RecedingHorizon:
         began = thread_time()
         solution = self._solver.solve(guess, parameters)
         solver_seconds = thread_time() - began
-        if not (solution.solved and np.isfinite(solution.unknown).all()):
+        if not (solution.solved and np.isfinite(solution.unknowns).all()):
             self.forget()
             return None
-        self._previous, self._previous_time = solution.unknown, time
-        control = solution.unknown[len(start) : len(start) + model.control.numel()]
+        self._previous, self._previous_time = solution.unknowns, time
+        control = solution.unknowns[len(start) : len(start) + model.control.numel()]
         target = np.asarray(
             self._target_function(start, control, constants), dtype=np.float64
         ).ravel()
-        return Plan(solution.iterations, solver_seconds, *(float(v) for v in target))
+        return FirstControl(solution.iterations, solver_seconds, *(float(v) for v in target))
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
         """The first guess: the previous plan shifted to `time`, or the reference."""
         if self._previous is None or not time >= self._previous_time:
             return plan_on_reference(self._model, nodes, self._settings)
-        steps = (time - self._previous_time) / self._settings.step
+        steps = (time - self._previous_time) / self._settings.step_duration
         return shifted_plan(self._model, self._previous, steps)
 
 

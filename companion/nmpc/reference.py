@@ -38,8 +38,9 @@ class Start(NamedTuple):
     position: Vector
     """Position at which the trajectory begins, m, NED; added to the positions of its samples."""
     heading_offset: float = 0.0
-    """Angle added to the headings of the trajectory, rad: the sum of the heading resets; if the
-    trajectory holds the heading of its start, plus that heading. Positions are not rotated."""
+    """Angle added to the headings of the trajectory, rad: the sum of the heading resets. If the
+    trajectory holds the heading at its start, that heading is also added. Positions are not
+    rotated."""
 
 
 def node_of(
@@ -53,9 +54,10 @@ def node_of(
 ) -> Node:
     """The node of a sample of the trajectory: differential flatness of a point mass with drag.
 
-    The rotors must provide f = a + d − w − g, with d the deceleration by drag. The upward part of f
-    is kept above a fifth of gravity. |f| is the specific thrust, the horizontal part of f/|f| the
-    coefficients, and ḟ = jerk + ḋ gives their time derivative.
+    The rotors must provide the specific force f = a + d − w − g: acceleration a of the sample,
+    deceleration d by drag, disturbance w, gravity g. The upward part of f is limited to at least a
+    fifth of gravity. |f| is the specific thrust. The horizontal part of f/|f| is the coefficients,
+    and ḟ = jerk + ḋ gives their time derivative.
 
     Args:
         sample: sample of the trajectory.

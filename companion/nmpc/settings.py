@@ -71,13 +71,13 @@ class Settings:
                 raise ValueError(f"{name} must be positive and finite, not {getattr(self, name)}")
         if not self.min_thrust < self.gravity < self.max_thrust:
             raise ValueError("gravity must lie between min_thrust and max_thrust")
-        if self.lag < 0.5 * self.step:
+        if self.lag < 0.5 * self.step_duration:
             raise ValueError(
-                f"lag must be at least half a step of the horizon ({0.5 * self.step:g} s),"
+                f"lag must be at least half a step of the horizon ({0.5 * self.step_duration:g} s),"
                 f" not {self.lag}"
             )
 
     @property
-    def step(self) -> float:
+    def step_duration(self) -> float:
         """Length of one step of the horizon, s."""
         return self.horizon / self.steps

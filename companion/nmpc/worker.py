@@ -17,18 +17,18 @@ from companion.attitude import BodyRates, InvalidQuaternionError, wrap_angle
 from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.coefficient_model import coefficient_model
 from companion.nmpc.messages import (
-    READY,
+    READY_MESSAGE,
     Answer,
-    Input,
+    ControlInput,
     Request,
     Status,
-    Vehicle,
+    VehicleSnapshot,
     pack_answer,
     unpack_request,
 )
 from companion.nmpc.model import Model
 from companion.nmpc.prediction import Predictor, TiltedTooFarError, conditions_of
-from companion.nmpc.receding_horizon import Plan, RecedingHorizon
+from companion.nmpc.receding_horizon import FirstControl, RecedingHorizon
 from companion.nmpc.reference import Node, Start, node_of
 from companion.nmpc.settings import Settings
 
@@ -64,8 +64,10 @@ class Worker:
 
     def warm_up(self) -> None:
         """Solve a few times and discard the answers."""
-        level = Vehicle(0.0, (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0))
-        hover = Input(0.0, 0.0, 0.0, 0.0, self._settings.gravity)
+        level = VehicleSnapshot(
+            0.0, (0.0,) * 3, (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
+        )
+        hover = ControlInput(0.0, 0.0, 0.0, 0.0, self._settings.gravity)
         for number in range(_WARM_UP_SOLVES):
             self.answer(Request(number, level, 0.0, Start((0.0, 0.0, 0.0)), (hover,)))
         self.forget()
@@ -79,27 +81,27 @@ class Worker:
         began = perf_counter()
         use_time = request.vehicle.time + self._settings.lead
         try:
-            plan = self._plan(request)
+            control = self._solve(request)
         except (InvalidQuaternionError, TiltedTooFarError):
             self.forget()
-            return _no_answer(request, Status.TILTED_TOO_FAR, use_time, perf_counter() - began)
-        if plan is None:
-            return _no_answer(request, Status.FAILED, use_time, perf_counter() - began)
+            return _failed_answer(request, Status.TILTED_TOO_FAR, use_time, perf_counter() - began)
+        if control is None:
+            return _failed_answer(request, Status.FAILED, use_time, perf_counter() - began)
         return Answer(
             request.number,
             Status.SOLVED,
             monotonic(),
             use_time,
-            plan.north,
-            plan.east,
-            wrap_angle(plan.heading),
-            plan.thrust,
+            control.north,
+            control.east,
+            wrap_angle(control.heading),
+            control.thrust,
             perf_counter() - began,
-            plan.solver_seconds,
-            plan.iterations,
+            control.solver_seconds,
+            control.iterations,
         )
 
-    def _plan(self, request: Request) -> Plan | None:
+    def _solve(self, request: Request) -> FirstControl | None:
         vehicle = request.vehicle
         until = vehicle.time + self._effect_delay
         motion = self._predictor.predict(vehicle, request.inputs, until)
@@ -111,7 +113,7 @@ class Worker:
         """The reference over the horizon; its headings are unwrapped, beginning near `heading`."""
         settings, nodes = self._settings, list[Node]()
         for k in range(settings.steps + 1):
-            time = request.trajectory_time + self._effect_delay + k * settings.step
+            time = request.trajectory_time + self._effect_delay + k * settings.step_duration
             sample = self._trajectory.at(time)
             node = node_of(
                 sample,
@@ -127,7 +129,7 @@ class Worker:
         return nodes
 
 
-def _no_answer(request: Request, status: Status, use_time: float, seconds: float) -> Answer:
+def _failed_answer(request: Request, status: Status, use_time: float, seconds: float) -> Answer:
     return Answer(
         request.number, status, monotonic(), use_time, 0.0, 0.0, 0.0, 0.0, seconds, 0.0, 0
     )
@@ -145,7 +147,7 @@ def main() -> None:
     gc.freeze()
     gc.disable()  # a collection would delay an answer, and nothing here makes reference cycles
     try:
-        connection.send(READY)
+        connection.send(READY_MESSAGE)
         while message := _newest_request(connection):
             connection.send(pack_answer(worker.answer(unpack_request(message))))
     except (BrokenPipeError, ConnectionResetError):

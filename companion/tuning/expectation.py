@@ -28,16 +28,16 @@ class Disturbances:
 
     gust: float = 0.5
     """Standard deviation of the gusts, m/s; drag turns them into an acceleration."""
-    gust_time: float = 2.0
+    gust_correlation_time: float = 2.0
     """Correlation time of the gusts, s."""
     velocity_error: float = 0.03
     """Standard deviation of the slow error of the estimated velocity on a path, m/s."""
     acceleration_error: float = 0.1
     """Standard deviation of the slow error of the predicted acceleration on a path, m/s²."""
-    path_time: float = 1.0
+    path_correlation_time: float = 1.0
     """Correlation time of `velocity_error` and `acceleration_error`, s."""
     velocity_density: float = 0.01
-    """One-sided amplitude spectral density of the error of the velocity in hover, m/s/√Hz."""
+    """One-sided amplitude spectral density of the estimated velocity's error in hover, m/s/√Hz."""
     acceleration_density: float = 0.02
     """One-sided amplitude spectral density of the acceleration that is not due to tilt and drag,
     m/s²/√Hz."""
@@ -58,7 +58,7 @@ class Errors(NamedTuple):
     """Position error on a path at 5 m/s, m."""
     noise: float
     """Position error due to the noise of the estimate, m."""
-    rate: float
+    commanded_rate: float
     """Commanded roll-pitch rate √(p² + q²) due to gusts, path and noise, rad/s."""
 
     @property
@@ -77,14 +77,14 @@ class Expectation:
     """Margins of the loop opened at the commanded acceleration."""
     errors: Errors
     """Expected position errors and commanded rate."""
-    peak: float
-    """Largest position error after a gust that changes the velocity by 1 m/s at once, m."""
-    settling: float
-    """Time from a gust until the position error stays below 5 % of `peak`, s; at most 10 s."""
+    peak_error: float
+    """Largest position error, m, after a gust that at once adds 1 m/s to the vehicle's velocity."""
+    settling_time: float
+    """Time from that gust until the position error stays below 5 % of `peak_error`, up to 10 s."""
 
     @property
     def margins(self) -> Margins:
-        """Of each margin the smaller of `margins_at_rate` and `margins_at_acceleration`."""
+        """The smaller value of each margin in `margins_at_rate` and `margins_at_acceleration`."""
         return smaller_margins(self.margins_at_rate, self.margins_at_acceleration)
 
 
@@ -105,9 +105,10 @@ def stability(config: Config, error: ModelError = EXACT) -> Margins:
 
 
 def loop_margins(loop: Loop) -> Margins:
-    """Of each margin of a loop the smaller value: opened at the rate, or at the acceleration.
+    """Stability margins of a loop that is computed at `frequencies`.
 
-    `loop` is computed at `frequencies`.
+    The loop is opened at the commanded body rate and at the commanded acceleration; of each margin
+    the smaller value is returned.
     """
     return smaller_margins(
         margins(loop.s, loop.gain_at_rate), margins(loop.s, loop.gain_at_acceleration)
@@ -123,20 +124,14 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         period: time between two position messages, s.
     """
     omega = loop.s.imag
-    by_acceleration, by_velocity = loop.by_acceleration(), loop.by_velocity_error()
-    by_position = loop.by_position_error()
-    gusts = (
-        (
-            by_acceleration,
-            _slow_density(omega, disturbances.gust * loop.drag, disturbances.gust_time),
-        ),
-    )
+    by_acceleration = loop.responses_to_acceleration()
+    by_velocity = loop.responses_to_velocity_error()
+    by_position = loop.responses_to_position_error()
+    gust_time, path_time = disturbances.gust_correlation_time, disturbances.path_correlation_time
+    gusts = ((by_acceleration, _slow_density(omega, disturbances.gust * loop.drag, gust_time)),)
     path = (
-        (by_velocity, _slow_density(omega, disturbances.velocity_error, disturbances.path_time)),
-        (
-            by_acceleration,
-            _slow_density(omega, disturbances.acceleration_error, disturbances.path_time),
-        ),
+        (by_velocity, _slow_density(omega, disturbances.velocity_error, path_time)),
+        (by_acceleration, _slow_density(omega, disturbances.acceleration_error, path_time)),
     )
     noise = (
         (
@@ -202,11 +197,11 @@ def _variance(omega: Floats, response: Complex, density: Floats | float) -> floa
 
 
 def _after_gust(config: Config) -> tuple[float, float]:
-    """`Expectation.peak` and `Expectation.settling` of a configuration."""
+    """`Expectation.peak_error` and `Expectation.settling_time` of a configuration."""
     real_part = 0.1  # 1/s; real part of the frequencies, so that the integrators lie to their left
     omega = np.arange(0.0, 60.0, 0.05)
     s = np.asarray(real_part + 1j * omega, dtype=np.complex128)
-    position, _ = control_loop(config, s).by_acceleration()
+    position, _ = control_loop(config, s).responses_to_acceleration()
     time = np.arange(0.0, _RESPONSE_DURATION, _RESPONSE_PERIOD)
     integral = np.trapezoid(np.exp(1j * np.outer(time, omega)) * position, omega).real
     response = np.abs(np.exp(real_part * time) * integral / pi)

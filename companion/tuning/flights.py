@@ -16,7 +16,7 @@ from companion.testing import MockVehicle, fly
 _Rows = np.ndarray[Any, np.dtype[np.float64]]
 
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
-"""Wind of the courses in gusts: mean and standard deviation, m/s."""
+"""Wind of the trial flights in gusts: mean and standard deviation, m/s."""
 _STRONG_GUST = 2.0
 """Strength of a strong gust, in standard deviations of the gusts."""
 _LARGEST_RESERVE = 0.8
@@ -24,7 +24,7 @@ _LARGEST_RESERVE = 0.8
 _MAX_THRUST = 0.95
 _FENCE_SIZE = 50.0  # m
 _REFERENCE_JUMP = 20.0
-"""Speed of the reference, m/s, above which it is taken for a jump to the vehicle's position."""
+"""Speed of the reference, m/s, above which its movement counts as a jump to the vehicle."""
 _DATAGRAM_DELAY_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
 _STEPS_PER_TRUTH_ROW = 5
@@ -37,8 +37,8 @@ _QUICK_TAKEOFF_AND_LANDING = {
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
-    """A trajectory to fly, and the wind."""
+class TrialFlight:
+    """A trajectory to fly on the mock vehicle, and the wind."""
 
     name: str
     """Name for the user."""
@@ -48,16 +48,16 @@ class Course:
     """Section `wind` of the configuration of the mock vehicle."""
 
 
-CIRCLE = Course("circle at 5 m/s", "circle5.yaml", {})
-EIGHT = Course("figure-eight at 5 m/s", "figure8.yaml", {})
-CIRCLE_IN_GUSTS = Course("circle in gusts", "circle5.yaml", GUSTS)
-EIGHT_IN_GUSTS = Course("figure-eight in gusts", "figure8.yaml", GUSTS)
-COURSES = (CIRCLE, EIGHT, CIRCLE_IN_GUSTS, EIGHT_IN_GUSTS)
+CIRCLE = TrialFlight("circle at 5 m/s", "circle5.yaml", {})
+EIGHT = TrialFlight("figure-eight at 5 m/s", "figure8.yaml", {})
+CIRCLE_IN_GUSTS = TrialFlight("circle in gusts", "circle5.yaml", GUSTS)
+EIGHT_IN_GUSTS = TrialFlight("figure-eight in gusts", "figure8.yaml", GUSTS)
+TRIAL_FLIGHTS = (CIRCLE, EIGHT, CIRCLE_IN_GUSTS, EIGHT_IN_GUSTS)
 
 
 @dataclass(frozen=True, slots=True)
-class CourseResult:
-    """How well a course was tracked; the figures are NaN if the flight failed.
+class TrialResult:
+    """How well a trial flight was tracked; the figures are NaN if the flight failed.
 
     Attributes:
         result: "ok", or why the flight ended early.
@@ -67,8 +67,8 @@ class CourseResult:
             reduces it.
         rate: RMS commanded roll-pitch rate, rad/s.
         rate_limited: share of the setpoints at the rate limit.
-        speed: largest speed of the reference, m/s; lower if the course was slowed down.
-        wind: mean wind, m/s; weaker than that of the course if the tilt limit requires it.
+        speed: largest speed of the reference, m/s; lower if the trajectory was slowed down.
+        wind: mean wind, m/s; weaker than that of the trial if the tilt limit requires it.
     """
 
     result: str
@@ -82,11 +82,11 @@ class CourseResult:
 
     @property
     def ok(self) -> bool:
-        """Whether the course was flown to its end."""
+        """Whether the trajectory was flown to its end."""
         return self.result == "ok"
 
 
-def autopilot_like(config: Config) -> str:
+def matching_autopilot(config: Config) -> str:
     """Autopilot of the mock vehicle that suits the vehicle best: "ardupilot" or "px4".
 
     It is "ardupilot" if the roll rate has a slew limit.
@@ -95,18 +95,18 @@ def autopilot_like(config: Config) -> str:
     return "px4" if roll.acceleration_limit is None else "ardupilot"
 
 
-def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) -> CourseResult:
-    """Fly a course on the mock vehicle, with this configuration's gains, lag and dead time.
+def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3) -> TrialResult:
+    """Fly a trial on the mock vehicle, with the planner's configured gains, lag and dead time.
 
-    The configured limits of tilt and tilt rate apply. The course is slowed down if it would exceed
-    them, with a reserve for feedback and wind. Wind and gusts are both scaled down if the vehicle
-    could not hold its position in them within the tilt limit. Thrust, drag, take-off height and
-    fence are not the configured ones, but suit the mock vehicle and the course. No message is
+    The configured limits of tilt and tilt rate apply. The trajectory is slowed down if it would
+    exceed them, with a reserve for feedback and wind. Wind and gusts are both scaled down if the
+    vehicle could not hold its position in them within the tilt limit. Thrust, drag, take-off height
+    and fence are not the configured ones, but suit the mock vehicle and the trial. No message is
     signed.
 
     Args:
         config: the configuration.
-        course: course to fly.
+        trial: trajectory and wind.
         autopilot: autopilot of the mock vehicle, "px4" or "ardupilot".
         seed: seed of the noise and the gusts.
 
@@ -115,29 +115,29 @@ def fly_course(config: Config, course: Course, autopilot: str, seed: int = 3) ->
     """
     mock = load(shipped(f"mock-{autopilot}.yaml"))
     parameters = (mock.mock or {}).get("parameters", {})
-    course = replace(course, wind=_tolerable_wind(config, course, mock))
+    trial = replace(trial, wind=_tolerable_wind(config, trial, mock))
     vehicle = MockVehicle(
         autopilot,
         lockstep=False,
         delay_s=_DATAGRAM_DELAY_S,
         prearm_delay_s=0.2,
         seed=seed,
-        wind=dict(course.wind),
+        wind=dict(trial.wind),
         parameters={**parameters, **_QUICK_TAKEOFF_AND_LANDING[autopilot]},
     )
-    flown_config = _flight_config(config, course, mock)
+    flown_config = _flight_config(config, trial, mock)
     with _recorded_truth(vehicle) as rows:
         summary = fly(flown_config, vehicle)
     if summary.result != "ok":
-        return CourseResult(summary.result)
-    result = _tracking(summary.trace.tracking_rows(), np.array(rows), vehicle, flown_config)
-    return replace(result, wind=course.wind.get("speed_m_s", 0.0))
+        return TrialResult(summary.result)
+    result = _tracking_figures(summary.trace.tracking_rows(), np.array(rows), vehicle, flown_config)
+    return replace(result, wind=trial.wind.get("speed_m_s", 0.0))
 
 
-def _tracking(
+def _tracking_figures(
     tracking: _Rows, truth: _Rows, vehicle: MockVehicle, flown_config: Config
-) -> CourseResult:
-    """The tracking figures of a course, over the time in which its reference moved.
+) -> TrialResult:
+    """The tracking figures of a flight, over the time in which its reference moved.
 
     Args:
         tracking: rows of `FlightTrace.tracking_rows`.
@@ -158,7 +158,7 @@ def _tracking(
         if time[moving_indices[0]] <= column.time <= time[moving_indices[-1]]
     ]
     rates, max_tilt_rate = np.array(tilt_rates), flown_config.limits.max_tilt_rate
-    return CourseResult(
+    return TrialResult(
         "ok",
         _rms(tracking[moving_rows, 4:6] - reference[moving_rows]),
         _rms(true_position[moving_rows] - reference[moving_rows]),
@@ -191,7 +191,7 @@ def _recorded_truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, f
     vehicle.after_step.remove(record)
 
 
-def _flight_config(config: Config, course: Course, mock: Config) -> Config:
+def _flight_config(config: Config, trial: TrialFlight, mock: Config) -> Config:
     """The configuration for a flight of the mock vehicle."""
     return changed(
         config,
@@ -211,9 +211,9 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
             "flight": {
                 "arm": True,
                 "maneuvers": ("trajectory",),
-                "trajectory": shipped(f"trajectories/{course.trajectory}"),
+                "trajectory": shipped(f"trajectories/{trial.trajectory}"),
                 "slow_down": True,
-                "slow_down_reserve_m_s2": _reserve(config, course, mock),
+                "slow_down_reserve_m_s2": _acceleration_reserve(config, trial, mock),
                 "takeoff_height_m": 5.0,
             },
         },
@@ -221,23 +221,23 @@ def _flight_config(config: Config, course: Course, mock: Config) -> Config:
     )
 
 
-def _tolerable_wind(config: Config, course: Course, mock: Config) -> Mapping[str, float]:
-    """The wind of the course, weakened if its drag would need too much of the tilt limit."""
+def _tolerable_wind(config: Config, trial: TrialFlight, mock: Config) -> Mapping[str, float]:
+    """The wind of the trial, weakened if its drag would need too much of the tilt limit."""
     largest_deceleration = _LARGEST_RESERVE * config.limits.max_horizontal_acceleration
-    factor = min(1.0, largest_deceleration / max(_wind_deceleration(course, mock), 1e-9))
-    return {key: factor * value for key, value in course.wind.items()}
+    factor = min(1.0, largest_deceleration / max(_wind_deceleration(trial, mock), 1e-9))
+    return {key: factor * value for key, value in trial.wind.items()}
 
 
-def _wind_deceleration(course: Course, mock: Config) -> float:
+def _wind_deceleration(trial: TrialFlight, mock: Config) -> float:
     """Deceleration of a vehicle at rest by the drag in a strong gust, m/s²."""
-    wind_peak = course.wind.get("speed_m_s", 0.0) + _STRONG_GUST * course.wind.get("gust_m_s", 0.0)
+    wind_peak = trial.wind.get("speed_m_s", 0.0) + _STRONG_GUST * trial.wind.get("gust_m_s", 0.0)
     deceleration, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((wind_peak, 0.0, 0.0))
     return deceleration
 
 
-def _reserve(config: Config, course: Course, mock: Config) -> float:
-    """Horizontal acceleration that a course must leave for feedback and wind drag, m/s²."""
+def _acceleration_reserve(config: Config, trial: TrialFlight, mock: Config) -> float:
+    """Horizontal acceleration that the trajectory must leave for feedback and wind drag, m/s²."""
     largest_reserve = _LARGEST_RESERVE * config.limits.max_horizontal_acceleration
     return min(
-        config.flight.slow_down_reserve_m_s2 + _wind_deceleration(course, mock), largest_reserve
+        config.flight.slow_down_reserve_m_s2 + _wind_deceleration(trial, mock), largest_reserve
     )

@@ -58,33 +58,35 @@ class Loop:
     """Response of the coefficient to the commanded body rate, s."""
     command_response: Complex
     """Response of the coefficient to the commanded coefficient of guidance, without feedback."""
-    velocity: Complex
+    velocity_feedback: Complex
     """Response of the commanded coefficient to the measured velocity, sign reversed, s/m."""
-    position: Complex
+    position_feedback: Complex
     """Response of the commanded coefficient to the measured position, sign reversed, 1/m."""
     drag: float
     """Linear drag, 1/s."""
 
-    def by_acceleration(self) -> tuple[Complex, Complex]:
+    def responses_to_acceleration(self) -> tuple[Complex, Complex]:
         """Responses of position (m) and rate command (rad/s) to a disturbing acceleration, m/s²."""
         velocity_response = 1.0 / (self.s + self.drag)
-        tilt = self._tilt((self.velocity + self.position / self.s) * velocity_response)
+        tilt = self._closed_loop_tilt(
+            (self.velocity_feedback + self.position_feedback / self.s) * velocity_response
+        )
         return (GRAVITY * tilt + 1.0) * velocity_response / self.s, tilt / self.rate_response
 
-    def by_position_error(self) -> tuple[Complex, Complex]:
+    def responses_to_position_error(self) -> tuple[Complex, Complex]:
         """Responses of position (m) and commanded rate (rad/s) to an error of the position, m."""
-        return self._by_measurement_error(self.position)
+        return self._responses_to_measurement_error(self.position_feedback)
 
-    def by_velocity_error(self) -> tuple[Complex, Complex]:
+    def responses_to_velocity_error(self) -> tuple[Complex, Complex]:
         """Responses of position (m) and commanded rate (rad/s) to an error of the velocity, m/s."""
-        return self._by_measurement_error(self.velocity)
+        return self._responses_to_measurement_error(self.velocity_feedback)
 
-    def _by_measurement_error(self, feedback: Complex) -> tuple[Complex, Complex]:
+    def _responses_to_measurement_error(self, feedback: Complex) -> tuple[Complex, Complex]:
         """Responses of position and commanded rate to an error of the measurement of `feedback`."""
-        tilt = self._tilt(feedback)
+        tilt = self._closed_loop_tilt(feedback)
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rate_response
 
-    def _tilt(self, subtracted: Complex) -> Complex:
+    def _closed_loop_tilt(self, subtracted: Complex) -> Complex:
         """Coefficient in the closed loop if `subtracted` is subtracted from guidance's command."""
         return -self.command_response * subtracted / (1.0 + self.gain_at_rate)
 
@@ -129,8 +131,8 @@ def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
         gain_at_acceleration=guidance_path / (1.0 + attitude_path),
         rate_response=rate_response,
         command_response=command_response,
-        velocity=velocity,
-        position=position,
+        velocity_feedback=velocity,
+        position_feedback=position,
         drag=drag,
     )
 
@@ -149,8 +151,8 @@ def _planner_response(config: Config, s: Complex) -> tuple[Complex, float]:
     The first response is (n,); the second is a number, with reversed sign.
 
     `model-following` commands the rates that compensate the lag in its reference model, and feeds
-    back the difference from this model, one dead time later. All other planners command p times the
-    error of the coefficient.
+    back the difference of the coefficient from this model one dead time ago. All other planners
+    command p times the error of the coefficient.
     """
     gain = config.planner.gain_per_s
     if config.planner_name != MODEL_FOLLOWING:

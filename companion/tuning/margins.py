@@ -78,7 +78,7 @@ def margins(s: Complex, loop_gain: Complex) -> Margins:
 
 
 def smaller_margins(one: Margins, other: Margins) -> Margins:
-    """The smaller of each margin of two loops; stable only if both are."""
+    """The smaller value of each margin of two loops; stable only if both loops are stable."""
     return Margins(
         min(one.gain_db, other.gain_db),
         min(one.phase_deg, other.phase_deg),

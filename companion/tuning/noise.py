@@ -37,7 +37,7 @@ def measured_disturbances(log: Path, drag: float, default: Disturbances) -> Dist
         log: a `.tlog` of this or another program.
         drag: linear drag of the vehicle, 1/s.
         default: disturbances that supply what a log does not show: gusts and the errors on a path.
-            It is returned unchanged if the log has too little flight.
+            `default` is returned unchanged if the log has too little flight.
 
     Raises:
         LogError: the file cannot be read or is not a `.tlog`.

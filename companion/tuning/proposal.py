@@ -10,7 +10,7 @@ from companion.tuning.margins import Margins
 from companion.tuning.search import Aims, Design, errors_to_tolerate, search
 
 _ANALYSED_MANEUVERS = ("hover",)
-"""Maneuvers that the analysis assumes; those of `identify` are flown with lower gains."""
+"""Maneuvers that the analysis assumes; the maneuver `identify` would be flown with lower gains."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +48,8 @@ class Proposal:
         return {
             "planner": {"gain_per_s": design.gain},
             "guidance": {
-                "position_weight_per_s4": design.position,
-                "velocity_weight_per_s2": design.velocity,
+                "position_weight_per_s4": design.position_weight,
+                "velocity_weight_per_s2": design.velocity_weight,
                 "disturbance_bandwidth_rad_s": design.bandwidth,
                 **known_drag,
             },
@@ -82,7 +82,7 @@ def propose(
     untuned = config.model_copy(update={"flight": analysed_flight})
     before = expectation(untuned, disturbances)
     design = search(untuned, disturbances, aims)
-    tuned = design.applied(untuned)
+    tuned = design.apply_to(untuned)
     after = expectation(tuned, disturbances)
     reached_margins = after.margins
     # The values are rounded after the search, which costs up to a twentieth of a margin.

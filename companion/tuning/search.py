@@ -30,7 +30,7 @@ class Aims:
     """Factor by which real lag and dead time may be larger or smaller than configured."""
     mismatch_gain_db: float = 3.0
     """Smallest gain margin when lag and dead time differ by the factor `mismatch`, dB. While the
-    rate loop is at its slew limit, half of this and half of `mismatch_phase_deg` are enough."""
+    rate loop is at its slew limit, half of each of the two `mismatch` margins is enough."""
     mismatch_phase_deg: float = 15.0
     """Smallest phase margin when lag and dead time differ by the factor `mismatch`, degrees."""
     rate_share: float = 1.0
@@ -43,18 +43,18 @@ class Design(NamedTuple):
 
     gain: float
     """Gain p of the planner, 1/s."""
-    position: float
+    position_weight: float
     """Weight of the position in guidance, 1/s⁴."""
-    velocity: float
+    velocity_weight: float
     """Weight of the velocity in guidance, 1/s²."""
     bandwidth: float
     """Bandwidth of the motion observer, rad/s."""
 
-    def applied(self, config: Config) -> Config:
+    def apply_to(self, config: Config) -> Config:
         """Return `config` with these values."""
         weights = {
-            "position_weight_per_s4": self.position,
-            "velocity_weight_per_s2": self.velocity,
+            "position_weight_per_s4": self.position_weight,
+            "velocity_weight_per_s2": self.velocity_weight,
             "disturbance_bandwidth_rad_s": self.bandwidth,
         }
         guidance = config.guidance.model_copy(update=weights)
@@ -84,7 +84,7 @@ vehicle.
 
 
 def largest_gain(config: Config) -> float:
-    """Largest planner gain of the search, 1/s: the largest sensible gain, but at most 20."""
+    """Largest planner gain of the search, 1/s: `inner_loop.sensible_gain`, but at most 20."""
     return min(_LARGEST_DESIGN.gain, sensible_gain(config))
 
 
@@ -107,7 +107,9 @@ def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
     Raises:
         ConfigError: see `control_loop`.
     """
-    best_designs = [_best_near(config, start, disturbances, aims) for start in _starts(config)]
+    best_designs = [
+        _best_near(config, start, disturbances, aims) for start in _starting_designs(config)
+    ]
     return min(best_designs)[1].rounded()
 
 
@@ -119,7 +121,7 @@ def _best_near(
     best, step = Design(*map(min, start, largest)), _FIRST_STEP
     cost = _cost(config, best, disturbances, aims)
     while step >= _LAST_STEP:
-        for design in _neighbours(best, step, largest):
+        for design in _neighbour_designs(best, step, largest):
             other_cost = _cost(config, design, disturbances, aims, cost)
             if other_cost < cost:
                 best, cost = design, other_cost
@@ -129,7 +131,7 @@ def _best_near(
     return cost, best
 
 
-def _starts(config: Config) -> Iterator[Design]:
+def _starting_designs(config: Config) -> Iterator[Design]:
     """Three starts, because the pattern search finds only the nearest minimum.
 
     The starts scale with the delay of the attitude, as the default weights do
@@ -146,7 +148,7 @@ def _starts(config: Config) -> Iterator[Design]:
         yield Design(gain, position / delay**4, velocity / delay**2, bandwidth / delay)
 
 
-def _neighbours(design: Design, step: float, largest: Design) -> Iterator[Design]:
+def _neighbour_designs(design: Design, step: float, largest: Design) -> Iterator[Design]:
     """Designs that differ by one step in one or two values, clamped to the bounds."""
     up, down = exp(step), exp(-step)
     scales = [
@@ -166,13 +168,14 @@ def _cost(
 
     The computation stops when the cost reaches `stop_at`; the result is then a lower bound.
     """
-    candidate = design.applied(config)
+    candidate = design.apply_to(config)
     s = frequencies()
     loop = control_loop(candidate, s)
     expected_error = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
     shortfall = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
     shortfall += max(
-        0.0, 3.0 * expected_error.rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0
+        0.0,
+        3.0 * expected_error.commanded_rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0,
     )
     cost = log(expected_error.position) + _COST_OF_MISSED_AIM * shortfall
     for error in errors_to_tolerate(candidate, aims):

@@ -9,17 +9,17 @@ from companion.control.hold_settings import disturbance_bandwidth, hold_weights,
 from companion.control.inner_loop import LARGEST_GAIN_TIMES_DELAY, sensible_gain
 from companion.files import bounded_yaml
 from companion.tuning.expectation import Expectation
-from companion.tuning.flights import CourseResult
+from companion.tuning.flights import TrialResult
 from companion.tuning.loop import ModelError
 from companion.tuning.proposal import Proposal
 from companion.tuning.search import largest_gain
 
-Flights = Mapping[str, tuple[CourseResult, CourseResult]]
-"""Results of the flights before and with the proposal, by name of the course."""
+Flights = Mapping[str, tuple[TrialResult, TrialResult]]
+"""Results of the flights without and with the proposal, by name of the trial flight."""
 
 
 _WORSE_FACTOR, _WORSE_DISTANCE = 1.25, 0.01
-"""A course is flown worse if the true error grows by more than the factor and the distance, m."""
+"""A flight is worse if its true error grows by more than both this factor and this distance, m."""
 
 
 def proposal_text(
@@ -49,10 +49,10 @@ def proposal_text(
 
 
 def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
-    """Text for the user: expected behaviour before and with the proposal, rates, and flights."""
+    """Text for the user: expected behaviour without and with the proposal, rates, and flights."""
     before, after, aims = proposal.before, proposal.after, proposal.aims
     limit = degrees(proposal.tuned.limits.max_tilt_rate)
-    warning = worse_sentence(flights)
+    warning = worse_flights_warning(flights)
     lines = [] if warning is None else [warning]
     lines += [
         "Expected by linear analysis, before -> after:",
@@ -66,11 +66,11 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         f"margin {_error_text(error)}: {reached.sentence()}"
         for error, reached in proposal.margins_with_errors
     ]
-    used_rate = 3.0 * degrees(after.errors.rate)
+    used_rate = 3.0 * degrees(after.errors.commanded_rate)
     lines.append(
         f"cost: these disturbances command up to {used_rate:.0f}°/s (3 standard deviations) of the "
         f"{limit:.0f}°/s that limits.max_tilt_rate_deg_s allows; before: "
-        f"{3.0 * degrees(before.errors.rate):.0f}°/s"
+        f"{3.0 * degrees(before.errors.commanded_rate):.0f}°/s"
     )
     if flights:
         lines += [
@@ -81,12 +81,12 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         lines += [_flight_line(name, *pair) for name, pair in flights.items()]
     if flights and warning is None:
         percent = 100.0 * (_WORSE_FACTOR - 1.0)
-        lines.append(f"No course was flown worse by {percent:.0f} % and {_WORSE_DISTANCE:g} m.")
+        lines.append(f"No flight was worse by {percent:.0f} % and {_WORSE_DISTANCE:g} m.")
     return lines
 
 
-def worse_sentence(flights: Flights) -> str | None:
-    """A warning if a course failed or was flown worse with the proposal; else None."""
+def worse_flights_warning(flights: Flights) -> str | None:
+    """A warning if a flight with the proposal failed or was worse than without; else None."""
     failed_as_before: list[str] = []
     worse_flights: list[str] = []
     for name, (before, after) in flights.items():
@@ -111,8 +111,8 @@ def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
         f"{after.margins_at_acceleration.sentence()}",
         f"position error by gusts {old.gusts:.3f} -> {new.gusts:.3f} m, on a path at 5 m/s "
         f"{old.path:.3f} -> {new.path:.3f} m, by noise {old.noise:.3f} -> {new.noise:.3f} m",
-        f"after a gust that adds 1 m/s: {before.peak:.2f} -> {after.peak:.2f} m off, settled after "
-        f"{before.settling:.1f} -> {after.settling:.1f} s",
+        f"after a gust that adds 1 m/s: {before.peak_error:.2f} -> {after.peak_error:.2f} m off, "
+        f"settled after {before.settling_time:.1f} -> {after.settling_time:.1f} s",
     ]
 
 
@@ -124,7 +124,7 @@ def _error_text(error: ModelError) -> str:
     return f"with lag and dead time {percent} % {change}"
 
 
-def _flight_line(name: str, before: CourseResult, after: CourseResult) -> str:
+def _flight_line(name: str, before: TrialResult, after: TrialResult) -> str:
     if not (before.ok and after.ok):
         return f"{name}: {before.result} -> {after.result}"
     wind = f" in wind of {after.wind:.1f} m/s" if after.wind else ""

@@ -28,7 +28,7 @@ class ActuatorOutput:
         parameters: the autopilot's parameters; MOT_THST_HOVER is written here.
         guided: the task of GUIDED; during a take-off the rotors turn on the ground.
         hold: the position hold, whose climb rate shows whether the vehicle hovers.
-        throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
+        to_throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """
 
     def __init__(
@@ -37,13 +37,13 @@ class ActuatorOutput:
         parameters: ParameterTable,
         guided: Guided,
         hold: PositionHold,
-        throttle: Callable[[float], float],
+        to_throttle: Callable[[float], float],
     ) -> None:
         self._state = state
         self._parameters = parameters
         self._guided = guided
         self._hold = hold
-        self._throttle = throttle
+        self._to_throttle = to_throttle
         self.thrust = 0.0
         """Latest normalised thrust, 0..1, without the angle boost."""
 
@@ -66,11 +66,13 @@ class ActuatorOutput:
     def _learn_hover(self, output: PositionOutput, dt: float) -> None:
         """Move MOT_THST_HOVER towards the thrust of a level hover, if MOT_HOVER_LEARN is set."""
         state, parameters = self._state, self._parameters
-        is_steady = self._hold.climb.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
+        is_steady = (
+            self._hold.climb_profile.rate == 0.0 and abs(state.estimate.velocity_ned[2]) < 0.6
+        )
         if parameters["MOT_HOVER_LEARN"] and is_steady and self.cos_tilt > cos(radians(5.0)):
-            hover = float(parameters["MOT_THST_HOVER"])
-            change = dt / HOVER_LEARNING_TIME_S * (output.thrust - hover)
-            parameters.set("MOT_THST_HOVER", hover + change)
+            hover_thrust = float(parameters["MOT_THST_HOVER"])
+            change = dt / HOVER_LEARNING_TIME_S * (output.thrust - hover_thrust)
+            parameters.set("MOT_THST_HOVER", hover_thrust + change)
 
     def attitude_command(self, target: Quaternion, thrust: float) -> ActuatorCommand:
         """Return the command that turns to an attitude, with ArduPilot's normalised thrust.
@@ -91,5 +93,5 @@ class ActuatorOutput:
         On the ground the thrust is 0, except during a take-off in GUIDED.
         """
         flying = not self._state.landed or self.taking_off
-        throttle = self._throttle(specific_thrust(thrust)) if flying else 0.0
+        throttle = self._to_throttle(specific_thrust(thrust)) if flying else 0.0
         return ActuatorCommand(True, *rates, throttle)

@@ -62,7 +62,7 @@ class Boot:
     """Tracks the progress of the boot.
 
     Args:
-        state: state of the autopilot, for the time.
+        state: the autopilot's state, which gives the vehicle time.
         notifier: sends the texts and messages of the boot.
         ready_us: vehicle time at which the position estimate is good; the other times of the boot
             are scaled with it.
@@ -74,7 +74,7 @@ class Boot:
     ) -> None:
         self._state = state
         self._notifier = notifier
-        self._scale = ready_us / (RECORDED_READY_S * 1e6)
+        self._time_scale = ready_us / (RECORDED_READY_S * 1e6)
         self._elevation = elevation
         self._unsent_texts = list(_TEXTS)
         self._unsent_parameters = list(_SAVED_PARAMETERS)
@@ -83,7 +83,7 @@ class Boot:
 
     def reached(self, recorded_s: float) -> bool:
         """Whether the time ``recorded_s`` of the recorded boot, scaled to this boot, has passed."""
-        return self._state.time_us >= recorded_s * self._scale * 1e6
+        return self._state.time_us >= recorded_s * self._time_scale * 1e6
 
     @property
     def initialised(self) -> bool:

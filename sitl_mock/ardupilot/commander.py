@@ -30,10 +30,10 @@ class ArduPilotCommander:
     Args:
         state: the autopilot's state.
         parameters: the autopilot's parameters.
-        vehicle: the vehicle, for its battery.
-        control: begins each mode that is entered.
+        vehicle: the simulated vehicle; the failsafe reads its battery.
+        control: controls the vehicle in each mode.
         guided: the task of GUIDED.
-        stream: counts the accepted setpoints.
+        stream: receives the accepted setpoints.
         notifier: sends texts, the home position and changed parameters.
         boot: progress of the boot.
     """
@@ -75,7 +75,7 @@ class ArduPilotCommander:
         return follows_attitude and state.armed and not state.landed
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips all checks but those of boot and crash."""
+        """Arm, and return a MAV_RESULT; ``force`` skips all checks except for boot and crash."""
         state = self._state
         if state.armed:
             return ACCEPTED
@@ -109,7 +109,7 @@ class ArduPilotCommander:
         return ACCEPTED
 
     def request_mode(self, mode: Mode) -> int:
-        """Change the mode, and return a MAV_RESULT; during the boot it has no effect."""
+        """Change the mode, and return a MAV_RESULT; during the boot the mode does not change."""
         state = self._state
         if not self._boot.initialised or mode is state.mode:
             return ACCEPTED
@@ -140,7 +140,7 @@ class ArduPilotCommander:
         """Record a heartbeat, for the ground station failsafe."""
         self.failsafe.receive_heartbeat(heartbeat)
 
-    def take_setpoint(self, message: Message) -> None:
+    def receive_setpoint(self, message: Message) -> None:
         """Accept a setpoint in GUIDED, unless the sender has the autopilot's own MAVLink ids."""
         state = self._state
         own_ids = (self._parameters["MAV_SYSID"], _OWN_COMPONENT)
@@ -149,14 +149,14 @@ class ArduPilotCommander:
         if (message.get_srcSystem(), message.get_srcComponent()) == own_ids:
             return
         if message.get_type() == "SET_ATTITUDE_TARGET":
-            self._take_attitude_setpoint(message)
+            self._receive_attitude_setpoint(message)
             return
         setpoint = position_setpoint(message)
         if setpoint is not None:
             self._stream.accept(setpoint, state.time_us)
             self._guided.follow(setpoint, state.time_us)
 
-    def _take_attitude_setpoint(self, message: Message) -> None:
+    def _receive_attitude_setpoint(self, message: Message) -> None:
         state = self._state
         try:
             setpoint = attitude_setpoint(message)
@@ -196,8 +196,8 @@ class ArduPilotCommander:
         if self._yaw_aligned or height < YAW_ALIGNMENT_HEIGHT_M:
             return
         self._yaw_aligned = True
-        for unit in (0, 1):
-            self._announce.say(f"EKF3 IMU{unit} MAG0 in-flight yaw alignment complete", INFO)
+        for imu in (0, 1):
+            self._announce.say(f"EKF3 IMU{imu} MAG0 in-flight yaw alignment complete", INFO)
 
     def _update_prearm_problem(self) -> str | None:
         """Store in the state and return why arming is refused now; None if it is allowed."""
@@ -217,12 +217,12 @@ class ArduPilotCommander:
         if not state.landed or self._control.taking_off:
             self._landed_since_us = state.time_us
             return
-        waited = state.time_us - self._landed_since_us
-        delay = self._parameters["DISARM_DELAY"] * 1e6
+        time_on_ground_us = state.time_us - self._landed_since_us
+        delay_us = self._parameters["DISARM_DELAY"] * 1e6
         if self._control.landing and state.took_off:
-            if waited >= LANDED_DISARM_DELAY_US:
+            if time_on_ground_us >= LANDED_DISARM_DELAY_US:
                 self._stop_motors(EventKind.DISARMED_BY_LANDING)
-        elif 0.0 < delay <= waited:
+        elif 0.0 < delay_us <= time_on_ground_us:
             self._stop_motors(EventKind.DISARMED_ON_GROUND)
 
     def _stop_motors(self, kind: EventKind) -> None:

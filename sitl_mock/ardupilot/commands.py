@@ -50,7 +50,7 @@ class ArduPilotCommands(Commands):
     Args:
         state: the autopilot's state.
         commander: changes arming and modes.
-        builders: message id -> builder, for requests.
+        builders: message id -> builder of the message, for requests.
         announce: sends the reason for a refusal.
     """
 
@@ -74,8 +74,8 @@ class ArduPilotCommands(Commands):
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
         }
 
-    def data_stream(self, message: Message, link: Link) -> None:
-        """REQUEST_DATA_STREAM: start or stop a group of messages on this link; 0 means all."""
+    def request_data_stream(self, message: Message, link: Link) -> None:
+        """REQUEST_DATA_STREAM: start or stop a message group on this link; group 0 means all."""
         requested_group = message.req_stream_id
         groups = (
             _STREAM_GROUPS.values()

@@ -1,8 +1,8 @@
 """ArduCopter's parameters, and the defaults of its simulated vehicle (measured).
 
-Parameters have the types and defaults of its simulated quadrotor, and the names of 4.7 where they
-were recorded. Parameters marked * have an effect in the mock. The others exist because clients read
-them or users look for them.
+The parameters have the types and defaults of ArduPilot's simulated quadrotor. The names that were
+recorded are those of ArduPilot 4.7. Parameters marked * have an effect in the mock. The others
+exist because clients read them or users look for them.
 """
 
 from typing import Any
@@ -104,8 +104,8 @@ lag of 5 ms."""
 RATE_LAG_MS = 11.0
 """Delay of the gyro's low pass, ms (measured)."""
 STAMP_SLIPS_HZ = 1.6
-"""How often the time stamp of LOCAL_POSITION_NED slips by 1 ms, per second (measured in circles and
-figure-eights: 0.3 to 2.7); see `StampSlips`."""
+"""Mean number of 1 ms jumps of the time stamp of LOCAL_POSITION_NED per second (measured in circles
+and figure-eights: 0.3 to 2.7); see `StampSlips`."""
 
 AIRFRAME: dict[str, Any] = {
     "thrust_slope_m_s2": specific_thrust(1.0),
@@ -132,12 +132,13 @@ BATTERY: dict[str, Any] = {
 
 
 def _with_rotor_lag(gains: AxisGains, inertia: float) -> AxisGains:
-    """Return gains that give the same poles and the same steady state with ROTOR_LAG_MS.
+    """Return gains that give, with ROTOR_LAG_MS, the poles and the steady state of ``gains``.
 
-    The gains passed were fitted with the rotor lag of the default airframe. With gains P, D and
-    feed-forward F, inertia J, aerodynamic damping b and rotor lag T an axis without a torque filter
-    answers as (P + F) / (J T s^2 + (J + b T + D) s + P + b). An axis with a torque filter gets a
-    slower filter instead: two lags in series respond almost as their sum.
+    ``gains`` were fitted with the rotor lag of the default airframe. An axis without a torque
+    filter has the transfer function (P + F) / (J T s^2 + (J + b T + D) s + P + b), with gains P and
+    D, feed-forward F, inertia J, aerodynamic damping b and rotor lag T. For an axis with a torque
+    filter, the filter's time constant increases by as much as the rotor lag decreases, because two
+    lags in series respond almost as one lag with the sum of their time constants.
     """
     default_airframe = AirframeConfig()
     lag_reduction_ms = default_airframe.rotor_lag_ms - ROTOR_LAG_MS
@@ -175,11 +176,15 @@ RATE_LOOP = _rate_loop()
 def with_ardupilot_defaults(section: dict[str, Any]) -> dict[str, Any]:
     """Return the ``mock:`` section, completed by the defaults of ArduCopter's simulator."""
     top_level = {"prearm_delay_s": RECORDED_READY_S, "rate_loop": RATE_LOOP, "burst_ms": BURST_MS}
-    completed = {**top_level, **section}
-    if completed["rate_loop"] == "ardupilot":
-        completed["rate_loop"] = RATE_LOOP
+    completed_section = {**top_level, **section}
+    if completed_section["rate_loop"] == "ardupilot":
+        completed_section["rate_loop"] = RATE_LOOP
     sensors = {"rate_lag_ms": RATE_LAG_MS, "stamp_slips_hz": STAMP_SLIPS_HZ}
     for key, defaults in (("airframe", AIRFRAME), ("battery", BATTERY), ("sensors", sensors)):
-        configured = section.get(key, {})
-        completed[key] = {**defaults, **configured} if isinstance(configured, dict) else configured
-    return completed
+        configured_section = section.get(key, {})
+        completed_section[key] = (
+            {**defaults, **configured_section}
+            if isinstance(configured_section, dict)
+            else configured_section
+        )
+    return completed_section

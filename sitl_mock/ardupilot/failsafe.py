@@ -40,7 +40,7 @@ class ArduPilotFailsafe:
     Args:
         state: the autopilot's state.
         parameters: the autopilot's parameters.
-        vehicle: for the battery's voltage.
+        vehicle: the simulated vehicle, which has the battery's voltage.
         announce: sends texts.
         act: enters the mode of a failsafe, or disarms a vehicle that is on the ground.
     """
@@ -80,11 +80,11 @@ class ArduPilotFailsafe:
 
     def _watch_gcs(self) -> None:
         state, parameters = self._state, self._parameters
-        enabled = int(parameters["FS_GCS_ENABLE"])
+        action_number = int(parameters["FS_GCS_ENABLE"])
         if self._gcs_heartbeat_us is None:
             return
-        limit = parameters["FS_GCS_TIMEOUT"] * 1e6
-        lost = bool(enabled) and state.time_us - self._gcs_heartbeat_us >= limit
+        timeout_us = parameters["FS_GCS_TIMEOUT"] * 1e6
+        lost = bool(action_number) and state.time_us - self._gcs_heartbeat_us >= timeout_us
         if self.gcs_lost and not lost:
             self.gcs_lost = False
             self._announce(EventKind.GCS_REGAINED, "")
@@ -95,7 +95,7 @@ class ArduPilotFailsafe:
                 int(parameters["FS_OPTIONS"]) & _GCS_CONTINUE_IF_PILOT_CONTROL
                 and state.mode in PILOTED_MODES
             )
-            mode = _GCS_ACTIONS.get(enabled)
+            mode = _GCS_ACTIONS.get(action_number)
             if mode is not None and not pilot_continues:
                 self._act(mode)
 
@@ -111,11 +111,11 @@ class ArduPilotFailsafe:
         if warning <= state.battery_warning:
             return  # the battery failsafe never ends
         state.battery_warning = warning
-        critical = warning is BatteryWarning.CRITICAL
-        used = parameters["BATT_CAPACITY"] - remaining_mah
-        detail = f"{self._vehicle.battery.voltage_v:.2f}V used {used:.0f} mAh"
-        self._announce(EventKind.BATTERY_CRITICAL if critical else EventKind.BATTERY_LOW, detail)
-        action = parameters["BATT_FS_CRT_ACT" if critical else "BATT_FS_LOW_ACT"]
+        is_critical = warning is BatteryWarning.CRITICAL
+        used_mah = parameters["BATT_CAPACITY"] - remaining_mah
+        detail = f"{self._vehicle.battery.voltage_v:.2f}V used {used_mah:.0f} mAh"
+        self._announce(EventKind.BATTERY_CRITICAL if is_critical else EventKind.BATTERY_LOW, detail)
+        action = parameters["BATT_FS_CRT_ACT" if is_critical else "BATT_FS_LOW_ACT"]
         mode = _BATTERY_ACTIONS.get(int(action))
         if state.armed and mode is not None:
             self._act(mode)
@@ -125,13 +125,13 @@ class ArduPilotFailsafe:
 
     def _voltage_low(self) -> bool:
         """Whether the voltage has been below BATT_LOW_VOLT for BATT_LOW_TIMER."""
-        now = self._state.time_us
+        now_us = self._state.time_us
         if not self._voltage_below("BATT_LOW_VOLT"):
             self._voltage_low_since_us = None
             return False
         if self._voltage_low_since_us is None:
-            self._voltage_low_since_us = now
-        return now - self._voltage_low_since_us >= self._parameters["BATT_LOW_TIMER"] * 1e6
+            self._voltage_low_since_us = now_us
+        return now_us - self._voltage_low_since_us >= self._parameters["BATT_LOW_TIMER"] * 1e6
 
     def _watch_position(self) -> None:
         """Land if the position is lost in a mode that needs it and FS_EKF_ACTION demands it."""

@@ -32,11 +32,11 @@ def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
         FatalSetpointError: the attitude has a NaN.
     """
     mask = message.type_mask
-    ignored = mask & _ALL_RATES_IGNORED
-    if mask & THROTTLE_IGNORED or ignored not in (0, _ALL_RATES_IGNORED):
+    ignored_rates = mask & _ALL_RATES_IGNORED
+    if mask & THROTTLE_IGNORED or ignored_rates not in (0, _ALL_RATES_IGNORED):
         return None
     rates = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
-    rates = (0.0, 0.0, 0.0) if ignored else rates
+    rates = (0.0, 0.0, 0.0) if ignored_rates else rates
     if mask & ATTITUDE_IGNORED:
         return AttitudeSetpoint(None, rates, rates[2], message.thrust)
     w, x, y, z = message.q

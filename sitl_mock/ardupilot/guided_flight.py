@@ -5,7 +5,11 @@ from math import isnan
 from sitl_mock.ardupilot.actuator_output import ActuatorOutput
 from sitl_mock.ardupilot.guided import Guided, Task
 from sitl_mock.ardupilot.hold import PositionHold, approach_speed
-from sitl_mock.ardupilot.thrust import angle_boosted, climb_rate_of_setpoint, thrust_of_setpoint
+from sitl_mock.ardupilot.thrust import (
+    angle_boosted_thrust,
+    climb_rate_of_setpoint,
+    thrust_of_setpoint,
+)
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import setpoint_demand
 from sitl_mock.autopilot.setpoints import AttitudeSetpoint, PositionSetpoint
@@ -22,7 +26,7 @@ ARRIVAL_DECELERATION = 0.55
 ARRIVAL_TOLERANCE_M = 0.1
 """Distance below the take-off height at which a take-off ends, m."""
 _MIN_CLIMB_RATE = 0.1
-"""Smallest climb rate of a take-off, m/s; without it the take-off height is never reached."""
+"""Smallest climb rate of a take-off, m/s; a rate decreasing to 0 would never reach the height."""
 
 
 class GuidedFlight:
@@ -73,10 +77,14 @@ class GuidedFlight:
         if state.landed and state.time_us - self._spooling_since_us < SPOOL_UP_US:
             self._hold.begin()
             return self._output.rate_command((0.0, 0.0, 0.0), 0.0)
-        remaining = guided.takeoff_height - state.home_ned[2] - self._hold.climb.height
+        remaining_height = (
+            guided.takeoff_height - state.home_ned[2] - self._hold.climb_profile.height
+        )
         max_speed = 0.01 * self._parameters["WPNAV_SPEED_UP"]
-        speed = max(_MIN_CLIMB_RATE, approach_speed(remaining, ARRIVAL_DECELERATION, max_speed))
-        if remaining < ARRIVAL_TOLERANCE_M:
+        speed = max(
+            _MIN_CLIMB_RATE, approach_speed(remaining_height, ARRIVAL_DECELERATION, max_speed)
+        )
+        if remaining_height < ARRIVAL_TOLERANCE_M:
             guided.end_takeoff()
         return self._output.position_command(self._hold.step(speed, dt), dt)
 
@@ -94,17 +102,21 @@ class GuidedFlight:
         if self._timed_out and not was_timed_out:
             self._hold.begin()
         if is_climb_rate:
-            up = 0.01 * parameters["WPNAV_SPEED_UP"]
-            down = 0.01 * parameters["WPNAV_SPEED_DN"]
-            climb = 0.0 if self._timed_out else climb_rate_of_setpoint(setpoint.thrust, up, down)
-            thrust = self._hold.step(climb, dt, level=True).thrust
+            max_climb_rate = 0.01 * parameters["WPNAV_SPEED_UP"]
+            max_sink_rate = 0.01 * parameters["WPNAV_SPEED_DN"]
+            climb_rate = (
+                0.0
+                if self._timed_out
+                else climb_rate_of_setpoint(setpoint.thrust, max_climb_rate, max_sink_rate)
+            )
+            thrust = self._hold.step(climb_rate, dt, level=True).thrust
             state.position_target.active = False
         else:
             thrust = thrust_of_setpoint(setpoint.thrust)
         self._output.thrust = state.attitude_target.thrust = thrust
         # The angle boost always applies to a climb rate; to a thrust only if it is enabled.
         if is_climb_rate or parameters["ATC_ANGLE_BOOST"]:
-            thrust = angle_boosted(thrust, self._output.cos_tilt)
+            thrust = angle_boosted_thrust(thrust, self._output.cos_tilt)
         if self._timed_out:
             return self._output.attitude_command(from_yaw(self._hold.yaw), thrust)
         rates = setpoint.rates or (0.0, 0.0, 0.0)
@@ -122,11 +134,11 @@ class GuidedFlight:
             guided.hold()
             return self._output.position_command(self._hold.step(0.0, dt), dt)
         hold = self._hold
-        speeds = (
+        speed_limits = (
             0.01 * parameters["WPNAV_SPEED"],
             0.01 * parameters["WPNAV_SPEED_UP"],
             0.01 * parameters["WPNAV_SPEED_DN"],
         )
-        demand = setpoint_demand(setpoint, self._state.estimate.q, hold.yaw, speeds, dt)
+        demand = setpoint_demand(setpoint, self._state.estimate.q, hold.yaw, speed_limits, dt)
         hold.yaw = demand.yaw
         return self._output.position_command(hold.follow(demand, dt), dt)

@@ -1,4 +1,4 @@
-"""Position hold: a point and a heading are held, a climb rate is followed."""
+"""Position hold: holds a point and a heading, and follows a climb rate."""
 
 from math import nan, radians, sqrt
 
@@ -13,12 +13,12 @@ from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Vector, yaw
 
 STOPPING_S = 0.65
-"""Distance from the vehicle to the held point per speed, s (recorded on entering LAND)."""
+"""Ratio of stopping distance to speed when a hold begins, s (recorded on entering LAND)."""
 _CLIMB_RATE_INTEGRAL_GAIN = 1.0
 """Integral gain of the climb rate, 1/s^2; chosen for a steady hover, not measured."""
 _CLIMB_LIMIT = 10.0
-"""Largest climb and descent of the height controller, m/s. It is high, because the callers limit
-the climb rate that they ask for."""
+"""Largest climb rate and sink rate of the height controller, m/s. It is high, because the callers
+limit the climb rate that they request."""
 
 
 class ClimbProfile:
@@ -50,7 +50,7 @@ def approach_speed(distance: float, deceleration: float, max_speed: float) -> fl
 
 
 class PositionHold:
-    """Holds a point, a heading, and a height that a climb rate changes.
+    """Holds a point and a heading, and follows a climb rate.
 
     Args:
         state: the autopilot's state; its ``position_target`` is written here.
@@ -61,7 +61,7 @@ class PositionHold:
         self._state = state
         self._parameters = parameters
         self._controller = PositionController(self._gains)
-        self.climb = ClimbProfile()
+        self.climb_profile = ClimbProfile()
         self.point = (0.0, 0.0)
         """North and east of the held point, m."""
         self.yaw = 0.0
@@ -74,14 +74,14 @@ class PositionHold:
         vx, vy, vz = estimate.velocity_ned
         self.point = (x + STOPPING_S * vx, y + STOPPING_S * vy)
         self.yaw = yaw(estimate.q)
-        self.climb.begin(-z, -vz)
+        self.climb_profile.begin(-z, -vz)
         self._controller.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
         """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         dx, dy, dz = position_step
         self.point = (self.point[0] + dx, self.point[1] + dy)
-        self.climb.height -= dz
+        self.climb_profile.height -= dz
         self.yaw += yaw_step
 
     def step(self, climb_rate: float, dt: float, *, level: bool = False) -> PositionOutput:
@@ -92,13 +92,13 @@ class PositionHold:
             dt: the period, s.
             level: keep level instead of holding the point.
         """
-        parameters, climb = self._parameters, self.climb
-        climb.step(climb_rate, 0.01 * parameters["WPNAV_ACCEL_Z"], dt)
+        parameters, profile = self._parameters, self.climb_profile
+        profile.step(climb_rate, 0.01 * parameters["WPNAV_ACCEL_Z"], dt)
         north, east = (nan, nan) if level else self.point
         demand = PositionDemand(
-            (north, east, -climb.height),
-            (nan, nan, -climb.rate),
-            (*((0.0, 0.0) if level else (nan, nan)), -climb.acceleration),
+            (north, east, -profile.height),
+            (nan, nan, -profile.rate),
+            (*((0.0, 0.0) if level else (nan, nan)), -profile.acceleration),
             self.yaw,
             0.01 * parameters["WPNAV_SPEED"],
             _CLIMB_LIMIT,

@@ -7,11 +7,11 @@ from sitl_mock.ardupilot.guided import Guided
 from sitl_mock.ardupilot.guided_flight import GuidedFlight
 from sitl_mock.ardupilot.hold import PositionHold, approach_speed
 from sitl_mock.ardupilot.return_home import Leg, ReturnHome
-from sitl_mock.ardupilot.thrust import angle_boosted, specific_thrust
+from sitl_mock.ardupilot.thrust import angle_boosted_thrust, specific_thrust
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
 from sitl_mock.physics.quaternion import Vector, from_yaw
-from sitl_mock.physics.vehicle import STILL, ActuatorCommand
+from sitl_mock.physics.vehicle import DISARMED_COMMAND, ActuatorCommand
 
 TOUCHDOWN_THRUST_RATE = 0.43
 """Decrease of the normalised thrust after contact in LAND, 1/s (recorded: landed after 1.6 s)."""
@@ -24,7 +24,7 @@ class ArduPilotModeControl:
         state: the autopilot's state; its command and targets are written here.
         parameters: gains, limits and speeds; MOT_THST_HOVER is written here.
         guided: the task of GUIDED.
-        throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
+        to_throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """
 
     def __init__(
@@ -32,19 +32,19 @@ class ArduPilotModeControl:
         state: State,
         parameters: ParameterTable,
         guided: Guided,
-        throttle: Callable[[float], float],
+        to_throttle: Callable[[float], float],
     ) -> None:
         self._state = state
         self._parameters = parameters
         self._guided = guided
-        self._throttle = throttle
+        self._to_throttle = to_throttle
         self._hold = PositionHold(state, parameters)
-        self._output = ActuatorOutput(state, parameters, guided, self._hold, throttle)
+        self._output = ActuatorOutput(state, parameters, guided, self._hold, to_throttle)
         self._guided_flight = GuidedFlight(state, parameters, guided, self._hold, self._output)
         self._return = ReturnHome(state, parameters)
 
     def enter(self, mode: Mode) -> None:
-        """Begin a mode at the present estimate."""
+        """Begin a mode from the estimated position, velocity and heading."""
         self._hold.begin()
         if mode is Mode.RTL:
             self._return.begin()
@@ -69,7 +69,7 @@ class ArduPilotModeControl:
 
     def hover_throttle(self) -> float:
         """Return the rotors' throttle at MOT_THST_HOVER."""
-        return self._throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
+        return self._to_throttle(specific_thrust(float(self._parameters["MOT_THST_HOVER"])))
 
     def command(self, dt: float) -> ActuatorCommand:
         """Return the actuator command for the next ``dt`` s."""
@@ -82,7 +82,7 @@ class ArduPilotModeControl:
         )
         if not state.armed:
             self._hold.begin()
-            command = STILL
+            command = DISARMED_COMMAND
         elif state.landed and not self.taking_off:
             self._hold.begin()
             self._output.thrust = 0.0
@@ -101,7 +101,7 @@ class ArduPilotModeControl:
             # A pilot with centred sticks: level at the hover thrust.
             hover_thrust = float(self._parameters["MOT_THST_HOVER"])
             return self._output.attitude_command(
-                from_yaw(self._hold.yaw), angle_boosted(hover_thrust, self._output.cos_tilt)
+                from_yaw(self._hold.yaw), angle_boosted_thrust(hover_thrust, self._output.cos_tilt)
             )
         if self.landing:
             return self._land(dt)
@@ -118,11 +118,11 @@ class ArduPilotModeControl:
         if return_home.leg is not Leg.CLIMB:
             home = self._state.home_ned
             self._hold.point = (home[0], home[1])
-        remaining = return_home.height - self._hold.climb.height
+        remaining_height = return_home.height - self._hold.climb_profile.height
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
         max_speed = 0.01 * parameters["WPNAV_SPEED_UP"]
         return self._output.position_command(
-            self._hold.step(approach_speed(remaining, acceleration, max_speed), dt), dt
+            self._hold.step(approach_speed(remaining_height, acceleration, max_speed), dt), dt
         )
 
     def _land(self, dt: float) -> ActuatorCommand:
@@ -133,10 +133,11 @@ class ArduPilotModeControl:
             return self._output.attitude_command(from_yaw(self._hold.yaw), self._output.thrust)
         land_speed = 0.01 * parameters["LAND_SPEED"]
         height = state.home_ned[2] - state.estimate.position_ned[2]
-        remaining = height - 0.01 * parameters["LAND_ALT_LOW"]
+        remaining_height = height - 0.01 * parameters["LAND_ALT_LOW"]
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
         sink_rate = max(
-            land_speed, approach_speed(remaining, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"])
+            land_speed,
+            approach_speed(remaining_height, acceleration, 0.01 * parameters["WPNAV_SPEED_DN"]),
         )
         level = not state.position_valid
         state.position_controlled = not level

@@ -34,7 +34,7 @@ PILOTED_MODES = frozenset({Mode.STABILIZE, Mode.ALT_HOLD, Mode.LOITER})
 def base_mode(*, armed: bool, position_controlled: bool) -> int:
     """Return HEARTBEAT.base_mode: 81, plus 8 in horizontal position control, plus 128 if armed.
 
-    So it is 209 under rates in GUIDED, and 217 in a position hold (recorded).
+    When armed, it is 209 while GUIDED follows body rates, and 217 in a position hold (recorded).
     """
     flags = (
         dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
@@ -78,4 +78,4 @@ def arming_problem(
         (state.battery_warning > BatteryWarning.OK, "Battery failsafe on"),
         (gcs_failsafe, "GCS failsafe on"),
     )
-    return next((problem for present, problem in problems if present), None)
+    return next((problem for applies, problem in problems if applies), None)

@@ -22,7 +22,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         }
 
     def attitude_target(self) -> Message:
-        """Return ATTITUDE_TARGET: the shaped target, which leads the body, and its rates."""
+        """Return ATTITUDE_TARGET: attitude and rates of the shaped target."""
         shaped_target = self._vehicle.attitude_target
         if shaped_target is None:
             return super().attitude_target()

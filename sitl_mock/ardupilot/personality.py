@@ -111,7 +111,7 @@ class ArduPilot:
                 is_climbing=lambda: control.taking_off,
             ),
             builders,
-            handlers={"REQUEST_DATA_STREAM": commands.data_stream},
+            handlers={"REQUEST_DATA_STREAM": commands.request_data_stream},
             position_valid_from_us=parts.ready_us,
             position_timeout_us=lambda: POSITION_TIMEOUT_US,
         )

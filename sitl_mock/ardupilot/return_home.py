@@ -38,9 +38,9 @@ class ReturnHome:
         self._waiting_since_us = 0
 
     def begin(self) -> None:
-        """Choose the height of the flight home: RTL_ALT, less near home (RTL_CONE_SLOPE).
+        """Choose the height of the flight home: RTL_ALT, or a lower one near home (RTL_CONE_SLOPE).
 
-        The height is at least the present one.
+        The vehicle never descends to this height: it keeps a higher present height.
         """
         state, parameters = self._state, self._parameters
         present_height = -state.estimate.position_ned[2]

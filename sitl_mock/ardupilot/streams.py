@@ -28,11 +28,11 @@ class ArduPilotStreams:
         loop_us: int,
         booting_until_us: float,
     ) -> None:
-        self._defaults = {message: round(1e6 / hz) for message, hz in rates.items()}
+        self._boot_intervals_us = {message_id: round(1e6 / hz) for message_id, hz in rates.items()}
         self._loop_us = loop_us
         self._booting_until_us = booting_until_us
-        self._intervals = dict(self._defaults)
-        self._last_due_us = dict.fromkeys(self._defaults, 0)
+        self._intervals_us = dict(self._boot_intervals_us)
+        self._last_due_us = dict.fromkeys(self._boot_intervals_us, 0)
 
     def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
         """Set the interval of a message; 0 = the rate at boot, negative = never.
@@ -41,39 +41,41 @@ class ArduPilotStreams:
             the reason for a refusal in ArduPilot's words, None if accepted.
         """
         if interval_us < 0.0:
-            self._intervals.pop(message_id, None)
+            self._intervals_us.pop(message_id, None)
             return None
         rounded_us = 1000 * min(int(interval_us) // 1000, MAX_INTERVAL_MS)
         if interval_us == 0.0:
-            rounded_us = self._defaults.get(message_id, 0)
+            rounded_us = self._boot_intervals_us.get(message_id, 0)
             if not rounded_us:
-                self._intervals.pop(message_id, None)
+                self._intervals_us.pop(message_id, None)
                 return None
         if rounded_us < self._loop_us:
             return f"Requested rate for message ID {message_id} too fast. Increase SCHED_LOOP_RATE"
-        self._intervals[message_id] = rounded_us
+        self._intervals_us[message_id] = rounded_us
         self._last_due_us[message_id] = now_us
         return None
 
     def interval(self, message_id: int) -> int:
         """Return the interval of a message in us, -1 if it is not streamed."""
-        return self._intervals.get(message_id, -1)
+        return self._intervals_us.get(message_id, -1)
 
     def due(self, slot_us: int, status_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
 
         ``status_us`` (for PX4) is ignored.
         """
-        due = []
+        due_ids = []
         booting = slot_us < self._booting_until_us
         last_due_us = self._last_due_us
-        for message_id, interval in self._intervals.items():
-            waited = slot_us - last_due_us[message_id]
-            if waited < interval or (booting and message_id not in self._defaults):
+        for message_id, interval_us in self._intervals_us.items():
+            since_due_us = slot_us - last_due_us[message_id]
+            if since_due_us < interval_us or (
+                booting and message_id not in self._boot_intervals_us
+            ):
                 continue
             # More than one interval late, the phase restarts, so that no message is sent twice.
             last_due_us[message_id] = (
-                slot_us if waited >= 2 * interval else slot_us - waited + interval
+                slot_us if since_due_us >= 2 * interval_us else slot_us - since_due_us + interval_us
             )
-            due.append(message_id)
-        return due
+            due_ids.append(message_id)
+        return due_ids

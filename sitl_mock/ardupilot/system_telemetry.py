@@ -40,7 +40,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         state: the autopilot's state.
         origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
-        vehicle: the vehicle, for its battery.
+        vehicle: the simulated vehicle, whose battery is reported.
         boot: progress of the boot.
     """
 
@@ -62,7 +62,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
         }
 
     def heartbeat(self) -> Message:
-        """Return HEARTBEAT; during the boot the guided bit is set (recorded: 89)."""
+        """Return HEARTBEAT; during the boot its base_mode is 89, with the guided bit (recorded)."""
         state = self._state
         position_controlled = state.position_controlled or not self._boot.initialised
         return dialect.MAVLink_heartbeat_message(

@@ -1,4 +1,4 @@
-"""ArduCopter's normalised thrust: specific thrust, angle boost, thrust or climb rate of a setpoint.
+"""ArduCopter's normalised thrust: its curve, the angle boost, and the thrust field of setpoints.
 
 Measured on 4.7.0-dev's built-in quadrotor, with GUID_OPTIONS bit 3 set.
 """
@@ -11,29 +11,29 @@ from sitl_mock.physics.rigid_body import GRAVITY
 HOVER_THRUST = 0.364
 """Normalised thrust that hovers, 0..1."""
 
-_CURVE = (
+_THRUST_CURVE = (
     (0.0, 0.045),
     (0.1, 0.29),
     (HOVER_THRUST, 1.0),
     (1.0, 2.745),
 )
 """Points of the curve: (normalised thrust, specific thrust in g). From `HOVER_THRUST` on, the curve
-is a straight line through the origin; from 0.1 on, almost. In circles, figure-eights and steps
-between 0.3 and 0.6, this line is within 0.03 m/s^2 of the simulator's truth. Climbs at a constant
-thrust accelerate less, because their drag grows quickly.
+is a straight line through the origin, and it is close to this line from 0.1 on. In circles,
+figure-eights and steps between 0.3 and 0.6, the line is within 0.03 m/s^2 of the simulator's truth.
+In a climb at constant thrust the vehicle accelerates less, because its drag grows quickly.
 """
 
 
 def specific_thrust(thrust: float) -> float:
     """Return the specific thrust of a normalised thrust, m/s^2."""
-    for (low, low_g), (high, high_g) in pairwise(_CURVE):
-        if thrust <= high:
-            fraction = max(0.0, thrust - low) / (high - low)
+    for (low_thrust, low_g), (high_thrust, high_g) in pairwise(_THRUST_CURVE):
+        if thrust <= high_thrust:
+            fraction = max(0.0, thrust - low_thrust) / (high_thrust - low_thrust)
             return GRAVITY * (low_g + fraction * (high_g - low_g))
-    return GRAVITY * _CURVE[-1][1]
+    return GRAVITY * _THRUST_CURVE[-1][1]
 
 
-def angle_boosted(thrust: float, cos_tilt: float) -> float:
+def angle_boosted_thrust(thrust: float, cos_tilt: float) -> float:
     """Return the thrust divided by the cosine of the tilt, as ATC_ANGLE_BOOST does.
 
     Near 90 degrees of tilt and beyond, the thrust decreases to zero.

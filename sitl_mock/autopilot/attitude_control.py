@@ -48,29 +48,30 @@ def attitude_rates(
         gains: gains and limits.
     """
     target = normalise(target)
-    reduced = multiply(_shortest_arc(q, target), q)
-    mix = multiply(conjugate(reduced), target)
-    sign = copysign(1.0, mix[0])
-    cos_half = max(-1.0, min(1.0, mix[0] * sign))
-    sin_half = max(-1.0, min(1.0, mix[3] * sign))
-    weight = gains.yaw_weight
-    weighted = multiply(
-        reduced, (cos(weight * acos(cos_half)), 0.0, 0.0, sin(weight * asin(sin_half)))
+    reduced_target = multiply(_shortest_arc(q, target), q)
+    rest_rotation = multiply(conjugate(reduced_target), target)
+    sign = copysign(1.0, rest_rotation[0])
+    cos_half = max(-1.0, min(1.0, rest_rotation[0] * sign))
+    sin_half = max(-1.0, min(1.0, rest_rotation[3] * sign))
+    yaw_weight = gains.yaw_weight
+    weighted_target = multiply(
+        reduced_target,
+        (cos(yaw_weight * acos(cos_half)), 0.0, 0.0, sin(yaw_weight * asin(sin_half))),
     )
-    ew, ex, ey, ez = multiply(conjugate(q), weighted)
-    scale = copysign(2.0, ew)
-    yaw_gain = gains.yaw / weight if weight > 0.0 else gains.yaw
+    ew, ex, ey, ez = multiply(conjugate(q), weighted_target)
+    error_scale = copysign(2.0, ew)
+    yaw_gain = gains.yaw / yaw_weight if yaw_weight > 0.0 else gains.yaw
     w, x, y, z = q
     down = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
-    limits = gains.max_rates
+    max_rates = gains.max_rates
     return (
-        _limit(scale * ex * gains.roll + down[0] * yaw_rate, limits[0]),
-        _limit(scale * ey * gains.pitch + down[1] * yaw_rate, limits[1]),
-        _limit(scale * ez * yaw_gain + down[2] * yaw_rate, limits[2]),
+        _clamp(error_scale * ex * gains.roll + down[0] * yaw_rate, max_rates[0]),
+        _clamp(error_scale * ey * gains.pitch + down[1] * yaw_rate, max_rates[1]),
+        _clamp(error_scale * ez * yaw_gain + down[2] * yaw_rate, max_rates[2]),
     )
 
 
-def is_usable(q: Quaternion) -> bool:
+def is_usable_quaternion(q: Quaternion) -> bool:
     """Whether a quaternion has no NaN, and a length between 0.001 and 1000."""
     w, x, y, z = q
     squared_length = w * w + x * x + y * y + z * z
@@ -90,5 +91,5 @@ def _shortest_arc(q: Quaternion, target: Quaternion) -> Quaternion:
     )
 
 
-def _limit(value: float, bound: float) -> float:
+def _clamp(value: float, bound: float) -> float:
     return max(-bound, min(bound, value))

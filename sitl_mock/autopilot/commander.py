@@ -46,7 +46,7 @@ class Commander(Protocol):
     def receive_heartbeat(self, heartbeat: Message) -> None:
         """Record the heartbeat of another system or component, to notice when it is lost."""
 
-    def take_setpoint(self, message: Message) -> None:
+    def receive_setpoint(self, message: Message) -> None:
         """Handle a SET_ATTITUDE_TARGET or a SET_POSITION_TARGET_LOCAL_NED."""
 
     def step(self, *, crashed: bool) -> None:

@@ -24,7 +24,7 @@ FORCE_MAGIC = 21196.0
 class Command(NamedTuple):
     """A command with its seven parameters; 5 and 6 are in degrees if they are a position."""
 
-    number: int
+    command_id: int
     parameters: tuple[float, float, float, float, float, float, float]
 
 
@@ -38,7 +38,7 @@ class Commands:
     Args:
         state: the autopilot's state.
         commander: changes arming and modes.
-        builders: message id -> builder, for requests.
+        builders: message id -> builder of the message, for requests.
     """
 
     def __init__(self, state: State, commander: Commander, builders: dict[int, Builder]) -> None:
@@ -58,7 +58,7 @@ class Commands:
 
     def run(self, command: Command, link: Link) -> int:
         """Execute one command received on a link, and return its MAV_RESULT."""
-        handler = self.handlers.get(command.number)
+        handler = self.handlers.get(command.command_id)
         return UNSUPPORTED if handler is None else handler(command, link)
 
     def send(self, message_id: int, link: Link) -> int:

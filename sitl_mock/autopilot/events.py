@@ -42,15 +42,15 @@ class Event(NamedTuple):
     """How an autopilot announces an event: by STATUSTEXT, and by EVENT if it has an id.
 
     ``text`` may have one ``{}`` for a detail; ``severity`` is MAV_SEVERITY; ``event_id`` 0 = text
-    only; ``arguments`` are the packed arguments of EVENT; ``internal`` is the severity in the
-    vehicle's log, None = the same.
+    only; ``arguments`` are the packed arguments of EVENT; ``internal_severity`` is the severity in
+    the vehicle's log, None = the same.
     """
 
     text: str
     severity: int
     event_id: int = 0
     arguments: bytes = b""
-    internal: int | None = None
+    internal_severity: int | None = None
 
 
 Announce = Callable[[EventKind, str], None]

@@ -57,10 +57,12 @@ class FaultSchedule:
 
     def clear(self) -> list[VehicleFault]:
         """Remove all faults; return the vehicle faults that were active."""
-        active = [e.fault for e in self._entries if e.active and not isinstance(e.fault, LinkFault)]
+        active_faults = [
+            e.fault for e in self._entries if e.active and not isinstance(e.fault, LinkFault)
+        ]
         self._entries = []
         self.link_faults = ()
-        return active
+        return active_faults
 
     def update(
         self, now_us: int, offboard_us: int | None
@@ -75,17 +77,17 @@ class FaultSchedule:
             return [], []
         begun_faults: list[VehicleFault] = []
         ended_faults: list[VehicleFault] = []
-        changed = False
+        any_changed = False
         for entry in self._entries:
-            active = self._is_active(entry, now_us, offboard_us)
-            if active == entry.active:
+            is_active = self._is_active(entry, now_us, offboard_us)
+            if is_active == entry.active:
                 continue
-            changed = True
-            entry.active = active
-            entry.has_ended = not active
+            any_changed = True
+            entry.active = is_active
+            entry.has_ended = not is_active
             if not isinstance(entry.fault, LinkFault):
-                (begun_faults if active else ended_faults).append(entry.fault)
-        if changed:
+                (begun_faults if is_active else ended_faults).append(entry.fault)
+        if any_changed:
             self._entries = [entry for entry in self._entries if not entry.has_ended]
             self.link_faults = tuple(
                 e.fault for e in self._entries if e.active and isinstance(e.fault, LinkFault)
@@ -98,14 +100,14 @@ class FaultSchedule:
         if fault.after_offboard_s is not None:
             if offboard_us is None:
                 return False
-            start = max(offboard_us + fault.after_offboard_s * 1e6, entry.injected_us)
+            start_us = max(offboard_us + fault.after_offboard_s * 1e6, entry.injected_us)
         elif fault.at_s is not None:
-            start = max(fault.at_s * 1e6, entry.injected_us)
+            start_us = max(fault.at_s * 1e6, entry.injected_us)
         else:
-            start = entry.injected_us
-        if now_us < start:
+            start_us = entry.injected_us
+        if now_us < start_us:
             return False
-        return fault.duration_s is None or now_us < start + fault.duration_s * 1e6
+        return fault.duration_s is None or now_us < start_us + fault.duration_s * 1e6
 
 
 class FaultEffects:
@@ -113,10 +115,10 @@ class FaultEffects:
 
     Args:
         state: the autopilot's state.
-        vehicle: changed by faults of the estimate and the battery.
-        commander: changed by faults of arming and mode.
-        control: its held position and heading follow an estimator reset.
-        links: changed by faults of messages.
+        vehicle: the simulated vehicle; faults change its estimator and its battery.
+        commander: refuses arming or changes the mode when a fault demands it.
+        control: moves its held position and heading when the estimator resets.
+        links: links whose messages `NanField` faults change.
     """
 
     def __init__(
@@ -138,7 +140,7 @@ class FaultEffects:
         self._telemetry_stops: list[StopTelemetry] = []
         self._nan_fields: list[NanField] = []
         self._gps_lost_us = 0
-        self._lost_s = 0.0
+        self._slip_s = 0.0
 
     def apply(self, begun_faults: list[VehicleFault], ended_faults: list[VehicleFault]) -> None:
         """Apply the faults that began, and undo those that ended, as far as they can be undone."""
@@ -149,8 +151,8 @@ class FaultEffects:
 
     def take_slip(self) -> float:
         """Return the wall time lost to `SlipClock` faults since the last call, s."""
-        lost_s, self._lost_s = self._lost_s, 0.0
-        return lost_s
+        slip_s, self._slip_s = self._slip_s, 0.0
+        return slip_s
 
     def is_stopped(self, message_id: int) -> bool:
         """Whether a `StopTelemetry` fault stops a message now."""
@@ -178,16 +180,16 @@ class FaultEffects:
             case FreezeClock():
                 self.clock_frozen = True
             case SlipClock():
-                self._lost_s += fault.slip_ms * 1e-3
+                self._slip_s += fault.slip_ms * 1e-3
             case NanField():
                 self._nan_fields.append(fault)
                 self._set_link_hooks()
             case PilotTakeover():
                 self._commander.take_over(Mode[fault.mode])
             case EstimatorReset():
-                step = radians(fault.yaw_deg)
-                self._vehicle.estimator.shift(yaw=step, position_ned=fault.position_ned_m)
-                self._control.shift(step, fault.position_ned_m)
+                yaw_step = radians(fault.yaw_deg)
+                self._vehicle.estimator.shift(yaw=yaw_step, position_ned=fault.position_ned_m)
+                self._control.shift(yaw_step, fault.position_ned_m)
             case RefuseArming():
                 self._commander.refusal = fault.reason
             case LowBattery():

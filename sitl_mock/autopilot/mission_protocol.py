@@ -38,7 +38,7 @@ class MissionProtocol:
             "MISSION_REQUEST_INT": self._send_item,
             "MISSION_REQUEST": self._send_item,
             "MISSION_COUNT": self._begin_upload,
-            "MISSION_ITEM_INT": self._take_item,
+            "MISSION_ITEM_INT": self._receive_item,
             "MISSION_CLEAR_ALL": self._clear,
         }
 
@@ -70,7 +70,7 @@ class MissionProtocol:
             self._upload = _Upload(message.mission_type, message.count, _sender(message), [])
             self._request_item(link, self._upload)
 
-    def _take_item(self, message: Message, link: Link) -> None:
+    def _receive_item(self, message: Message, link: Link) -> None:
         upload = self._upload
         if upload is None or upload.sender != _sender(message):
             _acknowledge(message, link, dialect.MAV_MISSION_ERROR)
@@ -87,15 +87,17 @@ class MissionProtocol:
 
     @staticmethod
     def _request_item(link: Link, upload: _Upload) -> None:
-        number, mission_type = len(upload.items), upload.mission_type
-        link.send(dialect.MAVLink_mission_request_int_message(*upload.sender, number, mission_type))
+        sequence, mission_type = len(upload.items), upload.mission_type
+        link.send(
+            dialect.MAVLink_mission_request_int_message(*upload.sender, sequence, mission_type)
+        )
 
     def _clear(self, message: Message, link: Link) -> None:
         clears_all = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
-        cleared = _PLAN_TYPES if clears_all else self.plans.keys() & {message.mission_type}
-        for mission_type in cleared:
+        cleared_types = _PLAN_TYPES if clears_all else self.plans.keys() & {message.mission_type}
+        for mission_type in cleared_types:
             self.plans[mission_type] = []
-        result = _ACCEPTED if cleared else dialect.MAV_MISSION_UNSUPPORTED
+        result = _ACCEPTED if cleared_types else dialect.MAV_MISSION_UNSUPPORTED
         _acknowledge(message, link, result)
 
 

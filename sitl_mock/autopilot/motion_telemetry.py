@@ -32,7 +32,8 @@ class MotionTelemetry:
 
     Args:
         state: the autopilot's state.
-        vehicle: the vehicle, for rotors, reset counter and ArduPilot's shaped attitude target.
+        vehicle: the simulated vehicle; its rotors, its reset counter and (for ArduPilot) its
+            shaped attitude target are reported.
         origin: origin of the local frame.
         slips: lag of the time stamp of LOCAL_POSITION_NED behind the true time.
     """
@@ -194,7 +195,7 @@ class MotionTelemetry:
         )
 
     def servo_output_raw(self) -> Message:
-        """Return SERVO_OUTPUT_RAW: 900 us disarmed, 1000..2000 us armed, PX4's rotor order."""
+        """Return SERVO_OUTPUT_RAW: 900 us disarmed, 1000..2000 us armed, in PX4's rotor order."""
         state = self._state
         outputs = [900] * 16
         if state.armed:

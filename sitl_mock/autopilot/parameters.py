@@ -33,7 +33,7 @@ class Encoding(Protocol):
     has_hash: bool
     """Whether the list begins with a hash of all values."""
     sends_index: bool
-    """Whether the answer to a read by name, or to a set, contains the parameter's index."""
+    """Whether the answer to a PARAM_SET, or to a read by name, contains the parameter's index."""
 
     def to_wire(self, name: str, value: int | float) -> tuple[float, int]:
         """Return (param_value, param_type)."""

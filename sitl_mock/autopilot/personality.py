@@ -43,8 +43,8 @@ class VehicleParts(NamedTuple):
     origin: Geodetic
     links: list[Link]
     ready_us: int
-    """Vehicle time at which the boot ends (`mock.prearm_delay_s`), us; before it, arming is refused
-    in modes that need a position, on PX4 in all modes."""
+    """Vehicle time at which the boot ends (`mock.prearm_delay_s`), us. Until then ArduPilot refuses
+    arming in modes that need a position, and PX4 refuses it in all modes."""
     slips: StampSlips
     """Lag of the time stamp of LOCAL_POSITION_NED behind the true time."""
 

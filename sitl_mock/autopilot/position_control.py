@@ -31,7 +31,7 @@ class PositionDemand(NamedTuple):
 
 
 def setpoint_demand(
-    setpoint: PositionSetpoint, q: Quaternion, yaw: float, speeds: Vector, dt: float
+    setpoint: PositionSetpoint, q: Quaternion, yaw: float, speed_limits: Vector, dt: float
 ) -> PositionDemand:
     """Return the demand of an offboard setpoint for the next ``dt`` s.
 
@@ -39,7 +39,7 @@ def setpoint_demand(
         setpoint: the setpoint. If it has no yaw, its yaw rate changes ``yaw``.
         q: present attitude, for a setpoint relative to the heading (``in_body_heading``).
         yaw: yaw of the previous demand, rad.
-        speeds: limits of the speed: horizontal, up, down, m/s.
+        speed_limits: limits of the speed: horizontal, up, down, m/s.
         dt: the period, s.
     """
     if not isnan(setpoint.yaw):
@@ -49,7 +49,7 @@ def setpoint_demand(
     velocity, acceleration = setpoint.velocity, setpoint.acceleration
     if setpoint.in_body_heading:
         velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
-    return PositionDemand(setpoint.position, velocity, acceleration, yaw, *speeds)
+    return PositionDemand(setpoint.position, velocity, acceleration, yaw, *speed_limits)
 
 
 class PositionOutput(NamedTuple):
@@ -62,7 +62,7 @@ class PositionOutput(NamedTuple):
 
 
 class PositionGains(NamedTuple):
-    """Gains (1/s, integrals 1/s^2), tilt limit (rad) and normalised thrusts (0..1)."""
+    """Gains (1/s; integral gains 1/s^2), tilt limit (rad) and normalised thrusts (0..1)."""
 
     horizontal_position: float  # velocity per position error, 1/s
     vertical_position: float
@@ -114,32 +114,33 @@ class PositionController:
     ) -> Vector:
         xy = (gains.horizontal_velocity, gains.horizontal_integral)
         z = (gains.vertical_velocity, gains.vertical_integral)
-        result = []
+        acceleration = []
         for axis, (proportional, integral) in enumerate((xy, xy, z)):
             feed_forward = demand.acceleration[axis]
-            total = 0.0 if isnan(feed_forward) else feed_forward
-            error = velocity_setpoint[axis] - velocity[axis]
-            if not isnan(error):
-                integrated = self._integral[axis] + integral * error * dt
-                self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, integrated))
-                total += proportional * error + self._integral[axis]
-            result.append(total)
-        north, east, down = result
+            component = 0.0 if isnan(feed_forward) else feed_forward
+            velocity_error = velocity_setpoint[axis] - velocity[axis]
+            if not isnan(velocity_error):
+                new_integral = self._integral[axis] + integral * velocity_error * dt
+                self._integral[axis] = max(-GRAVITY / 2, min(GRAVITY / 2, new_integral))
+                component += proportional * velocity_error + self._integral[axis]
+            acceleration.append(component)
+        north, east, down = acceleration
         return (north, east, down)
 
 
 def _velocity_setpoint(gains: PositionGains, demand: PositionDemand, position: Vector) -> Vector:
     """Return the velocity setpoint, m/s NED; NaN = none."""
-    factors = (gains.horizontal_position, gains.horizontal_position, gains.vertical_position)
+    position_gains = (gains.horizontal_position, gains.horizontal_position, gains.vertical_position)
     velocity_setpoint = []
     for axis in range(3):
-        error = demand.position[axis] - position[axis]
+        position_error = demand.position[axis] - position[axis]
         feed_forward = demand.velocity[axis]
-        if isnan(error):
+        if isnan(position_error):
             velocity_setpoint.append(feed_forward)
         else:
             velocity_setpoint.append(
-                factors[axis] * error + (0.0 if isnan(feed_forward) else feed_forward)
+                position_gains[axis] * position_error
+                + (0.0 if isnan(feed_forward) else feed_forward)
             )
     north, east, down = velocity_setpoint
     speed = hypot(north, east)
@@ -176,25 +177,25 @@ def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:
     # Tilt about a level axis, then turn about the body's down axis to reach the Euler yaw.
     w = sqrt(max(0.5 * (1.0 + zz), 1e-9))
     tilt = (w, -zy / (2.0 * w), zx / (2.0 * w), 0.0)
-    # The body x axis after both must point along the yaw: solve for `turn` in the horizontal plane.
+    # After both rotations the body x axis must point along the yaw. This gives `yaw_rotation`.
     # `body_x` and `body_y` are the north and east components of the tilted body axes.
     body_x = (1.0 - 2.0 * tilt[2] * tilt[2], 2.0 * tilt[1] * tilt[2])
     body_y = (2.0 * tilt[1] * tilt[2], 1.0 - 2.0 * tilt[1] * tilt[1])
     cos_yaw, sin_yaw = cos(yaw), sin(yaw)
     across_x = body_x[0] * sin_yaw - body_x[1] * cos_yaw
     across_y = body_y[0] * sin_yaw - body_y[1] * cos_yaw
-    turn = atan2(-across_x, across_y)
-    if (body_x[0] * cos(turn) + body_y[0] * sin(turn)) * cos_yaw + (
-        body_x[1] * cos(turn) + body_y[1] * sin(turn)
+    yaw_rotation = atan2(-across_x, across_y)
+    if (body_x[0] * cos(yaw_rotation) + body_y[0] * sin(yaw_rotation)) * cos_yaw + (
+        body_x[1] * cos(yaw_rotation) + body_y[1] * sin(yaw_rotation)
     ) * sin_yaw < 0:
-        turn += copysign(pi, -turn)
-    cos_half_turn, sin_half_turn = cos(0.5 * turn), sin(0.5 * turn)
+        yaw_rotation += copysign(pi, -yaw_rotation)
+    cos_half, sin_half = cos(0.5 * yaw_rotation), sin(0.5 * yaw_rotation)
     tw, tx, ty, _ = tilt
     return normalise(
         (
-            tw * cos_half_turn,
-            tx * cos_half_turn + ty * sin_half_turn,
-            ty * cos_half_turn - tx * sin_half_turn,
-            tw * sin_half_turn,
+            tw * cos_half,
+            tx * cos_half + ty * sin_half,
+            ty * cos_half - tx * sin_half,
+            tw * sin_half,
         )
     )

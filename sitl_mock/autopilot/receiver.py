@@ -47,8 +47,8 @@ class Receiver:
         self._personality = personality
         self._system_id = system_id
         self._handlers: dict[str, Callable[[Message, Link], None]] = {
-            "SET_ATTITUDE_TARGET": lambda message, _: commander.take_setpoint(message),
-            "SET_POSITION_TARGET_LOCAL_NED": lambda message, _: commander.take_setpoint(message),
+            "SET_ATTITUDE_TARGET": lambda message, _: commander.receive_setpoint(message),
+            "SET_POSITION_TARGET_LOCAL_NED": lambda message, _: commander.receive_setpoint(message),
             "HEARTBEAT": self._heartbeat,
             "COMMAND_LONG": self._command_long,
             "COMMAND_INT": self._command_int,
@@ -118,7 +118,7 @@ class Receiver:
         self._acknowledge(dialect.MAV_CMD_DO_SET_MODE, result, message, link)
 
     def _run(self, command: Command, message: Message, link: Link) -> None:
-        self._acknowledge(command.number, self._commands.run(command, link), message, link)
+        self._acknowledge(command.command_id, self._commands.run(command, link), message, link)
 
     def _acknowledge(self, command: int, result: int, message: Message, link: Link) -> None:
         link.send(

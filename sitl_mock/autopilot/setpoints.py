@@ -30,9 +30,9 @@ ms)."""
 class AttitudeSetpoint(NamedTuple):
     """Attitude and/or rates with thrust, from SET_ATTITUDE_TARGET.
 
-    ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = none given, NaN = hold the
-    rate; ``yaw_rate`` (rad/s) is the feed-forward of attitude control; ``thrust`` 0..1, NaN = none
-    (with ArduPilot it may mean a climb rate, 0.5 = zero).
+    ``q`` None = no attitude control; ``rates`` (rad/s, body FRD) None = no body rates, NaN = hold
+    the present rate; ``yaw_rate`` (rad/s) is the feed-forward of attitude control; ``thrust`` 0..1,
+    NaN = none (with ArduPilot it may mean a climb rate, 0.5 = zero).
     """
 
     q: Quaternion | None

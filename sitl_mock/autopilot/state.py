@@ -5,7 +5,7 @@ from enum import Enum, IntEnum, auto
 from math import nan
 
 from sitl_mock.physics.quaternion import Quaternion, Vector
-from sitl_mock.physics.vehicle import STILL, ActuatorCommand, Estimate
+from sitl_mock.physics.vehicle import DISARMED_COMMAND, ActuatorCommand, Estimate
 
 NAN_VECTOR = (nan, nan, nan)
 
@@ -73,7 +73,7 @@ class State:
     estimate: Estimate
     time_us: int = 0
     stamp_us: int = 0
-    """Time in telemetry; it differs from ``time_us`` only while a fault freezes the clock."""
+    """Time stamp of telemetry, us; not equal to ``time_us`` while a fault freezes the clock."""
     armed: bool = False
     armed_at_us: int = 0
     mode: Mode = Mode.LOITER
@@ -99,7 +99,7 @@ class State:
     home_ned: Vector = (0.0, 0.0, 0.0)
     home_q: Quaternion = (1.0, 0.0, 0.0, 0.0)
     home_set_at_us: int = 0
-    command: ActuatorCommand = STILL
+    command: ActuatorCommand = DISARMED_COMMAND
     attitude_target: AttitudeTargetEcho = field(default_factory=AttitudeTargetEcho)
     position_target: PositionTargetEcho = field(default_factory=PositionTargetEcho)
     height_controlled: bool = False

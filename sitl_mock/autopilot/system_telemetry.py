@@ -27,7 +27,7 @@ class SystemTelemetry:
         state: the autopilot's state.
         origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
-        vehicle: the vehicle, for its battery.
+        vehicle: the simulated vehicle, whose battery is reported.
     """
 
     def __init__(

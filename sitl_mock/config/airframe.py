@@ -7,7 +7,14 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, preset
+from sitl_mock.config.section import (
+    Finite,
+    Fraction,
+    NonNegative,
+    Positive,
+    Section,
+    resolve_preset,
+)
 
 AIRFRAMES: dict[str, dict[str, object]] = {
     "sih": {},
@@ -40,7 +47,7 @@ class AirframeConfig(Section):
     quadratic_drag_n_s2_per_m2: NonNegative = 0.0
     """Quadratic drag: force in N per (m/s)^2 of airspeed."""
     axis_drag_n_s2_per_m2: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
-    """Quadratic drag along body x, y, z, as of a bluff body: N per (m/s)^2 of that component."""
+    """Quadratic drag along body x, y, z: force in N per (m/s)^2 of the airspeed along that axis."""
     momentum_drag_n_s_per_m: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     """Momentum drag of the rotors along body x, y, z, at hover thrust: force in N per m/s of
     airspeed. It grows with the square root of the thrust.
@@ -52,7 +59,8 @@ class AirframeConfig(Section):
     thrust_offset_m_s2: NonNegative = 0.22
     """Specific thrust at throttle 0 if the linear part of the thrust curve is extrapolated."""
     thrust_linear_from: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.15
-    """Throttle from which the thrust curve is its linear part; below, a straight line from 0."""
+    """Throttle above which ``thrust_slope_m_s2`` and ``thrust_offset_m_s2`` give the thrust curve.
+    Below, the curve is a straight line from zero thrust at throttle 0."""
     rotor_lag_ms: Positive = 50.0
     """Time constant of each rotor's thrust (first order)."""
     rotor_arm_m: Positive = 0.2
@@ -69,7 +77,7 @@ class AirframeConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _resolve_preset(cls, value: object) -> object:
-        return preset(AIRFRAMES, value, "airframes")
+        return resolve_preset(AIRFRAMES, value, "airframes")
 
 
 class WindConfig(Section):
@@ -104,4 +112,5 @@ class BatteryConfig(Section):
     hover_current_a: NonNegative = 10.0
     """Current of the rotors in a hover; it grows with thrust to the power 1.5."""
     thrust_exponent: NonNegative = 2.0
-    """Exponent with which thrust grows with (voltage / voltage of the full battery in a hover)."""
+    """The thrust is proportional to (V / V0) to this power, with the battery's voltage V. V0 is the
+    voltage of the full battery in a hover."""

@@ -62,7 +62,7 @@ def _is_host(text: str) -> bool:
     return text.isprintable() and len(text) <= 253
 
 
-def for_vehicle(text: str, index: int) -> str:
+def endpoint_for_vehicle(text: str, index: int) -> str:
     """Return the endpoint of the vehicle with this index, which counts from 0.
 
     The index is added to a TCP port. From index 1 on, a serial path gets the suffix ``-2``, ``-3``

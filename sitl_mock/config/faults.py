@@ -25,10 +25,10 @@ class TimedFault(Section):
     """Start and duration of a fault, in vehicle time; without a start the fault begins at once."""
 
     at_s: NonNegative | None = None
-    """Vehicle time at which the fault begins; if this time is over, the fault begins at once."""
+    """Vehicle time at which the fault begins; if this time has passed, the fault begins at once."""
     after_offboard_s: NonNegative | None = None
-    """Time from the moment when setpoints first control the vehicle to the fault. The moment is on
-    PX4 the first time armed in OFFBOARD, on ArduPilot the first time in the air in GUIDED under
+    """Delay of the fault after setpoints first control the vehicle. On PX4 this is when the vehicle
+    is first armed in OFFBOARD; on ArduPilot, when it is first in the air in GUIDED under
     SET_ATTITUDE_TARGET."""
     duration_s: Positive | None = None
     """Duration of the fault; without it, the fault does not end."""
@@ -104,7 +104,8 @@ class PilotTakeover(TimedFault):
 
     kind: Literal["pilot_takeover"]
     mode: Literal["POSCTL", "ALTCTL", "STABILIZED", "MANUAL"] = "POSCTL"
-    """Mode of the pilot, by PX4's name; ArduCopter enters LOITER, ALT_HOLD or (twice) STABILIZE."""
+    """Mode of the pilot, by PX4's name. ArduCopter enters LOITER for POSCTL, ALT_HOLD for ALTCTL,
+    and STABILIZE for the other two."""
 
 
 class EstimatorReset(TimedFault):

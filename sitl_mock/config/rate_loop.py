@@ -5,7 +5,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section, resolve_preset
 
 
 class AxisShaping(Section):
@@ -112,7 +112,7 @@ class RateLoopConfig(Section):
     @model_validator(mode="before")
     @classmethod
     def _resolve_preset(cls, value: object) -> object:
-        return preset(RATE_LOOPS, value, "rate loops")
+        return resolve_preset(RATE_LOOPS, value, "rate loops")
 
     @model_validator(mode="after")
     def _shape_all_axes_or_none(self) -> Self:

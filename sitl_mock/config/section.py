@@ -40,12 +40,12 @@ _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?)\s*(\D*)")
 
 
 class Section(BaseModel):
-    """Base of every configuration section: unknown keys are errors, values are constant."""
+    """Base of every configuration section: unknown keys are errors, values cannot be changed."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def preset(presets: Mapping[str, object], value: object, plural: str) -> object:
+def resolve_preset(presets: Mapping[str, object], value: object, plural: str) -> object:
     """Return the preset that a text names; return any other value unchanged.
 
     Args:
@@ -126,7 +126,9 @@ def describe_wrong_value(error: ValidationError) -> str:
 
 
 def describe_wrong_member(detail: Any, annotation: Any) -> str:
-    """Return why a value such as a fault is wrong: it is no mapping, or its ``kind`` is unknown.
+    """Return what is wrong with a value that has a ``kind``, such as a fault.
+
+    The value may be no mapping, or its ``kind`` may be missing or unknown.
 
     Args:
         detail: error reported by pydantic.
@@ -141,14 +143,14 @@ def describe_wrong_member(detail: Any, annotation: Any) -> str:
         return ""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         annotation = annotation.model_fields[detail["loc"][0]].annotation
-    kinds = [kind for each in _models_of(annotation) for kind in _kinds(each)]
+    kinds = [kind for model in _models_of(annotation) for kind in _kinds(model)]
     known_kinds = f"kinds are {', '.join(kinds)}"
     if detail["type"] == "union_tag_not_found":
         return f" needs a kind; {known_kinds}"
-    tag = detail["ctx"]["tag"]
-    nearest = _nearest(tag, kinds)
+    unknown_kind = detail["ctx"]["tag"]
+    nearest = _nearest(unknown_kind, kinds)
     hint = f"did you mean {nearest}?; " if nearest else ""
-    return f": there is no kind {tag!r:.40}; {hint}{known_kinds}"
+    return f": there is no kind {unknown_kind!r:.40}; {hint}{known_kinds}"
 
 
 def error_path(error: ValidationError) -> list[str]:

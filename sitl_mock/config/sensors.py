@@ -4,30 +4,31 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from sitl_mock.config.section import Finite, NonNegative, Positive, Section, preset
+from sitl_mock.config.section import Finite, NonNegative, Positive, Section, resolve_preset
 
 InnovationGains = tuple[NonNegative, NonNegative]
-"""Gains of one state of the filter: per position innovation, per velocity innovation."""
+"""Gains of one state of the filter: for the position innovation, for the velocity innovation."""
 
 
 class EkfConfig(Section):
     """Errors of the navigation filter, and the gains with which satellite fixes correct them.
 
-    The filter integrates an acceleration that is wrong because its attitude is wrong. Delayed
+    Errors of the filter's attitude become errors of the acceleration that it integrates. Delayed
     fixes correct the errors. Noise is given as standard deviation; the defaults are PX4's.
     """
 
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Age of the motion that the filter fuses with a fix; at least ``position_delay_ms``."""
+    """Delay with which the filter fuses a fix: it corrects its estimate for this time ago. A value
+    below ``position_delay_ms`` has the effect of ``position_delay_ms``."""
     position_late_ms: Finite = 0.0
     """Mean delay of a fix's position beyond ``fix_delay_ms``; the filter does not correct it."""
     velocity_late_ms: Finite = 0.0
     """Mean delay of a fix's velocity beyond ``fix_delay_ms``; the filter does not correct it."""
     fix_slip_ms: NonNegative = 0.0
-    """Peak-to-peak amplitude of a sawtooth in ``position_late_ms`` and ``velocity_late_ms``. Each
-    falls steadily, then jumps back. The time of the first jump is random."""
+    """Peak-to-peak amplitude of a sawtooth in ``position_late_ms`` and ``velocity_late_ms``. Both
+    delays fall steadily, then jump back. The time of the first jump is random."""
     fix_slip_time_s: Positive = 14.0
     """Period of the sawtooth of ``fix_slip_ms``."""
     position_noise_m: NonNegative = 0.0246
@@ -46,8 +47,8 @@ class EkfConfig(Section):
     yaw_time_s: Positive = 15.0
     """Correlation time of the heading error."""
     turn_yaw_ms: Finite = -4.0
-    """Heading error in a turn per turn rate of the course, sign reversed; delayed fixes cause it.
-    The error builds up over seconds, faster at a larger acceleration."""
+    """Delayed fixes cause a heading error in a turn: minus this time multiplied by the turn rate of
+    the course. The error builds up over seconds, faster at a larger acceleration."""
     compass_error_deg: Finite = 0.0
     """Heading error that the compass causes without acceleration; an acceleration reduces it."""
     yaw_rate_bias_deg_s: Finite = 0.0
@@ -67,8 +68,8 @@ class EkfConfig(Section):
     """Error of the vertical velocity (estimated minus true, down) per horizontal acceleration. The
     error follows the acceleration over seconds; the position has no such error."""
     height_noise_m: NonNegative = 0.036
-    """Standard deviation of the slow noise that the estimated height follows within 2 s, as of a
-    barometer."""
+    """Standard deviation of a slow noise, like that of a barometer. The error of the estimated
+    height follows the noise with a time constant of 2 s."""
     height_noise_time_s: Positive = 6.0
     """Correlation time of the slow noise of the height."""
     position_gains: InnovationGains = (0.0774, 0.0494)
@@ -78,9 +79,9 @@ class EkfConfig(Section):
     acceleration_gains: InnovationGains = (0.0056, 0.0102)
     """Gains of the acceleration error for an innovation of position and velocity, 1/s^2 and 1/s."""
     predictor_ms: Positive = 250.0
-    """Time constant with which the output predictor applies a correction of position or speed."""
+    """Time constant with which the output predictor corrects the position and the velocity."""
     heading_predictor_ms: Positive = 250.0
-    """Time constant with which the output predictor applies a correction of the heading."""
+    """Time constant with which the output predictor corrects the heading."""
 
 
 EKFS: dict[str, EkfConfig | None] = {
@@ -132,7 +133,7 @@ class SensorConfig(Section):
 
     ekf: EkfConfig | None = None
     """Navigation filter whose errors are added: px4, ardupilot, none, or the keys of `EkfConfig`.
-    The default of a vehicle (`MockSettings`) is that of its autopilot."""
+    `MockSettings` sets the filter of the vehicle's autopilot as the default."""
     attitude_noise_deg: NonNegative = 0.02
     rate_noise_rad_s: NonNegative = 0.002
     position_noise_m: NonNegative = 0.01
@@ -153,4 +154,4 @@ class SensorConfig(Section):
     @field_validator("ekf", mode="before")
     @classmethod
     def _resolve_preset(cls, value: object) -> object:
-        return preset(EKFS, value, "navigation filters")
+        return resolve_preset(EKFS, value, "navigation filters")

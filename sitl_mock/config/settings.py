@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator
 
 from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
-from sitl_mock.config.endpoint import for_vehicle, parse_endpoint
+from sitl_mock.config.endpoint import endpoint_for_vehicle, parse_endpoint
 from sitl_mock.config.faults import Fault
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.config.section import Finite, NonNegative, Positive, Section
@@ -65,8 +65,8 @@ class VehicleSettings(Section):
     ``burst_ms`` and ``prearm_delay_s``."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
     endpoint: str = "udp"
-    """The companion link: udp (see ``port``); tcpin://HOST:PORT, for one client, boots when the
-    client connects; serial:///PATH, a pseudo-terminal with a symbolic link at PATH."""
+    """The companion link. udp: see ``port``. tcpin://HOST:PORT: for one client; the vehicle boots
+    when the client connects. serial:///PATH: a pseudo-terminal with a symbolic link at PATH."""
     gcs_port: Annotated[int, Field(ge=0, le=65535 - GCS_PORT_OFFSET)] = 14550
     """UDP port of the ground station; 0 = no ground station link."""
     control_port: Port = 0
@@ -76,13 +76,12 @@ class VehicleSettings(Section):
     """Vehicle seconds per wall second; lockstep ignores it."""
     inner_loop_hz: Literal[100, 250, 800] = 250
     """Inner loop rate. It limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE
-    instead. 100 (PX4's IMU_INTEG_RATE allows it) was not recorded; it is the quickest to
-    simulate.
-    """
+    instead. The rate 100, which PX4's IMU_INTEG_RATE allows, was not recorded; it takes the least
+    time to simulate."""
     exact_rates: bool | None = None
-    """Whether a stream at the full rate is sent in every slot. false: PX4's 250 Hz loop skips some
-    slots, as measured; PX4's other inner loop rates and ArduPilot never skip. Null: true in
-    lockstep, else false."""
+    """Whether a stream at the full rate is sent in every slot, that is, in every cycle in which the
+    autopilot can send. false: PX4's 250 Hz loop skips some slots, as measured; PX4's other inner
+    loop rates and ArduPilot never skip. Null: true in lockstep, else false."""
     burst_ms: NonNegative = 0.0
     """In real time the vehicle runs in bursts with this period of vehicle time, as ArduPilot's
     simulator does; 0 = no bursts. The default for ArduPilot is 5.6."""
@@ -118,7 +117,7 @@ class VehicleSettings(Section):
         return self.model_copy(
             update={
                 "port": self.port + index,
-                "endpoint": for_vehicle(self.endpoint, index),
+                "endpoint": endpoint_for_vehicle(self.endpoint, index),
                 "gcs_port": self.gcs_port + index if self.gcs_port else 0,
                 "control_port": self.control_port + index if self.control_port else 0,
                 "seed": self.seed + index,

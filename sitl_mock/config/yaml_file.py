@@ -85,14 +85,14 @@ class Document(NamedTuple):
         node, line = self.node, None
         for part in path:
             if isinstance(node, yaml.MappingNode):
-                found = {key.value: (key, value) for key, value in node.value}.get(part)
+                key_and_value = {key.value: (key, value) for key, value in node.value}.get(part)
             elif isinstance(node, yaml.SequenceNode) and part.isdigit():
                 item = node.value[int(part)] if int(part) < len(node.value) else None
-                found = None if item is None else (item, item)
+                key_and_value = None if item is None else (item, item)
             else:
                 break
-            if found is not None:  # a part may name the member of a union instead
-                line, node = found[0].start_mark.line + 1, found[1]
+            if key_and_value is not None:  # a part may name the member of a union instead
+                line, node = key_and_value[0].start_mark.line + 1, key_and_value[1]
         return line
 
 

@@ -3,7 +3,7 @@
 import os
 from collections import deque
 
-from sitl_mock.link.framing import split
+from sitl_mock.link.framing import split_frames
 
 _READ_BYTES = 65536
 
@@ -57,7 +57,7 @@ class ByteStream:
         if not data:
             self.open = False
             return
-        frames, self._partial_frame = split(self._partial_frame + data)
+        frames, self._partial_frame = split_frames(self._partial_frame + data)
         self._frames.extend(frames)
 
     def _write(self, data: bytes) -> int:

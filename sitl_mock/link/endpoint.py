@@ -31,7 +31,7 @@ class Endpoint(Protocol):
     def receive(self) -> tuple[bytes, bool] | None:
         """Return the next datagram (of a byte stream: the next frame), None if there is none.
 
-        The flag: whether the bytes came from the client to which the endpoint sends.
+        The flag tells whether the bytes came from the client to which the endpoint sends.
         """
 
     def send(self, datagrams: list[bytes]) -> None:

@@ -13,11 +13,11 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.link.event_messages import event_request
 from sitl_mock.link.payload import Message, pack, unpack
 
-__all__ = ["SIGNATURE_BYTES", "SIGNED", "Framer", "Message", "decode", "split"]
+__all__ = ["SIGNATURE_BYTES", "SIGNED_FLAG", "Framer", "Message", "decode", "split_frames"]
 
 _MAGIC_V1 = 0xFE
 _MAGIC_V2 = 0xFD
-SIGNED = 0x01
+SIGNED_FLAG = 0x01
 """Incompatibility flag of a signed frame."""
 SIGNATURE_BYTES = 13
 _OVERHEAD_V1 = 8
@@ -82,7 +82,7 @@ def _decode_other(frame: bytes) -> tuple[bool, Message | None]:
     return True, event_request(message) if isinstance(message, dialect.MAVLink_unknown) else message
 
 
-def split(data: bytes) -> tuple[list[bytes], bytes]:
+def split_frames(data: bytes) -> tuple[list[bytes], bytes]:
     """Return the complete frames in a byte stream, and the remaining bytes.
 
     Bytes that cannot begin a frame are skipped. `decode` checks whether a frame is valid.
@@ -109,9 +109,9 @@ def _announced_length(data: bytes, start: int) -> int:
         if available < _FLAGS_OFFSET + 1:
             return _UNKNOWN_LENGTH
         flags = data[start + _FLAGS_OFFSET]
-        if flags & ~SIGNED:
+        if flags & ~SIGNED_FLAG:
             return 0
-        return _OVERHEAD_V2 + data[start + 1] + (SIGNATURE_BYTES if flags & SIGNED else 0)
+        return _OVERHEAD_V2 + data[start + 1] + (SIGNATURE_BYTES if flags & SIGNED_FLAG else 0)
     if data[start] == _MAGIC_V1:
         return _UNKNOWN_LENGTH if available < _FLAGS_OFFSET else _OVERHEAD_V1 + data[start + 1]
     return 0
@@ -129,7 +129,7 @@ class Framer:
     def __init__(self, system_id: int, component_id: int, *, signed: bool = False) -> None:
         self._system_id = system_id
         self._component_id = component_id
-        self._flags = SIGNED if signed else 0
+        self._flags = SIGNED_FLAG if signed else 0
         self._sequence = 0
 
     def frame(self, message: Message) -> bytes:

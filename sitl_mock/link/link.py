@@ -79,7 +79,7 @@ class Link:
         """Queue a message that the dialect lacks, given as its payload."""
         self.outbox.append(self._framer.frame_raw(message_id, crc_extra, payload))
 
-    def take(self) -> list[bytes]:
+    def take_frames(self) -> list[bytes]:
         """Return the queued frames in order, signed, and clear the queue."""
         frames, self.outbox = self.outbox, []
         return [self.sign(frame) for frame in frames]

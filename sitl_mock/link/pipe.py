@@ -19,7 +19,7 @@ class DatagramPipe:
         self._direction = direction
         self._random = random.Random(seed)
         self._delayed_datagrams: list[tuple[float, int, bytes]] = []
-        self._order = count()
+        self._delayed_count = count()
         self._held_back_datagram: bytes | None = None
 
     def is_clear(self, faults: tuple[LinkFault, ...]) -> bool:
@@ -30,17 +30,17 @@ class DatagramPipe:
         self, datagrams: list[bytes], faults: tuple[LinkFault, ...], now_us: int
     ) -> list[bytes]:
         """Accept datagrams; return those to deliver now, delayed ones first."""
-        active = [fault for fault in faults if fault.direction in (self._direction, "both")]
+        active_faults = [fault for fault in faults if fault.direction in (self._direction, "both")]
         to_deliver = []
         while self._delayed_datagrams and self._delayed_datagrams[0][0] <= now_us:
             to_deliver.append(heapq.heappop(self._delayed_datagrams)[2])
         for datagram in datagrams:
             survivors = [datagram]
-            for fault in active:
+            for fault in active_faults:
                 survivors = [
-                    passed
+                    passed_datagram
                     for survivor in survivors
-                    for passed in self._apply(survivor, fault, now_us)
+                    for passed_datagram in self._apply(survivor, fault, now_us)
                 ]
             if survivors and self._held_back_datagram is not None:
                 survivors.append(self._held_back_datagram)
@@ -58,8 +58,10 @@ class DatagramPipe:
             case "corrupt":
                 return [self._corrupted(datagram)]
             case "delay":
-                due = now_us + fault.delay_ms * 1e3
-                heapq.heappush(self._delayed_datagrams, (due, next(self._order), datagram))
+                due_us = now_us + fault.delay_ms * 1e3
+                heapq.heappush(
+                    self._delayed_datagrams, (due_us, next(self._delayed_count), datagram)
+                )
             case "reorder" if self._held_back_datagram is None:
                 self._held_back_datagram = datagram
             case "reorder":

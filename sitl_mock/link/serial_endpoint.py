@@ -45,7 +45,7 @@ class SerialEndpoint:
 
     @property
     def descriptors(self) -> list[int]:
-        """File descriptor for select; none while the other end is closed: select would not wait."""
+        """File descriptor for select; none while the other end is closed, so that select waits."""
         return [self._master] if self._other_end_open() else []
 
     def receive(self) -> tuple[bytes, bool] | None:

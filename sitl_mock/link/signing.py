@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.section import ConfigError
 from sitl_mock.config.settings import SigningConfig
-from sitl_mock.link.framing import SIGNED, Message
+from sitl_mock.link.framing import SIGNED_FLAG, Message
 
 _EPOCH_UNIX_S = 1420070400
 """Unix time at which signature timestamps (units of 10 us) begin, s: 2015-01-01 UTC."""
@@ -69,7 +69,7 @@ class Signing:
             ones of their stream (system, component, link id).
         unsigned: number of frames without a signature, whether accepted or not.
         refused: number of frames signed with another key, replayed, or (on a stream not heard
-            before) a minute older than the newest time stamp.
+            before) more than a minute older than the newest time stamp.
 
     Args:
         key: 32 bytes.
@@ -104,7 +104,7 @@ class Signing:
     def accepts(self, message: Message) -> bool:
         """Whether a received message is accepted; also count it in the attributes."""
         frame = bytearray(message.get_msgbuf())
-        if frame[0] != _MAGIC_V2 or not frame[_FLAGS_OFFSET] & SIGNED:
+        if frame[0] != _MAGIC_V2 or not frame[_FLAGS_OFFSET] & SIGNED_FLAG:
             self.unsigned += 1
             return self._accept_unsigned
         self._update_timestamp()

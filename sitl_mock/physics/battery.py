@@ -15,7 +15,10 @@ class BatteryState(NamedTuple):
 
 
 class Battery:
-    """Integrates the current. The voltage is the open-circuit voltage (linear in charge) minus R I.
+    """Integrates the current.
+
+    The voltage is the open-circuit voltage, which is linear in the charge, minus the voltage drop
+    over the internal resistance.
 
     Attributes:
         state: measurements after the latest step.

@@ -1,6 +1,7 @@
 """One step of a multirotor in the air: rate loop, allocation, rotors and rigid body.
 
-A step is `drive`, then `move` or `at_rest`. Pure, except for the rings of delayed setpoints.
+A step calls `drive`, then `move` in the air or `at_rest` on the ground. The functions are pure,
+except that they change the ring buffers of delayed setpoints.
 """
 
 from typing import NamedTuple
@@ -10,18 +11,24 @@ from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.quaternion import Quaternion, Vector, rotated_slightly
 from sitl_mock.physics.rate_loop import (
     ZERO_STATE,
-    Axes,
+    AxisStates,
     RateLaw,
     Ring,
-    delayed,
+    delay_setpoint,
     rate_law,
     rate_step,
 )
-from sitl_mock.physics.rate_shaping import NOT_SHAPED, ShapingLaw, ShapingState, shape, shaping_law
+from sitl_mock.physics.rate_shaping import (
+    INACTIVE_SHAPING,
+    ShapingLaw,
+    ShapingState,
+    shape,
+    shaping_law,
+)
 from sitl_mock.physics.rigid_body import Body, Load, Motion, advance, body_of, derivative
 from sitl_mock.physics.rotors import (
-    STOPPED,
-    Four,
+    STOPPED_MIX,
+    FourFloats,
     Mix,
     RotorLaw,
     mix,
@@ -51,7 +58,7 @@ class MultirotorLaw(NamedTuple):
 Kinematics = tuple[Motion, Vector, Vector]
 """Motion after a step, and the means over the step: acceleration (NED, m/s^2), and angular
 acceleration (FRD, rad/s^2)."""
-Actuation = tuple[Mix, Four, Axes, ShapingState]
+Actuation = tuple[Mix, FourFloats, AxisStates, ShapingState]
 """State of controller and rotors after a step: throttles, thrust of each rotor (N), rate loop,
 shaping."""
 
@@ -102,7 +109,7 @@ def initial_actuation(law: MultirotorLaw, throttle: float) -> Actuation:
     """Return the state of controller and rotors at the start, with rotors at a steady speed."""
     thrust = steady_thrust(law.rotors, throttle)
     mixed = mix(throttle, 0.0, 0.0, 0.0)
-    return mixed, (thrust, thrust, thrust, thrust), ZERO_STATE, NOT_SHAPED
+    return mixed, (thrust, thrust, thrust, thrust), ZERO_STATE, INACTIVE_SHAPING
 
 
 def empty_rings(law: MultirotorLaw) -> Rings:
@@ -131,7 +138,7 @@ def drive(
 
     Args:
         law: constants.
-        rings: the latest setpoints; they are changed.
+        rings: ring buffers of the latest setpoints; changed in place.
         actuation: state of controller and rotors before the step.
         body: motion before the step.
         step: number of the step, one more with each call.
@@ -139,7 +146,7 @@ def drive(
             are shaped, NaN holds the shaped rate, and infinity lets it grow without limit.
         throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
         controlled: whether the rate loop runs; otherwise it idles.
-        conditions: battery, wind, and the error of the attitude, which only the shaping uses.
+        conditions: battery, wind and attitude error; only the shaping uses the attitude error.
     """
     mixed, thrusts, axes, shaping = actuation
     motion, _, angular_acceleration = body
@@ -149,7 +156,7 @@ def drive(
         setpoint, shaping = _shape_setpoint(
             law, rings, shaping, estimated_q, step, setpoint, controlled
         )
-    setpoint = delayed(rings.before_rate_loop, law.rates.delays, step, setpoint)
+    setpoint = delay_setpoint(rings.before_rate_loop, law.rates.delays, step, setpoint)
     if controlled:
         _, tilt_saturated, yaw_saturated = mixed
         axes = rate_step(
@@ -181,23 +188,23 @@ def _shape_setpoint(
 
     If the rate loop does not run, the setpoint is returned unchanged.
     """
-    delayed_setpoint = delayed(rings.before_shaping, law.shaping.delays, step, setpoint)
+    delayed_setpoint = delay_setpoint(rings.before_shaping, law.shaping.delays, step, setpoint)
     if controlled:
         return shape(law.shaping, state, delayed_setpoint, q)
-    return setpoint, NOT_SHAPED
+    return setpoint, INACTIVE_SHAPING
 
 
-def _allocate(law: MultirotorLaw, axes: Axes, throttle: float) -> Mix:
+def _allocate(law: MultirotorLaw, axes: AxisStates, throttle: float) -> Mix:
     """Allocate torques and throttle to the rotors."""
     # A NaN throttle fails this comparison, which stops the rotors.
     if throttle > 0.0:
         roll, pitch, yaw = axes
         tilt_torque = law.tilt_torque
         return mix(throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / law.yaw_torque)
-    return STOPPED
+    return STOPPED_MIX
 
 
-def _load(law: MultirotorLaw, wrench: Four, wind: Vector) -> Load:
+def _load(law: MultirotorLaw, wrench: FourFloats, wind: Vector) -> Load:
     """Return the load on the body from thrust (N) and torques x, y, z (N m), with the wind."""
     thrust, torque_x, torque_y, torque_z = wrench
     wind_n, wind_e, wind_d = wind
@@ -216,6 +223,6 @@ def move(law: MultirotorLaw, body: Kinematics, load: Load) -> tuple[Kinematics, 
     return (motion, acceleration, angular_acceleration), displacement
 
 
-def sinks(law: MultirotorLaw, body: Kinematics, load: Load) -> bool:
+def does_not_rise(law: MultirotorLaw, body: Kinematics, load: Load) -> bool:
     """Whether the body does not accelerate upward under this load."""
     return derivative(body[0], load, law.body)[2] >= 0.0

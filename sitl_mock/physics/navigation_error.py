@@ -1,4 +1,4 @@
-"""The error of a navigation filter between two fixes: its parts in closed form (pure).
+"""The errors of a navigation filter between two fixes, in closed form and without side effects.
 
 Horizontal vectors are complex numbers, north + j east. The functions can be compiled.
 """
@@ -56,15 +56,15 @@ class FilterState(NamedTuple):
 class ErrorLaw(NamedTuple):
     """Constants of the errors between two fixes."""
 
-    lead: float  # position error per velocity, and velocity error per acceleration, s
-    scale: float  # relative error of the acceleration
-    tilt: complex  # constant rotation about north + j east, rad
+    lead_time: float  # position error per velocity, and velocity error per acceleration, s
+    acceleration_error: float  # relative error of the acceleration
+    tilt_bias: complex  # constant rotation about north + j east, rad
     height_offset: float  # true minus estimated height, m
     predictor_ms: float  # time constant with which the output follows a correction, ms
     heading_predictor_ms: float  # the same for the heading, ms
 
 
-def extrapolated(errors: Errors, elapsed: float) -> Errors:
+def extrapolated_errors(errors: Errors, elapsed: float) -> Errors:
     """Return the errors ``elapsed`` s later, without new disturbances."""
     position, velocity, acceleration = errors
     return (
@@ -82,15 +82,16 @@ def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
     return exp((state.corrected_at - now) * 1e3 / predictor_ms)
 
 
-def propagated_horizontal(
+def propagated_horizontal_errors(
     law: ErrorLaw, state: FilterState, truth: TruthRow, elapsed: float
 ) -> Errors:
     """Return the horizontal errors ``elapsed`` s after the fix.
 
-    The filter integrated an acceleration that was rotated and scaled.
+    The filter integrated an acceleration that was rotated by the heading error, and scaled by the
+    relative error of the acceleration.
     """
-    position, velocity, acceleration = extrapolated(state.horizontal.errors, elapsed)
-    relative_error = complex(law.scale, state.yaw)
+    position, velocity, acceleration = extrapolated_errors(state.horizontal.errors, elapsed)
+    relative_error = complex(law.acceleration_error, state.yaw)
     fused_velocity = state.velocity
     displacement = complex(truth[10], truth[11]) - state.position
     return (
@@ -100,16 +101,16 @@ def propagated_horizontal(
     )
 
 
-def propagated_vertical(
+def propagated_vertical_errors(
     law: ErrorLaw, state: FilterState, truth: TruthRow, elapsed: float
 ) -> Errors:
     """Return the vertical errors (down) ``elapsed`` s after the fix; only the real parts count.
 
-    The filter takes a part of the horizontal acceleration for a vertical one: tilt times
-    acceleration.
+    With the tilt bias, a part of the horizontal acceleration (tilt times acceleration) appears
+    vertical to the filter.
     """
-    down, sink_rate, acceleration = extrapolated(state.vertical.errors, elapsed)
-    tilt_factor, fused_velocity = law.tilt.conjugate(), state.velocity
+    down, sink_rate, acceleration = extrapolated_errors(state.vertical.errors, elapsed)
+    tilt_factor, fused_velocity = law.tilt_bias.conjugate(), state.velocity
     displacement = complex(truth[10], truth[11]) - state.position
     return (
         down + (tilt_factor * (displacement - elapsed * fused_velocity)).imag,
@@ -123,11 +124,11 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> 
     elapsed = now - state.fused_at
     pending_part = pending_share(law.predictor_ms, state, now)
     yaw_pending_part = pending_share(law.heading_predictor_ms, state, now)
-    position, velocity, acceleration = propagated_horizontal(law, state, truth, elapsed)
+    position, velocity, acceleration = propagated_horizontal_errors(law, state, truth, elapsed)
     pending = state.horizontal.pending
-    position += law.lead * complex(truth[0], truth[1]) - pending_part * pending[0]
-    velocity += law.lead * complex(truth[13], truth[14]) - pending_part * pending[1]
-    down, sink_rate, _ = propagated_vertical(law, state, truth, elapsed)
+    position += law.lead_time * complex(truth[0], truth[1]) - pending_part * pending[0]
+    velocity += law.lead_time * complex(truth[13], truth[14]) - pending_part * pending[1]
+    down, sink_rate, _ = propagated_vertical_errors(law, state, truth, elapsed)
     pending = state.vertical.pending
     down += law.height_offset + state.down_error - pending_part * pending[0]
     return ErrorVectors(
@@ -139,8 +140,8 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> 
         ),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (
-            acceleration.imag / GRAVITY + law.tilt.real,
-            -acceleration.real / GRAVITY + law.tilt.imag,
+            acceleration.imag / GRAVITY + law.tilt_bias.real,
+            -acceleration.real / GRAVITY + law.tilt_bias.imag,
             state.yaw - yaw_pending_part * state.pending_yaw,
         ),
     )

@@ -16,8 +16,8 @@ from sitl_mock.physics.navigation_error import (
     FilterState,
     TruthRow,
     pending_share,
-    propagated_horizontal,
-    propagated_vertical,
+    propagated_horizontal_errors,
+    propagated_vertical_errors,
 )
 from sitl_mock.physics.rigid_body import GRAVITY
 
@@ -76,7 +76,7 @@ class NavigationFilter:
         )
 
     def _initial(self, ratio: float) -> ErrorState:
-        """Return the errors after the first fix: the noise of the fix, scaled by `ratio`."""
+        """Return the errors after the first fix: the configured noise of a fix times `ratio`."""
         config, gauss = self._config, self._random.gauss
         sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
         noise = (
@@ -102,18 +102,18 @@ class NavigationFilter:
         elapsed = at - state.fused_at
         velocity = complex(delayed[0], delayed[1])
         acceleration = complex(delayed[13], delayed[14])
-        errors = propagated_horizontal(law, state, delayed, elapsed)
+        errors = propagated_horizontal_errors(law, state, delayed, elapsed)
         noise = self._next_noise(state.horizontal.noise, 1.0)
         slip = config.fix_slip_ms * (0.5 - (at / config.fix_slip_time_s + self._slip_phase) % 1.0)
         fix_errors = (
-            noise[0] - ((config.position_late_ms + slip) * 1e-3 + law.lead) * velocity,
-            noise[1] - ((config.velocity_late_ms + slip) * 1e-3 + law.lead) * acceleration,
+            noise[0] - ((config.position_late_ms + slip) * 1e-3 + law.lead_time) * velocity,
+            noise[1] - ((config.velocity_late_ms + slip) * 1e-3 + law.lead_time) * acceleration,
         )
         tilt_noise = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
         horizontal = self._corrected_state(errors, fix_errors, noise, tilt_noise)
         share = config.vertical_share
         noise = self._next_noise(state.vertical.noise, share)
-        errors = propagated_vertical(law, state, delayed, elapsed)
+        errors = propagated_vertical_errors(law, state, delayed, elapsed)
         vertical = self._corrected_state(errors, noise, noise, share * tilt_noise)
         noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
         yaw = self._next_yaw_noise() + noiseless_yaw
@@ -145,15 +145,15 @@ class NavigationFilter:
         horizontal = _with_pending(
             state.horizontal,
             corrected.horizontal,
-            propagated_horizontal(law, state, present, since_last_fix),
-            propagated_horizontal(law, corrected, present, since_this_fix),
+            propagated_horizontal_errors(law, state, present, since_last_fix),
+            propagated_horizontal_errors(law, corrected, present, since_this_fix),
             pending_part,
         )
         vertical = _with_pending(
             state.vertical,
             corrected.vertical,
-            propagated_vertical(law, state, present, since_last_fix),
-            propagated_vertical(law, corrected, present, since_this_fix),
+            propagated_vertical_errors(law, state, present, since_last_fix),
+            propagated_vertical_errors(law, corrected, present, since_this_fix),
             pending_part,
         )
         return corrected._replace(horizontal=horizontal, vertical=vertical)
@@ -200,7 +200,7 @@ class NavigationFilter:
         return decay * self.state.height_noise + self._height_random.gauss(0.0, sigma)
 
     def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
-        """Return the noise of the next fix; `ratio` scales it."""
+        """Return the noise of the next fix: the configured noise times `ratio`."""
         config, gauss, decay = self._config, self._random.gauss, self._decay
         scale = ratio * sqrt(1.0 - decay * decay)
         sigma_p, sigma_v = config.position_noise_m * scale, config.velocity_noise_m_s * scale

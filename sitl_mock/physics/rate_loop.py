@@ -11,9 +11,9 @@ from sitl_mock.physics.quaternion import Vector
 
 AxisState = tuple[float, float]
 """State of one axis, N m: integral, and filtered torque, which is the output."""
-Axes = tuple[AxisState, AxisState, AxisState]
+AxisStates = tuple[AxisState, AxisState, AxisState]
 """States of roll, pitch and yaw."""
-ZERO_STATE: Axes = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+ZERO_STATE: AxisStates = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 """State of a rate loop that does not run: no integral and no torque."""
 Delays = tuple[int, int, int]
 """Delays of roll, pitch and yaw, steps."""
@@ -103,13 +103,13 @@ def rate_law(config: RateLoopConfig, dt: float) -> RateLaw:
 
 def rate_step(
     law: RateLaw,
-    axes: Axes,
+    axes: AxisStates,
     setpoint: Vector,
     rates: Vector,
     accelerations: Vector,
     tilt_saturated: bool,
     yaw_saturated: bool,
-) -> Axes:
+) -> AxisStates:
     """Return the state of the three axes after a step; the torques are their outputs (pure).
 
     A NaN or infinite setpoint holds the present rate, as measured on PX4: the error is zero, and a
@@ -142,8 +142,8 @@ def delay_steps(delays_ms: Vector, dt: float) -> Delays:
     return roll, pitch, yaw
 
 
-def delayed(ring: Ring, delays: Delays, step: int, setpoint: Vector) -> Vector:
-    """Store the setpoint of a step in the ring; return the delayed one.
+def delay_setpoint(ring: Ring, delays: Delays, step: int, setpoint: Vector) -> Vector:
+    """Store the setpoint of a step in the ring; return the delayed setpoint.
 
     Args:
         ring: the latest setpoints, longer than any delay. It is changed.

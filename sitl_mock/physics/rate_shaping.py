@@ -27,7 +27,7 @@ class ShapingState(NamedTuple):
     """Attitude target, body to world."""
 
 
-NOT_SHAPED = ShapingState(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+INACTIVE_SHAPING = ShapingState(False, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
 def slew(goal: float, rate: float, limit: float) -> float:
@@ -60,7 +60,8 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
     """Return the rate that corrects an angle error, rad/s, as ArduPilot's sqrt_controller does.
 
     The rate has the sign of the error. For small errors it is proportional to the error. For larger
-    ones it is the rate that `acceleration` brings to zero together with the error.
+    errors it is the rate from which the deceleration `acceleration` reaches zero rate and zero
+    error at the same time.
 
     Args:
         angle: angle error, rad.

@@ -58,7 +58,8 @@ def derivative(motion: Motion, load: Load, body: Body) -> Motion:
 
     v' = g - T z_body - (drag + quadratic |u|) u - f with u = v - wind, specific thrust T and drag
     per mass; f has the components (axis_drag_i |u_i| + momentum_drag_i sqrt(T / g)) u_i along the
-    body axes. J w' = torque - damping w - w x J w; q' = q (0, w) / 2.
+    body axes. J w' = torque - damping w - w x J w and q' = q (0, w) / 2, with inertia J, body rates
+    w and attitude q.
     """
     vn, ve, vd, w, x, y, z, p, q, r = motion
     thrust, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d = load

@@ -9,19 +9,19 @@ from typing import NamedTuple
 
 from sitl_mock.config.airframe import AirframeConfig
 
-Four = tuple[float, float, float, float]
+FourFloats = tuple[float, float, float, float]
 """One number for each rotor, or thrust and torques about body x, y, z."""
 
 
 class Mix(NamedTuple):
     """Result of the allocation: throttles 0..1, and which torques saturated."""
 
-    throttles: Four
+    throttles: FourFloats
     tilt_saturated: bool
     yaw_saturated: bool
 
 
-STOPPED = Mix((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
+STOPPED_MIX = Mix((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
 """Result of the allocation while the rotors are off and give no torque."""
 
 
@@ -111,8 +111,8 @@ def throttle_of(law: RotorLaw, thrust: float) -> float:
 
 
 def rotor_step(
-    law: RotorLaw, thrusts: Four, throttles: Four, thrust_factor: float
-) -> tuple[Four, Four]:
+    law: RotorLaw, thrusts: FourFloats, throttles: FourFloats, thrust_factor: float
+) -> tuple[FourFloats, FourFloats]:
     """Advance the rotors by one step towards the throttles.
 
     The discretisation is exact for a throttle that is constant over the step. The mean of the

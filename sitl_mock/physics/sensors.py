@@ -134,8 +134,8 @@ def estimate(
 class Estimator:
     """The state of the simulated estimator, and the seeded generator of its white noise.
 
-    Only `draw` uses the generator, so the white noise depends on the seed and the number of calls.
-    The noise of the navigation filter depends on the seed and the time.
+    Only `draw_noise` uses the generator, so the white noise depends on the seed and the number of
+    calls. The noise of the navigation filter depends on the seed and the time.
 
     Args:
         config: noise, delays and filter.
@@ -220,7 +220,7 @@ class Estimator:
             self._filter.advance(row_before(self._fusion_delay), fusion_time, row_before(0), time)
             self.state = self.state._replace(filter=self._filter.state)
 
-    def draw(self) -> Sequence[float]:
+    def draw_noise(self) -> Sequence[float]:
         """Return new white noise for one estimate, 15 numbers."""
         count, begin = len(self._deviations), self._noise_used
         if begin == len(self._noise):

@@ -18,10 +18,10 @@ from sitl_mock.physics.multirotor_step import (
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply
 from sitl_mock.physics.rate_shaping import ShapingState
-from sitl_mock.physics.rotors import Four
+from sitl_mock.physics.rotors import FourFloats
 from sitl_mock.physics.sensors import Estimate, Estimator
 from sitl_mock.physics.vehicle_step import (
-    STILL,
+    DISARMED_COMMAND,
     ActuatorCommand,
     Plant,
     PythonPlant,
@@ -30,7 +30,14 @@ from sitl_mock.physics.vehicle_step import (
     truth_row,
 )
 
-__all__ = ["STILL", "ActuatorCommand", "BatteryState", "Estimate", "TruthState", "Vehicle"]
+__all__ = [
+    "DISARMED_COMMAND",
+    "ActuatorCommand",
+    "BatteryState",
+    "Estimate",
+    "TruthState",
+    "Vehicle",
+]
 
 SLOW_STEP_S = 0.01
 """Step of wind and battery, which change slowly, s."""
@@ -48,8 +55,8 @@ class TruthState(NamedTuple):
     on_ground: bool
     crashed: bool
     touchdown_speed: float  # m/s down at the latest touchdown, NaN before the first
-    rotor_thrusts: Four  # N, PX4's rotor order
-    throttles: Four  # commanded to each rotor, 0..1
+    rotor_thrusts: FourFloats  # N, PX4's rotor order
+    throttles: FourFloats  # commanded to each rotor, 0..1
 
 
 class Vehicle:
@@ -155,7 +162,7 @@ class Vehicle:
         estimator, time = self.estimator, self.time
         estimator.correct(time, self.plant.row_before)
         estimate, estimator.rotation = self.plant.estimate(
-            estimator.law, estimator.state, time, estimator.draw()
+            estimator.law, estimator.state, time, estimator.draw_noise()
         )
         return estimate
 

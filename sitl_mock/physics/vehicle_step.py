@@ -14,10 +14,10 @@ from sitl_mock.physics.multirotor_step import (
     MultirotorLaw,
     Rings,
     at_rest,
+    does_not_rise,
     drive,
     empty_rings,
     move,
-    sinks,
 )
 from sitl_mock.physics.navigation_error import TruthHistory, TruthRow
 from sitl_mock.physics.quaternion import Vector
@@ -40,7 +40,7 @@ class ActuatorCommand(NamedTuple):
     thrust: float
 
 
-STILL = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
+DISARMED_COMMAND = ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0)
 """Command while disarmed: the rotors stand still."""
 
 
@@ -82,7 +82,7 @@ def advance(
 
     Args:
         law: constants.
-        rings: the latest setpoints; they are changed.
+        rings: ring buffers of the latest setpoints; changed in place.
         history: the latest rows of `truth_row`, one for each step. It is changed.
         state: state before the steps.
         command: command for all steps.
@@ -130,7 +130,7 @@ def _move_or_rest(
     _, _, _, w, x, y, z, _, _, _ = body[0]
     if crashed:
         return at_rest((w, x, y, z)), position, on_ground, crashed, touchdown_speed
-    if on_ground and sinks(multirotor, body, load):
+    if on_ground and does_not_rise(multirotor, body, load):
         body = at_rest(levelled(ground, (w, x, y, z)))
         return body, position, on_ground, crashed, touchdown_speed
     body, displacement = move(multirotor, body, load)

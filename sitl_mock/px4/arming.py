@@ -8,10 +8,10 @@ from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.modes import PILOTED_MODES
 
 UNARMABLE_MODES = frozenset({Mode.RTL, Mode.LAND})
-"""Modes in which PX4 cannot be armed, and to which it does not return when it disarms."""
+"""Modes in which PX4 cannot be armed. When PX4 disarms, it does not return to these modes."""
 PREFLIGHT_MARGIN_US = 1_000_000
 """Delay beyond COM_DISARM_PRFLT after which an armed vehicle that has not taken off disarms, us
-(measured: 11 s for 10 s)."""
+(measured: 11 s with COM_DISARM_PRFLT = 10 s)."""
 
 
 class ArmingChecks:
@@ -70,7 +70,7 @@ class ArmingChecks:
             (state.mode in PILOTED_MODES and not pilot_present, "no manual control input"),
             (state.mode in UNARMABLE_MODES, "mode is not suitable for arming"),
         )
-        first_problem = next((problem for present, problem in problems if present), None)
+        first_problem = next((problem for applies, problem in problems if applies), None)
         state.prearm_problem = first_problem
         return first_problem
 
@@ -111,10 +111,10 @@ class AutoDisarm:
         if not state.landed:
             self._landed_since_us = state.time_us
             return None
-        waited = state.time_us - self._landed_since_us
+        time_on_ground_us = state.time_us - self._landed_since_us
         if state.took_off:
-            limit = parameters["COM_DISARM_LAND"]
-            return EventKind.DISARMED_BY_LANDING if 0 < limit * 1e6 <= waited else None
-        limit = parameters["COM_DISARM_PRFLT"]
-        is_overdue = waited >= limit * 1e6 + PREFLIGHT_MARGIN_US
-        return EventKind.DISARMED_ON_GROUND if limit > 0 and is_overdue else None
+            delay_s = parameters["COM_DISARM_LAND"]
+            return EventKind.DISARMED_BY_LANDING if 0 < delay_s * 1e6 <= time_on_ground_us else None
+        delay_s = parameters["COM_DISARM_PRFLT"]
+        is_overdue = time_on_ground_us >= delay_s * 1e6 + PREFLIGHT_MARGIN_US
+        return EventKind.DISARMED_ON_GROUND if delay_s > 0 and is_overdue else None

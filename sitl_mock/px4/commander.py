@@ -1,4 +1,4 @@
-"""PX4's rules of arming and modes, by its measured behaviour."""
+"""PX4's rules of arming and modes, as measured."""
 
 import struct
 
@@ -60,7 +60,7 @@ class Px4Commander:
         self._published_status: tuple[bool, Mode, Mode, bool] | None = None
 
     def arm(self, *, force: bool = False) -> int:
-        """Arm, and return a MAV_RESULT; ``force`` skips all checks but that of a crash."""
+        """Arm, and return a MAV_RESULT; ``force`` skips all checks except for a crash."""
         state = self._state
         if state.armed:
             return ACCEPTED
@@ -91,7 +91,7 @@ class Px4Commander:
         return ACCEPTED
 
     def request_mode(
-        self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
+        self, mode: Mode, *, takeoff_z: float | None = None, hold_position: Vector | None = None
     ) -> int:
         """Change the intended mode, and return a MAV_RESULT.
 
@@ -101,7 +101,7 @@ class Px4Commander:
         Args:
             mode: requested mode.
             takeoff_z: down position where TAKEOFF ends, m; None = MIS_TAKEOFF_ALT above home.
-            hold: position of LOITER, m NED; None = here.
+            hold_position: position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         state = self._state
         if state.armed and not self._can_run(mode):
@@ -112,7 +112,7 @@ class Px4Commander:
         self.failsafe.clear()
         if mode is Mode.TAKEOFF:
             self._requested_takeoff_z = takeoff_z
-        self._enter_mode(mode, hold=hold)
+        self._enter_mode(mode, hold_position=hold_position)
         return ACCEPTED
 
     def land(self) -> int:
@@ -132,11 +132,11 @@ class Px4Commander:
         """Record the heartbeat of a ground station or a companion, told apart by MAV_TYPE."""
         self.failsafe.receive_heartbeat(heartbeat.type)
 
-    def manual_control(self, message: Message, _: Link) -> None:
+    def receive_manual_control(self, message: Message, _: Link) -> None:
         """Handle MANUAL_CONTROL, a pilot's sticks."""
         self._sticks.receive(message, self._state.time_us)
 
-    def take_setpoint(self, message: Message) -> None:
+    def receive_setpoint(self, message: Message) -> None:
         """Accept a setpoint in any mode, if MAV_FWDEXTSP is set and PX4 would not ignore it."""
         setpoint = decode_setpoint(message)
         if setpoint is not None and self._parameters["MAV_FWDEXTSP"]:
@@ -227,11 +227,11 @@ class Px4Commander:
             return False
         return self._state.position_valid or mode not in POSITION_MODES
 
-    def _enter_mode(self, mode: Mode, *, hold: Vector | None = None) -> None:
-        """Enter a mode at the present estimate; the intended mode stays."""
+    def _enter_mode(self, mode: Mode, *, hold_position: Vector | None = None) -> None:
+        """Enter a mode without changing the intended mode."""
         self._state.mode = mode
         takeoff_z = self._takeoff_z() if mode is Mode.TAKEOFF else None
-        self._control.enter(mode, takeoff_z=takeoff_z, hold=hold)
+        self._control.enter(mode, takeoff_z=takeoff_z, hold_position=hold_position)
 
     def _takeoff_z(self) -> float:
         """Return the down position at which TAKEOFF ends, m: as requested, or MIS_TAKEOFF_ALT."""

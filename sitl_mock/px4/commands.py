@@ -28,7 +28,7 @@ class Px4Commands(Commands):
     Args:
         state: the autopilot's state.
         commander: changes arming and modes.
-        builders: message id -> builder, for requests.
+        builders: message id -> builder of the message, for requests.
         origin: origin of the local frame.
     """
 
@@ -82,7 +82,7 @@ class Px4Commands(Commands):
         mode_change_requested = isfinite(flags) and int(flags) & _CHANGE_MODE
         if not mode_change_requested and self._state.mode is not Mode.LOITER:
             return TEMPORARILY_REJECTED
-        return self._px4_commander.request_mode(Mode.LOITER, hold=self._position(command))
+        return self._px4_commander.request_mode(Mode.LOITER, hold_position=self._position(command))
 
     def _position(self, command: Command) -> Vector:
         """Return the position in parameters 5 to 7, m NED; NaN keeps the present value."""

@@ -40,7 +40,7 @@ class EventLog:
     """Sends events on all links.
 
     Args:
-        state: state of the autopilot, for the time.
+        state: the autopilot's state, which gives the vehicle time.
         links: links to send on.
     """
 
@@ -52,23 +52,33 @@ class EventLog:
         self._sequence_sent_us = 0
 
     def send(
-        self, event_id: int, severity: int, internal: int | None = None, arguments: bytes = b""
+        self,
+        event_id: int,
+        severity: int,
+        internal_severity: int | None = None,
+        arguments: bytes = b"",
     ) -> None:
         """Send a new event.
 
         Args:
             event_id: see `sitl_mock.px4.events.event_id`.
             severity: MAV_SEVERITY for the user; 8 = for programs only.
-            internal: MAV_SEVERITY for the vehicle's log; None = the same.
+            internal_severity: MAV_SEVERITY for the vehicle's log; None = the same.
             arguments: packed arguments.
         """
         is_first = not self._sent_events
         self._latest_sequence = (self._latest_sequence + 1) & 0xFFFF
         if is_first:
             self._send_sequence(_SEQUENCE_RESET)
-        levels = (severity if internal is None else internal) << 4 | severity
+        log_levels = (severity if internal_severity is None else internal_severity) << 4 | severity
         payload = EVENT.payload.pack(
-            event_id, self._state.stamp_us // 1000, self._latest_sequence, 0, 0, levels, arguments
+            event_id,
+            self._state.stamp_us // 1000,
+            self._latest_sequence,
+            0,
+            0,
+            log_levels,
+            arguments,
         )
         self._sent_events.append(_SentEvent(self._latest_sequence, payload))
         for link in self._links:
@@ -82,7 +92,7 @@ class EventLog:
     def answer_request(self, request: Message, link: Link) -> None:
         """Answer a REQUEST_EVENT: resend each event, or refuse it with a reason.
 
-        If the requested range is longer than the log, one refusal covers all older events.
+        If the request is for more events than the log holds, one refusal covers the oldest ones.
         """
         first, last = request.first_sequence, request.last_sequence
         count = (last - first & 0xFFFF) + 1
@@ -144,7 +154,10 @@ class Announcer:
         event = PX4_EVENTS[kind]
         if event.event_id:
             self._events.send(
-                event.event_id, event.severity, event.internal, arguments or event.arguments
+                event.event_id,
+                event.severity,
+                event.internal_severity,
+                arguments or event.arguments,
             )
         for link in self._links:
             if link.gcs_heard:

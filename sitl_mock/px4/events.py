@@ -1,7 +1,8 @@
 """PX4's texts and event ids.
 
 An event id is a hash of the event's name. Names and texts come from PX4's source (main, 2026); the
-recorded ids agree. The text of an announcement that is sent as an EVENT as well ends in a tab.
+ids of these names agree with the recorded ids. If an announcement is sent as an EVENT as well, its
+text ends in a tab.
 """
 
 from pymavlink.dialects.v20 import development as dialect
@@ -26,9 +27,14 @@ def event_id(name: str) -> int:
 
 
 def _event(
-    name: str, severity: int, text: str, arguments: bytes = b"", *, internal: int | None = None
+    name: str,
+    severity: int,
+    text: str,
+    arguments: bytes = b"",
+    *,
+    internal_severity: int | None = None,
 ) -> Event:
-    return Event(text + "\t", severity, event_id(name), arguments, internal)
+    return Event(text + "\t", severity, event_id(name), arguments, internal_severity)
 
 
 PX4_EVENTS: dict[EventKind, Event] = {
@@ -37,7 +43,7 @@ PX4_EVENTS: dict[EventKind, Event] = {
         "commander_arm_denied_resolve_failures",
         _CRITICAL,
         "Arming denied: Resolve system health failures first",
-        internal=_INFO,
+        internal_severity=_INFO,
     ),
     EventKind.PREFLIGHT_FAIL: Event("Preflight Fail: {}", _CRITICAL),
     EventKind.DISARMED_BY_COMMAND: _event(
@@ -59,13 +65,13 @@ PX4_EVENTS: dict[EventKind, Event] = {
         "commander_disarm_denied_not_landed",
         _CRITICAL,
         "Disarming denied: not landed",
-        internal=_INFO,
+        internal_severity=_INFO,
     ),
     EventKind.MODE_DENIED: _event(
         "commander_modeswitch_not_avail",
         _CRITICAL,
         "Switching to mode '{}' is currently not possible",
-        internal=_INFO,
+        internal_severity=_INFO,
     ),
     EventKind.DEFAULT_TAKEOFF_ALTITUDE: _event(
         "navigator_takeoff_default_alt", _INFO, "Using default takeoff altitude: {} m"
@@ -76,23 +82,26 @@ PX4_EVENTS: dict[EventKind, Event] = {
     ),
     EventKind.LANDING_DETECTED: _event("commander_landing_detected", _INFO, "Landing detected"),
     EventKind.FAILSAFE: _event(
-        "commander_failsafe_enter", _CRITICAL, "Failsafe activated", internal=_WARNING
+        "commander_failsafe_enter", _CRITICAL, "Failsafe activated", internal_severity=_WARNING
     ),
     EventKind.FAILSAFE_UNNAMED: _event(
-        "commander_failsafe_enter_generic", _CRITICAL, "Failsafe activated", internal=_WARNING
+        "commander_failsafe_enter_generic",
+        _CRITICAL,
+        "Failsafe activated",
+        internal_severity=_WARNING,
     ),
     EventKind.FAILSAFE_HOLD: _event(
         "commander_failsafe_enter_hold",
         _CRITICAL,
         "Failsafe activated, entering Hold for {} seconds",
-        internal=_WARNING,
+        internal_severity=_WARNING,
     ),
     EventKind.FAILSAFE_WARNING: _event(
         "commander_failsafe_enter_generic_warn", _WARNING, "Failsafe activated"
     ),
     EventKind.PILOT_LOST: _event("commander_rc_lost", _INFO, "Manual control lost"),
     EventKind.GCS_LOST: _event(
-        "commander_gcs_lost", _WARNING, "Connection to ground station lost", internal=_INFO
+        "commander_gcs_lost", _WARNING, "Connection to ground station lost", internal_severity=_INFO
     ),
     EventKind.GCS_REGAINED: _event("commander_dl_regained", _INFO, "GCS connection regained"),
     EventKind.COMPANION_LOST: _event(
@@ -105,19 +114,19 @@ PX4_EVENTS: dict[EventKind, Event] = {
         "commander_failsafe_enter_low_bat",
         _WARNING,
         "Low battery level, return advised",
-        internal=_INFO,
+        internal_severity=_INFO,
     ),
     EventKind.BATTERY_CRITICAL: _event(
         "commander_failsafe_enter_crit_bat_warn",
         _CRITICAL,
         "Critical battery level, land now",
-        internal=_INFO,
+        internal_severity=_INFO,
     ),
     EventKind.BATTERY_EMERGENCY: _event(
         "commander_failsafe_enter_crit_low_bat_warn",
         _EMERGENCY,
         "Emergency battery level, land immediately",
-        internal=_INFO,
+        internal_severity=_INFO,
     ),
     EventKind.PILOT_TOOK_OVER: _event(
         "commander_rc_override", _INFO, "Pilot took over using sticks"

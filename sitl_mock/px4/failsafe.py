@@ -22,7 +22,7 @@ from sitl_mock.px4.modes import PILOTED_MODES, POSITION_MODES, custom_mode
 _NO_MANUAL_CONTROL = 4
 """Value of COM_RC_IN_MODE: no manual control."""
 _EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
-"""Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT: no failsafe in automatic modes, in OFFBOARD."""
+"""Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT that exempt automatic modes and OFFBOARD."""
 _GCS_MARGIN_US = 2_000_000
 """Delay beyond COM_DL_LOSS_T after which the ground station counts as lost, us (measured)."""
 _ACTED_ALREADY = -1
@@ -74,7 +74,7 @@ class Failsafe:
         self._companion_lost = False
 
     def clear(self) -> None:
-        """End any failsafe: a mode was requested, or the vehicle disarmed."""
+        """End any failsafe, because a mode was requested or the vehicle disarmed."""
         self._actions.clear()
         # A lost link that has caused a failsafe causes another one only after it was regained.
         if self._gcs_lost_us is not None:
@@ -84,19 +84,19 @@ class Failsafe:
 
     def receive_heartbeat(self, heartbeat_type: int) -> None:
         """Record a heartbeat, whose MAV_TYPE is ``heartbeat_type``."""
-        now = self._state.time_us
+        now_us = self._state.time_us
         if heartbeat_type == dialect.MAV_TYPE_GCS:
-            self._gcs_heartbeat_us = now
+            self._gcs_heartbeat_us = now_us
         elif heartbeat_type == dialect.MAV_TYPE_ONBOARD_CONTROLLER:
-            self._companion_heartbeat_us = now
+            self._companion_heartbeat_us = now_us
 
     @property
     def gcs_alive(self) -> bool:
         """Whether a ground station is connected."""
         if self._gcs_heartbeat_us is None:
             return False
-        limit = self._parameters["COM_DL_LOSS_T"] * 1e6 + _GCS_MARGIN_US
-        return self._state.time_us - self._gcs_heartbeat_us <= limit
+        timeout_us = self._parameters["COM_DL_LOSS_T"] * 1e6 + _GCS_MARGIN_US
+        return self._state.time_us - self._gcs_heartbeat_us <= timeout_us
 
     def step(self, *, pilot_present: bool) -> None:
         """Check every failsafe once; ``pilot_present``: a pilot holds the sticks."""
@@ -190,8 +190,8 @@ class Failsafe:
     def _watch_companion(self) -> None:
         if self._companion_heartbeat_us is None:
             return
-        limit = self._parameters["COM_OBC_LOSS_T"] * 1e6 + _COMPANION_MARGIN_US
-        lost = self._state.time_us - self._companion_heartbeat_us > limit
+        timeout_us = self._parameters["COM_OBC_LOSS_T"] * 1e6 + _COMPANION_MARGIN_US
+        lost = self._state.time_us - self._companion_heartbeat_us > timeout_us
         if lost != self._companion_lost:
             self._companion_lost = lost
             self._announce(EventKind.COMPANION_LOST if lost else EventKind.COMPANION_REGAINED, "")

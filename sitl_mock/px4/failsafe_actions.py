@@ -15,7 +15,7 @@ _ENTER_LAYOUT = struct.Struct("<IBB")
 
 
 class Action(NamedTuple):
-    """Action of a failsafe: its number in PX4's events, and its mode; None = motors off."""
+    """Action of a failsafe: its number in PX4's events, and its mode (None: motors off)."""
 
     number: int
     mode: Mode | None
@@ -118,7 +118,7 @@ class FailsafeActions:
         )
 
     def act(self, cause: Cause, action: Action, next_action: Action | None = None) -> None:
-        """Execute an action unless a more severe cause is active; announce it if it is new.
+        """Execute an action unless a more severe cause is active; announce a new action.
 
         Args:
             cause: cause of the failsafe.

@@ -12,9 +12,9 @@ from sitl_mock.physics.rigid_body import GRAVITY
 CRAWL_HEIGHT_M = 0.65
 """Height below which LAND descends at MPC_LAND_CRWL (recorded with a distance sensor)."""
 BRAKING_S = 0.7
-"""Distance from the vehicle to the held point per speed, s."""
+"""Ratio of stopping distance to speed when a mode with a held point begins, s."""
 LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
-"""Acceleration demand of a vehicle that stays level without holding its horizontal position."""
+"""Acceleration demand that keeps the vehicle level but holds no horizontal position, m/s^2 NED."""
 
 
 class FlightTasks:
@@ -28,7 +28,7 @@ class FlightTasks:
     def __init__(self, state: State, parameters: ParameterTable) -> None:
         self._state = state
         self._parameters = parameters
-        self._hold: Vector = (0.0, 0.0, 0.0)
+        self._hold_position: Vector = (0.0, 0.0, 0.0)
         self.yaw = 0.0
         """Heading to hold, rad."""
         self._takeoff_z = 0.0
@@ -36,23 +36,27 @@ class FlightTasks:
         self._descending = False
 
     def enter(
-        self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
+        self, mode: Mode, *, takeoff_z: float | None = None, hold_position: Vector | None = None
     ) -> None:
-        """Begin a mode at the present estimate.
+        """Begin a mode from the estimated position, velocity and heading.
 
         Args:
             mode: the mode to begin.
-            takeoff_z: where TAKEOFF ends, m down; None = as before.
-            hold: position of LOITER, m NED; None = stop here.
+            takeoff_z: down position at which TAKEOFF ends, m; None = unchanged.
+            hold_position: position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         estimate = self._state.estimate
         self._entered_us = self._state.time_us
         self.yaw = yaw(estimate.q)
         x, y, z = estimate.position_ned
         vx, vy, vz = estimate.velocity_ned
-        self._hold = hold or (x + BRAKING_S * vx, y + BRAKING_S * vy, z + BRAKING_S * vz)
+        self._hold_position = hold_position or (
+            x + BRAKING_S * vx,
+            y + BRAKING_S * vy,
+            z + BRAKING_S * vz,
+        )
         if mode in (Mode.TAKEOFF, Mode.LAND):
-            self._hold = (x, y, z)
+            self._hold_position = (x, y, z)
         if takeoff_z is not None:
             self._takeoff_z = takeoff_z
         if mode is Mode.RTL:
@@ -60,9 +64,9 @@ class FlightTasks:
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
         """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
-        x, y, z = self._hold
+        x, y, z = self._hold_position
         dx, dy, dz = position_step
-        self._hold = (x + dx, y + dy, z + dz)
+        self._hold_position = (x + dx, y + dy, z + dz)
         self._takeoff_z += dz
         self.yaw += yaw_step
 
@@ -87,11 +91,11 @@ class FlightTasks:
         if mode is Mode.RTL:
             return self._return()
         if mode is Mode.ALTCTL:
-            level = (nan, nan, self._hold[2])
-            return PositionDemand(level, NAN_VECTOR, LEVEL_DEMAND_ACCELERATION, self.yaw)
+            level_position = (nan, nan, self._hold_position[2])
+            return PositionDemand(level_position, NAN_VECTOR, LEVEL_DEMAND_ACCELERATION, self.yaw)
         parameters = self._parameters
         return PositionDemand(
-            self._hold,
+            self._hold_position,
             NAN_VECTOR,
             yaw=self.yaw,
             max_speed=parameters["MPC_XY_CRUISE"],
@@ -102,7 +106,7 @@ class FlightTasks:
     def _takeoff(self) -> PositionDemand:
         parameters, state = self._parameters, self._state
         speed = parameters["MPC_TKO_SPEED"]
-        x, y, _ = self._hold
+        x, y, _ = self._hold_position
         if not state.contact:
             target = (x, y, self._takeoff_z)
             return PositionDemand(target, NAN_VECTOR, yaw=self.yaw, max_up_speed=speed)
@@ -110,9 +114,13 @@ class FlightTasks:
         ramp_begin_us = max(
             self._entered_us, state.armed_at_us + parameters["COM_SPOOLUP_TIME"] * 1e6
         )
-        ramp = (state.time_us - ramp_begin_us) / (1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1))
-        lowest_rate = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
-        climb_rate = lowest_rate + (speed - lowest_rate) * max(0.0, min(1.0, ramp))
+        ramp_progress = (state.time_us - ramp_begin_us) / (
+            1e6 * max(parameters["MPC_TKO_RAMP_T"], 0.1)
+        )
+        zero_thrust_rate = -GRAVITY / parameters["MPC_Z_VEL_P_ACC"]
+        climb_rate = zero_thrust_rate + (speed - zero_thrust_rate) * max(
+            0.0, min(1.0, ramp_progress)
+        )
         return PositionDemand(
             NAN_VECTOR,
             (nan, nan, -climb_rate),
@@ -122,7 +130,7 @@ class FlightTasks:
         )
 
     def _land(self) -> PositionDemand:
-        x, y, _ = self._hold
+        x, y, _ = self._hold_position
         velocity = (nan, nan, self._descent_speed())
         if not self._state.position_valid:
             return PositionDemand(NAN_VECTOR, velocity, LEVEL_DEMAND_ACCELERATION, self.yaw)
@@ -139,9 +147,10 @@ class FlightTasks:
         return land_speed + (max_speed - land_speed) * fraction
 
     def _begin_return(self) -> None:
-        """Choose the return height: by the cone around home, at most RTL_RETURN_ALT.
+        """Choose the return height: that of the cone around home, at most RTL_RETURN_ALT.
 
-        The return height is at least the present one; within NAV_ACC_RAD of home they are equal.
+        The vehicle never descends to this height: it keeps a higher present height, and within
+        NAV_ACC_RAD of home it keeps any height.
         """
         parameters, state = self._parameters, self._state
         home = state.home_ned
@@ -156,7 +165,7 @@ class FlightTasks:
                 parameters["RTL_RETURN_ALT"],
             )
             height = max(height, return_height)
-        self._hold = (x, y, home[2] - height)
+        self._hold_position = (x, y, home[2] - height)
         self._descending = distance <= acceptance_radius
 
     def _return(self) -> PositionDemand:
@@ -164,14 +173,14 @@ class FlightTasks:
         home = state.home_ned
         x, y, z = state.estimate.position_ned
         if not self._descending:
-            if z - self._hold[2] < 0.5:
-                self._hold = (home[0], home[1], self._hold[2])
+            if z - self._hold_position[2] < 0.5:
+                self._hold_position = (home[0], home[1], self._hold_position[2])
             self._descending = hypot(x - home[0], y - home[1]) < parameters["NAV_ACC_RAD"] / 2.0
         if self._descending:
-            self._hold = (home[0], home[1], nan)
+            self._hold_position = (home[0], home[1], nan)
             return self._land()
         return PositionDemand(
-            self._hold,
+            self._hold_position,
             NAN_VECTOR,
             yaw=self.yaw,
             max_speed=parameters["MPC_XY_CRUISE"],
@@ -181,11 +190,11 @@ class FlightTasks:
     def offboard_demand(self, setpoint: PositionSetpoint, dt: float) -> PositionDemand:
         """Return the demand of an offboard setpoint; its yaw rate turns the held heading."""
         parameters = self._parameters
-        speeds = (
+        speed_limits = (
             parameters["MPC_XY_VEL_MAX"],
             parameters["MPC_Z_VEL_MAX_UP"],
             parameters["MPC_Z_VEL_MAX_DN"],
         )
-        demand = setpoint_demand(setpoint, self._state.estimate.q, self.yaw, speeds, dt)
+        demand = setpoint_demand(setpoint, self._state.estimate.q, self.yaw, speed_limits, dt)
         self.yaw = demand.yaw
         return demand

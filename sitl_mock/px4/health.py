@@ -76,7 +76,7 @@ class HealthReport:
     def step(
         self, *, offboard_alive: bool, pilot_present: bool, gcs_alive: bool, gcs_required: bool
     ) -> None:
-        """Send a report if it changed and is due; also step the events (`EventLog.step`).
+        """Call `EventLog.step`, and send a report if it changed and is due.
 
         Args:
             offboard_alive: whether offboard setpoints arrive.
@@ -101,27 +101,29 @@ class HealthReport:
         )
         failing_checks = tuple(check for check in candidates if check is not None)
         gps_present = state.gps_ok and state.position_valid
-        present = (
+        components_present = (
             _SENSORS_PRESENT
             | (_GPS_PRESENT if gps_present else 0)
             | (_GCS_PRESENT if gcs_alive else 0)
         )
-        if (failing_checks, present) != self._last_report:
-            self._last_report = (failing_checks, present)
+        if (failing_checks, components_present) != self._last_report:
+            self._last_report = (failing_checks, components_present)
             self._last_report_us = state.time_us
-            self._send(failing_checks, present)
+            self._send(failing_checks, components_present)
 
     @property
     def _position_ready(self) -> bool:
         return self._state.position_valid and self._state.time_us >= self._ready_us
 
-    def _send(self, failing_checks: tuple[_Check, ...], present: int) -> None:
+    def _send(self, failing_checks: tuple[_Check, ...], components_present: int) -> None:
         errors = [check for check in failing_checks if check.severity <= _ERROR]
         warnings = [check for check in failing_checks if check.severity == _WARNING]
-        modes = _ARMABLE_MODES
+        armable_modes = _ARMABLE_MODES
         for check in errors:
-            modes &= ~check.modes
-        summary = _SUMMARY_LAYOUT.pack(0, _components(errors), _components(warnings), modes, modes)
+            armable_modes &= ~check.modes
+        summary = _SUMMARY_LAYOUT.pack(
+            0, _components(errors), _components(warnings), armable_modes, armable_modes
+        )
         send = self._events.send
         send(event_id("commander_arming_check_summary"), _PROTOCOL, arguments=summary)
         for check in failing_checks:
@@ -130,7 +132,7 @@ class HealthReport:
                 check.severity,
                 arguments=_FAILURE_LAYOUT.pack(check.modes, check.health_component),
             )
-        health = _HEALTH_LAYOUT.pack(0, present, 0, 0)
+        health = _HEALTH_LAYOUT.pack(0, components_present, 0, 0)
         send(event_id("commander_health_summary"), _PROTOCOL, arguments=health)
 
 

@@ -2,7 +2,7 @@
 
 from math import radians
 
-from sitl_mock.autopilot.attitude_control import AttitudeGains, attitude_rates, is_usable
+from sitl_mock.autopilot.attitude_control import AttitudeGains, attitude_rates, is_usable_quaternion
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import (
     PositionController,
@@ -12,7 +12,7 @@ from sitl_mock.autopilot.position_control import (
 from sitl_mock.autopilot.setpoints import OffboardStream, PositionSetpoint
 from sitl_mock.autopilot.state import NAN_VECTOR, Mode, PositionTargetEcho, State
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, yaw
-from sitl_mock.physics.vehicle import STILL, ActuatorCommand
+from sitl_mock.physics.vehicle import DISARMED_COMMAND, ActuatorCommand
 from sitl_mock.px4.flight_tasks import FlightTasks
 from sitl_mock.px4.modes import PILOTED_MODES
 
@@ -39,17 +39,17 @@ class Px4ModeControl:
         self._parameters = parameters
         self._stream = stream
         self._tasks = FlightTasks(state, parameters)
-        self._position = PositionController(lambda: position_gains(parameters))
+        self._position_controller = PositionController(lambda: position_gains(parameters))
         self._last_thrust = 0.0
         self._unusable_since_us: int | None = None
         self._attitude_failed = False
 
     def enter(
-        self, mode: Mode, *, takeoff_z: float | None = None, hold: Vector | None = None
+        self, mode: Mode, *, takeoff_z: float | None = None, hold_position: Vector | None = None
     ) -> None:
-        """Begin a mode at the present estimate; see `FlightTasks.enter`."""
-        self._tasks.enter(mode, takeoff_z=takeoff_z, hold=hold)
-        self._position.reset()
+        """Begin a mode from the estimated motion and heading; see `FlightTasks.enter`."""
+        self._tasks.enter(mode, takeoff_z=takeoff_z, hold_position=hold_position)
+        self._position_controller.reset()
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
         """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
@@ -71,18 +71,18 @@ class Px4ModeControl:
                 state.position_target = PositionTargetEcho(
                     True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
                 )
-            command = STILL
+            command = DISARMED_COMMAND
         elif state.mode is Mode.OFFBOARD:
             command = self._follow_offboard(dt, fresh=fresh)
         elif state.landed and state.mode is not Mode.TAKEOFF:
-            self._position.reset()
+            self._position_controller.reset()
             command = self._rate_command((0.0, 0.0, 0.0), 0.0)
         elif state.mode in (Mode.MANUAL, Mode.STABILIZED):
             hover_thrust = float(self._parameters["MPC_THR_HOVER"])
             command = self._attitude_command(from_yaw(self._tasks.yaw), 0.0, hover_thrust)
         else:
             if state.mode is Mode.TAKEOFF and state.contact:
-                self._position.reset()
+                self._position_controller.reset()
             command = self._follow(self._tasks.demand(), dt)
         self._last_thrust = command.thrust
         state.attitude_target.rates = command[1:4]
@@ -97,7 +97,7 @@ class Px4ModeControl:
             return self._attitude_command(from_yaw(self._tasks.yaw), 0.0, thrust)
         estimate = state.estimate
         position = estimate.position_ned
-        output = self._position.step(demand, position, estimate.velocity_ned, dt)
+        output = self._position_controller.step(demand, position, estimate.velocity_ned, dt)
         state.position_target = PositionTargetEcho(
             True, demand.position, output.velocity, output.acceleration, demand.yaw
         )
@@ -124,7 +124,7 @@ class Px4ModeControl:
         self, target: Quaternion, yaw_rate: float, thrust: float
     ) -> ActuatorCommand:
         now = self._state.time_us
-        if is_usable(target):
+        if is_usable_quaternion(target):
             self._unusable_since_us = None
         elif self._unusable_since_us is None:
             self._unusable_since_us = now

@@ -55,7 +55,7 @@ def custom_mode(mode: Mode) -> int:
 def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
     """Return HEARTBEAT.base_mode (recorded): 29 in automatic modes, 81 in those of a pilot.
 
-    In OFFBOARD it is 1 under body rates, else 17. Armed, it is 128 more.
+    In OFFBOARD it is 1 while PX4 follows body rates, else 17. When armed, it is 128 more.
 
     Args:
         mode: the flight mode.

@@ -98,7 +98,7 @@ class Px4:
         return section
 
     def slot_us(self, settings: VehicleSettings) -> int:
-        """Return the slot period of the inner loop rate, us."""
+        """Return the slot period at the configured inner loop rate, us."""
         return SLOT_US[settings.inner_loop_hz]
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
@@ -144,7 +144,7 @@ class Px4:
             ),
             builders,
             handlers={
-                "MANUAL_CONTROL": commander.manual_control,
+                "MANUAL_CONTROL": commander.receive_manual_control,
                 "REQUEST_EVENT": events.answer_request,
             },
             position_valid_from_us=POSITION_VALID_SHARE * parts.ready_us,

@@ -35,8 +35,10 @@ class Sticks:
             dt = (now_us - self._last_us) / 1e6
             filter_gain = 1.0 - exp(-dt / _FILTER_S)
             self._speeds = tuple(
-                speed + filter_gain * ((new - old) / dt - speed)
-                for speed, new, old in zip(self._speeds, axes, self._axes, strict=True)
+                speed + filter_gain * ((deflection - last_deflection) / dt - speed)
+                for speed, deflection, last_deflection in zip(
+                    self._speeds, axes, self._axes, strict=True
+                )
             )
         else:
             self._speeds = (0.0,) * len(axes)
@@ -44,15 +46,15 @@ class Sticks:
 
     def present(self, now_us: int) -> bool:
         """Whether sticks were received within COM_RC_LOSS_T."""
-        limit = self._parameters["COM_RC_LOSS_T"] * 1e6
-        return self._last_us is not None and now_us - self._last_us <= limit
+        timeout_us = self._parameters["COM_RC_LOSS_T"] * 1e6
+        return self._last_us is not None and now_us - self._last_us <= timeout_us
 
     def are_overriding(self, now_us: int) -> bool:
         """Whether a stick moves faster than MAN_OVERRIDE_SPD (half travels/s; negative: never).
 
         As in PX4, a low pass of 0.1 s filters the speed.
         """
-        limit = self._parameters["MAN_OVERRIDE_SPD"]
-        if limit < 0.0 or not isfinite(limit) or not self.present(now_us):
+        max_speed = self._parameters["MAN_OVERRIDE_SPD"]
+        if max_speed < 0.0 or not isfinite(max_speed) or not self.present(now_us):
             return False
-        return any(abs(speed) > limit for speed in self._speeds)
+        return any(abs(speed) > max_speed for speed in self._speeds)

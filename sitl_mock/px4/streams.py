@@ -20,7 +20,7 @@ MISS_PROBABILITY = 0.22
 one flight, 0.23 in another)."""
 
 VALUE_PERIOD_US = {LOCAL_POSITION_NED: 8000}
-"""Message id -> period of new values, us; unless rates are exact, a value is not sent twice."""
+"""Message id -> period of new values, us; without `exact_rates`, no value is sent twice."""
 
 
 class _Stream:
@@ -46,11 +46,12 @@ class Px4Streams:
     """
 
     def __init__(self, rates: Mapping[int, float], *, random: Random | None) -> None:
-        self._defaults = {message: round(1e6 / hz) for message, hz in rates.items()}
+        self._boot_intervals_us = {message_id: round(1e6 / hz) for message_id, hz in rates.items()}
         self._random = random
-        self._slot_before_us: int | None = None
+        self._last_slot_us: int | None = None
         self._streams = {
-            message: _Stream(message, interval, 0) for message, interval in self._defaults.items()
+            message_id: _Stream(message_id, interval_us, 0)
+            for message_id, interval_us in self._boot_intervals_us.items()
         }
 
     def set_interval(self, message_id: int, interval_us: float, now_us: int) -> str | None:
@@ -63,7 +64,7 @@ class Px4Streams:
             return "the rate of HEARTBEAT is fixed"
         interval = round(interval_us)
         if interval == 0:
-            interval = self._defaults.get(message_id, -1)
+            interval = self._boot_intervals_us.get(message_id, -1)
         if interval < 0:
             self._streams.pop(message_id, None)
         else:
@@ -81,7 +82,7 @@ class Px4Streams:
         CURRENT_MODE is sent at most once per publication of the vehicle status, the latest of which
         was at ``status_us`` (measured: 2 Hz of 20 Hz requested).
         """
-        due = []
+        due_ids = []
         for stream in self._streams.values():
             late_us = slot_us - stream.due_us
             if late_us < 0:
@@ -91,13 +92,13 @@ class Px4Streams:
             if nothing_new or self._misses_slot(stream, slot_us):
                 continue
             # Keep the phase while the stream is nearly on time, else restart it.
-            on_time = 2 * late_us < stream.interval_us
-            stream.due_us = (stream.due_us if on_time else slot_us) + stream.interval_us
+            nearly_on_time = 2 * late_us < stream.interval_us
+            stream.due_us = (stream.due_us if nearly_on_time else slot_us) + stream.interval_us
             stream.sent_us = slot_us
             stream.status_us = status_us
-            due.append(message_id)
-        self._slot_before_us = slot_us
-        return due
+            due_ids.append(message_id)
+        self._last_slot_us = slot_us
+        return due_ids
 
     def _misses_slot(self, stream: _Stream, slot_us: int) -> bool:
         """Whether a due message misses the slot at ``slot_us``."""
@@ -105,5 +106,5 @@ class Px4Streams:
             return False
         if slot_us % VALUE_PERIOD_US.get(stream.message_id, 1):
             return True
-        in_slot_before = stream.sent_us is not None and stream.sent_us == self._slot_before_us
-        return in_slot_before and self._random.random() < MISS_PROBABILITY
+        sent_in_last_slot = stream.sent_us is not None and stream.sent_us == self._last_slot_us
+        return sent_in_last_slot and self._random.random() < MISS_PROBABILITY

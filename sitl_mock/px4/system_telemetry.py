@@ -31,7 +31,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         state: the autopilot's state.
         origin: origin of the local frame.
         identity: content of AUTOPILOT_VERSION.
-        vehicle: the vehicle, for its battery.
+        vehicle: the simulated vehicle, whose battery is reported.
         stream: the offboard setpoints.
     """
 

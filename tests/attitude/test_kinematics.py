@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 from companion.attitude.kinematics import (
     cos_tilt,
     heading_of,
-    into_body,
     law_weight,
     levelling_rates,
     rates_to_speed,
+    rotate_to_heading,
     speed_to_rates,
     split,
     tilt_angle,
@@ -101,7 +101,7 @@ def test_the_rates_for_a_speed_make_it_and_keep_the_heading():
 def test_horizontal_rates_are_seen_from_the_heading():
     for heading, r_x, r_y in RATES.tolist():
         seen = Rotation.from_euler("Z", heading).inv().apply([r_x, r_y, 0.0])
-        found = into_body(math.cos(heading), math.sin(heading), r_x, r_y)
+        found = rotate_to_heading(math.cos(heading), math.sin(heading), r_x, r_y)
         assert found == pytest.approx(seen[:2], abs=1e-14)
 
 

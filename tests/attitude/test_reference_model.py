@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from companion.attitude import Coefficients, Limits, Target
-from companion.attitude.kinematics import into_body
+from companion.attitude.kinematics import rotate_to_heading
 from companion.attitude.limits import make_constants
 from companion.attitude.reference_model import (
     ReferenceModel,
@@ -164,7 +164,7 @@ def test_its_rates_move_the_attitude_along_it():
     rng = np.random.default_rng(4)
     for north, east, heading, *speed in rng.uniform(-0.65, 0.65, (50, 5)) * [1, 1, 4.8, 2, 2]:
         r_x, r_y, r_z = rates_along(north, east, *speed)
-        rates = (*into_body(np.cos(heading), np.sin(heading), r_x, r_y), r_z)
+        rates = (*rotate_to_heading(np.cos(heading), np.sin(heading), r_x, r_y), r_z)
         r = attitudes((north, east), heading)
         h = 1e-5
         ahead, behind = held(r, [rates], h), held(r, [rates], -h)

@@ -81,7 +81,7 @@ def test_it_flies_as_the_planner_and_the_lags_do_in_python(planner, targets, nam
     flight = fly_steps(planner, LOOPS[name], start, targets, EVERY)
     assert np.abs(path).max() > 0.25
     assert flight.coefficients == pytest.approx(path, abs=1e-10)
-    assert flight.commanded == pytest.approx(commanded, abs=1e-9)
+    assert flight.commanded_rates == pytest.approx(commanded, abs=1e-9)
     assert flight.q == pytest.approx(end, abs=1e-10)
 
 
@@ -96,7 +96,7 @@ def test_its_figures_are_those_that_a_flight_measures(planner, targets):
     assert figures.model_deviation_max == pytest.approx(measured.model_deviation_max, rel=1e-9)
     assert figures.time_constant_north == pytest.approx(measured.time_constant_north_s, rel=1e-3)
     assert figures.time_constant_east == pytest.approx(measured.time_constant_east_s, rel=1e-3)
-    tilt_rates = np.hypot(flight.commanded[:, 0], flight.commanded[:, 1])
+    tilt_rates = np.hypot(flight.commanded_rates[:, 0], flight.commanded_rates[:, 1])
     assert figures.rate_max == pytest.approx(tilt_rates.max())
     assert figures.rate_rms == pytest.approx(np.sqrt(np.mean(tilt_rates**2)))
 

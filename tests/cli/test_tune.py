@@ -9,7 +9,7 @@ import yaml
 from companion.cli import tune as command
 from companion.cli.main import main
 from companion.config.files import load, shipped
-from companion.tuning.flights import COURSES, CourseResult
+from companion.tuning.flights import TRIAL_FLIGHTS, TrialResult
 from tests.tuning.test_noise import Log, flown, white
 
 
@@ -119,22 +119,22 @@ def test_what_is_no_flight_folder_needs_a_vehicle_file(tmp_path, capsys):
 def test_both_configurations_are_flown_on_each_course_and_told(vehicle, capsys, monkeypatch):
     asked = []
 
-    def fly(config, course, autopilot):
-        asked.append((course.name, autopilot, config.planner.gain_per_s))
+    def fly(config, trial, autopilot):
+        asked.append((trial.name, autopilot, config.planner.gain_per_s))
         ok = len(asked) != 2
         return (
-            CourseResult("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
+            TrialResult("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
             if ok
-            else CourseResult("the fence was left")
+            else TrialResult("the fence was left")
         )
 
-    monkeypatch.setattr(command, "fly_course", fly)
+    monkeypatch.setattr(command, "fly_trial", fly)
     config = vehicle.with_name("my.yaml")
     config.write_text("guidance: {drag_per_s: 1.0}\nplanner: {gain_per_s: 4.0}\n")
     code, out, error = run(capsys, vehicle, "--config", config, "--json")
     assert code == 1  # a flight with the proposal failed
     figures = json.loads(out.splitlines()[-1])
-    names = [course.name for course in COURSES]
+    names = [trial.name for trial in TRIAL_FLIGHTS]
     assert [each[0] for each in asked] == [name for name in names for _ in range(2)]
     assert {each[1] for each in asked} == {"px4"}
     assert [each[2] == 4.0 for each in asked[:2]] == [True, False]

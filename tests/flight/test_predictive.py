@@ -14,7 +14,7 @@ from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.guidance.trajectory import Laps, circle
 from companion.mavlink import lockstep
-from companion.nmpc import Answer, Start, Status, Trouble, Vehicle
+from companion.nmpc import Answer, Start, Status, Trouble, VehicleSnapshot
 from tests.flight.sockets import mock_vehicle, session_for
 from tests.flight.test_tracking import following
 
@@ -95,7 +95,7 @@ class FakeSolver:
     def __init__(self, report):
         self.report, self.answer, self.requests = report, None, []
 
-    def take(self, wait):
+    def take_answer(self, wait):
         answer, self.answer = self.answer, None
         return answer
 
@@ -113,7 +113,7 @@ def bench():
 
 
 def vehicle(time):
-    return Vehicle(
+    return VehicleSnapshot(
         time, (0.0, 0.0, -5.0), (0.0,) * 3, (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
     )
 

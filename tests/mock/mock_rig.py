@@ -84,7 +84,7 @@ class Rig:
             self.run(0.004)
 
     def _take(self) -> None:
-        self._frames += [(self.time, frame) for frame in self.simulation.companion.take()]
+        self._frames += [(self.time, frame) for frame in self.simulation.companion.take_frames()]
 
     def _decoded(self, frame: bytes) -> list[Any]:
         return decode(frame)

@@ -88,7 +88,7 @@ class Script:
         self.rig.say(message_type(**filled))
 
     def _take(self) -> None:
-        frames = self.rig.simulation.companion.take()
+        frames = self.rig.simulation.companion.take_frames()
         if self.rig.time < self.here(self.recording["from_s"]):
             return  # nobody recorded it
         for frame in frames:

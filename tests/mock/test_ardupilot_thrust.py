@@ -8,7 +8,7 @@ import pytest
 from sitl_mock.ardupilot.defaults import AIRFRAME
 from sitl_mock.ardupilot.hold import ClimbProfile, approach_speed
 from sitl_mock.ardupilot.thrust import (
-    angle_boosted,
+    angle_boosted_thrust,
     climb_rate_of_setpoint,
     specific_thrust,
     thrust_of_setpoint,
@@ -61,8 +61,10 @@ def test_thrust_as_a_climb_rate(asked, climb):
 
 
 def test_the_boost_divides_by_the_cosine_of_the_tilt_and_ends_upside_down():
-    assert angle_boosted(0.364, cos(radians(25.0))) * cos(radians(25.0)) == pytest.approx(0.364)
-    assert angle_boosted(0.364, 0.0) == angle_boosted(0.364, -0.5) == 0.0
+    assert angle_boosted_thrust(0.364, cos(radians(25.0))) * cos(radians(25.0)) == pytest.approx(
+        0.364
+    )
+    assert angle_boosted_thrust(0.364, 0.0) == angle_boosted_thrust(0.364, -0.5) == 0.0
 
 
 def test_a_climb_gathers_speed_no_faster_than_its_limit():

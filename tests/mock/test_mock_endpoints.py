@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.section import ConfigError
 from sitl_mock.link.byte_stream import ByteStream
-from sitl_mock.link.framing import Framer, decode, split
+from sitl_mock.link.framing import Framer, decode, split_frames
 from sitl_mock.link.serial_endpoint import SerialEndpoint
 from sitl_mock.link.tcp_endpoint import TcpEndpoint
 from sitl_mock.link.udp_endpoint import UdpEndpoint
@@ -99,7 +99,7 @@ def test_a_full_line_drops_whole_frames_and_cuts_none():
                 heard += theirs.recv(1 << 20)
             except BlockingIOError:
                 stream.send([])
-        whole, rest = split(bytes(heard))
+        whole, rest = split_frames(bytes(heard))
         assert set(whole) <= set(frames)
         assert (b"".join(whole), rest) == (bytes(heard), b"")
         assert len(whole) < 100 * len(frames)

@@ -157,7 +157,7 @@ def test_only_mavlink_2_leaves_even_for_a_version_1_client():
         rig.simulation.handle(message, link)
     for _ in range(25):
         rig.simulation.tick()
-    frames = link.take()
+    frames = link.take_frames()
     assert len(frames) > 10
     assert {frame[0] for frame in frames} == {0xFD}
 

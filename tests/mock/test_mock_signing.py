@@ -41,7 +41,7 @@ def test_what_it_signs_pymavlink_accepts(tmp_path):
     judge = dialect.MAVLink(None)
     judge.signing.secret_key = KEY
     rig.simulation.boot()
-    frames = rig.simulation.companion.take()
+    frames = rig.simulation.companion.take_frames()
     assert len(frames) > 5
     for frame in frames:
         assert judge.decode(bytearray(frame)).get_link_id() == 5

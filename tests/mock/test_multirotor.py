@@ -7,7 +7,7 @@ import pytest
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
-from sitl_mock.physics.multirotor_step import sinks
+from sitl_mock.physics.multirotor_step import does_not_rise
 
 AIRFRAME = AirframeConfig(drag_n_s_per_m=0.0)
 LEVEL = (1.0, 0.0, 0.0, 0.0)
@@ -43,7 +43,7 @@ def test_more_thrust_than_there_is_is_full_throttle():
 def test_it_sinks_below_its_weight_and_lifts_above(factor):
     standing = multirotor(factor * AIRFRAME.gravity_m_s2)
     load = standing.drive(REST, standing.throttle(factor * AIRFRAME.gravity_m_s2))
-    assert sinks(standing.law, standing.body, load) == (factor < 1.0)
+    assert does_not_rise(standing.law, standing.body, load) == (factor < 1.0)
 
 
 @pytest.mark.parametrize("throttle", [nan, 0.0, -1.0])

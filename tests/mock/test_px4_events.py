@@ -7,7 +7,7 @@ import pytest
 from mock_rig import ACCEPTED, TEMPORARILY_REJECTED, Rig
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.link.framing import Framer, decode, split
+from sitl_mock.link.framing import Framer, decode, split_frames
 from sitl_mock.px4.events import PX4_EVENTS
 
 EVENT, SEQUENCE, ERROR = 410, 411, 413
@@ -172,7 +172,7 @@ def test_a_stream_of_bytes_is_split_into_its_frames():
     data = b"\x00noise" + frames[0] + frames[1] + b"\xfe" + frames[2] + frames[3]
     whole, rest = [], b""
     for start in range(0, len(data), 7):
-        found, rest = split(rest + data[start : start + 7])
+        found, rest = split_frames(rest + data[start : start + 7])
         whole += found
     sequences = [message.seq for frame in whole for message in decode(frame)]
     assert sequences[:2] == [0, 1]

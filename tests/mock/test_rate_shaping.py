@@ -26,7 +26,7 @@ from sitl_mock.physics.multirotor_step import (
     multirotor_law,
     steady_throttle,
 )
-from sitl_mock.physics.rate_shaping import NOT_SHAPED, shape, shaping_law, sqrt_controller
+from sitl_mock.physics.rate_shaping import INACTIVE_SHAPING, shape, shaping_law, sqrt_controller
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings, load_settings
 
@@ -139,7 +139,7 @@ def test_the_shaped_rate_never_changes_faster_than_the_limit(axis):
     axes = RateLoopConfig.ardupilot().shaping
     law = shaping_law(tuple(a.model_copy(update={"attitude_gain_1_s": 0.0}) for a in axes), DT)
     rng = np.random.default_rng(4)
-    shaped, state = [0.0], NOT_SHAPED
+    shaped, state = [0.0], INACTIVE_SHAPING
     for _ in range(100):
         goals = vector(axis, rng.uniform(-4.0, 4.0))
         for _ in range(rng.integers(1, 300)):
@@ -162,7 +162,7 @@ def test_the_angle_reached_is_the_integral_of_the_command(axis, rate):
 def test_the_attitude_target_and_what_it_asks_of_the_body_about_all_axes():
     """Against SciPy: the setpoints integrated, and seen from a body that does not move."""
     axis = AxisShaping(acceleration_limit_rad_s2=1e6)  # so that angles are closed in proportion
-    law, state = shaping_law((axis, axis, axis), DT), NOT_SHAPED
+    law, state = shaping_law((axis, axis, axis), DT), INACTIVE_SHAPING
     body = Rotation.from_euler("ZYX", [0.7, -0.3, 0.2])
     x, y, z, w = body.as_quat()
     target = body

@@ -8,18 +8,18 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Coefficients, InvalidQuaternionError, attitude
-from companion.nmpc import Input, Settings, Vehicle
+from companion.nmpc import ControlInput, Settings, VehicleSnapshot
 from companion.nmpc.prediction import Predictor, TiltedTooFarError, motion_of
 from tests.nmpc import rigid
 
 SETTINGS = Settings(gravity=rigid.GRAVITY, dead_time=0.05, gain=4.0, lag=0.08, yaw_gain=1.5)
 INPUTS = (
-    Input(9.90, 0.3, 0.1, 0.2, 11.0),
-    Input(9.96, -0.2, 0.3, 0.1, 9.0),
-    Input(9.98, 0.1, -0.4, -0.3, 12.0),
-    Input(10.00, 0.4, 0.2, 0.5, 8.0),
+    ControlInput(9.90, 0.3, 0.1, 0.2, 11.0),
+    ControlInput(9.96, -0.2, 0.3, 0.1, 9.0),
+    ControlInput(9.98, 0.1, -0.4, -0.3, 12.0),
+    ControlInput(10.00, 0.4, 0.2, 0.5, 8.0),
 )
-VEHICLE = Vehicle(
+VEHICLE = VehicleSnapshot(
     10.0,
     (1.0, -2.0, -5.0),
     (3.0, 1.0, -0.5),
@@ -66,7 +66,7 @@ def test_a_target_beyond_the_tilt_limit_acts_as_the_planner_shortens_it():
     settings = Settings(max_tilt=radians(30.0))
     level = VEHICLE._replace(q=(1.0, 0.0, 0.0, 0.0), body_rates=BodyRates(0.0, 0.0, 0.0))
     long, short = (
-        Predictor(settings).predict(level, (Input(9.0, length, 0.0, 0.0, 9.8),), 10.3)
+        Predictor(settings).predict(level, (ControlInput(9.0, length, 0.0, 0.0, 9.8),), 10.3)
         for length in (5.0, sin(radians(30.0)))
     )
     assert long == pytest.approx(short)

@@ -16,7 +16,16 @@ from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
 from companion.extras import MissingExtraError
 from companion.guidance.trajectory.figures import Hover, Laps, circle
-from companion.nmpc import Input, Request, Settings, Solver, Start, Trouble, Vehicle, process
+from companion.nmpc import (
+    ControlInput,
+    Request,
+    Settings,
+    Solver,
+    Start,
+    Trouble,
+    VehicleSnapshot,
+    process,
+)
 from companion.nmpc.messages import (
     Answer,
     Status,
@@ -66,8 +75,10 @@ def request(number, **changes):
     time = 6.0 + 0.02 * number
     sample = CIRCLE.at(time)
     rest = BodyRates(0.0, 0.0, 0.0)
-    vehicle = Vehicle(time, sample.position, sample.velocity, (1.0, 0.0, 0.0, 0.0), rest, drag=DRAG)
-    inputs = tuple(Input(time - 0.02 * k, 0.01 * k, 0.0, 0.1, 9.8) for k in range(5, 0, -1))
+    vehicle = VehicleSnapshot(
+        time, sample.position, sample.velocity, (1.0, 0.0, 0.0, 0.0), rest, drag=DRAG
+    )
+    inputs = tuple(ControlInput(time - 0.02 * k, 0.01 * k, 0.0, 0.1, 9.8) for k in range(5, 0, -1))
     vehicle = vehicle._replace(**changes)
     return Request(number, vehicle, time, Start((0.0, 0.0, 0.0)), inputs)
 
@@ -97,7 +108,7 @@ def test_what_is_sent_is_what_arrives():
 
 def test_an_answer_is_that_of_the_same_worker_here(flight):
     flight.solver.request(request(1))
-    found = flight.solver.take(LONG)
+    found = flight.solver.take_answer(LONG)
     worker = Worker(SETTINGS, CIRCLE)
     worker.warm_up()
     wanted = worker.answer(request(1))
@@ -112,10 +123,10 @@ def test_an_answer_is_handed_out_once_and_nothing_blocks(flight):
     child = flight.child()
     child.suspend()
     flight.solver.request(request(2))
-    assert flight.solver.take() is None
+    assert flight.solver.take_answer() is None
     child.resume()
-    assert flight.solver.take(LONG).number == 2
-    assert flight.solver.take() is None
+    assert flight.solver.take_answer(LONG).number == 2
+    assert flight.solver.take_answer() is None
     assert not flight.troubles
 
 
@@ -125,20 +136,20 @@ def test_what_was_asked_before_is_late_and_its_answer_is_not_taken_for_the_next(
     flight.solver.request(request(4))
     flight.solver.request(request(5))
     child.resume()
-    assert flight.solver.take(LONG).number == 5
+    assert flight.solver.take_answer(LONG).number == 5
     assert flight.kinds == [Trouble.LATE]
     assert "request 4 was not answered before the next one" in flight.troubles[0][1]
 
 
 def test_a_vehicle_upside_down_is_a_failure_and_the_next_is_not(flight):
     flight.solver.request(request(6, q=(0.0, 1.0, 0.0, 0.0)))
-    assert flight.solver.take(LONG) is None
+    assert flight.solver.take_answer(LONG) is None
     flight.solver.request(request(7, position=(nan, 0.0, 0.0)))
-    assert flight.solver.take(LONG) is None
+    assert flight.solver.take_answer(LONG) is None
     assert flight.kinds == [Trouble.FAILED, Trouble.FAILED]
     assert "tilted too far" in flight.troubles[0][1]
     flight.solver.request(request(8))
-    assert flight.solver.take(LONG).number == 8
+    assert flight.solver.take_answer(LONG).number == 8
 
 
 @pytest.mark.parametrize(
@@ -155,7 +166,7 @@ def test_an_absurd_answer_is_not_handed_out(flight, monkeypatch, changes, words)
         process, "unpack_answer", lambda message: unpack_answer(message)._replace(**changes)
     )
     flight.solver.request(request(9))
-    assert flight.solver.take(LONG) is None
+    assert flight.solver.take_answer(LONG) is None
     assert flight.kinds == [Trouble.IMPLAUSIBLE]
     assert words in flight.troubles[0][1]
 
@@ -165,7 +176,7 @@ def test_a_tilt_beyond_the_limit_is_not_absurd_while_the_vehicle_has_it(flight, 
         process, "unpack_answer", lambda message: unpack_answer(message)._replace(north=0.8, east=0)
     )
     flight.solver.request(request(10, q=attitude(Coefficients(0.8, 0.0), 0.0)))
-    assert flight.solver.take(LONG).number == 10
+    assert flight.solver.take_answer(LONG).number == 10
 
 
 def test_no_answer_within_the_deadline_is_late_once():
@@ -174,20 +185,20 @@ def test_no_answer_within_the_deadline_is_late_once():
         child = flight.child()
         child.suspend()
         flight.solver.request(request(1))
-        assert flight.solver.take() is None
+        assert flight.solver.take_answer() is None
         assert not flight.troubles
-        assert flight.solver.take(0.6) is None
-        assert flight.solver.take() is None
+        assert flight.solver.take_answer(0.6) is None
+        assert flight.solver.take_answer() is None
         assert flight.kinds == [Trouble.LATE]
         child.resume()
         flight.solver.request(request(2))  # the late answer to the first comes before its answer
-        assert flight.solver.take(LONG).number == 2
+        assert flight.solver.take_answer(LONG).number == 2
 
 
 def test_an_answer_after_the_deadline_is_late_however_soon_it_is_taken():
     with Flight(replace(SETTINGS, deadline=1e-6)) as flight:
         flight.warm().solver.request(request(1))
-        assert flight.solver.take(LONG) is None
+        assert flight.solver.take_answer(LONG) is None
         assert flight.kinds == [Trouble.LATE]
         assert "took" in flight.troubles[0][1]
 
@@ -197,11 +208,11 @@ def test_a_killed_process_is_noticed_at_once_and_nothing_is_asked_of_it():
         flight.warm().solver.request(request(1))
         os.kill(flight.solver.pid, signal.SIGKILL)
         while flight.solver.alive:
-            assert flight.solver.take(LONG) is None
+            assert flight.solver.take_answer(LONG) is None
         assert flight.kinds == [Trouble.DIED]
         assert "ended by signal 9" in flight.troubles[0][1]
         flight.solver.request(request(2))
-        assert flight.solver.take() is None
+        assert flight.solver.take_answer() is None
         assert not flight.solver.ready
         assert flight.kinds == [Trouble.DIED]
 
@@ -221,7 +232,7 @@ def test_it_is_less_urgent_than_the_flight_and_goes_with_it():
         assert child.nice() == min(19, psutil.Process().nice() + 7)
         child.send_signal(signal.SIGINT)  # the terminal sends it to both
         flight.solver.request(request(1))
-        assert flight.solver.take(LONG) is not None
+        assert flight.solver.take_answer(LONG) is not None
         flight.solver.close()
         assert not child.is_running()
         flight.solver.close()

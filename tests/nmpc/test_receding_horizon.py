@@ -28,7 +28,7 @@ def nodes(settings, time):
     start = Start((0.0, 0.0, 0.0))
     return [
         node_of(
-            CIRCLE.at(time + k * settings.step),
+            CIRCLE.at(time + k * settings.step_duration),
             start,
             0.0,
             DRAG,
@@ -85,7 +85,7 @@ def test_the_cost_is_the_weighted_square_of_the_error_over_the_horizon_and_at_it
     settings = Settings(weights=weights, horizon=0.8, steps=16, max_thrust=50.0)
     model, ahead = coefficient_model(settings), nodes(settings, STEADY)
     program = transcribe(model, settings)
-    residual = ca.Function("r", [program.unknown, program.parameters], [program.residual])
+    residual = ca.Function("r", [program.unknowns, program.parameters], [program.residual])
     constants = model.constants_of(CONDITIONS, on_circle(STEADY))
     parameters = parameters_of(
         constants, ahead, [model.attitude_reference_of(node) for node in ahead]

@@ -8,7 +8,7 @@ import pytest
 from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
 from companion.guidance.trajectory.figures import Hover, Laps, circle
-from companion.nmpc import Input, Request, Settings, Start, Status, Vehicle
+from companion.nmpc import ControlInput, Request, Settings, Start, Status, VehicleSnapshot
 from companion.nmpc.reference import node_of
 from companion.nmpc.worker import Worker
 
@@ -32,7 +32,7 @@ def test_it_plans_for_when_the_answer_acts_on_where_the_vehicle_is_then():
     inputs = []
     for k in range(30, 0, -1):
         _, led = wanted(at - 0.02 * k + SETTINGS.dead_time)
-        inputs.append(Input(-0.02 * k, *led, 0.0, node.thrust))
+        inputs.append(ControlInput(-0.02 * k, *led, 0.0, node.thrust))
     q = attitude(Coefficients(node.north, node.east), 0.0)
     # At the speed that its coefficients have on the circle: these body rates, by differences.
     later = attitude(Coefficients(wanted(at + 1e-4)[0].north, wanted(at + 1e-4)[0].east), 0.0)
@@ -43,7 +43,7 @@ def test_it_plans_for_when_the_answer_acts_on_where_the_vehicle_is_then():
         w * later[3] - z * later[0] - x * later[2] + y * later[1],
     )
     rates = BodyRates(*(2.0 * v / 1e-4 for v in turn))
-    vehicle = Vehicle(0.0, node.position, node.velocity, q, rates, drag=DRAG)
+    vehicle = VehicleSnapshot(0.0, node.position, node.velocity, q, rates, drag=DRAG)
     start = Start((0.0, 0.0, 0.0))
     answer = Worker(SETTINGS, CIRCLE).answer(Request(1, vehicle, at, start, tuple(inputs)))
     assert answer.status is Status.SOLVED
@@ -58,7 +58,7 @@ def test_it_plans_for_when_the_answer_acts_on_where_the_vehicle_is_then():
 def test_tilted_beyond_a_limit_that_it_cannot_return_to_at_once_it_still_plans():
     settings = Settings(max_tilt=0.4, max_tilt_rate=0.5)
     q = attitude(Coefficients(0.7, 0.0), 0.0)
-    vehicle = Vehicle(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), q, STILL)
+    vehicle = VehicleSnapshot(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), q, STILL)
     answer = Worker(settings, Hover(9.0)).answer(
         Request(1, vehicle, 1.0, Start((0.0, 0.0, 0.0)), ())
     )
@@ -70,7 +70,7 @@ def test_tilted_beyond_a_limit_that_it_cannot_return_to_at_once_it_still_plans()
 def test_a_held_heading_is_laid_out_from_the_start_and_found_the_short_way(turned):
     settings = replace(SETTINGS, dead_time=0.0, max_yaw_rate=5.0)
     q = attitude(Coefficients(0.0, 0.0), turned + radians(3.0))
-    vehicle = Vehicle(0.0, (1.0, 2.0, -3.0), (0.0, 0.0, 0.0), q, STILL)
+    vehicle = VehicleSnapshot(0.0, (1.0, 2.0, -3.0), (0.0, 0.0, 0.0), q, STILL)
     answer = Worker(settings, Hover(9.0)).answer(
         Request(1, vehicle, 1.0, Start((1.0, 2.0, -3.0), turned), ())
     )
@@ -81,7 +81,7 @@ def test_a_held_heading_is_laid_out_from_the_start_and_found_the_short_way(turne
 
 
 def test_wind_is_leant_against():
-    vehicle = Vehicle(
+    vehicle = VehicleSnapshot(
         0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), attitude(Coefficients(-0.1, 0.0), 0.0), STILL
     )
     blown = vehicle._replace(disturbance=(0.1 * 9.80665, 0.0, 0.0))

@@ -12,11 +12,11 @@ from companion.tuning import flights, propose
 from companion.tuning.flights import (
     CIRCLE,
     CIRCLE_IN_GUSTS,
-    COURSES,
     EIGHT,
     EIGHT_IN_GUSTS,
-    autopilot_like,
-    fly_course,
+    TRIAL_FLIGHTS,
+    fly_trial,
+    matching_autopilot,
 )
 
 LIMITS = {"max_tilt_deg": 54.0, "max_tilt_rate_deg_s": 135.0}
@@ -43,8 +43,8 @@ def started(autopilot, factor=1.0):
 
 def test_in_gusts_the_error_is_much_smaller():
     config = started("px4")
-    before = fly_course(config, CIRCLE_IN_GUSTS, "px4")
-    after = fly_course(propose(config).tuned, CIRCLE_IN_GUSTS, "px4")
+    before = fly_trial(config, CIRCLE_IN_GUSTS, "px4")
+    after = fly_trial(propose(config).tuned, CIRCLE_IN_GUSTS, "px4")
     assert before.ok, before
     assert after.ok, after
     assert after.reported <= 0.85 * before.reported
@@ -58,8 +58,8 @@ def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts():
     mock = load(shipped("mock-ardupilot.yaml"))
     keys = {"vehicle": vehicle, "guidance": drag, "limits": LIMITS}
     config = changed(mock, keys, "as `identify` writes it")
-    before = fly_course(config, EIGHT_IN_GUSTS, "ardupilot", seed=5)
-    after = fly_course(propose(config).tuned, EIGHT_IN_GUSTS, "ardupilot", seed=5)
+    before = fly_trial(config, EIGHT_IN_GUSTS, "ardupilot", seed=5)
+    after = fly_trial(propose(config).tuned, EIGHT_IN_GUSTS, "ardupilot", seed=5)
     assert before.ok, before
     assert after.ok, after
     assert after.reported < 0.15
@@ -69,7 +69,7 @@ def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts():
 def test_a_pilots_small_limits_are_kept_and_slow_the_course_down():
     limits = {"max_tilt_deg": 20.0, "max_tilt_rate_deg_s": 45.0}
     config = changed(started("px4"), {"limits": limits}, "test")
-    flight = fly_course(config, EIGHT, "px4")
+    flight = fly_trial(config, EIGHT, "px4")
     assert flight.ok, flight
     assert 1.0 < flight.speed < 4.5
     assert flight.rate < radians(45.0)
@@ -80,10 +80,10 @@ def test_a_configuration_without_drag_leaves_the_tilt_that_the_mock_vehicles_dra
     """With the drag unknown, the circle needed more tilt than allowed: the error was 1.2 m."""
     config = load(shipped("px4.yaml"))
     assert config.guidance.drag is None
-    flight = fly_course(config, CIRCLE, "px4")
+    flight = fly_trial(config, CIRCLE, "px4")
     assert flight.ok, flight
     assert flight.reported < 0.1
-    in_gusts = fly_course(config, CIRCLE_IN_GUSTS, "px4")
+    in_gusts = fly_trial(config, CIRCLE_IN_GUSTS, "px4")
     assert in_gusts.ok, in_gusts
     assert 1.5 < in_gusts.wind < 3.0  # 25 degrees do not hold against gusts of 5 m/s
     assert in_gusts.reported < 0.3
@@ -91,8 +91,8 @@ def test_a_configuration_without_drag_leaves_the_tilt_that_the_mock_vehicles_dra
 
 
 def test_the_mock_vehicle_is_like_the_identified_one():
-    assert autopilot_like(started("px4")) == "px4"
-    assert autopilot_like(started("ardupilot")) == "ardupilot"
+    assert matching_autopilot(started("px4")) == "px4"
+    assert matching_autopilot(started("ardupilot")) == "ardupilot"
 
 
 @pytest.mark.slow
@@ -100,8 +100,8 @@ def test_the_mock_vehicle_is_like_the_identified_one():
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_it_flies_with_lag_and_dead_time_wrong_by_30_percent(autopilot, factor):
     tuned = propose(started(autopilot, factor)).tuned
-    for course in COURSES:
-        result = fly_course(tuned, course, autopilot)
+    for trial in TRIAL_FLIGHTS:
+        result = fly_trial(tuned, trial, autopilot)
         assert result.ok, result
         assert result.reported <= 0.2
 
@@ -111,6 +111,6 @@ def test_a_flight_that_fails_is_told_with_its_reason(monkeypatch):
         result = "the fence was left"
 
     monkeypatch.setattr(flights, "fly", lambda *_: Failed())
-    told = fly_course(load(shipped("mock-px4.yaml")), EIGHT, "px4")
+    told = fly_trial(load(shipped("mock-px4.yaml")), EIGHT, "px4")
     assert not told.ok
     assert told.result == "the fence was left"

@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
 from companion.tuning import ModelError, propose, stability
-from companion.tuning.flights import CourseResult
+from companion.tuning.flights import TrialResult
 from companion.tuning.margins import Margins
 from companion.tuning.search import largest_gain
 from companion.tuning.writing import _error_text, proposal_text, summary_lines
@@ -60,8 +60,8 @@ def test_the_margins_are_those_of_a_rate_loop_of_second_order():
 def test_a_vehicle_that_slews_slowly_gets_a_lower_gain_and_weight():
     quick, slow = (propose(vehicle(20.0, 15.0, slew)).design for slew in (None, 500.0))
     assert slow.gain < 0.9 * quick.gain
-    assert slow.position < 0.3 * quick.position
-    assert slow.position < quick.position
+    assert slow.position_weight < 0.3 * quick.position_weight
+    assert slow.velocity_weight < 0.7 * quick.velocity_weight
 
 
 def test_an_unknown_vehicle_is_refused():
@@ -98,10 +98,10 @@ def test_a_vehicle_without_good_values_is_refused(monkeypatch):
 
 def test_flights_stand_in_the_text_with_their_errors_or_their_reasons():
     proposal = propose(VEHICLES["px4"])
-    before = CourseResult("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
-    after = CourseResult("ok", 0.1, 0.2, 0.1, 0.5, 0.0, 5.0)
+    before = TrialResult("ok", 0.2, 0.3, 0.1, 0.5, 0.0, 5.0)
+    after = TrialResult("ok", 0.1, 0.2, 0.1, 0.5, 0.0, 5.0)
     lines = summary_lines(
-        proposal, {"circle": (before, after), "eight": (before, CourseResult("lost"))}
+        proposal, {"circle": (before, after), "eight": (before, TrialResult("lost"))}
     )
     assert lines[-1] == "eight: ok -> lost"
     assert lines[-2].startswith("circle, flown at up to 5.0 m/s: reported 0.200 -> 0.100, true ")
@@ -126,14 +126,14 @@ def test_each_error_of_the_model_has_its_words():
     assert _error_text(ModelError(time_factor=0.7)) == "with lag and dead time 30 % smaller"
 
 
-FLOWN = CourseResult("ok", true=0.134, reported=0.1, speed=5.0)
+FLOWN = TrialResult("ok", true=0.134, reported=0.1, speed=5.0)
 
 
 @pytest.mark.parametrize(
     ("after", "said"),
     [
         (replace(FLOWN, true=0.910), "the circle 0.134 -> 0.910 m"),
-        (CourseResult("no attitude"), "the circle no attitude"),
+        (TrialResult("no attitude"), "the circle no attitude"),
         (replace(FLOWN, true=0.140), None),  # flights differ by that
     ],
 )
@@ -148,7 +148,7 @@ def test_a_proposal_that_flies_worse_says_so_first(after, said):
 
 
 def test_a_course_that_no_values_fly_to_its_end_is_not_called_worse():
-    proposal, lost = propose(VEHICLES["px4"]), CourseResult("no attitude")
+    proposal, lost = propose(VEHICLES["px4"]), TrialResult("no attitude")
     opening = "DO NOT USE IT: with the proposal the mock vehicle "
     first = summary_lines(proposal, {"the circle": (lost, lost), "the eight": (FLOWN, FLOWN)})[0]
     assert first == f"{opening}failed, as it did without the proposal: the circle no attitude"

@@ -9,8 +9,7 @@ from companion.attitude.kinematics import cos_tilt, tilt_products
 from companion.drag import Drag
 from companion.guidance.reference import GRAVITY
 from companion.guidance.trajectory.sample import Vector
-from companion.nmpc import Input, Request, Start, Status
-from companion.nmpc import Vehicle as KnownState
+from companion.nmpc import ControlInput, Request, Start, Status, VehicleSnapshot
 from companion.study.lag_loop import STEP_HZ, LagBody
 from companion.study.nmpc.variants import (
     CIRCLE,
@@ -116,13 +115,13 @@ class Flight:
         self._vehicle = Vehicle()
         north, east, down = task.trajectory.at(task.begin).position
         self._start = Start((-north, -east, -down))
-        self._inputs = [Input(0.0, 0.0, 0.0, 0.0, GRAVITY)]
+        self._inputs = [ControlInput(0.0, 0.0, 0.0, 0.0, GRAVITY)]
         self._periods = 0
 
     def step(self) -> None:
         """Simulate one period: solve, and fly with the answer of the period before."""
         now, vehicle, flown_input = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
-        known_state = KnownState(
+        known_state = VehicleSnapshot(
             now,
             vehicle.position,
             vehicle.velocity,
@@ -138,7 +137,7 @@ class Flight:
         self.iterations.append(answer.iterations)
         if answer.status is Status.SOLVED:
             target = answer.north, answer.east, answer.heading
-            self._inputs.append(Input(answer.time, *target, answer.thrust))
+            self._inputs.append(ControlInput(answer.time, *target, answer.thrust))
         else:
             self.failures += 1
         vehicle.fly(

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import casadi as ca
 
-from companion.attitude.kinematics import into_body
+from companion.attitude.kinematics import rotate_to_heading
 from companion.attitude.reference_model import rates_along
 from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import attitude_of, euler_angles
@@ -240,7 +240,7 @@ def _euler_near_heading(north: float, east: float, heading: float) -> tuple[floa
 def _body_rates(node: Node) -> tuple[float, float, float]:
     """Body rates of a vehicle that follows the reference exactly, rad/s."""
     x, y, z = rates_along(node.north, node.east, node.speed_north, node.speed_east)
-    return (*into_body(cos(node.heading), sin(node.heading), x, y), z + node.heading_rate)
+    return (*rotate_to_heading(cos(node.heading), sin(node.heading), x, y), z + node.heading_rate)
 
 
 def _angle_rates(node: Node) -> tuple[float, float]:

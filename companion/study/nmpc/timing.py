@@ -10,7 +10,7 @@ from companion.attitude import BodyRates, Coefficients, attitude
 from companion.drag import Drag
 from companion.guidance.reference import GRAVITY
 from companion.guidance.trajectory.sample import Vector
-from companion.nmpc import Input, Request, Solver, Start, Status, Trouble, Vehicle
+from companion.nmpc import ControlInput, Request, Solver, Start, Status, Trouble, VehicleSnapshot
 from companion.study.nmpc.models import ModelName
 from companion.study.nmpc.variants import CIRCLE, DRAG, EIGHT, MODELS, RATE_HZ, Variant
 from companion.study.step import Floats
@@ -69,7 +69,7 @@ def count_iterations() -> ColdStarts:
 
 
 def _request_from_state(state: State) -> Request:
-    vehicle = Vehicle(
+    vehicle = VehicleSnapshot(
         0.0,
         state.position_error,
         state.velocity,
@@ -108,7 +108,7 @@ def time_process() -> ProcessTimes:
         for number in range(_REQUESTS):
             sent_at = monotonic()
             solver.request(_request_on_the_eight(number))
-            answer = solver.take(1.0)
+            answer = solver.take_answer(1.0)
             elapsed = monotonic() - sent_at
             if answer is not None:
                 answer_times.append(elapsed)
@@ -132,7 +132,7 @@ def _await_start(solver: Solver, troubles: list[tuple[Trouble, str]]) -> None:
 def _request_on_the_eight(number: int) -> Request:
     time = number / RATE_HZ
     sample = EIGHT.trajectory.at(time)
-    vehicle = Vehicle(
+    vehicle = VehicleSnapshot(
         time,
         sample.position,
         sample.velocity,
@@ -140,5 +140,7 @@ def _request_on_the_eight(number: int) -> Request:
         BodyRates(0.0, 0.0, 0.0),
         drag=Drag(DRAG),
     )
-    inputs = tuple(Input(time - k / RATE_HZ, 0.0, 0.0, 0.0, GRAVITY) for k in range(5, 0, -1))
+    inputs = tuple(
+        ControlInput(time - k / RATE_HZ, 0.0, 0.0, 0.0, GRAVITY) for k in range(5, 0, -1)
+    )
     return Request(number, vehicle, time, Start((0.0, 0.0, 0.0)), inputs)
