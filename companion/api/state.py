@@ -74,7 +74,7 @@ class NewestState:
 
     def _publish(self, _: object) -> None:
         context, guidance = self._context, self._context.guidance_loop
-        sample = context.loop.resets.newest
+        sample = context.loop.resets.newest_attitude
         try:
             motion = guidance.motion_now()
         except RuntimeError:  # no position yet

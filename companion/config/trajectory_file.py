@@ -124,8 +124,8 @@ def _table_notes(
             "csv.frame in a YAML file that names it"
         )
     notes = [axes]
-    if table.unused:
-        names = ", ".join(table.unused[:_MOST_COLUMNS_SHOWN])
+    if table.unused_columns:
+        names = ", ".join(table.unused_columns[:_MOST_COLUMNS_SHOWN])
         notes.append(f"{path.name}: these columns are not used: {names}")
     table_duration = float(table.times[-1])
     if trajectory.duration > table_duration + _SHORTEST_RAMP:

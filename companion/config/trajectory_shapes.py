@@ -7,9 +7,9 @@ from pydantic import Field, model_validator
 
 from companion.files.yaml_file import Section
 from companion.guidance.trajectory import (
-    FARTHEST,
-    FASTEST,
-    LONGEST,
+    LARGEST_COORDINATE,
+    LARGEST_SPEED,
+    LONGEST_DURATION,
     Hover,
     Laps,
     Trajectory,
@@ -23,11 +23,11 @@ from companion.guidance.trajectory import (
 )
 
 Metres = Annotated[float, Field(ge=0.01, le=1000.0)]
-Speed = Annotated[float, Field(ge=0.01, le=FASTEST)]
+Speed = Annotated[float, Field(ge=0.01, le=LARGEST_SPEED)]
 Acceleration = Annotated[float, Field(ge=0.01, le=100.0)]
 Jerk = Annotated[float, Field(ge=0.01, le=1000.0)]
 Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
-Offset = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
+Offset = Annotated[float, Field(ge=-LARGEST_COORDINATE, le=LARGEST_COORDINATE)]
 Point = tuple[Offset, Offset, Offset]
 FixedOrAlong = Literal["fixed", "along"]
 
@@ -35,7 +35,7 @@ FixedOrAlong = Literal["fixed", "along"]
 class HoverShape(Section):
     """Hover at the start."""
 
-    duration_s: Annotated[float, Field(ge=0.01, le=LONGEST)]
+    duration_s: Annotated[float, Field(ge=0.01, le=LONGEST_DURATION)]
     """Duration of the hover."""
 
     def trajectory(self) -> Trajectory:

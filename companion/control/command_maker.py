@@ -8,13 +8,13 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.heading_frame import HeadingFrame
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.predictive import Predictive
+from companion.control.predictive import PredictiveControl
 from companion.guidance import GRAVITY, GuidanceInput, Reference
 from companion.guidance.linear import Guidance
 
 
 class CommandMaker:
-    """Asks guidance or predictive control for a command; limits the tilt to what thrust can hold.
+    """Asks guidance or predictive control for a command; limits its tilt so that height is held.
 
     Args:
         guidance: makes targets from references.
@@ -25,7 +25,7 @@ class CommandMaker:
 
     Attributes:
         guidance: makes targets from references.
-        predictive: predictive control, which flies trajectories instead of `guidance`, or None.
+        predictive_control: flies trajectories instead of `guidance`; None: `guidance` flies them.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class CommandMaker:
         period: float,
     ) -> None:
         self.guidance = guidance
-        self.predictive: Predictive | None = None
+        self.predictive_control: PredictiveControl | None = None
         self._flown_source, self._estimate, self._learning = flown_source, estimate, learning
         self._period = period
 
@@ -75,10 +75,10 @@ class CommandMaker:
         reference_at = cache(self._flown_source.reference(now, inputs.now, heading))
         reference = reference_at(now)
         linear = self.guidance.command(reference_at, now, inputs)
-        if self.predictive is not None:
+        if self.predictive_control is not None:
             vehicle = self._estimate.vehicle(now, inputs)
             followed = self._flown_source.followed_trajectory(now)
-            linear = self.predictive.replacement_for(linear, frame, vehicle, followed)
+            linear = self.predictive_control.replacement_for(linear, frame, vehicle, followed)
         target, later, down = linear
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self._learning.limit_tilt(each, down) for each in (target, later))
@@ -93,7 +93,7 @@ class CommandMaker:
             body_rates=reference.body_rates,
             thrust=reference.thrust,
             frame=frame,
-            later=later,
+            later_target=later,
             period=self._period,
         )
         return reference, command

@@ -34,8 +34,8 @@ In lockstep the link keeps setpoints until the step ends, and sends only the las
 
 _MISFIT_REASONS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
 _END_THE_STREAM = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
-"""Outcomes of a sample after which `end_stream` releases control: it was answered (None), or no
-later sample can be answered either."""
+"""`end_stream` releases control after a sample with one of these outcomes: None (the sample was
+answered), or a reason for which no later sample can be answered either."""
 
 
 class ControlLoop:
@@ -52,12 +52,11 @@ class ControlLoop:
         taking_over: whether offboard was requested and may become active at any moment.
         offboard_active: whether the autopilot obeys the setpoints.
         awaiting_mode: whether the loop waits for `resume` after a gap.
-        resets: estimator resets, which the planner does not see.
+        resets: the estimator's resets, which are removed from what the planner gets.
         planner: runs the planner.
         record: counters, latest times, and reasons of unanswered samples.
         ask_mode: called once after each gap, to request the mode.
-        is_same_vehicle: called at each sample; returns whether it comes from the vehicle that was
-            checked before the flight.
+        is_same_vehicle: returns, at each sample, whether the vehicle is the one that was checked.
     """
 
     def __init__(
@@ -187,10 +186,11 @@ class ControlLoop:
         # Checked here, because body rates from guidance bypass the planner's own check.
         if not is_unit(sample.q):
             raise InvalidQuaternionError(f"attitude {sample.q} is no unit quaternion")
+        hover = self._hover_thrust
         thrust = (
-            self._hover_thrust.normalised(command.acceleration_down, sample.q, sample.body_rates)
+            hover.normalised_thrust(command.acceleration_down, sample.q, sample.body_rates)
             if command.thrust is None
-            else self._hover_thrust.within_limits(command.thrust)
+            else hover.within_limits(command.thrust)
         )
         return self.planner.rates(sample, command, period), thrust
 
@@ -229,7 +229,7 @@ class ControlLoop:
         self.on = self.offboard_active = self.taking_over = False
 
     def end_stream(self) -> None:
-        """Answer one more fresh sample with zero body rates, which the autopilot keeps for seconds.
+        """Answer one more fresh sample, with zero body rates; the autopilot holds them for a while.
 
         If offboard is not active, or there is no command, send nothing more.
         """

@@ -26,8 +26,8 @@ from companion.vehicle.records import AttitudeSample, LocalPosition
 _LONGEST_ATTITUDE_GAP = 0.1
 """Longest time between two attitudes compared for a jump, s; beyond it the rates are unknown."""
 _LONGEST_CORRECTED_GAP = 0.025
-"""Longest time between two attitudes that add to `EstimatorResets.corrections`, s; over a longer
-time the body rates are too uncertain."""
+"""Longest time between two attitudes that add to `EstimatorResets.heading_corrections`, s; over a
+longer time the body rates are too uncertain."""
 _SMALLEST_ATTITUDE_JUMP = radians(4.0)
 """Smallest attitude jump that is recognised, rad; smaller ones count as noise."""
 _SMALLEST_POSITION_JUMP = 0.2
@@ -46,24 +46,24 @@ class EstimatorResets:
     """Finds the jumps, adds them up and counts them.
 
     Attributes:
-        frame: the frame without heading jumps; its `offset` is their sum.
-        shift: sum of the position jumps, m NED.
-        corrections: sum of the estimator's gradual heading corrections, rad: heading changes that
-            the body rates do not explain, without the jumps; see `StepFrame`.
+        frame: the frame without heading jumps; its `offset` is the sum of these jumps, rad.
+        position_shift: sum of the position jumps, m NED.
+        heading_corrections: sum of the estimator's gradual heading corrections, rad: heading
+            changes that the body rates do not explain, without the jumps; see `StepFrame`.
         rate_lag: learned lag of the body rates behind the attitude.
         largest_tilt_jump: largest jump of the thrust axis, rad; it is not compensated.
-        newest: the newest attitude, or None.
-        times: when the latest resets were found, s of event-loop time.
+        newest_attitude: the newest attitude, or None.
+        reset_times: when the latest resets were found, s of event-loop time.
     """
 
     def __init__(self) -> None:
         self.frame = HeadingFrame()
-        self.shift: Vector = (0.0, 0.0, 0.0)
-        self.corrections = 0.0
+        self.position_shift: Vector = (0.0, 0.0, 0.0)
+        self.heading_corrections = 0.0
         self.rate_lag = RateLag()
         self.largest_tilt_jump = 0.0
-        self.times: deque[float] = deque(maxlen=32)
-        self.newest: AttitudeSample | None = None
+        self.reset_times: deque[float] = deque(maxlen=32)
+        self.newest_attitude: AttitudeSample | None = None
         self._newest_position: LocalPosition | None = None
         self._reset_counter: int | None = None
 
@@ -71,7 +71,7 @@ class EstimatorResets:
         """Compare a newer sample with the last one; return whether the thrust axis jumped."""
         if not is_unit(sample.q):
             return False
-        before, self.newest = self.newest, sample
+        before, self.newest_attitude = self.newest_attitude, sample
         if before is None:
             return False
         dt = sample.vehicle_time - before.vehicle_time
@@ -85,23 +85,24 @@ class EstimatorResets:
             self.frame = HeadingFrame(wrap_difference(self.frame.offset + yaw))
         elif not jumped:
             if dt <= _LONGEST_CORRECTED_GAP:
-                self.corrections += yaw
+                self.heading_corrections += yaw
                 self.rate_lag.learn(before.body_rates, sample.body_rates, predicted, sample.q)
             return False
         self._count_reset(sample.received)
         self.largest_tilt_jump = max(self.largest_tilt_jump, tilt if jumped else 0.0)
         return jumped
 
-    def without_jumps(self, position: LocalPosition) -> LocalPosition:
+    def position_without_jumps(self, position: LocalPosition) -> LocalPosition:
         """The position in the frame without jumps; a new position is first checked for a jump."""
         before, self._newest_position = self._newest_position, position
         if before is not None:
             self._find_position_jump(before, position)
-        return position._replace(position_ned=minus(position.position_ned, self.shift))
+        return position._replace(position_ned=minus(position.position_ned, self.position_shift))
 
     def forget(self) -> None:
         """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
-        self.frame, self.shift, self._newest_position = HeadingFrame(), (0.0, 0.0, 0.0), None
+        self.frame, self.position_shift = HeadingFrame(), (0.0, 0.0, 0.0)
+        self._newest_position = None
 
     def on_counter(self, counter: int | None, now: float) -> None:
         """Take ODOMETRY's `reset_counter`, which also counts resets too small to be detected."""
@@ -124,13 +125,13 @@ class EstimatorResets:
             )
         ]
         if hypot(*jump) > _SMALLEST_POSITION_JUMP + _LARGEST_ACCELERATION_CHANGE * dt * dt / 8.0:
-            north, east, down = self.shift
-            self.shift = (north + jump[0], east + jump[1], down + jump[2])
+            north, east, down = self.position_shift
+            self.position_shift = (north + jump[0], east + jump[1], down + jump[2])
             self._count_reset(position.received)
 
     def _count_reset(self, now: float) -> None:
-        if not self.times or now - self.times[-1] > _ONE_RESET_TIME:
-            self.times.append(now)
+        if not self.reset_times or now - self.reset_times[-1] > _ONE_RESET_TIME:
+            self.reset_times.append(now)
 
 
 def _attitude_jump(

@@ -16,7 +16,8 @@ from companion.control.inner_loop import (
 from companion.guidance import InnerResponse
 
 _NOTICEABLE_SHARE = 0.99
-"""A change is reported if it reduces the time constant below this share of the present one."""
+"""The removal of a cause of delay is reported if it reduces the time constant below this share of
+the present time constant."""
 
 _GAIN_KEY, _RATE_LIMIT_KEY = "planner.gain_per_s", "limits.max_tilt_rate_deg_s"
 _LAG_CAUSE, _DEAD_TIME_CAUSE = "the vehicle's lag", "the vehicle's dead time"
@@ -31,8 +32,8 @@ class ExpectedResponse:
     time_constant: float
     """Time until 63 % of the step is covered, s."""
     time_constants_without: dict[str, float]
-    """Time constant (s) by the name of a cause of delay if only this cause changes: with twice the
-    gain, or without the rate limit, the lag or the dead time."""
+    """For each cause of delay, by name, the time constant (s) without this cause: without the rate
+    limit, the lag or the dead time. For the gain it is the time constant with twice the gain."""
     gain: float
     """Gain p of the planner, 1/s."""
     largest_gain: float | None
@@ -42,7 +43,7 @@ class ExpectedResponse:
 
     @property
     def limited_by(self) -> str:
-        """Name of the cause whose change reduces the time constant most."""
+        """Name of the cause of delay whose removal reduces the time constant most."""
         return min(self.time_constants_without, key=self.time_constants_without.__getitem__)
 
     @property
@@ -51,7 +52,7 @@ class ExpectedResponse:
         return self.largest_gain is not None and self.gain > self.largest_gain
 
     def sentence(self) -> str:
-        """A message for the user: time constant, its main limit, and the effect of each change."""
+        """A message for the user: time constant, its main cause, and the effect of each cause."""
         changes = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
             for name, time in self.time_constants_without.items()
@@ -78,7 +79,10 @@ class ExpectedResponse:
 
 
 def gain_warning(config: Config) -> str | None:
-    """A warning for the user if one of our planners has more than the largest sensible gain."""
+    """A warning for the user if the gain is above the largest sensible one, else None.
+
+    A planner of another package gets no warning.
+    """
     gain, largest = config.planner.gain_per_s, sensible_gain(config)
     if config.planner_name not in PLANNER_NAMES or gain <= largest:
         return None
@@ -95,21 +99,21 @@ def _gain_sentence(gain: float, largest: float) -> str:
 
 def expected_response(config: Config) -> ExpectedResponse:
     """Predict the response by a linear model of planner and rate loop with the tilt rate limit."""
-    step, response = 2.0 * config.steps.coefficient, tilt_response(config)
-    speed = _largest_speed(config)
+    step_size, response = 2.0 * config.steps.coefficient, tilt_response(config)
+    speed = _largest_coefficient_rate(config)
     gain, largest = config.planner.gain_per_s, sensible_gain(config)
     time_constants_without = {
-        _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step, speed),
-        _RATE_LIMIT_KEY: response.step_time(step),
+        _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step_size, speed),
+        _RATE_LIMIT_KEY: response.step_time(step_size),
         **_without_rate_loop_delays(config, response, speed),
     }
     return ExpectedResponse(
         config.steps.coefficient,
-        response.step_time(step, speed),
+        response.step_time(step_size, speed),
         time_constants_without,
         gain,
         None if largest == inf else largest,
-        None if largest == inf else tilt_response(with_gain(config, largest)).step_time(step),
+        None if largest == inf else tilt_response(with_gain(config, largest)).step_time(step_size),
     )
 
 
@@ -119,17 +123,20 @@ def _without_rate_loop_delays(
     """Time constants (s) without the rate loop's lag, and without its dead time; empty: unknown."""
     if not config.vehicle.response_known:
         return {}
-    step = 2.0 * config.steps.coefficient
-    axes = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
-    without_lag = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=axes)})
+    step_size = 2.0 * config.steps.coefficient
+    updates = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
+    without_lag = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=updates)})
     return {
-        _LAG_CAUSE: tilt_response(without_lag).step_time(step, speed),
-        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step, speed),
+        _LAG_CAUSE: tilt_response(without_lag).step_time(step_size, speed),
+        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step_size, speed),
     }
 
 
-def _largest_speed(config: Config) -> float:
-    """Speed of a coefficient at the tilt rate limit, 1/s, at half of `steps.coefficient`."""
+def _largest_coefficient_rate(config: Config) -> float:
+    """Rate of change of a coefficient while the vehicle tilts at the tilt rate limit, 1/s.
+
+    It is computed where the coefficient is half of `steps.coefficient`.
+    """
     roll, pitch, _ = rates_along(0.5 * config.steps.coefficient, 0.0, 1.0, 0.0)
     return config.limits.max_tilt_rate / hypot(roll, pitch)
 

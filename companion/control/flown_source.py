@@ -38,7 +38,7 @@ class FlownSource:
     def hold(self, braking: Braking) -> None:
         """Brake, and hold the pose where the vehicle stops."""
         self.clear()
-        self.pose, self._braking = Pose(braking.stop, braking.heading), braking
+        self.pose, self._braking = Pose(braking.stopping_point, braking.heading), braking
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
         """Fly `source` from `pose`; `now` is event-loop time, s."""
@@ -98,8 +98,8 @@ class FlownSource:
         """Distance from the reference, m; `now` is event-loop time, s.
 
         None without a pose, and in open loop (the reference does not hold the position). After open
-        loop it stays None until the vehicle has returned to its reference, at most for
-        `_RETURN_TIME` in all, even if open loop begins again meanwhile.
+        loop it stays None until the vehicle has returned to its reference, for at most
+        `_RETURN_TIME`. Open loop that begins before the return does not restart this time.
         """
         distance = dist(reference.position_ned, motion.position_ned)
         since = self._returning_since

@@ -1,4 +1,4 @@
-"""Tells whether the vehicle stands on the ground: landed flag, height, speed and commands."""
+"""Tells from landed flag, height, speed and commands whether the vehicle stands on the ground."""
 
 from collections.abc import Callable
 
@@ -46,7 +46,7 @@ class GroundContact:
         self.takeoff_commanded = self._left_ground = True
 
     def update(self) -> None:
-        """Take the newest telemetry; the watch calls this at least 50 times a second."""
+        """Use the newest telemetry; to be called at least 50 times a second."""
         state = self._state
         if not state.landed:
             self._landed_since = None

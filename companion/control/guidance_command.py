@@ -11,7 +11,8 @@ class GuidanceCommand(NamedTuple):
     """One command from guidance; it holds until the next one."""
 
     target: Target
-    """Target of the planner: north and east in the estimator's frame, heading in `frame`."""
+    """Target of the planner: its north and east part is in the estimator's frame, its heading in
+    `frame`."""
     acceleration_down: float
     """Wanted vertical acceleration by thrust and gravity together, positive down, m/s²."""
     made_at: float
@@ -28,7 +29,7 @@ class GuidanceCommand(NamedTuple):
     None: the computed thrust is sent."""
     frame: HeadingFrame = HeadingFrame()
     """The frame without estimator resets, as it was when the command was made."""
-    later: Target | None = None
+    later_target: Target | None = None
     """Target at the time `made_at` + `period`; in between, the target is interpolated linearly,
     and later it is constant. None: the target is constant from the beginning."""
     period: float = 0.0
@@ -39,8 +40,8 @@ class GuidanceCommand(NamedTuple):
         return self._replace(body_rates=BodyRates(0.0, 0.0, 0.0), is_step=False)
 
     def target_at(self, time: float) -> Target:
-        """The target at `time`, s of event-loop time, interpolated from `target` to `later`."""
-        before, after, elapsed = self.target, self.later, time - self.made_at
+        """The target at `time` (s of event-loop time), between `target` and `later_target`."""
+        before, after, elapsed = self.target, self.later_target, time - self.made_at
         if after is None or not elapsed > 0.0:
             return before
         if elapsed >= self.period:

@@ -18,7 +18,7 @@ from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.braking import AssumedBraking
 from companion.guidance.linear import Guidance
-from companion.guidance.reference import Horizontal
+from companion.guidance.reference import NorthEast
 from companion.guidance.source import Source
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -69,7 +69,7 @@ class GuidanceLoop:
         self.flown_source = FlownSource()
         self.bound_to_hold = False
         self.motion: VehicleMotion | None = None
-        self.acceleration: Horizontal = (0.0, 0.0)
+        self.acceleration: NorthEast = (0.0, 0.0)
         self.tracking_error: float | None = None
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, state)
@@ -78,7 +78,7 @@ class GuidanceLoop:
         self._ground = ground
         self.record = TrackingRecord(trace, self.flown_source)
         self.hold = Hold(self.flown_source, self.maker, self.learning, max_tilt, assumed_braking)
-        self._fresh = FreshPosition(state, vehicle_clock, max_position_age)
+        self._fresh_position = FreshPosition(state, vehicle_clock, max_position_age)
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -86,14 +86,14 @@ class GuidanceLoop:
         self._recorder = StepRecorder(trace.recorder, state, vehicle_clock)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
-        """Keep an attitude that is a unit quaternion and fits the vehicle's clock."""
+        """Use an attitude from now on, if it is a unit quaternion and fits the vehicle's clock."""
         if sample.misfit is None and is_unit(sample.q):
             self._q = sample.q
             self.estimate.note_attitude(sample)
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it arrived, or was measured, too long ago."""
-        return self._fresh.at(self._clock())
+        return self._fresh_position.at(self._clock())
 
     def stand_by(self) -> None:
         """Hold no pose: idle on the ground, damp the motion in the air."""
@@ -134,7 +134,7 @@ class GuidanceLoop:
     def follow(self, source: Source) -> None:
         """Fly `source` from the held pose; after `give_up`, keep holding.
 
-        Without a held pose it begins where the vehicle would stop if it braked now.
+        Without a held pose the source begins where the vehicle would stop if it braked now.
 
         Raises:
             RuntimeError: no pose is held and no position has come yet.
@@ -179,7 +179,7 @@ class GuidanceLoop:
         """Make one command, unless the position is stale or the command would not be finite."""
         now = self._clock()
         self.before_step(now)
-        position = self._fresh.at(now)
+        position = self._fresh_position.at(now)
         standing = self._ground.standing
         may_idle = standing and self._ground.may_idle
         before, active = self._loop.command, self._loop.offboard_active
@@ -208,7 +208,7 @@ class GuidanceLoop:
             if may_idle:
                 self._loop.command = GuidanceCommand(_LEVEL_TARGET, 0.0, now, idle=True)
                 return None
-        position = self._loop.resets.without_jumps(position)
+        position = self._loop.resets.position_without_jumps(position)
         self.estimate.note_heading_resets(self._loop.resets.frame.offset)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
         inputs = self.maker.guidance_input(now)

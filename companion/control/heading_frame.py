@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from companion.attitude import Quaternion, Target
 from companion.attitude.rotation import turned_about_vertical
-from companion.guidance.reference import rotated
+from companion.guidance.reference import rotate
 
 
 class HeadingFrame(NamedTuple):
@@ -28,9 +28,10 @@ class HeadingFrame(NamedTuple):
     def target(self, target: Target) -> Target:
         """Convert a target of guidance to this frame.
 
-        Its horizontal part is in the estimator's frame; its heading is in this frame already.
+        The given target has its horizontal part in the estimator's frame, and its heading in this
+        frame already.
         """
         if self.offset == 0.0:
             return target
-        north, east = rotated(target.north, target.east, -self.offset)
+        north, east = rotate(target.north, target.east, -self.offset)
         return target._replace(north=north, east=east)

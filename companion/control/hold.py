@@ -19,7 +19,7 @@ class Hold:
         maker: provides the estimated motion of the vehicle.
         learning: learns the hover thrust, which limits the tilt at which the height is held.
         max_tilt: largest tilt in open loop, rad.
-        assumed_braking: reaction and braking that the monitors of the fence assume.
+        assumed_braking: reaction time and deceleration that the monitors of the fence assume.
 
     Attributes:
         max_tilt: largest tilt in open loop, rad; it may change in flight.

@@ -5,9 +5,14 @@ from math import inf, isfinite
 from companion.attitude.rate_response import FIRST_ORDER_LAG_SHARE
 from companion.config import Config
 from companion.config.known_drag import drag_prior
-from companion.control.inner_loop import sensible_gain, slower_tilt, tilt_damping, tilt_response
-from companion.guidance import ObserverSettings, Weights, chain_gains
-from companion.guidance.feedback import ChainGains
+from companion.control.inner_loop import (
+    sensible_gain,
+    tilt_damping,
+    tilt_lag_and_dead_time,
+    tilt_response,
+)
+from companion.guidance import ObserverSettings, Weights, horizontal_gains
+from companion.guidance.feedback import HorizontalGains
 from companion.guidance.position_correction import CorrectionSettings
 
 _CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
@@ -15,18 +20,19 @@ _CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
 _USUAL_RATE_LOOP_DELAY = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
 _STIFF_HOLD_DELAYS = 0.065, 0.08
-"""Delay of the rate loop up to which the hold is stiff, and from which it is normal, s: dead time
-+ half the lag + half the time to slew to the largest roll-pitch rate."""
-_SHORTEST_DELAY = 0.275
-"""Lower bound of the delay T from which the weights of the hold follow, s. Higher weights would
-amplify the noise of the estimate: the rate loop would always slew, and the vehicle would swing."""
-_SECOND_ORDER_SHARE = 0.2
-"""Share of a second-order lag that is added to the delay T of the hold. The hold then keeps the
-stability margins that it has with a first-order model of PX4's rate loop."""
+"""Two delays of the rate loop, s: below the first the hold is stiff, above the second it is normal.
+The delay is dead time + half the lag + half the time to slew to the largest roll-pitch rate."""
+_SHORTEST_HOLD_DELAY = 0.275
+"""Smallest delay T from which weights of the hold are computed, s. A smaller T would give higher
+weights, which amplify the noise of the estimate: the rate loop would always slew, and the vehicle
+would swing."""
+_SECOND_ORDER_LAG_SHARE = 0.2
+"""If the lag is of second order, this share of it is added to the delay T of the hold. The hold
+then has the same stability margins as with a first-order model of PX4's rate loop."""
 _QUICK_OBSERVER_DELAYS = 0.035, 0.06
 """Delays of the rate loop (dead time plus half the lag) between which the observer changes from
 quick to normal, s."""
-_GAIN_RANGE = 5.0, 7.0
+_QUICK_OBSERVER_GAINS = 5.0, 7.0
 """Gains of the planner between which the observer changes from quick to normal, 1/s."""
 _BANDWIDTH_INCREASE = 0.6
 """`ObserverSettings.bandwidth_increase` of a quick observer."""
@@ -39,22 +45,22 @@ _POSITION_PULL = 4.0, 8.0
 the velocities of PX4 and ArduPilot, off by 0.05 m/s for seconds (measured), would be trusted."""
 _TRUSTED_PULL_INCREASE = 5.0
 """`ObserverSettings.pull_increase` with a quick rate loop, 1/s. With recorded errors of PX4's and
-ArduPilot's estimators the vehicle then moves 5 to 25 % less."""
+ArduPilot's estimators the vehicle moves 5 to 25 % less than without the increase."""
 _CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_FILTER_TIMES = 0.1, 0.04
 """`CorrectionSettings.filter_time` with a normal and with a quick observer, s."""
 _LARGEST_CORRECTION = 0.2
-"""Largest anticipated correction, m: the noise of a bad GPS must not move the vehicle."""
+"""Largest position correction that is anticipated, m; GPS noise must not move the vehicle."""
 
 
 def hold_weights(config: Config) -> Weights:
     """The weights of the position hold; those not configured follow from the delay T.
 
     T is the delay of the attitude behind its target (`attitude_delay`), but at least 0.275 s. The
-    weights 1/T⁴ (position) and 1/T² (velocity) place the three poles of the hold at about 1/T from
-    0. A quick rate loop allows up to twice the position weight. `tests/control/test_margins.py`
-    checks the stability margins against errors of T and of the thrust.
+    weights 1/T⁴ (position) and 1/T² (velocity) place the three poles of the hold about 1/T from the
+    origin. A quick rate loop allows up to twice the position weight.
+    `tests/control/test_margins.py` checks the stability margins against errors of T and thrust.
     """
     guidance, delay = config.guidance, _hold_delay(config)
     position, velocity = guidance.position_weight_per_s4, guidance.velocity_weight_per_s2
@@ -64,7 +70,7 @@ def hold_weights(config: Config) -> Weights:
     )
 
 
-def _falling_share(value: float, bounds: tuple[float, float]) -> float:
+def _falling_ramp(value: float, bounds: tuple[float, float]) -> float:
     """Share that is 1 up to the lower bound and 0 from the upper one on; linear in between."""
     lower, upper = bounds
     return min(max(0.0, (upper - value) / (upper - lower)), 1.0)
@@ -74,13 +80,16 @@ def _hold_stiffness(config: Config) -> float:
     """How stiff a hold the rate loop allows, from 0 (normal) to 1 (stiff).
 
     A rate loop that slews slowly is late only in large motions. After a large motion a stiff hold
-    would oscillate without end, as on the ArduPilot mock at 200 °/s.
+    would oscillate without end, as on the ArduPilot mock with a rate limit of 200 °/s.
     """
-    return _falling_share(_rate_loop_delay(config) + slewing_delay(config), _STIFF_HOLD_DELAYS)
+    return _falling_ramp(_rate_loop_delay(config) + slewing_delay(config), _STIFF_HOLD_DELAYS)
 
 
 def slewing_delay(config: Config) -> float:
-    """Half the time in which the rate loop slews to the largest roll-pitch rate, s; 0: no limit."""
+    """Half the time in which the rate loop slews to the largest roll-pitch rate, s.
+
+    It is 0 if no limit of the angular acceleration is known.
+    """
     axes = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
     limits = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]
     return 0.5 * config.limits.max_tilt_rate / min(limits) if limits else 0.0
@@ -89,10 +98,11 @@ def slewing_delay(config: Config) -> float:
 def _rate_loop_delay(config: Config) -> float:
     """Delay of the rate loop: dead time plus half the lag, s; infinite if it is not identified.
 
-    A second-order lag is first converted to first order plus dead time (`FIRST_ORDER_LAG_SHARE`),
-    because it delays quick commands more.
+    A second-order lag is first converted to a first-order lag plus dead time
+    (`FIRST_ORDER_LAG_SHARE`), because it delays quick commands more than a first-order lag of the
+    same length.
     """
-    lag, dead_time = slower_tilt(config)
+    lag, dead_time = tilt_lag_and_dead_time(config)
     share = FIRST_ORDER_LAG_SHARE if isfinite(tilt_damping(config)) else 1.0
     return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.response_known else inf
 
@@ -108,9 +118,7 @@ def observer_quickness(config: Config) -> float:
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
-    return _falling_share(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS) * _gain_quickness(
-        config
-    )
+    return _falling_ramp(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS) * _gain_quickness(config)
 
 
 def _gain_quickness(config: Config) -> float:
@@ -119,14 +127,14 @@ def _gain_quickness(config: Config) -> float:
     The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of 7.5 and a quick
     observer.
     """
-    return _falling_share(config.planner.gain_per_s, _GAIN_RANGE)
+    return _falling_ramp(config.planner.gain_per_s, _QUICK_OBSERVER_GAINS)
 
 
 def observer_settings(config: Config) -> ObserverSettings:
     """The settings of the motion observer."""
     (slow, quick), quickness = (
         _POSITION_PULL,
-        _falling_share(_rate_loop_delay(config), _STIFF_HOLD_DELAYS),
+        _falling_ramp(_rate_loop_delay(config), _STIFF_HOLD_DELAYS),
     )
     return ObserverSettings(
         _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
@@ -164,13 +172,13 @@ def attitude_delay(config: Config) -> float:
     excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
     delay = feedback_delay(config) + max(0.0, excess)
     if isfinite(tilt_damping(config)):
-        delay += _SECOND_ORDER_SHARE * slower_tilt(config)[0]
+        delay += _SECOND_ORDER_LAG_SHARE * tilt_lag_and_dead_time(config)[0]
     return delay if config.vehicle.response_known else delay + _USUAL_RATE_LOOP_DELAY
 
 
 def _hold_delay(config: Config) -> float:
     """The delay T that sets weights and wind estimate, s: `attitude_delay`, at least 0.275 s."""
-    return max(_SHORTEST_DELAY, attitude_delay(config))
+    return max(_SHORTEST_HOLD_DELAY, attitude_delay(config))
 
 
 def feedback_delay(config: Config) -> float:
@@ -178,14 +186,14 @@ def feedback_delay(config: Config) -> float:
     return tilt_response(config).effective_delay + 0.5 / config.guidance.rate_hz
 
 
-def hold_gains(config: Config) -> ChainGains:
+def hold_gains(config: Config) -> HorizontalGains:
     """The gains of the position hold that follow from its weights.
 
     Raises:
         ValueError: no positive and finite gains follow.
     """
     weights = _CALM_WEIGHTS if flies_identify(config) else hold_weights(config)
-    return chain_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
+    return horizontal_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
 
 
 def flies_identify(config: Config) -> bool:

@@ -5,7 +5,7 @@ from math import sin
 from companion.attitude import Quaternion, Target
 from companion.control.telemetry import Telemetry
 from companion.guidance import GRAVITY, HoverThrust
-from companion.guidance.reference import limited
+from companion.guidance.reference import clamp_length
 from companion.guidance.thrust import largest_tilt
 
 _CLEAR_HEIGHT = 1.0
@@ -54,11 +54,11 @@ class HoverLearning:
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""
         largest = sin(self.largest_tilt(acceleration_down))
-        north, east = limited(target.north, target.east, largest)
+        north, east = clamp_length(target.north, target.east, largest)
         return target._replace(north=north, east=east)
 
     def on_ground(self) -> None:
-        """Note that the vehicle stands on the ground: pause, and forget the voltage at take-off."""
+        """Note that the vehicle is on the ground: pause learning, forget the take-off voltage."""
         self._hover_thrust.on_ground()
 
     def pause(self) -> None:
@@ -100,7 +100,7 @@ class HoverLearning:
         )
 
     def _note_autopilot_thrust(self, now: float, q: Quaternion) -> bool:
-        """Note the autopilot's own thrust; False if it is unknown or the vehicle does not fly."""
+        """Note the autopilot's thrust; return False if unknown, or if the vehicle does not fly."""
         target, height = self._state.attitude_target_thrust, self._state.height
         if target is None or now - target.received > _MAX_THRUST_AGE:
             return False

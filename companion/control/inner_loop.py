@@ -21,7 +21,7 @@ _TRIAL_INPUT = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.1, 0.0), 0.004
 step from level to 8° of tilt."""
 
 LARGEST_GAIN_TIMES_DELAY = 0.45
-"""Largest sensible gain · (lag + dead time); above it, the response overshoots."""
+"""Largest sensible product of gain and (lag + dead time); above it, the response overshoots."""
 
 
 def planner(config: Config) -> Planner:
@@ -60,7 +60,7 @@ def planner(config: Config) -> Planner:
     return flight_planner
 
 
-def law_constants(config: Config) -> Constants:
+def planner_constants(config: Config) -> Constants:
     """Gains and limits of our own planners."""
     gains, recovery_angle = config.planner, config.limits.recovery_angle
     return make_constants(
@@ -134,14 +134,14 @@ def with_gain(config: Config, gain: float) -> Config:
 
 def tilt_response(config: Config) -> InnerResponse:
     """Response of the acceleration coefficients to their targets: planner and rate loop."""
-    gain, (lag, dead_time) = config.planner.gain_per_s, slower_tilt(config)
+    gain, (lag, dead_time) = config.planner.gain_per_s, tilt_lag_and_dead_time(config)
     follows = config.planner_name == MODEL_FOLLOWING
     if follows:
         gain, lag = model_response(gain, model_lag(gain, lag))
     return InnerResponse(gain, lag, dead_time, follows)
 
 
-def slower_tilt(config: Config) -> tuple[float, float]:
+def tilt_lag_and_dead_time(config: Config) -> tuple[float, float]:
     """The larger lag and the larger dead time of roll and pitch, s; 0 if unknown.
 
     The planner `model-following` delays the axis with the shorter dead time, so both axes respond
@@ -163,7 +163,7 @@ def tilt_damping(config: Config) -> float:
 
 def sensible_gain(config: Config) -> float:
     """Largest sensible gain of the planner, 1/s; infinite if the rate loop is not identified."""
-    delay = sum(slower_tilt(config))
+    delay = sum(tilt_lag_and_dead_time(config))
     identified = config.vehicle.response_known and delay > 0.0
     return LARGEST_GAIN_TIMES_DELAY / delay if identified else inf
 

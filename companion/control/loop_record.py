@@ -94,19 +94,19 @@ class LoopRecord:
     """Why the newest sample is unanswered, or None."""
     latency_ns: int = 0
     """Time from the arrival of the last answered sample to its setpoint, ns."""
-    sent: deque[tuple[BodyRates, float]] = field(
+    sent_setpoints: deque[tuple[BodyRates, float]] = field(
         default_factory=lambda: deque(maxlen=_KEPT_SETPOINTS)
     )
     """Body rates (rad/s) and thrust of the latest setpoints, the newest last."""
-    last_sample: float = -inf
+    last_sample_arrival: float = -inf
     """When the newest sample arrived, s of event-loop time."""
     last_vehicle_time: float = -inf
     """Vehicle time of the newest sample that fits the vehicle's clock, s."""
-    last_answer: float = -inf
+    last_answered_arrival: float = -inf
     """When the newest answered sample arrived, s of event-loop time."""
     gap_from: float = inf
-    """Time from which the present gap between setpoints counts: `last_answer`; inf (no gap) before
-    the first answer and after `ControlLoop.resume`."""
+    """Time from which the present gap between setpoints counts: `last_answered_arrival`. It is inf
+    (no gap) before the first answer and after `ControlLoop.resume`."""
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
     """Ends of the latest gaps, s of event-loop time: arrival of the first sample that could be
     answered. A gap is a time longer than `Deadlines.telemetry_stale` without a setpoint, while
@@ -116,7 +116,7 @@ class LoopRecord:
 
     def note_arrival(self, sample: AttitudeSample) -> float:
         """Note an arrived sample; return the time since `last_vehicle_time`, s of vehicle time."""
-        self.last_sample = sample.received
+        self.last_sample_arrival = sample.received
         period = sample.vehicle_time - self.last_vehicle_time
         if sample.misfit is None:
             self.last_vehicle_time = sample.vehicle_time
@@ -134,26 +134,26 @@ class LoopRecord:
             telemetry_stale: a longer interval between setpoints is a gap, s.
         """
         self.setpoints += 1
-        self.sent.append((rates, thrust))
-        interval = received - self.last_answer
+        self.sent_setpoints.append((rates, thrust))
+        interval = received - self.last_answered_arrival
         if interval <= telemetry_stale:
             self.setpoint_intervals.add(interval)
-        self.last_answer = self.gap_from = received
+        self.last_answered_arrival = self.gap_from = received
 
     @property
     def thrust(self) -> float:
         """The thrust last sent, 0..1; 0 before the first setpoint."""
-        return self.sent[-1][1] if self.sent else 0.0
+        return self.sent_setpoints[-1][1] if self.sent_setpoints else 0.0
 
     @property
-    def stale(self) -> int:
+    def stale_count(self) -> int:
         """Number of samples not answered because data were stale, missing or out of order.
 
-        All reasons count that are no refusal (`Unanswered.is_refusal`).
+        Every reason counts that is not a refusal (`Unanswered.is_refusal`).
         """
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 
     @property
-    def refused(self) -> int:
+    def refused_count(self) -> int:
         """Number of samples for which no valid setpoint could be computed or sent."""
         return sum(n for reason, n in self.unanswered.items() if reason.is_refusal)

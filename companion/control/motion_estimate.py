@@ -17,7 +17,7 @@ from companion.guidance import (
 from companion.guidance.climb_bias import ClimbBias
 from companion.guidance.motion_observer import SlopeHistory
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
-from companion.guidance.reference import Horizontal
+from companion.guidance.reference import NorthEast
 from companion.nmpc import VehicleSnapshot
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
@@ -56,7 +56,7 @@ class MotionEstimate:
         self.drag = drag
         self._offset = offset
         self._slopes = SlopeHistory()
-        self._climb = ClimbBias()
+        self._climb_bias = ClimbBias()
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
@@ -64,13 +64,13 @@ class MotionEstimate:
         self._heading = 0.0
 
     @property
-    def disturbance(self) -> Horizontal:
+    def disturbance(self) -> NorthEast:
         """Acceleration by wind and bias, m/s², NED."""
         return self._observer.disturbance
 
     @property
     def _axis_drag(self) -> AxisDrag:
-        """The learned difference of the drag along the body's axes, at the present heading."""
+        """The learned part of the drag that depends on the direction of flight."""
         return AxisDrag(self.drag.axis_coefficient, self._heading)
 
     def retune(self, observer: ObserverSettings, correction: CorrectionSettings) -> None:
@@ -109,8 +109,10 @@ class MotionEstimate:
         since = position.vehicle_time if before is None else before.vehicle_time
         slope = self._slopes.mean(since, position.vehicle_time)
         north, east, down = position.velocity_ned
-        down = self._climb.corrected(position.vehicle_time, position.position_ned[2], down)
-        measured = self._correction.corrected(
+        down = self._climb_bias.corrected_speed(
+            position.vehicle_time, position.position_ned[2], down
+        )
+        measured = self._correction.corrected_motion(
             position.vehicle_time, VehicleMotion(position.position_ned, (north, east, down))
         )
         modelled = self._modelled_acceleration(slope, measured)
@@ -186,7 +188,7 @@ class MotionEstimate:
             f"{learned.linear:.2f} and guidance.quadratic_drag_per_m to {learned.quadratic:.3f}"
         )
 
-    def _learn_drag(self, before: LocalPosition, now: LocalPosition, slope: Horizontal) -> None:
+    def _learn_drag(self, before: LocalPosition, now: LocalPosition, slope: NorthEast) -> None:
         dt = now.vehicle_time - before.vehicle_time
         if not 0.0 < dt < _LONGEST_POSITION_GAP:
             return
@@ -201,7 +203,7 @@ class MotionEstimate:
             self._heading,
         )
 
-    def _modelled_acceleration(self, slope: Horizontal, motion: VehicleMotion) -> Horizontal:
+    def _modelled_acceleration(self, slope: NorthEast, motion: VehicleMotion) -> NorthEast:
         """Horizontal acceleration due to thrust and drag, m/s², without the disturbance."""
         north, east, _ = motion.velocity_ned
         drag = self.drag.drag.deceleration(motion.velocity_ned)

@@ -12,12 +12,12 @@ from companion.control.hold_settings import correction_settings, hold_gains, obs
 from companion.control.inner_loop import (
     heading_response,
     plugin,
-    slower_tilt,
     thrust_limits,
+    tilt_lag_and_dead_time,
     tilt_response,
 )
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.predictive import Predictive
+from companion.control.predictive import PredictiveControl
 from companion.drag import NO_DRAG
 from companion.files.yaml_file import ConfigError
 from companion.guidance import (
@@ -141,9 +141,9 @@ def motion_estimate(
     )
 
 
-def predictive(
+def make_predictive_control(
     config: Config, maneuver: Follow, note: Callable[[str], None], *, vehicle_waits: bool
-) -> Predictive:
+) -> PredictiveControl:
     """Predictive control of one trajectory; starts its process.
 
     Args:
@@ -157,7 +157,7 @@ def predictive(
         MissingExtraError: the solver is not installed.
     """
     settings = predictive_settings(config, vehicle_waits=vehicle_waits)
-    return Predictive(
+    return PredictiveControl(
         lambda report: Solver(settings, maneuver.trajectory, report),
         period=settings.lead,
         vehicle_waits=vehicle_waits,
@@ -185,7 +185,7 @@ def predictive_settings(config: Config, *, vehicle_waits: bool = False) -> Setti
             gain=response.gain,
             yaw_gain=config.planner.yaw_gain_per_s,
             lag=response.lag or model_lag(config.planner.gain_per_s, 0.0),
-            dead_time=slower_tilt(config)[1],
+            dead_time=tilt_lag_and_dead_time(config)[1],
             max_tilt=limits.max_tilt,
             max_tilt_rate=limits.max_tilt_rate,
             max_yaw_rate=limits.max_yaw_rate,

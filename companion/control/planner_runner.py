@@ -1,4 +1,4 @@
-"""Runs the planner on each sample: sample period, restarts, and the frame of the attitude."""
+"""Runs the planner on each sample; provides sample period, restarts and the attitude's frame."""
 
 from collections.abc import Callable
 from math import inf
@@ -111,7 +111,7 @@ class PlannerRunner:
         # Over a gap the body rates are not known, so the frame does not follow the estimator.
         stepping = is_step and period <= _LONGEST_PERIOD
         self._step_frame.advance(
-            self._resets.corrections, min(abs(period), 10.0), stepping=stepping
+            self._resets.heading_corrections, min(abs(period), 10.0), stepping=stepping
         )
         q = self.attitude(sample.q)
         if not is_step:

@@ -15,9 +15,9 @@ from companion.guidance.follow import Follow
 from companion.nmpc import Answer, ControlInput, Request, Solver, Start, Trouble, VehicleSnapshot
 
 _LONGEST_SOLVER_START = 30.0
-"""If the vehicle waits, longest wait for the solver to start, s of wall time."""
+"""Longest wait for the solver to start, s of wall time; used if the vehicle waits for it."""
 _LONGEST_ANSWER_WAIT = 1.0
-"""If the vehicle waits, longest wait for an answer, s of wall time."""
+"""Longest wait for an answer, s of wall time; used if the vehicle waits for the solver."""
 
 
 class FollowedTrajectory(NamedTuple):
@@ -43,7 +43,7 @@ class PredictiveRecord:
     """Computation time of each flown answer in the solver's process."""
 
 
-class Predictive:
+class PredictiveControl:
     """Requests the solver's answer for the next step, at each step of guidance.
 
     Linear guidance also makes a command at every step. This command is flown at once if an answer
@@ -82,23 +82,23 @@ class Predictive:
 
     def replacement_for(
         self,
-        linear: LinearCommand,
+        linear_command: LinearCommand,
         frame: HeadingFrame,
         vehicle: VehicleSnapshot,
         followed: FollowedTrajectory | None,
     ) -> LinearCommand:
-        """The solver's answer for this step if there is one, else `linear`; requests the next one.
+        """The solver's answer for this step, or `linear_command`; requests the next answer.
 
         The solver works in the estimator's frame, whose heading jumps at each reset. The solver's
         target is constant for a period, which its model takes into account.
 
         Args:
-            linear: command of linear guidance.
+            linear_command: command of linear guidance.
             frame: the frame without heading resets.
             vehicle: present state of the vehicle.
             followed: the trajectory that is followed, or None.
         """
-        target, down = linear.target, linear.down
+        target, down = linear_command.target, linear_command.down
         target = target._replace(heading=frame.estimated_heading(target.heading))
         answer = None if followed is None else self._answer(vehicle.time)
         if answer is not None:
@@ -109,7 +109,7 @@ class Predictive:
         if followed is not None:
             self._request(vehicle, followed, frame)
         if answer is None:
-            return linear
+            return linear_command
         target = target._replace(heading=frame.heading(target.heading))
         return LinearCommand(target, target, down)
 
@@ -152,7 +152,7 @@ class Predictive:
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:
-    """The answer's target, and the downward acceleration (m/s²) of its thrust at its own tilt.
+    """The answer's target, and the downward acceleration (m/s²) by its thrust at the target's tilt.
 
     `HoverThrust` converts this acceleration to the thrust at the present tilt.
     """

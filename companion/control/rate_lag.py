@@ -24,8 +24,9 @@ class RateLag:
 
     All rotations have the same weight. So a lag that changes in flight, for example when a filter
     of the autopilot is switched, is followed slowly. That matters little: on the mock vehicles,
-    where the lag grew by 11 ms after `corners`, the heading of later steps erred by 0.1° more;
-    without this class it erred by 0.3° more. Forgetting old rotations would save only 0.05°.
+    where the lag grew by 11 ms after `corners`, the heading error in later steps grew by 0.1°;
+    without this class it grew by 0.3°. Forgetting old rotations would reduce the growth by only
+    0.05°.
 
     Attributes:
         seconds: the learned lag, s; about 0 before the first fast rotation.

@@ -12,13 +12,13 @@ from companion.config.in_flight import Difference, differences
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.hold_settings import correction_settings, hold_weights, observer_settings
-from companion.control.inner_loop import law_constants, rate_limits
+from companion.control.inner_loop import planner_constants, rate_limits
 from companion.control.outer_loop import linear_settings
 from companion.guidance import LinearGuidance, LinearSettings, ObserverSettings
 from companion.guidance.position_correction import CorrectionSettings
 
 
-class Tuning(NamedTuple):
+class LoopSettings(NamedTuple):
     """The values of a configuration that may change in flight, computed for the loops."""
 
     guidance: LinearSettings
@@ -35,17 +35,17 @@ class Tuning(NamedTuple):
     """Largest tilt in open loop, rad."""
 
 
-def tuning(config: Config) -> Tuning:
+def loop_settings(config: Config) -> LoopSettings:
     """Compute from a configuration the values that may change in flight.
 
     Raises:
         ValueError: gains cannot be computed from the configuration.
     """
-    return Tuning(
+    return LoopSettings(
         linear_settings(config),
         observer_settings(config),
         correction_settings(config),
-        law_constants(config),
+        planner_constants(config),
         rate_limits(config),
         config.limits.max_tilt,
     )
@@ -73,7 +73,7 @@ class Retuning:
         finally:
             self._guidance_loop.before_step = lambda _: None
 
-    def apply(self, values: Tuning) -> None:
+    def apply(self, values: LoopSettings) -> None:
         """Use these values from the next sample and the next step on.
 
         Raises:
@@ -89,7 +89,7 @@ class Retuning:
         guidance_loop.hold.max_tilt = values.max_tilt
 
 
-def fixed_because(config: Config) -> str | None:
+def reason_against_changes(config: Config) -> str | None:
     """Why this configuration permits no changes in flight, as a sentence; None: it permits them."""
     if config.guidance.kind != LINEAR:
         return f"guidance.kind {config.guidance.kind} keeps the values with which the flight began"
@@ -98,7 +98,7 @@ def fixed_because(config: Config) -> str | None:
     return None
 
 
-def interpolated(before: Config, after: Config, share: float) -> Config:
+def interpolated_config(before: Config, after: Config, share: float) -> Config:
     """A configuration between two others; only keys that differ are interpolated.
 
     Positive values are interpolated geometrically, others linearly. A value that is null is first

@@ -28,8 +28,8 @@ _HALF_ROOT = sqrt(0.5)
 _MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EVERY, _PATHS_EVERY, _BODY_EVERY = 2, 5, 10
-"""Numbers of drawings after which a point is added to the paths, the paths are sent, and the body
-is sent. With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows.
+"""Every how many drawings a point is added to the paths, the paths are sent, and the body is sent.
+With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows.
 
 Everything is sent again and again, because a viewer may join late or jump in the recording.
 """
@@ -87,7 +87,7 @@ class SceneRows:
 
         Args:
             writer: writer of the file.
-            time_ns: ns since 1970; in a file in vehicle time, since the vehicle's boot.
+            time_ns: ns since 1970, or since the vehicle's boot if the file is in vehicle time.
             q: attitude.
             position: position of the vehicle, m ENU.
             reference: position of the reference, m ENU.
@@ -132,12 +132,12 @@ def _wanted_attitude(command: GuidanceCommand) -> Quaternion | None:
     return attitude_of(north, east, 0.0)
 
 
-def _thrust_arrow_pose(turn: Quaternion) -> Pose:
-    """Pose (FLU) of an arrow along the thrust axis of a body that is turned by `turn` (FRD).
+def _thrust_arrow_pose(rotation: Quaternion) -> Pose:
+    """Pose (FLU) of an arrow along the thrust axis of a body that is rotated by `rotation` (FRD).
 
-    Its rotation is the turn in FLU ⊗ (√½, 0, −√½, 0), which turns x upwards.
+    The rotation of the arrow is `rotation` in FLU ⊗ (√½, 0, −√½, 0), which turns x upwards.
     """
-    w, x, y, z = turn
+    w, x, y, z = rotation
     return (
         0.0,
         0.0,
@@ -149,12 +149,19 @@ def _thrust_arrow_pose(turn: Quaternion) -> Pose:
     )
 
 
-def _arrow(q: Quaternion, goal: Quaternion, lift: float, color: Color) -> Arrow:
-    """An arrow along the thrust of attitude `goal`, in the frame of a vehicle of attitude `q`.
+def _arrow(q: Quaternion, thrust_attitude: Quaternion, lift: float, color: Color) -> Arrow:
+    """An arrow along the thrust of `thrust_attitude`, in the frame of a vehicle of attitude `q`.
 
     Its length shows the specific thrust whose vertical part is `lift`, m/s².
     """
-    cosine = max(cos_tilt(goal[1], goal[2]), _LEAST_COS)
+    cosine = max(cos_tilt(thrust_attitude[1], thrust_attitude[2]), _LEAST_COS)
     length = max(_METRES_PER_M_S2 * lift / cosine, 0.01)
-    head = min(0.15, 0.4 * length)
-    return Arrow(_thrust_arrow_pose(body_error(q, goal)), length - head, 0.03, head, 0.07, color)
+    head_length = min(0.15, 0.4 * length)
+    return Arrow(
+        _thrust_arrow_pose(body_error(q, thrust_attitude)),
+        length - head_length,
+        0.03,
+        head_length,
+        0.07,
+        color,
+    )

@@ -1,7 +1,7 @@
 """Moves the values of the loops from one configuration to another in small steps."""
 
 from companion.config import Config
-from companion.control.retuning import Tuning, interpolated, tuning
+from companion.control.retuning import LoopSettings, interpolated_config, loop_settings
 
 SLEW_TIME = 0.7
 """Time over which a change takes effect, s."""
@@ -39,7 +39,7 @@ class Slew:
         """Stay at the present values."""
         self._began_at = None
 
-    def step(self, now: float) -> Tuning | None:
+    def step(self, now: float) -> LoopSettings | None:
         """The values to use from now on; None: no change.
 
         Raises:
@@ -49,8 +49,8 @@ class Slew:
             return None
         self._stepped_at = now
         share = (now - self._began_at) / SLEW_TIME
-        self._present_config = interpolated(self._start_config, self._wanted_config, share)
-        values = tuning(self._present_config)
+        self._present_config = interpolated_config(self._start_config, self._wanted_config, share)
+        values = loop_settings(self._present_config)
         if share >= 1.0:
             self._began_at, self.settled_config = None, self._wanted_config
         return values

@@ -34,15 +34,15 @@ class StepFrame:
     """The frame in which open-loop steps are straight.
 
     Attributes:
-        frame: this frame now; it converts from the estimator's frame. Targets of open-loop steps
-            are in this frame already.
+        frame: this frame at present; it converts from the estimator's frame. Targets of open-loop
+            steps are in this frame already.
         offset_rate: rate of the frame's `offset`, low-passed, rad/s.
     """
 
     def __init__(self) -> None:
         self.frame = HeadingFrame()
         self.offset_rate = 0.0
-        self._corrections_at_zero = 0.0  # `corrections` at which the offset is 0
+        self._corrections_at_zero = 0.0  # `heading_corrections` at which the offset is 0
 
     def advance(self, corrections: float, dt: float, *, stepping: bool) -> None:
         """Follow the estimator's corrections during steps; let the offset decay otherwise.

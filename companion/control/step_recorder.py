@@ -52,6 +52,6 @@ class StepRecorder:
         self._recorder.add(now, self._rows.step, StepEntry(inputs, output, command))
 
     def action(self, now: float, name: str) -> None:
-        """Record a call by which a phase controls guidance at `now`, s of event-loop time."""
+        """Record a call at `now` by which a phase of the flight controls guidance; see `step`."""
         if self._recorder is not None:
             self._recorder.action(now, name, self._vehicle_clock.offset)

@@ -21,7 +21,7 @@ _NO_VECTOR = (nan, nan, nan)
 _NO_TARGET = Target(nan, nan, nan, nan)
 _HALF_ROOT = sqrt(0.5)
 _POSE_EVERY, _SCENE_EVERY = 2, 5
-"""Steps of guidance for each recorded pose, and for each drawing of the vehicle."""
+"""Number of guidance steps per recorded pose, and per drawing of the vehicle."""
 
 
 class StepFlags(NamedTuple):
@@ -154,7 +154,7 @@ def _target_row(command: GuidanceCommand) -> tuple[float, ...]:
     return (
         command.made_at,
         *command.target,
-        *(command.later or _NO_TARGET),
+        *(command.later_target or _NO_TARGET),
         command.acceleration_down,
         *(command.body_rates or _NO_VECTOR),
         _nan_if_none(command.thrust),

@@ -28,12 +28,12 @@ class AssembledFlight:
 
     def close(self) -> None:
         """End the process of predictive control, if there is one."""
-        if self.context.guidance_loop.maker.predictive is not None:
-            self.context.guidance_loop.maker.predictive.close()
+        if self.context.guidance_loop.maker.predictive_control is not None:
+            self.context.guidance_loop.maker.predictive_control.close()
 
     def predictive_figures(self) -> PredictiveFigures | None:
         """The figures of predictive control; None if the flight did not use it."""
-        predictive = self.context.guidance_loop.maker.predictive
+        predictive = self.context.guidance_loop.maker.predictive_control
         if predictive is None:
             return None
         record = predictive.record
@@ -47,8 +47,8 @@ class AssembledFlight:
             samples=record.samples,
             setpoints=record.setpoints,
             missed_deadlines=record.missed_deadlines,
-            stale=record.stale,
-            refused=record.refused,
+            stale=record.stale_count,
+            refused=record.refused_count,
             unanswered={reason.value: count for reason, count in record.unanswered.items()},
             rate_hz=self.context.setpoint_rate_hz,
         )

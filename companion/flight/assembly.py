@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.config.known_drag import KnownDrag
 from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
-from companion.control.outer_loop import predictive
+from companion.control.outer_loop import make_predictive_control
 from companion.flight.assembled import AssembledFlight
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
@@ -137,7 +137,7 @@ def _prepare_trajectories(
             for text in part.notes:
                 note(text)
             if context.config.guidance.kind == "nmpc":
-                context.guidance_loop.maker.predictive = predictive(
+                context.guidance_loop.maker.predictive_control = make_predictive_control(
                     context.config, part, note, vehicle_waits=not real_time
                 )
 

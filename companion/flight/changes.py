@@ -13,7 +13,7 @@ from companion.config.in_flight import (
     differences,
 )
 from companion.config.known_drag import KnownDrag
-from companion.control.retuning import Retuning, fixed_because, tuning
+from companion.control.retuning import Retuning, loop_settings, reason_against_changes
 from companion.control.slew import Slew
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate
@@ -161,7 +161,7 @@ class Changes:
         self._retuning, self._record = retuning, record
         if self.wanted_config is not self.start:
             self._slew.jump(self.wanted_config)
-            retuning.apply(tuning(self.wanted_config))
+            retuning.apply(loop_settings(self.wanted_config))
         if self.wanted_config is not self.at_flight_start:
             self._record_change(self.at_flight_start, at_once=True)
         note_before, self.note = self.note, note
@@ -191,7 +191,7 @@ class Changes:
         Raises:
             ChangeRefusedError: nothing can change in this flight, or the values are equal.
         """
-        why_fixed = fixed_because(self.start)
+        why_fixed = reason_against_changes(self.start)
         if why_fixed is not None:
             raise ChangeRefusedError(f"{by}: {why_fixed}; nothing has changed")
         keys = tuple(differences(self.wanted_config, wanted))
@@ -203,7 +203,7 @@ class Changes:
         if refusal is not None:
             raise ChangeRefusedError(f"{by}: {refusal}; nothing has changed")
         try:
-            tuning(wanted)
+            loop_settings(wanted)
         except (ValueError, ArithmeticError) as error:
             raise ChangeRefusedError(f"{by}: {error}; nothing has changed") from error
         now, before = asyncio.get_running_loop().time(), self.wanted_config

@@ -1,6 +1,6 @@
 """Checks before the flight that a maneuver stays far enough from the fence to trigger no monitor.
 
-`Fence.stop_breach` judges each moment of the reference with the monitor's formula.
+`Fence.breach_at_stopping_point` judges each moment of the reference with the monitor's formula.
 `TRACKING_MARGIN` allows for the tracking error. A vehicle that follows an accepted reference within
 this margin triggers no monitor.
 """
@@ -52,7 +52,7 @@ class FenceCheck:
 
     def _worst(self, motion: Motion) -> tuple[float, Breach] | None:
         """The worst breach and its time, s."""
-        columns = self.fence.stop(
+        columns = self.fence.stopping_point(
             _columns(motion.position), _columns(motion.velocity), _horizontal(motion.acceleration)
         )
         stops = np.stack(columns, axis=1)
@@ -86,7 +86,7 @@ class FenceCheck:
             fence = replace(fence, places=())
         north, east, _ = _vector(motion.acceleration[k])
         height = self.height - offset[2]
-        return fence.stop_breach(
+        return fence.breach_at_stopping_point(
             offset, velocity, height, self.origin, TRACKING_MARGIN, (north, east)
         )
 

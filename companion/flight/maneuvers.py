@@ -76,11 +76,11 @@ def _simple_maneuver(config: Config, name: str) -> Maneuver:
 def _doublets(identify: IdentifyConfig) -> Doublets:
     return Doublets(
         tilt_rate=identify.tilt_rate,
-        tilt_step=identify.tilt_duration_s,
+        tilt_step_time=identify.tilt_duration_s,
         yaw_rate=identify.yaw_rate,
-        yaw_step=identify.yaw_duration_s,
+        yaw_step_time=identify.yaw_duration_s,
         climb_acceleration=identify.climb_m_s2,
-        climb_step=identify.climb_duration_s,
+        climb_step_time=identify.climb_duration_s,
         settle=identify.settle_s,
     )
 

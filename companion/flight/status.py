@@ -199,7 +199,7 @@ class StatusReporter:
         return None if position is None else hypot(*position.velocity_ned)
 
     def _tilt(self, now: float) -> float | None:
-        sample = self._context.loop.resets.newest
+        sample = self._context.loop.resets.newest_attitude
         if sample is None or now - sample.received > _MAX_TELEMETRY_AGE:
             return None
         return tilt_angle(sample.q[1], sample.q[2])

@@ -116,7 +116,7 @@ async def _wait_until_held(context: FlightContext) -> None:
 
 
 def _is_held(context: FlightContext) -> bool:
-    sample, position = context.loop.resets.newest, context.fresh_position()
+    sample, position = context.loop.resets.newest_attitude, context.fresh_position()
     if sample is None or position is None:
         return False
     tilt, speed = tilt_angle(sample.q[1], sample.q[2]), hypot(*position.velocity_ned[:2])

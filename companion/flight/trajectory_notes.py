@@ -3,7 +3,7 @@
 import numpy as np
 
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory
-from companion.guidance.trajectory.demand import sampled
+from companion.guidance.trajectory.demand import sampled_motion
 from companion.guidance.trajectory.feasibility import TILT_LIMIT
 
 _MOST_PARTS_SHOWN = 4
@@ -11,7 +11,7 @@ _MOST_PARTS_SHOWN = 4
 
 def overview(trajectory: Trajectory) -> str:
     """One sentence: duration, largest speed and extent of the trajectory."""
-    motion = sampled(trajectory)
+    motion = sampled_motion(trajectory)
     fastest = float(np.linalg.norm(motion.velocity, axis=1).max())
     lows, highs = motion.position.min(axis=0), motion.position.max(axis=0)
     north, east = (_range_text(low, high) for low, high in zip(lows[:2], highs[:2], strict=True))
@@ -65,7 +65,7 @@ def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) ->
 
 
 def _fastest(trajectory: Trajectory) -> float:
-    return float(np.linalg.norm(sampled(trajectory).velocity, axis=1).max())
+    return float(np.linalg.norm(sampled_motion(trajectory).velocity, axis=1).max())
 
 
 def _range_text(low: float, high: float) -> str:

@@ -46,7 +46,7 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
 def _attitude(context: FlightContext, now: float) -> dict[str, float | None]:
     """Values of the newest sample, and of the target while setpoints are sent."""
     loop, values = context.loop, dict[str, float | None]()
-    sample, command = loop.resets.newest, loop.command
+    sample, command = loop.resets.newest_attitude, loop.command
     if sample is not None:
         north, east = coefficients(sample.q)
         values.update(zip(("q_w", "q_x", "q_y", "q_z"), sample.q, strict=True))

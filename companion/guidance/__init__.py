@@ -1,18 +1,18 @@
 """Maths of the outer loop: maneuvers, the acceleration that follows them, and the thrust.
 
-All of it is pure, except that `trajectory.csv_file` reads a file.
+Nothing here reads or writes anything, except that `trajectory.csv_file` reads a file.
 """
 
 from companion.guidance.doublets import Doublets
 from companion.guidance.drag_estimate import DragEstimate
-from companion.guidance.feedback import HeightGains, Weights, chain_gains
+from companion.guidance.feedback import HeightGains, Weights, horizontal_gains
 from companion.guidance.hover_thrust import HoverThrust, ThrustSettings
 from companion.guidance.inner_response import IMMEDIATE, InnerResponse
 from companion.guidance.linear import GuidanceInput, LinearCommand, LinearGuidance, LinearSettings
 from companion.guidance.maneuvers import Corners, Maneuver, ManeuverSequence, Steps
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.reference import GRAVITY, Pose, Reference, VehicleMotion
-from companion.guidance.thrust import height_first, specific_thrust
+from companion.guidance.thrust import acceleration_within_thrust, specific_thrust
 
 __all__ = [
     "GRAVITY",
@@ -37,7 +37,7 @@ __all__ = [
     "ThrustSettings",
     "VehicleMotion",
     "Weights",
-    "chain_gains",
-    "height_first",
+    "acceleration_within_thrust",
+    "horizontal_gains",
     "specific_thrust",
 ]

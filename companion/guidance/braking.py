@@ -17,7 +17,7 @@ _NOTICE_TIME = 0.1
 
 
 class AssumedBraking(NamedTuple):
-    """Braking that the fence's monitor assumes; the vehicle must not stop further away than that.
+    """Braking assumed by the fence's monitor; the vehicle must not need a longer stopping distance.
 
     Attributes:
         reaction: delay before the vehicle brakes, s (`safety.reaction_s`).
@@ -31,8 +31,8 @@ class AssumedBraking(NamedTuple):
 def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> float:
     """Time in which the vehicle brakes from a speed to rest, s; 0 for a vehicle at rest.
 
-    The vehicle stops smoothly. If it would then stop further away than the fence's monitor assumes,
-    it brakes harder.
+    The vehicle stops smoothly. If a smooth stop would need more distance than the fence's monitor
+    assumes, the vehicle brakes harder.
 
     Args:
         speed: horizontal speed, m/s.
@@ -42,11 +42,13 @@ def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> 
     if speed < _REST_SPEED:
         return 0.0
     reaction = max(0.0, assumed.reaction - _NOTICE_TIME)
-    longest = 2.0 * reaction + speed / assumed.deceleration
+    longest_time = 2.0 * reaction + speed / assumed.deceleration
     if acceleration <= 0.0:
-        return longest
-    smooth = max(speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _LARGEST_JERK))
-    return min(smooth, longest)
+        return longest_time
+    smooth_time = max(
+        speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _LARGEST_JERK)
+    )
+    return min(smooth_time, longest_time)
 
 
 class Braking(NamedTuple):
@@ -74,7 +76,7 @@ class Braking(NamedTuple):
         return self.begun_at + self.duration
 
     @property
-    def stop(self) -> Vector:
+    def stopping_point(self) -> Vector:
         """Place where the vehicle stops, m NED."""
         return self.at(self.end_time).position_ned
 

@@ -15,7 +15,7 @@ class ClimbBias:
 
     If the accelerometer is wrong while the vehicle is tilted, the estimated vertical speed differs
     from the change of the estimated height: on a real PX4 by 0.02 to 0.04 m/s in circles at 5 to
-    10 m/s. A height hold that uses this speed stays 0.02 to 0.03 m off.
+    10 m/s. A height hold that uses this speed keeps a height error of 0.02 to 0.03 m.
 
     Attributes:
         bias: reported minus true vertical speed, m/s, positive down.
@@ -27,7 +27,7 @@ class ClimbBias:
         self._down: float | None = None
         self._speed = 0.0
 
-    def corrected(self, time: float, down: float, speed: float) -> float:
+    def corrected_speed(self, time: float, down: float, speed: float) -> float:
         """Take a vertical position and speed; return the speed without its bias, m/s.
 
         Args:

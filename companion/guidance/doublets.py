@@ -7,8 +7,8 @@ from companion.attitude import BodyRates
 from companion.guidance.maneuvers import check_times_between
 from companion.guidance.reference import Pose, Reference, VerticalMode
 
-_SMALL_SIZE = 0.5
-"""Size of the first doublet of an axis as a share of its second one. From doublets of one size a
+_FIRST_DOUBLET_SHARE = 0.5
+"""Size of the first doublet of an axis, relative to the second one. With doublets of equal size, a
 slew limit could not be told from a lag."""
 _REST_TIME = 0.5
 """Time of zero rates after a doublet of body rates, in which the slowest axis comes to rest, s."""
@@ -20,19 +20,19 @@ class _Doublet(NamedTuple):
     """One doublet +A, −A, +A (lasting T, 2T, T) of body rates or of vertical acceleration.
 
     Attributes:
-        step: T, s.
+        step_time: T, s.
         body_rates: A of a doublet of body rates, rad/s; None: a doublet of vertical acceleration.
         climb_acceleration: A of a doublet of vertical acceleration, m/s², positive up.
     """
 
-    step: float
+    step_time: float
     body_rates: BodyRates | None = None
     climb_acceleration: float = 0.0
 
     @property
     def duration(self) -> float:
         """Duration, s, including the rest after a doublet of body rates."""
-        return 4.0 * self.step + (0.0 if self.body_rates is None else _REST_TIME)
+        return 4.0 * self.step_time + (0.0 if self.body_rates is None else _REST_TIME)
 
     def at(self, time: float, hold: Reference) -> Reference:
         """The reference `time` s after the beginning; `hold` is the reference of position hold."""
@@ -42,7 +42,7 @@ class _Doublet(NamedTuple):
         return hold._replace(horizontal=BodyRates(*(sign * rate for rate in self.body_rates)))
 
     def _climb_reference(self, time: float, hold: Reference) -> Reference:
-        step = self.step
+        step = self.step_time
         if time < step:
             speed, height = time, 0.5 * time * time
         elif time < 3.0 * step:
@@ -61,9 +61,9 @@ class _Doublet(NamedTuple):
         )
 
     def _doublet_sign(self, time: float) -> float:
-        if time >= 4.0 * self.step:
+        if time >= 4.0 * self.step_time:
             return 0.0
-        return -1.0 if self.step <= time < 3.0 * self.step else 1.0
+        return -1.0 if self.step_time <= time < 3.0 * self.step_time else 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,20 +77,20 @@ class Doublets:
 
     Attributes:
         tilt_rate: A of roll and pitch, rad/s.
-        tilt_step: T of roll and pitch, s.
+        tilt_step_time: T of roll and pitch, s.
         yaw_rate: A of yaw, rad/s.
-        yaw_step: T of yaw, s; yaw responds more slowly.
+        yaw_step_time: T of yaw, s; yaw responds more slowly.
         climb_acceleration: A of the vertical acceleration, m/s².
-        climb_step: T of the vertical acceleration, s.
+        climb_step_time: T of the vertical acceleration, s.
         settle: time of position hold before each doublet and at the end, s.
     """
 
     tilt_rate: float
-    tilt_step: float
+    tilt_step_time: float
     yaw_rate: float
-    yaw_step: float
+    yaw_step_time: float
     climb_acceleration: float
-    climb_step: float
+    climb_step_time: float
     settle: float
     name: str = "identify"
     _doublets: tuple[_Doublet, ...] = field(init=False, repr=False, compare=False)
@@ -108,13 +108,13 @@ class Doublets:
         rates = [
             _Doublet(step, BodyRates(*(size * rate for rate in axis)))
             for step, axis in (
-                (self.tilt_step, (tilt, 0.0, 0.0)),
-                (self.tilt_step, (0.0, tilt, 0.0)),
-                (self.yaw_step, (0.0, 0.0, yaw)),
+                (self.tilt_step_time, (tilt, 0.0, 0.0)),
+                (self.tilt_step_time, (0.0, tilt, 0.0)),
+                (self.yaw_step_time, (0.0, 0.0, yaw)),
             )
-            for size in (_SMALL_SIZE, 1.0)
+            for size in (_FIRST_DOUBLET_SHARE, 1.0)
         ]
-        climb = _Doublet(self.climb_step, climb_acceleration=self.climb_acceleration)
+        climb = _Doublet(self.climb_step_time, climb_acceleration=self.climb_acceleration)
         return *rates, *(_CLIMB_COUNT * [climb])
 
     def check_times(self) -> list[float]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from companion.attitude.rotation import clamp
 from companion.drag import AxisDrag, Drag
-from companion.guidance.reference import Horizontal, Vector
+from companion.guidance.reference import NorthEast, Vector
 
 _SHORTEST_WINDOW = 0.2
 """Shortest duration of one measurement, s; a longer one suffers less from velocity noise."""
@@ -30,8 +30,8 @@ _CERTAIN_DEVIATION = 0.1
 """The drag is certain if the standard deviation of linear + quadratic·`top_speed` is below this,
 1/s."""
 _GUSTY_INNOVATION = 2.0
-"""Above this mean of innovation²/variance the drag is not certain: gusts that change faster than
-the filter assumes also move the vehicle, and the filter takes them for drag."""
+"""Above this mean of innovation²/variance the drag is not certain: gusts change faster than the
+filter assumes, and the filter may take their effect for drag."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class DragEstimate:
         return speed > 0.0 and sqrt(max(variance, 0.0)) < _CERTAIN_DEVIATION
 
     def observe(
-        self, dt: float, velocity: Vector, residual: Horizontal, heading: float = 0.0
+        self, dt: float, velocity: Vector, residual: NorthEast, heading: float = 0.0
     ) -> None:
         """Take a measured acceleration; ignored if a number is not finite or `dt` not positive.
 
@@ -124,7 +124,7 @@ class DragEstimate:
             self._forget_window()
 
     def _update_filter(self) -> None:
-        """Update the filter with the means since the last update, one for north, one for east."""
+        """Update the filter with the mean residuals since the last update, north and then east."""
         span = self._span
         self.top_speed = max(self.top_speed, hypot(*self._displacement) / span)
         for wind in (2, 3):

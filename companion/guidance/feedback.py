@@ -34,7 +34,7 @@ class Weights:
 
 
 @dataclass(frozen=True, slots=True)
-class ChainGains:
+class HorizontalGains:
     """Gains of the feedback u = −(position·e_p + velocity·e_v + acceleration·e_a), u in m/s².
 
     Attributes:
@@ -48,7 +48,7 @@ class ChainGains:
     acceleration: float
 
 
-def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
+def horizontal_gains(weights: Weights, lag: float, drag: float = 0.0) -> HorizontalGains:
     """The optimal gains (LQR) for ė_p = e_v, ė_v = e_a − drag·e_v, ė_a = (u − e_a)/lag.
 
     X and Y are the upper and lower halves of the stable eigenvectors of the Hamiltonian matrix.
@@ -71,7 +71,7 @@ def chain_gains(weights: Weights, lag: float, drag: float = 0.0) -> ChainGains:
     stable = vectors[:, np.argsort(values.real)[:3]]
     riccati = np.real(stable[3:] @ np.linalg.inv(stable[:3]))
     position, velocity, acceleration = (b.T @ riccati)[0].tolist()
-    gains = ChainGains(position, velocity, acceleration)
+    gains = HorizontalGains(position, velocity, acceleration)
     if not all(isfinite(gain) and gain > 0.0 for gain in (position, velocity, acceleration)):
         raise ValueError(f"no positive and finite gains follow from {weights}: {gains}")
     return gains

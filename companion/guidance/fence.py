@@ -64,7 +64,7 @@ def height_in_words(height: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A cylinder between a floor and a ceiling, and an optional polygon; both must be kept.
+    """A cylinder between a floor and a ceiling, and an optional polygon; the vehicle stays in both.
 
     Attributes:
         radius: radius of the cylinder about the place where control began, m.
@@ -122,7 +122,7 @@ class Fence:
             return Breach("limits.fence_floor_m", "below", where, self.floor - height)
         return None
 
-    def stop(
+    def stopping_point(
         self, offset: Components, velocity: Components, acceleration: tuple[Any, Any] = (0.0, 0.0)
     ) -> Components:
         """Where the vehicle stops if it brakes now, m NED from where control began.
@@ -141,21 +141,27 @@ class Fence:
         """
         (north, east, down), twice_deceleration = velocity, 2.0 * self.deceleration
         reaction = self.reaction + self.estimate_delay
-        gain_north, gain_east = reaction * acceleration[0], reaction * acceleration[1]
+        dv_north, dv_east = (
+            reaction * acceleration[0],
+            reaction * acceleration[1],
+        )
         # The square of the speed after the reaction time, minus the square of the present speed.
-        increase = gain_north * (2.0 * north + gain_north) + gain_east * (2.0 * east + gain_east)
+        increase = dv_north * (2.0 * north + dv_north) + dv_east * (2.0 * east + dv_east)
         is_faster = (increase > 0.0) * 1.0
-        gain_north, gain_east = is_faster * gain_north, is_faster * gain_east
-        later_north, later_east = north + gain_north, east + gain_east
+        dv_north, dv_east = (
+            is_faster * dv_north,
+            is_faster * dv_east,
+        )
+        later_north, later_east = north + dv_north, east + dv_east
         later_speed = (later_north * later_north + later_east * later_east) ** 0.5
         half_braking_time = later_speed / twice_deceleration
         return (
-            offset[0] + reaction * (north + 0.5 * gain_north) + half_braking_time * later_north,
-            offset[1] + reaction * (east + 0.5 * gain_east) + half_braking_time * later_east,
+            offset[0] + reaction * (north + 0.5 * dv_north) + half_braking_time * later_north,
+            offset[1] + reaction * (east + 0.5 * dv_east) + half_braking_time * later_east,
             offset[2] + (self.reaction + abs(down) / twice_deceleration) * down,
         )
 
-    def stop_breach(
+    def breach_at_stopping_point(
         self,
         offset: Vector,
         velocity: Vector,
@@ -166,9 +172,9 @@ class Fence:
     ) -> Breach | None:
         """The breach at the place where the vehicle would stop; None: it would stop inside.
 
-        The arguments are those of `stop` and `breach`; `height` is the vehicle's present height.
+        The arguments are those of `stopping_point` and `breach`; `height` is the present height.
         """
-        stop = self.stop(offset, velocity, acceleration)
+        stop = self.stopping_point(offset, velocity, acceleration)
         descent = stop[2] - offset[2]
         return self.breach(stop, None if height is None else height - descent, origin, margin)
 

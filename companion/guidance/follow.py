@@ -84,7 +84,10 @@ class Follow:
 
     @property
     def duration(self) -> float:
-        """Duration with the turn before the trajectory, s; before the start, with a full turn."""
+        """Duration including the turn before the trajectory, s.
+
+        Before the maneuver begins, the angle of the turn is unknown and counts as 360°.
+        """
         if self._with_turn is not None:
             return self._with_turn.duration
         longest_turn = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate

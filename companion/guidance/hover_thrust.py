@@ -105,7 +105,9 @@ class HoverThrust:
         """Specific thrust at the smallest normalised thrust that is sent, m/s²."""
         return self._to_specific(self._settings.lowest)
 
-    def normalised(self, acceleration_down: float, q: Quaternion, body_rates: BodyRates) -> float:
+    def normalised_thrust(
+        self, acceleration_down: float, q: Quaternion, body_rates: BodyRates
+    ) -> float:
         """Normalised thrust for a wanted vertical acceleration, clamped to `limits`.
 
         Args:
@@ -157,7 +159,7 @@ class HoverThrust:
         self._battery.note(time, voltage)
 
     def on_ground(self) -> None:
-        """Note that the vehicle is on the ground: pause, and forget the voltage at take-off."""
+        """Note that the vehicle is on the ground: pause learning, forget the take-off voltage."""
         self.pause()
         self._battery.reset()
 

@@ -49,11 +49,11 @@ class InnerResponse:
         """
         return 1.0 / self.gain + self.lag + self.dead_time
 
-    def step_time(self, size: float, max_speed: float = inf) -> float:
+    def step_time(self, step_size: float, max_speed: float = inf) -> float:
         """Time from a step of the target until the coefficients cover 63 % of it, s.
 
         Args:
-            size: size of the step, without unit.
+            step_size: size of the step, without unit.
             max_speed: largest speed of the coefficients, 1/s.
 
         Returns:
@@ -63,10 +63,10 @@ class InnerResponse:
         speeds = deque([0.0] * (1 + round(delay / _INTEGRATION_STEP)))
         c = speed = 0.0
         for k in range(_MOST_STEPS):
-            if c >= _COVERED_SHARE * size:
+            if c >= _COVERED_SHARE * step_size:
                 return k * _INTEGRATION_STEP + (self.dead_time if self.follows_model else 0.0)
             # Without a model, the error of now takes effect one dead time later.
-            speeds.append(min(self.gain * (size - c), max_speed))
+            speeds.append(min(self.gain * (step_size - c), max_speed))
             wanted = speeds.popleft()
             moved, speed = first_order_step(
                 speed, wanted, max(self.lag, _INTEGRATION_STEP), _INTEGRATION_STEP

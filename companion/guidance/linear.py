@@ -6,20 +6,20 @@ from typing import NamedTuple, Protocol
 
 from companion.attitude import Coefficients, Target
 from companion.drag import ROUND_BODY, AxisDrag, Drag
-from companion.guidance.feedback import ChainGains, HeightGains, acceleration_down
+from companion.guidance.feedback import HeightGains, HorizontalGains, acceleration_down
 from companion.guidance.inner_response import InnerResponse
 from companion.guidance.reference import (
     GRAVITY,
-    Horizontal,
     HorizontalMode,
+    NorthEast,
     Reference,
     ReferenceAt,
     TiltCommand,
     Vector,
     VehicleMotion,
-    limited,
+    clamp_length,
 )
-from companion.guidance.thrust import height_first
+from companion.guidance.thrust import acceleration_within_thrust
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class LinearSettings:
             constant.
     """
 
-    gains: ChainGains
+    gains: HorizontalGains
     height: HeightGains
     tilt: InnerResponse
     heading: InnerResponse
@@ -61,14 +61,14 @@ class GuidanceInput(NamedTuple):
 
     now: VehicleMotion
     predicted: VehicleMotion
-    thrust: Horizontal
-    disturbance: Horizontal
+    thrust: NorthEast
+    disturbance: NorthEast
     drag: Drag
     thrust_limits: tuple[float, float]
     axis_drag: AxisDrag = ROUND_BODY
 
     @property
-    def acceleration(self) -> Horizontal:
+    def acceleration(self) -> NorthEast:
         """Present horizontal acceleration by thrust, wind and drag, m/s², NED."""
         north, east = self.deceleration(self.now.velocity_ned)
         return (
@@ -76,7 +76,7 @@ class GuidanceInput(NamedTuple):
             self.thrust[1] + self.disturbance[1] - east,
         )
 
-    def deceleration(self, velocity: Vector) -> Horizontal:
+    def deceleration(self, velocity: Vector) -> NorthEast:
         """Horizontal deceleration by drag, m/s², at a velocity in m/s, NED."""
         north, east, _ = self.drag.deceleration(velocity)
         axis_north, axis_east = self.axis_drag.deceleration(velocity[0], velocity[1])
@@ -116,11 +116,11 @@ class Guidance(Protocol):
 
 
 class Trim:
-    """Mean target coefficients of the latest pause of the position hold.
+    """Mean of the planner's target coefficients in the latest pause of the position hold.
 
     In a pause the reference's `horizontal` is `HorizontalMode.ACCELERATION`. The mean balances wind
-    and the error of the estimated attitude. It is added to open-loop coefficients, so that the
-    vehicle accelerates as these ask.
+    and the error of the estimated attitude. It is added to the coefficients of an open-loop
+    command, so that the vehicle has the commanded acceleration in spite of both.
     """
 
     def __init__(self) -> None:
@@ -178,10 +178,10 @@ class LinearGuidance:
             time: the present time, s.
             inputs: motion, thrust and disturbance of the vehicle.
         """
-        reference = reference_at(time)
-        ahead = reference_at(time + self._settings.thrust_lag)
-        down = acceleration_down(self._settings.height, reference, inputs.now, ahead, inputs.drag)
-        ends = time, time + self._settings.period
+        reference, settings = reference_at(time), self._settings
+        ahead = reference_at(time + settings.thrust_lag)
+        down = acceleration_down(settings.height, reference, inputs.now, ahead, inputs.drag)
+        ends = time, time + settings.period
         if isinstance(reference.horizontal, TiltCommand):
             north, east = self._trim.coefficients(reference.horizontal)
             target, later = (Target(north, east, *self._heading(reference_at, at)) for at in ends)
@@ -192,14 +192,13 @@ class LinearGuidance:
             return self._coefficients(reference_at(at), feedback, down, inputs)
 
         target, later = (
-            Target(*self._settings.tilt.target(path, at), *self._heading(reference_at, at))
-            for at in ends
+            Target(*settings.tilt.target(path, at), *self._heading(reference_at, at)) for at in ends
         )
         pausing = reference.horizontal is HorizontalMode.ACCELERATION
         self._trim.take(target, pausing=pausing)
         return LinearCommand(target, later, down)
 
-    def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> Horizontal:
+    def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> NorthEast:
         """Horizontal acceleration that corrects errors and disturbance, m/s².
 
         Args:
@@ -209,7 +208,7 @@ class LinearGuidance:
         """
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.horizontal is HorizontalMode.ACCELERATION:
-            return limited(-wind[0], -wind[1], settings.max_horizontal)
+            return clamp_length(-wind[0], -wind[1], settings.max_horizontal)
         wanted, drag = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
             position_error = inputs.predicted.position_ned[axis] - later.position_ned[axis]
@@ -221,22 +220,23 @@ class LinearGuidance:
                 - gains.acceleration * (acceleration - now.acceleration_ned[axis])
                 - wind[axis]
             )
-        return limited(wanted[0], wanted[1], settings.max_horizontal)
+        return clamp_length(wanted[0], wanted[1], settings.max_horizontal)
 
     def _coefficients(
-        self, reference: Reference, feedback: Horizontal, down: float, inputs: GuidanceInput
+        self, reference: Reference, feedback: NorthEast, down: float, inputs: GuidanceInput
     ) -> Coefficients:
-        """Coefficients for the reference's acceleration, its drag, and the feedback (m/s²).
+        """Coefficients for the acceleration of the reference plus `feedback` (m/s²).
 
-        `down` is the vertical acceleration of the command, m/s².
+        The drag at the velocity of the reference is compensated. `down` is the vertical
+        acceleration of the command, m/s².
         """
         drag = inputs.deceleration(reference.velocity_ned)
-        north, east = limited(
+        north, east = clamp_length(
             reference.acceleration_ned[0] + drag[0] + feedback[0],
             reference.acceleration_ned[1] + drag[1] + feedback[1],
             self._settings.max_horizontal,
         )
-        north, east, down = height_first((north, east, down), *inputs.thrust_limits)
+        north, east, down = acceleration_within_thrust((north, east, down), *inputs.thrust_limits)
         # The vertical part of the thrust is g − a_D.
         vertical = GRAVITY - down
         thrust = sqrt(north * north + east * east + vertical * vertical)

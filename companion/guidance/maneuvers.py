@@ -9,8 +9,8 @@ from companion.attitude import Coefficients
 from companion.guidance.reference import HorizontalMode, Pose, Reference, TiltCommand
 
 _HOLD_PAUSE = 1.0
-"""Pause of the position hold before open-loop steps, s. Its corrections would disturb the attitude
-from which a step is measured."""
+"""Pause of the position hold before open-loop steps, s. The hold's corrections would disturb the
+attitude from which a step is measured."""
 _CHECK_STEP = 0.01
 """Largest time between two checks of a maneuver, s."""
 
@@ -57,12 +57,12 @@ class Steps:
 
     Attributes:
         coefficient: length of the coefficients c: the sine of the tilt.
-        step: T, the duration of the first part of a doublet, s.
+        step_time: T, the duration of the first part of a doublet, s.
         settle: time of position hold after each doublet, s.
     """
 
     coefficient: float
-    step: float
+    step_time: float
     settle: float
     name: str = "steps"
 
@@ -75,14 +75,14 @@ class Steps:
 
     @property
     def _doublet_period(self) -> float:
-        return _HOLD_PAUSE + 4.0 * self.step + self.settle
+        return _HOLD_PAUSE + 4.0 * self.step_time + self.settle
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over each doublet, s; pauses and settling are not checked."""
         begins = [
             index * self._doublet_period + _HOLD_PAUSE for index in range(len(self.DIRECTIONS))
         ]
-        length = 4.0 * self.step
+        length = 4.0 * self.step_time
         return [time for begin in begins for time in check_times_between(begin, begin + length)]
 
     def at(self, time: float, start: Pose) -> Reference:
@@ -92,9 +92,9 @@ class Steps:
         hold = Reference(start.position_ned, heading=start.heading)
         if doublet_time < 0.0:
             return hold._replace(horizontal=HorizontalMode.ACCELERATION)
-        if doublet_time >= 4.0 * self.step:
+        if doublet_time >= 4.0 * self.step_time:
             return hold
-        sign = -1.0 if self.step <= doublet_time < 3.0 * self.step else 1.0
+        sign = -1.0 if self.step_time <= doublet_time < 3.0 * self.step_time else 1.0
         north, east = self.DIRECTIONS[index]
         c = sign * self.coefficient
         coefficients = Coefficients(c * north, c * east)
@@ -115,13 +115,14 @@ class Corners:
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
             √(north² + east²). 0.4 and 0.5 give the step of that figure 2.
-        step: duration of each corner, s; the one at which the second round begins lasts twice that.
+        corner_time: duration of each corner, s; the corner at which the second round begins lasts
+            twice as long.
         settle: time of position hold at the end, s.
     """
 
     north: float
     east: float
-    step: float
+    corner_time: float
     settle: float
     name: str = "corners"
 
@@ -139,11 +140,11 @@ class Corners:
     @property
     def duration(self) -> float:
         """The pause before the steps, all corners, and the settling, s."""
-        return _HOLD_PAUSE + len(self.CORNERS) * self.step + self.settle
+        return _HOLD_PAUSE + len(self.CORNERS) * self.corner_time + self.settle
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over the corners, and the end, s."""
-        end = _HOLD_PAUSE + len(self.CORNERS) * self.step
+        end = _HOLD_PAUSE + len(self.CORNERS) * self.corner_time
         return [*check_times_between(_HOLD_PAUSE, end), self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
@@ -151,7 +152,7 @@ class Corners:
         hold = Reference(start.position_ned, heading=start.heading)
         if time < _HOLD_PAUSE:
             return hold._replace(horizontal=HorizontalMode.ACCELERATION)
-        index = int((time - _HOLD_PAUSE) / self.step)
+        index = int((time - _HOLD_PAUSE) / self.corner_time)
         if index >= len(self.CORNERS):
             return hold
         north, east = self.CORNERS[index]

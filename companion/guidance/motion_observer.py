@@ -7,7 +7,7 @@ from math import exp
 from typing import NamedTuple
 
 from companion.attitude.history import locate_time
-from companion.guidance.reference import Horizontal, Vector, VehicleMotion, limited, rotated
+from companion.guidance.reference import NorthEast, Vector, VehicleMotion, clamp_length, rotate
 
 _LARGEST_PULL_TIMES_STEP = 0.5
 """Largest product of `ObserverSettings.pull` and the time between two measurements: with a larger
@@ -53,7 +53,10 @@ class ObserverSettings:
     pull_increase: float = 0.0
 
     def pull(self, dt: float, trust: float) -> float:
-        """`position_pull`, 1/s, increased by `trust` and limited for `dt`, as in `gains`."""
+        """`position_pull` increased by `trust`, and limited so that the observer is stable, 1/s.
+
+        The arguments are those of `gains`.
+        """
         return min(self.position_pull + trust * self.pull_increase, _LARGEST_PULL_TIMES_STEP / dt)
 
     def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:
@@ -85,7 +88,7 @@ class MotionObserver:
     """
 
     def __init__(self, settings: ObserverSettings) -> None:
-        self.disturbance: Horizontal = (0.0, 0.0)
+        self.disturbance: NorthEast = (0.0, 0.0)
         self._settings = settings
         self._motion: VehicleMotion | None = None
         self._time = 0.0
@@ -95,7 +98,7 @@ class MotionObserver:
         self._settings = settings
 
     def observe(
-        self, time: float, measured: VehicleMotion, modelled: Horizontal, trust: float = 0.0
+        self, time: float, measured: VehicleMotion, modelled: NorthEast, trust: float = 0.0
     ) -> None:
         """Take a measured position and velocity.
 
@@ -130,16 +133,16 @@ class MotionObserver:
             velocity[axis] = v + gains.velocity * error
             estimated[axis] = disturbance[axis] + gains.disturbance * error
         self._motion = VehicleMotion(_vector(position), _vector(velocity))
-        self.disturbance = limited(estimated[0], estimated[1], settings.largest_disturbance)
+        self.disturbance = clamp_length(estimated[0], estimated[1], settings.largest_disturbance)
 
     def rotate_disturbance(self, angle: float) -> None:
         """Rotate the disturbance by `angle` (rad), by which the estimated heading has jumped.
 
         The vehicle itself did not turn, so it must keep the tilt that balances the disturbance.
         """
-        self.disturbance = rotated(*self.disturbance, angle)
+        self.disturbance = rotate(*self.disturbance, angle)
 
-    def at(self, time: float, modelled: Horizontal) -> VehicleMotion | None:
+    def at(self, time: float, modelled: NorthEast) -> VehicleMotion | None:
         """The motion at `time`, predicted from the newest measurement; None before the first.
 
         Args:
@@ -183,10 +186,10 @@ class SlopeHistory:
 
     def __init__(self) -> None:
         self._times: deque[float] = deque(maxlen=_KEPT_ATTITUDES)
-        self._sums: deque[Horizontal] = deque(maxlen=_KEPT_ATTITUDES)
-        self.newest: Horizontal = (0.0, 0.0)
+        self._sums: deque[NorthEast] = deque(maxlen=_KEPT_ATTITUDES)
+        self.newest: NorthEast = (0.0, 0.0)
 
-    def add(self, time: float, slope: Horizontal) -> None:
+    def add(self, time: float, slope: NorthEast) -> None:
         """Add the slope of an attitude; an attitude not newer than the last restarts the history.
 
         Args:
@@ -219,7 +222,7 @@ class SlopeHistory:
         self._times.clear()
         self._sums.clear()
 
-    def mean(self, start: float, end: float) -> Horizontal:
+    def mean(self, start: float, end: float) -> NorthEast:
         """The mean slope between two vehicle times, s.
 
         Before the first attitude and after the last, the slope is taken as constant. It is `newest`
@@ -230,7 +233,7 @@ class SlopeHistory:
         (n0, e0), (n1, e1) = self._integral(start), self._integral(end)
         return (n1 - n0) / (end - start), (e1 - e0) / (end - start)
 
-    def _integral(self, time: float) -> Horizontal:
+    def _integral(self, time: float) -> NorthEast:
         """The integral of the slope from the start of the history to `time`.
 
         Between attitudes it is interpolated linearly; before the first and after the last it is

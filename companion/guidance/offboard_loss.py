@@ -3,7 +3,8 @@
 First the autopilot holds the last rates and the last thrust: the thrust axis keeps turning along a
 great circle, while drag slows the vehicle. The part of the rates that is feedback may have any
 direction, so it adds a spread to the result. Then the autopilot's failsafe levels the vehicle, and
-brakes it or lets it drift. `tests/flight/test_killed.py` compares this with the mock vehicles.
+brakes it or lets it drift. `tests/flight/test_killed.py` compares this worst case with
+the mock vehicles.
 """
 
 from math import acos, cos, hypot, pi, sin, sqrt
@@ -16,7 +17,8 @@ from companion.guidance.reference import GRAVITY, Vector
 _INTEGRATION_STEPS = 20
 """Number of integration steps while the rates are held."""
 _FEEDBACK_RATE = 0.15
-"""Largest part of the rates that is feedback on a smooth path, rad/s (mock vehicles: 0.1)."""
+"""Largest body rate that feedback may command on a smooth path, rad/s (measured on mock vehicles:
+0.1)."""
 _FAILSAFE_DELAY = 0.1
 """Delay of the failsafe beyond the time in its parameter, s (PX4: 0.06 to 0.11)."""
 _LEVELLING_RATE = 3.0
@@ -82,23 +84,25 @@ class Reach(NamedTuple):
         return hypot(*self.place) + self.spread
 
 
-class _HeldResult(NamedTuple):
+class _HeldMotion(NamedTuple):
     """Motion of the vehicle from the loss of setpoints until the autopilot stops holding the rates.
 
+    The held rates are planned rates plus unknown rates that feedback has commanded.
+
     Attributes:
-        displacement: displacement without feedback, m NED.
-        velocity: velocity without feedback, m/s NED.
-        feedback_displacement: displacement that feedback adds in the worst direction, m.
-        feedback_speed: speed that feedback adds in the worst direction, m/s.
-        highest: greatest height above the start, without feedback, m.
-        tilt: largest possible tilt, rad.
+        displacement: displacement by the planned rates alone, m NED.
+        velocity: final velocity by the planned rates alone, m/s NED.
+        feedback_displacement: displacement that the feedback rates add in the worst direction, m.
+        feedback_speed: speed that the feedback rates add in the worst direction, m/s.
+        greatest_height: greatest height above the point of the loss, by the planned rates alone, m.
+        tilt: largest possible final tilt, rad.
     """
 
     displacement: Vector
     velocity: Vector
     feedback_displacement: float
     feedback_speed: float
-    highest: float
+    greatest_height: float
     tilt: float
 
 
@@ -116,7 +120,7 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
     )
     up_speed = max(0.0, held.feedback_speed - held.velocity[2])
     up = (
-        held.highest
+        held.greatest_height
         + held.feedback_displacement
         + up_speed * _FAILSAFE_DELAY
         + _braking_distance(up_speed)
@@ -129,7 +133,7 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
     )
 
 
-def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
+def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldMotion:
     """Integrate the motion while the autopilot holds rates and thrust."""
     duration = loss.hold_time + _FAILSAFE_DELAY
     step = duration / _INTEGRATION_STEPS
@@ -142,7 +146,7 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
     rate = min(rate, loss.max_tilt_rate)
     feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
     displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
-    feedback_displacement = feedback_speed = highest = 0.0
+    feedback_displacement = feedback_speed = greatest_height = 0.0
     for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), direction, sin(angle))
@@ -156,10 +160,15 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldResult:
         acceleration = 2.0 * specific_thrust * sin(0.5 * feedback_angle)
         feedback_speed += (acceleration - loss.drag.linear * feedback_speed) * step
         feedback_displacement += feedback_speed * step
-        highest = max(highest, -displacement[2])
+        greatest_height = max(greatest_height, -displacement[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback * duration
-    return _HeldResult(
-        displacement, velocity, feedback_displacement, feedback_speed, highest, min(pi, tilt)
+    return _HeldMotion(
+        displacement,
+        velocity,
+        feedback_displacement,
+        feedback_speed,
+        greatest_height,
+        min(pi, tilt),
     )
 
 
@@ -168,21 +177,21 @@ def _stopping_distance(
 ) -> float:
     """Horizontal distance from the end of the held rates to the stop, m."""
     if loss.brakes:
-        return float(loss.fence.stop((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
+        return float(loss.fence.stopping_point((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
     level_time = _level_time(tilt)
     speed += specific_thrust * sin(min(tilt, 0.5 * pi)) * level_time
     return speed * level_time + speed / max(loss.drag.linear, _SMALLEST_DRAG)
 
 
-def _fall_distance(held: _HeldResult, specific_thrust: float) -> float:
+def _fall_distance(held: _HeldMotion, specific_thrust: float) -> float:
     """Largest fall while the rates are held, while the vehicle levels and until it stops, m."""
     duration = _level_time(held.tilt)
     mean_cosine = sin(held.tilt) / held.tilt if held.tilt > 0.0 else 1.0  # while it levels
     speed = held.velocity[2] + held.feedback_speed
     fall = held.displacement[2] + held.feedback_displacement
-    gain = max(0.0, GRAVITY - specific_thrust * mean_cosine)
-    fall += max(0.0, speed) * duration + 0.5 * gain * duration * duration
-    return max(0.0, fall + _braking_distance(max(0.0, speed) + gain * duration))
+    acceleration = max(0.0, GRAVITY - specific_thrust * mean_cosine)
+    fall += max(0.0, speed) * duration + 0.5 * acceleration * duration * duration
+    return max(0.0, fall + _braking_distance(max(0.0, speed) + acceleration * duration))
 
 
 def _level_time(tilt: float) -> float:
@@ -202,10 +211,13 @@ def _plus_scaled(a: Vector, b: Vector, factor: float) -> Vector:
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
-def _after_drag(velocity: Vector, drag: Drag, span: float) -> Vector:
-    """Velocity after `span` s of horizontal drag, m/s NED; the worst case of a fall has no drag."""
+def _after_drag(velocity: Vector, drag: Drag, duration: float) -> Vector:
+    """Velocity after `duration` s of horizontal drag, m/s NED.
+
+    Vertical drag is left out: without it a fall is longest, which is the worst case.
+    """
     north, east, _ = drag.deceleration((velocity[0], velocity[1], 0.0))
-    return velocity[0] - north * span, velocity[1] - east * span, velocity[2]
+    return velocity[0] - north * duration, velocity[1] - east * duration, velocity[2]
 
 
 def path_thrust(acceleration: Vector, velocity: Vector, drag: Drag) -> Vector:

@@ -3,27 +3,28 @@
 from dataclasses import dataclass
 from math import exp, hypot, sqrt
 
-from companion.guidance.reference import Horizontal, VehicleMotion, limited
+from companion.guidance.reference import NorthEast, VehicleMotion, clamp_length
 
 _LONGEST_GAP = 0.5
 """Longest time between two positions from which a correction is computed, s."""
-_LONGEST_WINDOW = 0.1
+_LONGEST_FILTER_TIME = 0.1
 """Time constant of each low-pass filter for noisy positions while the vehicle moves, s; smooth
 positions need a shorter one (`CorrectionSettings.filter_time`)."""
-_WINDOW_PER_NOISE = 0.1
+_FILTER_TIME_PER_NOISE = 0.1
 """Growth of `filter_time` with the noise of r, s per m/s; r is defined in `PositionCorrection`."""
 _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
 """Noise of r below which positions count as smooth, and above which as noisy, m/s. The noise of PX4
 and ArduPilot is at most 0.1 m/s; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _LARGEST_CHANGE = 0.08
-"""Before r is filtered, it is limited to this distance from the filtered r, m/s. ArduPilot stamps
-its position in whole milliseconds: at 5 m/s a stamp that is off by 1 ms changes one r by 0.25 m/s.
+"""Each new value of r is clamped to within this distance of the filtered r, m/s. ArduPilot stamps
+its position in whole milliseconds: at 5 m/s an error of 1 ms changes one value of r by 0.25 m/s.
 Real corrections of its estimator change r by 0.02 m/s, with peaks of 0.1 m/s (measured)."""
 _NOISE_TIME = 1.0
 """Time constant with which the noise of r is estimated, s."""
 _MOVING_SPEED = 2.0
 """Speed from which the positions are trusted fully, m/s. At lower speed, position errors are small
-and mostly noise: with less trust a real PX4 hovers with half the body rates, equally exactly."""
+and mostly noise. With less trust a real PX4 hovers as exactly as with full trust, and with half the
+body rates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +49,8 @@ class PositionCorrection:
     """Adds to horizontal positions the correction that the estimator has not made yet.
 
     The autopilot's Kalman filter moves its position by its velocity and towards GPS. The second
-    part, r = ṗ − v, is the filter's gain times the distance to GPS, so that distance is
-    estimator_time·r. If GPS is later than the filter assumes, the position also lags by
+    part, r = ṗ − v, is the filter's gain times the distance to GPS. So the distance to GPS
+    is estimator_time·r. If GPS is later than the filter assumes, the position also lags by
     position_delay·v.
 
     r is computed from two positions a short time apart, which amplifies their noise. Low-pass
@@ -71,9 +72,9 @@ class PositionCorrection:
         """Forget the correction, because the estimate has jumped."""
         self._time = 0.0
         self._before: VehicleMotion | None = None
-        self._raw: Horizontal = (0.0, 0.0)
-        self._filtered: Horizontal = (0.0, 0.0)
-        self._correction: Horizontal = (0.0, 0.0)
+        self._raw: NorthEast = (0.0, 0.0)
+        self._filtered: NorthEast = (0.0, 0.0)
+        self._correction: NorthEast = (0.0, 0.0)
         self._noise = 0.0
         self._moving = 0.0
 
@@ -86,7 +87,7 @@ class PositionCorrection:
         smoothness = (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)
         return min(max(0.0, smoothness), 1.0) * self._moving
 
-    def corrected(self, time: float, measured: VehicleMotion) -> VehicleMotion:
+    def corrected_motion(self, time: float, measured: VehicleMotion) -> VehicleMotion:
         """A measured motion with its horizontal position corrected.
 
         Args:
@@ -102,7 +103,7 @@ class PositionCorrection:
         if before is None or not 0.0 < dt < _LONGEST_GAP:
             self._raw = self._filtered = self._correction = (0.0, 0.0)
         else:
-            self._filter_unexplained(before, measured, dt)
+            self._filter_unexplained_velocity(before, measured, dt)
         (north, east, down), velocity = measured
         return VehicleMotion(
             (
@@ -113,7 +114,9 @@ class PositionCorrection:
             velocity,
         )
 
-    def _filter_unexplained(self, before: VehicleMotion, now: VehicleMotion, dt: float) -> None:
+    def _filter_unexplained_velocity(
+        self, before: VehicleMotion, now: VehicleMotion, dt: float
+    ) -> None:
         """Filter r, the change of position per time that the velocity does not explain."""
         settings = self._settings
         (p_before, v_before), (p_now, v_now) = before, now
@@ -121,8 +124,10 @@ class PositionCorrection:
         for axis in (0, 1):
             explained = 0.5 * (v_before[axis] + v_now[axis])
             raw[axis] = (p_now[axis] - p_before[axis]) / dt - explained
-        kept_share = exp(-dt / self._filter_window(raw, dt))
-        change = limited(raw[0] - self._filtered[0], raw[1] - self._filtered[1], _LARGEST_CHANGE)
+        kept_share = exp(-dt / self._filter_time(raw, dt))
+        change = clamp_length(
+            raw[0] - self._filtered[0], raw[1] - self._filtered[1], _LARGEST_CHANGE
+        )
         for axis in (0, 1):
             filtered[axis] = self._filtered[axis] + (1.0 - kept_share) * change[axis]
             wanted = settings.estimator_time * filtered[axis]
@@ -133,15 +138,15 @@ class PositionCorrection:
             if settings.estimator_time > 0.0
             else 0.0
         )
-        self._filtered = limited(filtered[0], filtered[1], largest)
-        self._correction = limited(correction[0], correction[1], settings.largest_correction)
+        self._filtered = clamp_length(filtered[0], filtered[1], largest)
+        self._correction = clamp_length(correction[0], correction[1], settings.largest_correction)
 
-    def _filter_window(self, raw: list[float], dt: float) -> float:
-        """Time constant of the low-pass filters, s, from the changes of r between two positions."""
+    def _filter_time(self, raw: list[float], dt: float) -> float:
+        """Time constant of the low-pass filters, s, for the new value `raw` of r and its noise."""
         change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
         kept_share = exp(-dt / _NOISE_TIME)
         self._noise = change * change + kept_share * (self._noise - change * change)
         shortest = self._settings.filter_time
-        longest = max(shortest, _LONGEST_WINDOW)
-        window = min(shortest + _WINDOW_PER_NOISE * sqrt(self._noise), longest)
-        return (2.0 - self._moving) * window
+        longest = max(shortest, _LONGEST_FILTER_TIME)
+        filter_time = min(shortest + _FILTER_TIME_PER_NOISE * sqrt(self._noise), longest)
+        return (2.0 - self._moving) * filter_time

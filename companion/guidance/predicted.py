@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from companion.drag import NO_DRAG, Drag
 from companion.guidance.maneuvers import Maneuver
-from companion.guidance.reference import GRAVITY, Horizontal, Pose, Reference, Vector, rotated
+from companion.guidance.reference import GRAVITY, NorthEast, Pose, Reference, Vector, rotate
 
 _LARGEST_TILT = 1.4
 """The predicted tilt is clamped to this, rad: no maneuver tilts further."""
@@ -68,36 +68,36 @@ class _OpenLoop:
         self._roll = self._pitch = 0.0
 
     def advance(
-        self, moment: PredictedMotion, reference: Reference, span: float
+        self, moment: PredictedMotion, reference: Reference, duration: float
     ) -> PredictedMotion:
-        """Integrate the commands of `reference` over `span` s.
+        """Integrate the commands of `reference` over `duration` s.
 
         Returns:
             `moment`, with the integrated motion as its horizontal motion.
         """
         (north, east), (v_north, v_east) = self._offset, self._velocity
-        by_tilt = self._acceleration(reference, span)
+        by_tilt = self._acceleration(reference, duration)
         drag = self._drag.deceleration((v_north, v_east, 0.0))
         a_north, a_east = by_tilt[0] - drag[0], by_tilt[1] - drag[1]
         self._offset = (
-            north + span * (v_north + 0.5 * span * a_north),
-            east + span * (v_east + 0.5 * span * a_east),
+            north + duration * (v_north + 0.5 * duration * a_north),
+            east + duration * (v_east + 0.5 * duration * a_east),
         )
-        self._velocity = v_north + span * a_north, v_east + span * a_east
+        self._velocity = v_north + duration * a_north, v_east + duration * a_east
         return moment._replace(
             offset=(*self._offset, moment.offset[2]),
             velocity=(*self._velocity, moment.velocity[2]),
             acceleration=(*by_tilt, moment.acceleration[2]),
         )
 
-    def _acceleration(self, reference: Reference, span: float) -> Horizontal:
+    def _acceleration(self, reference: Reference, duration: float) -> NorthEast:
         if reference.coefficients is not None:
             north, east = reference.coefficients
             lift = sqrt(max(1.0 - north * north - east * east, 0.01))
             return GRAVITY * north / lift, GRAVITY * east / lift
         if reference.body_rates is not None:
-            self._roll += span * reference.body_rates.roll
-            self._pitch += span * reference.body_rates.pitch
+            self._roll += duration * reference.body_rates.roll
+            self._pitch += duration * reference.body_rates.pitch
         forward = -GRAVITY * tan(min(max(self._pitch, -_LARGEST_TILT), _LARGEST_TILT))
         right = GRAVITY * tan(min(max(self._roll, -_LARGEST_TILT), _LARGEST_TILT))
-        return rotated(forward, right, self._heading)
+        return rotate(forward, right, self._heading)

@@ -158,7 +158,7 @@ ReferenceAt = Callable[[float], Reference]
 """The reference as a function of event-loop time, s."""
 
 
-Horizontal = tuple[float, float]
+NorthEast = tuple[float, float]
 """A horizontal vector: (north, east)."""
 
 
@@ -167,7 +167,7 @@ def minus(left: Vector, right: Vector) -> Vector:
     return left[0] - right[0], left[1] - right[1], left[2] - right[2]
 
 
-def limited(north: float, east: float, largest: float) -> Horizontal:
+def clamp_length(north: float, east: float, largest: float) -> NorthEast:
     """The vector, shortened to the length `largest` if it is longer; its direction is kept."""
     length = hypot(north, east)
     if length <= largest:
@@ -175,7 +175,7 @@ def limited(north: float, east: float, largest: float) -> Horizontal:
     return north * largest / length, east * largest / length
 
 
-def rotated(north: float, east: float, angle: float) -> Horizontal:
+def rotate(north: float, east: float, angle: float) -> NorthEast:
     """The vector rotated clockwise, seen from above, by `angle` in rad."""
     c, s = cos(angle), sin(angle)
     return c * north - s * east, s * north + c * east

@@ -146,16 +146,17 @@ class CommandedSource:
     def _jerk_towards(self, reference: Reference, now: float) -> Vector:
         """Jerk from an earlier reference to this one, m/s³; 0 if it cannot be computed.
 
-        If this reference comes less than `_SHORTEST_JERK_TIME` later, the last jerk is returned.
+        If this reference comes less than `_SHORTEST_JERK_TIME` after the earlier one, the last jerk
+        is returned.
         """
-        before, since = self._base, now - self._base_at
-        if before is not None and since < _SHORTEST_JERK_TIME:
+        before, elapsed = self._base, now - self._base_at
+        if before is not None and elapsed < _SHORTEST_JERK_TIME:
             return self._jerk if _loops_closed(before) == _loops_closed(reference) else _NO_JERK
         self._base, self._base_at = reference, now
         if before is None or _loops_closed(before) != _loops_closed(reference):
             return _NO_JERK
         old, new = before.acceleration_ned, reference.acceleration_ned
-        north, east, down = change_rate(old, new, since, LARGEST_JERK) or _NO_JERK
+        north, east, down = change_rate(old, new, elapsed, LARGEST_JERK) or _NO_JERK
         return north, east, down
 
     def end(self) -> None:
@@ -170,7 +171,7 @@ class CommandedSource:
         self._require_fresh(now)
         newest, given_at, jerk = self._newest, self._given_at, self._jerk
         if newest is not None and self._failure is None:
-            return lambda time: extrapolated(newest, jerk, time - given_at)
+            return lambda time: extrapolated_reference(newest, jerk, time - given_at)
         if self._hold_reference is None or newest is None:
             self._hold_reference = self._hold(motion)
         hold_reference = self._hold_reference
@@ -211,7 +212,7 @@ def _loops_closed(reference: Reference) -> tuple[bool, bool, bool]:
     return reference.closed_loop, reference.holds_position, reference.holds_height
 
 
-def extrapolated(reference: Reference, jerk_ned: Vector, elapsed: float) -> Reference:
+def extrapolated_reference(reference: Reference, jerk_ned: Vector, elapsed: float) -> Reference:
     """The reference `elapsed` seconds later, at a constant jerk (m/s³) and heading rate."""
     t, t2, t3 = elapsed, 0.5 * elapsed**2, elapsed**3 / 6.0
     p0, p1, p2 = reference.position_ned

@@ -16,7 +16,7 @@ _MIN_COSINE = 0.5
 def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
     """Specific thrust T = (g − a_D)/cos(tilt) that gives a vertical acceleration a_D, m/s².
 
-    Beyond 60° of tilt it decreases, to 0 at 90°, because upside down thrust would push the vehicle
+    Beyond 60° of tilt it decreases, to 0 at 90°, because upside down, thrust would push the vehicle
     to the ground.
     """
     wanted = max(0.0, GRAVITY - acceleration_down)
@@ -53,7 +53,7 @@ def largest_tilt(lift: float, largest_thrust: float) -> float:
     return acos(max(lift, 0.0) / (TILT_THRUST_SHARE * largest_thrust))
 
 
-def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
+def acceleration_within_thrust(wanted: Vector, smallest: float, largest: float) -> Vector:
     """Limit the acceleration to what the thrust gives, with priority for the height.
 
     If the thrust is too small, the horizontal part is shortened in its direction: the tilt shrinks
@@ -83,7 +83,7 @@ def height_first(wanted: Vector, smallest: float, largest: float) -> Vector:
 _VOLTAGE_FILTER_TIME = 0.3
 """Time constant of the voltage filter, s; ArduPilot's (MOT_BAT_V_MAX) has a cutoff of 0.5 Hz."""
 
-_PLAUSIBLE_RATIO = 0.6, 1.2
+_PLAUSIBLE_VOLTAGE_RATIO = 0.6, 1.2
 """Plausible range of V/V₀ (see `BatterySag`); a voltage outside it is ignored."""
 
 
@@ -147,6 +147,6 @@ class BatterySag:
             self._first_voltage = voltage
         dt, self._time = time - self._time, time
         ratio = voltage / self._first_voltage
-        if dt > 0.0 and _PLAUSIBLE_RATIO[0] < ratio < _PLAUSIBLE_RATIO[1]:
+        if dt > 0.0 and _PLAUSIBLE_VOLTAGE_RATIO[0] < ratio < _PLAUSIBLE_VOLTAGE_RATIO[1]:
             self._ratio += dt / (dt + _VOLTAGE_FILTER_TIME) * (ratio - self._ratio)
             self.factor = self._ratio**self._exponent

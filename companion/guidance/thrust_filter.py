@@ -20,7 +20,7 @@ configured `time_constant`."""
 _FIRST_NOISE, _SMALLEST_NOISE, _LARGEST_NOISE = 1.0, 0.05, 100.0
 """Initial variance of a measured specific thrust and its bounds, (m/s²)².
 
-The initial variance is large because the rotors still change from the thrust before takeover.
+The initial variance is large because after takeover the rotors still change to the new thrust.
 """
 
 _NOISE_TIME = 2.0
@@ -32,9 +32,9 @@ _REJECTION_TIME = 1.0
 _LASTING_REJECTION = 0.2
 """Magnitude of the low-pass filter's output from which a rejection resets the variance.
 
-That takes about 0.25 s of rejections. The filter's input is the squared ratio of the innovation to
-its gate, at most 1, with the sign of the innovation: +1 for a rejected measurement that is too
-high, −1 for one that is too low.
+The output reaches it after about 0.25 s of rejections. The filter's input is the squared ratio of
+the innovation to its gate, at most 1, with the sign of the innovation: +1 for a rejected
+measurement that is too high, −1 for one that is too low.
 """
 
 
@@ -47,8 +47,9 @@ class ThrustFilter:
     2017). After a load is picked up or dropped, all measurements would be rejected: if rejections
     last, the variance of the state is reset to its initial value.
 
-    PX4 estimates the hover thrust itself and must linearise: H = −g·u/h². The measurement is linear
-    in k, so the filter converges equally fast from a poor first guess.
+    PX4 estimates the hover thrust instead of k, and must linearise its measurement. Here the
+    measurement is linear in k, so the filter converges from a poor first guess as fast as from a
+    good one.
 
     Args:
         hover: expected share of thrust at hover.
@@ -71,22 +72,22 @@ class ThrustFilter:
         self._rejections = 0.0
 
     def learn(
-        self, span: float, share: float, specific_thrust: float, extra_variance: float
+        self, duration: float, share: float, specific_thrust: float, extra_variance: float
     ) -> None:
         """Take one measurement.
 
         Args:
-            span: duration of the measurement, s.
-            share: mean share of full thrust, 0..1: the part along the measured axis.
+            duration: duration of the measurement, s.
+            share: mean share of full thrust along the measured axis, 0..1.
             specific_thrust: measured mean specific thrust along the same axis, m/s².
             extra_variance: variance to add to the learned variance of the measurements, (m/s²)².
         """
-        self._variance = min(self._variance + self._drift * span, self._first_variance)
+        self._variance = min(self._variance + self._drift * duration, self._first_variance)
         innovation = specific_thrust - self.gain * share
         expected = share * share * self._variance + self._noise + extra_variance
         ratio = innovation * innovation / (_GATE_DEVIATIONS * _GATE_DEVIATIONS * expected)
-        new_share = min(1.0, span / _REJECTION_TIME)
-        self._rejections += new_share * (copysign(min(ratio, 1.0), innovation) - self._rejections)
+        new_weight = min(1.0, duration / _REJECTION_TIME)
+        self._rejections += new_weight * (copysign(min(ratio, 1.0), innovation) - self._rejections)
         if ratio > 1.0:
             if abs(self._rejections) > _LASTING_REJECTION:
                 self._variance, self._rejections = self._first_variance, 0.0
@@ -95,9 +96,9 @@ class ThrustFilter:
         gain = self.gain + kalman_gain * innovation
         self.gain = min(max(gain, self._bounds[0]), self._bounds[1])
         self._variance *= 1.0 - kalman_gain * share
-        self._learn_noise(span, share, specific_thrust - self.gain * share)
+        self._learn_noise(duration, share, specific_thrust - self.gain * share)
 
-    def _learn_noise(self, span: float, share: float, residual: float) -> None:
+    def _learn_noise(self, duration: float, share: float, residual: float) -> None:
         estimate = residual * residual + share * share * self._variance
-        noise = self._noise + min(1.0, span / _NOISE_TIME) * (estimate - self._noise)
+        noise = self._noise + min(1.0, duration / _NOISE_TIME) * (estimate - self._noise)
         self._noise = min(max(noise, _SMALLEST_NOISE), _LARGEST_NOISE)

@@ -9,7 +9,7 @@ from typing import Any
 from companion.config import Config
 from companion.config.in_flight import Values, changed_in_flight
 from companion.config.known_drag import KnownDrag, before_connecting
-from companion.control.retuning import fixed_because
+from companion.control.retuning import reason_against_changes
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate
@@ -76,7 +76,7 @@ class ChangeChecks:
                 be loaded.
         """
         wanted = changed_in_flight(self.start, self.current, values, name)
-        reason = fixed_because(self.start)
+        reason = reason_against_changes(self.start)
         if reason is not None:
             raise ConfigError(f"{name}: {reason}")
         try:

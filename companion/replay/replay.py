@@ -14,7 +14,7 @@ from companion.config import Config
 from companion.config.files import changed
 from companion.config.known_drag import KnownDrag, prior_of
 from companion.control.loops import make_loops
-from companion.control.retuning import Retuning, fixed_because, tuning
+from companion.control.retuning import Retuning, loop_settings, reason_against_changes
 from companion.control.slew import Slew
 from companion.drag import Drag
 from companion.flight.maneuvers import configured_maneuvers
@@ -185,12 +185,12 @@ class Replay:
 
     def _replay_change(self, entry: ValuesChange) -> None:
         """Begin a change of values, if the loops can change values in flight."""
-        if fixed_because(self._wanted) is not None:
+        if reason_against_changes(self._wanted) is not None:
             return
         self._wanted = changed(self._wanted, entry.values, "the record")
         if entry.at_once:
             self._slew.jump(self._wanted)
-            self._retuning.apply(tuning(self._wanted))
+            self._retuning.apply(loop_settings(self._wanted))
         else:
             self._slew.begin(self._wanted, entry.time)
 

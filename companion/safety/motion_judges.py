@@ -4,7 +4,7 @@ The docstring of each judge states its breach.
 
 The judge `braking` acts before the vehicle leaves the fence. It judges where the vehicle would stop
 with the deceleration `safety.braking_m_s2`, if it still accelerates for the reaction time
-(`Fence.stop`).
+(`Fence.stopping_point`).
 """
 
 from math import degrees, hypot
@@ -111,7 +111,7 @@ def braking(fence: Fence) -> Judge:
         offset, velocity, height = motion.offset, motion.velocity, motion.height
         if offset is None or fence.breach(offset, height, motion.origin) is not None:
             return None
-        breach = fence.stop_breach(
+        breach = fence.breach_at_stopping_point(
             offset, velocity, height, motion.origin, acceleration=motion.acceleration
         )
         return None if breach is None else f"braking now would end {breach}"

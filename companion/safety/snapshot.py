@@ -6,7 +6,7 @@ from typing import NamedTuple
 from companion.attitude import Quaternion
 from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Place
-from companion.guidance.reference import Horizontal, Vector
+from companion.guidance.reference import NorthEast, Vector
 from companion.vehicle.records import Battery, Estimator, Gps
 from companion.vehicle.timesync import Uplink
 
@@ -45,7 +45,7 @@ class Motion(NamedTuple):
     """Thrust last sent, 0..1; None while idle on the ground and without a command."""
     origin: Place | None = None
     """Latitude and longitude of the fence's centre, or None if they are unknown."""
-    acceleration: Horizontal = (0.0, 0.0)
+    acceleration: NorthEast = (0.0, 0.0)
     """Estimated horizontal acceleration, m/s², NED."""
 
 

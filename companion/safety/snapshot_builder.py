@@ -49,7 +49,7 @@ class SnapshotBuilder:
         self, link: Link, loop: ControlLoop, guidance_loop: GuidanceLoop, *, real_time: bool
     ) -> None:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
-        self.echo = SetpointEcho(loop.record.sent)
+        self.echo = SetpointEcho(loop.record.sent_setpoints)
         self.counters = CounterWindow(link, loop.record, real_time=real_time)
         self._frames_heard = 0
         self._heard_at = 0.0
@@ -73,10 +73,10 @@ class SnapshotBuilder:
         self.fence_centre_ned = None if motion is None else motion.position_ned
         self._fence_place = self._place(now)
         if centre is not None:
-            self.fence_centre_ned = minus(centre.position_ned, resets.shift)
+            self.fence_centre_ned = minus(centre.position_ned, resets.position_shift)
             self._fence_place = centre.place
         self._began_at = now
-        self._frame_at_begin, self._shift_at_begin = resets.frame, resets.shift
+        self._frame_at_begin, self._shift_at_begin = resets.frame, resets.position_shift
         resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
         self._clock_changes = self._link.clock.changes
@@ -88,7 +88,7 @@ class SnapshotBuilder:
         """Centre of the fence in the autopilot's frame; None before control or without position."""
         if self.fence_centre_ned is None:
             return None
-        to_autopilot_frame = minus((0.0, 0.0, 0.0), self._loop.resets.shift)
+        to_autopilot_frame = minus((0.0, 0.0, 0.0), self._loop.resets.position_shift)
         return FenceCentre(minus(self.fence_centre_ned, to_autopilot_frame), self._fence_place)
 
     def unheard(self, now: float) -> float | None:
@@ -123,16 +123,16 @@ class SnapshotBuilder:
             ),
             self._motion(),
             Control(
-                record.last_answer,
-                record.last_sample,
-                refused_at.get("ATTITUDE_QUATERNION", -inf) > record.last_sample,
+                record.last_answered_arrival,
+                record.last_sample_arrival,
+                refused_at.get("ATTITUDE_QUATERNION", -inf) > record.last_sample_arrival,
                 record.reason,
                 position_received,
                 refused_at.get("LOCAL_POSITION_NED", -inf) > position_received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.changes == self._clock_changes else clock.last_change,
-                self.counters.stall_time(since=record.last_answer),
+                self.counters.stall_time(since=record.last_answered_arrival),
             ),
             self._health(now),
             self._resets(now),
@@ -147,7 +147,7 @@ class SnapshotBuilder:
             (north, east, down), velocity = guidance_loop.motion
             if start is not None:
                 offset = north - start[0], east - start[1], down - start[2]
-        sample, idle = loop.resets.newest, loop.command is None or loop.command.idle
+        sample, idle = loop.resets.newest_attitude, loop.command is None or loop.command.idle
         return Motion(
             None if sample is None else sample.q,
             (0.0, 0.0, 0.0) if sample is None else sample.body_rates,
@@ -174,8 +174,8 @@ class SnapshotBuilder:
         resets = self._loop.resets
         since = max(self._began_at, now - _RESET_COUNTING_TIME)
         return Resets(
-            sum(at > since for at in resets.times),
-            dist(resets.shift, self._shift_at_begin),
+            sum(at > since for at in resets.reset_times),
+            dist(resets.position_shift, self._shift_at_begin),
             wrap_angle(resets.frame.offset - self._frame_at_begin.offset),
             resets.largest_tilt_jump,
         )

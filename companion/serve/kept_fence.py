@@ -39,7 +39,7 @@ class KeptFence:
         """
         if self._kept_centre is None:
             return None
-        negative_shift = minus(self._shift_when_kept, self._resets.shift)
+        negative_shift = minus(self._shift_when_kept, self._resets.position_shift)
         position = minus(self._kept_centre.position_ned, negative_shift)
         return self._kept_centre._replace(position_ned=position)
 
@@ -49,7 +49,7 @@ class KeptFence:
         Nothing is kept if the vehicle is disarmed.
         """
         if self._kept_centre is None and self._state.armed is not False:
-            self._kept_centre, self._shift_when_kept = centre, self._resets.shift
+            self._kept_centre, self._shift_when_kept = centre, self._resets.position_shift
 
     def refusal(self) -> str | None:
         """Why control must not begin; None if it may.
@@ -59,7 +59,7 @@ class KeptFence:
         position, kept_centre = self._state.position, self.centre
         if kept_centre is None or position is None:
             return None
-        shift = dist(self._resets.shift, self._shift_when_kept)
+        shift = dist(self._resets.position_shift, self._shift_when_kept)
         if shift > self._max_shift:
             return (
                 f"the estimator has moved the position by {shift:.1f} m since the first flight, "
@@ -78,4 +78,4 @@ class KeptFence:
 
     def _note_position(self, _: object) -> None:
         if self._state.position is not None:
-            self._resets.without_jumps(self._state.position)
+            self._resets.position_without_jumps(self._state.position)

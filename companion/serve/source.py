@@ -127,7 +127,7 @@ class ServedSource:
 
     def _without_jumps(self, request: MotionRequest) -> MotionRequest:
         """The request in the frame without estimator resets."""
-        north, east, down = self.resets.shift
+        north, east, down = self.resets.position_shift
         return request._replace(
             horizontal=_without_shift(request.horizontal, (north, east)),
             vertical=_without_shift(request.vertical, (down,)),

@@ -16,7 +16,7 @@ from companion.config import Config
 from companion.config.guidance import LINEAR
 from companion.config.known_drag import drag_prior
 from companion.control.hold_settings import observer_settings
-from companion.control.inner_loop import slower_tilt, tilt_damping
+from companion.control.inner_loop import tilt_damping, tilt_lag_and_dead_time
 from companion.control.outer_loop import linear_settings
 from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY
@@ -141,7 +141,7 @@ def _slower_axis(config: Config) -> AxisResponse:
     """Configured response of the slower of roll and pitch; if unknown, that of a heavy vehicle."""
     if not config.vehicle.response_known:
         return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
-    lag, dead_time = slower_tilt(config)
+    lag, dead_time = tilt_lag_and_dead_time(config)
     return AxisResponse(lag, dead_time, damping=tilt_damping(config))
 
 

@@ -85,7 +85,7 @@ def hold(config: Config, vehicle: Airframe, seconds=12.0, off=0.5, noise=(0.0, 0
             inputs = estimate.guidance_input(time, guidance.acts_after, (2.0, 18.0))
             held = Reference((0.0, 0.0, -5.0))
             target, later, down = guidance.command(lambda _, held=held: held, time, inputs)
-            command = GuidanceCommand(target, down, time, later=later, period=_GUIDANCE * DT)
+            command = GuidanceCommand(target, down, time, later_target=later, period=_GUIDANCE * DT)
         asked.append(vehicle.rate_gain * law.rates(q, command.target_at(time), DT, rates).roll)
         turning = kept @ turning + added * asked[0]
         rate = float(turning[0])

@@ -114,7 +114,7 @@ def test_nothing_is_sent_while_off_or_before_the_first_target():
     assert (bench.sent, bench.loop.record.samples) == ([], 0)
     bench.loop.on, bench.loop.command = True, None
     bench.sample(vehicle_time=9.0)
-    assert (bench.sent, bench.loop.record.stale) == ([], 1)
+    assert (bench.sent, bench.loop.record.stale_count) == ([], 1)
 
 
 def test_an_old_target_is_not_answered():
@@ -125,7 +125,7 @@ def test_an_old_target_is_not_answered():
         bench.sample()
     answered = len(bench.sent) - 2
     assert answered == 37  # 0.15 s of 4 ms samples
-    assert bench.loop.record.stale == 60 - answered
+    assert bench.loop.record.stale_count == 60 - answered
 
 
 @pytest.mark.parametrize("stamp", [3.02, None])
@@ -134,7 +134,7 @@ def test_repeated_and_reordered_samples_are_not_answered(stamp):
     bench.run(10)
     bench.sample(vehicle_time=stamp)
     assert len(bench.sent) == 10
-    assert bench.loop.record.stale == 1
+    assert bench.loop.record.stale_count == 1
 
 
 def test_a_duplicate_in_the_same_instant_is_not_answered_twice():
@@ -149,7 +149,7 @@ def test_a_sample_that_was_long_under_way_is_not_answered():
     bench.run(10)
     bench.time += 0.004
     bench.sample(late=0.11)
-    assert (len(bench.sent), bench.loop.record.stale) == (10, 1)
+    assert (len(bench.sent), bench.loop.record.stale_count) == (10, 1)
 
 
 @pytest.mark.parametrize("rates", [None, BodyRates(0.3, -0.4, 0.5)])
@@ -170,17 +170,17 @@ def test_an_unusable_attitude_is_refused_and_counted(q, rates):
         bench.time += 0.004
         bench.refresh(body_rates=rates)
         bench.sample(q=q)
-    assert (bench.sent, bench.loop.record.refused, bench.loop.record.setpoints) == ([], 3, 0)
+    assert (bench.sent, bench.loop.record.refused_count, bench.loop.record.setpoints) == ([], 3, 0)
 
 
 def test_a_setpoint_that_could_not_leave_is_no_answer():
     bench = Bench()
     bench.run(3)
-    last = bench.loop.record.last_answer
+    last = bench.loop.record.last_answered_arrival
     bench.connected = False
     bench.run(3)
-    assert (bench.loop.record.setpoints, bench.loop.record.refused) == (3, 3)
-    assert bench.loop.record.last_answer == last
+    assert (bench.loop.record.setpoints, bench.loop.record.refused_count) == (3, 3)
+    assert bench.loop.record.last_answered_arrival == last
 
 
 def test_idle_sends_neither_rates_nor_thrust():
@@ -266,8 +266,11 @@ def test_each_unanswered_sample_has_one_reason_which_is_counted():
         Unanswered.NO_TARGET: 1,
     }
     loop = bench.loop
-    assert (loop.record.stale, loop.record.refused) == (9, 4)
-    assert loop.record.samples == loop.record.setpoints + loop.record.stale + loop.record.refused
+    assert (loop.record.stale_count, loop.record.refused_count) == (9, 4)
+    assert (
+        loop.record.samples
+        == loop.record.setpoints + loop.record.stale_count + loop.record.refused_count
+    )
     assert loop.record.reason is Unanswered.INVALID_SETPOINT
     assert all(reason.words for reason in Unanswered)
 
@@ -353,7 +356,7 @@ def test_they_are_held_to_the_same_freshness_and_never_sent_as_nan():
     bench.sample(vehicle_time=3.1)
     bench.time += 0.2  # the command is older than 0.15 s
     bench.sample(vehicle_time=3.3)
-    assert (len(bench.sent), bench.loop.record.stale) == (1, 1)
+    assert (len(bench.sent), bench.loop.record.stale_count) == (1, 1)
     encoder = SetpointEncoder(1, 191, 1, 1, signed=False)
 
     def send(stamp, rates, thrust):
@@ -363,7 +366,7 @@ def test_they_are_held_to_the_same_freshness_and_never_sent_as_nan():
     bench = Bench(send=send)
     bench.refresh(body_rates=BodyRates(math.nan, 0.0, 0.0))
     bench.sample(vehicle_time=3.1)
-    assert (bench.loop.record.setpoints, bench.loop.record.refused) == (0, 1)
+    assert (bench.loop.record.setpoints, bench.loop.record.refused_count) == (0, 1)
 
 
 def test_after_them_the_planner_begins_anew():
@@ -415,7 +418,7 @@ def test_a_target_moves_with_the_samples_times_until_its_period_is_over():
     bench = Bench(planner)
     bench.run(20)  # the quickest of these tells the vehicle's clock
     asked.clear()
-    bench.refresh(target=Target(0.0, 0.0, 0.0), later=Target(0.2, 0.0, 0.0), period=0.02)
+    bench.refresh(target=Target(0.0, 0.0, 0.0), later_target=Target(0.2, 0.0, 0.0), period=0.02)
     begun = bench.time
     for elapsed in (0.005, 0.010, 0.020, 0.040):
         bench.time = begun + elapsed

@@ -45,7 +45,7 @@ class Tumbling:
 def test_a_tumbling_vehicle_is_not_taken_for_a_jump(dt):
     body = Tumbling(dt)
     assert not any(body.step() for _ in range(100))
-    assert (body.resets.frame.offset, list(body.resets.times)) == (0.0, [])
+    assert (body.resets.frame.offset, list(body.resets.reset_times)) == (0.0, [])
 
 
 def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_them():
@@ -56,7 +56,7 @@ def test_jumps_in_heading_add_up_the_short_way_and_the_attitude_goes_on_without_
         body.time += 1.0  # too long ago to compare with
         body.step()
     assert body.resets.frame.offset == pytest.approx(3.3 - 2 * np.pi, abs=0.01)
-    assert len(body.resets.times) == 3
+    assert len(body.resets.reset_times) == 3
     before = turn(-body.resets.frame.offset) * body.rotation
     assert body.resets.frame.attitude(quaternion(body.rotation)) == pytest.approx(
         quaternion(before)
@@ -88,17 +88,17 @@ def test_positions_go_on_without_the_jumps():
         jump = 0.5 if step >= 100 else 0.0
         raw = (way[0] + jump, way[1], way[2] - jump)
         speed = (2.0 * cos(2.0 * time), 3.0, -1.0)
-        shown = resets.without_jumps(LocalPosition(time, time, raw, speed))
+        shown = resets.position_without_jumps(LocalPosition(time, time, raw, speed))
         assert shown.position_ned == pytest.approx(way, abs=1e-3)
-    assert resets.shift == pytest.approx((0.5, 0.0, -0.5), abs=1e-3)
-    assert len(resets.times) == 1
+    assert resets.position_shift == pytest.approx((0.5, 0.0, -0.5), abs=1e-3)
+    assert len(resets.reset_times) == 1
 
 
 def test_the_counter_tells_of_resets_too_small_to_see_and_counts_none_twice():
     resets = EstimatorResets()
     for now, counter in ((1.0, 7), (2.0, 7), (3.0, 8), (3.2, 9), (5.0, 0)):
         resets.on_counter(counter, now)
-    assert list(resets.times) == [3.0, 5.0]
+    assert list(resets.reset_times) == [3.0, 5.0]
 
 
 @pytest.mark.parametrize(
@@ -134,9 +134,11 @@ def test_a_jump_in_heading_is_4_degrees_and_half_of_what_the_rates_changed(
 def test_a_jump_in_position_is_20_cm_and_what_a_change_of_acceleration_explains(dt, jump, found):
     """10 m/s² of change between two positions explain 10·dt²/8 m."""
     resets, speed = EstimatorResets(), (3.0, 0.0, 0.0)
-    resets.without_jumps(LocalPosition(5.0, 5.0, (0.0, 0.0, 0.0), speed))
-    resets.without_jumps(LocalPosition(5.0 + dt, 5.0 + dt, (3.0 * dt + jump, 0.0, 0.0), speed))
-    assert resets.shift == pytest.approx((jump if found else 0.0, 0.0, 0.0))
+    resets.position_without_jumps(LocalPosition(5.0, 5.0, (0.0, 0.0, 0.0), speed))
+    resets.position_without_jumps(
+        LocalPosition(5.0 + dt, 5.0 + dt, (3.0 * dt + jump, 0.0, 0.0), speed)
+    )
+    assert resets.position_shift == pytest.approx((jump if found else 0.0, 0.0, 0.0))
 
 
 def flown(summary):

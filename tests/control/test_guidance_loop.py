@@ -21,7 +21,7 @@ from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
 from tests.control.kept_messages import KeptMessages
 
-DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step=0.25, settle=1.0)
+DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step_time=0.25, settle=1.0)
 IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 3.0, DOUBLETS.duration - 1.5
 HERE = (3.0, 4.0, -5.0)
 
@@ -143,13 +143,13 @@ def test_a_vehicle_that_never_comes_back_from_open_loop_is_off_its_course():
 def test_jumps_on_the_ground_are_corrections_and_are_not_kept_out():
     """A compass or GPS that settles before take-off improves the estimate: no reset to hide."""
     bench = Bench()
-    bench.loop.resets.frame, bench.loop.resets.shift = HeadingFrame(0.5), (3.0, 0.0, 0.0)
+    bench.loop.resets.frame, bench.loop.resets.position_shift = HeadingFrame(0.5), (3.0, 0.0, 0.0)
     bench.ground.standing = True
     bench.fly(IN_HOLD)
     assert bench.loop.resets.frame.offset == 0.5  # in control "landed" is not believed
     bench.loop.offboard_active = False
     bench.fly(IN_HOLD)
-    assert (bench.loop.resets.frame, bench.loop.resets.shift) == (
+    assert (bench.loop.resets.frame, bench.loop.resets.position_shift) == (
         HeadingFrame(0.0),
         (0.0, 0.0, 0.0),
     )
@@ -216,7 +216,7 @@ def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
     command = bench.fly(IN_HOLD)
     assert (command.made_at, command.period, command.frame.offset) == (13.0, 0.02, 0.25)
     assert (command.idle, command.is_step, command.thrust) == (False, False, None)
-    assert command.later is not None
+    assert command.later_target is not None
 
 
 def test_what_a_phase_tells_guidance():

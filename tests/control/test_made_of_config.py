@@ -13,8 +13,8 @@ from companion.control.hold_settings import hold_weights
 from companion.control.hover_learning import HoverLearning
 from companion.control.inner_loop import (
     hover_thrust,
-    law_constants,
     planner,
+    planner_constants,
     plugin,
     thrust_limits,
 )
@@ -23,7 +23,12 @@ from companion.control.loops import make_loops
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.outer_loop import linear_settings, make_guidance, predictive_settings
 from companion.control.planner_runner import PlannerRunner
-from companion.control.retuning import Retuning, fixed_because, interpolated, tuning
+from companion.control.retuning import (
+    Retuning,
+    interpolated_config,
+    loop_settings,
+    reason_against_changes,
+)
 from companion.control.slew import Slew
 from companion.control.telemetry import FreshPosition
 from companion.drag import AxisDrag, Drag
@@ -89,7 +94,7 @@ def retuned(values):
 
 def test_a_change_of_values_reaches_both_loops():
     limits = CONFIG.limits.model_copy(update={"max_tilt_deg": 20.0})
-    values = tuning(CONFIG.model_copy(update={"limits": limits}))
+    values = loop_settings(CONFIG.model_copy(update={"limits": limits}))
     assert retuned(values) == {
         "law": (values.constants, values.limits),
         "estimate": (values.observer, values.correction),
@@ -102,7 +107,7 @@ def test_a_change_of_values_reaches_both_loops():
 
 
 def test_a_planner_of_another_package_keeps_its_gains():
-    values = tuning(CONFIG)
+    values = loop_settings(CONFIG)
     runner = PlannerRunner(SimpleNamespace(), EstimatorResets(), values.limits)
     with pytest.raises(TypeError, match="SimpleNamespace cannot be retuned"):
         runner.retune(values.constants, values.limits)
@@ -116,9 +121,9 @@ def test_a_planner_of_another_package_keeps_its_gains():
     ],
 )
 def test_what_may_not_change_in_flight_says_why(section, key, name, words):
-    assert fixed_because(CONFIG) is None
+    assert reason_against_changes(CONFIG) is None
     changed = getattr(CONFIG, section).model_copy(update={key: name})
-    assert words in fixed_because(CONFIG.model_copy(update={section: changed}))
+    assert words in reason_against_changes(CONFIG.model_copy(update={section: changed}))
 
 
 def with_gains(**gains):
@@ -127,15 +132,17 @@ def with_gains(**gains):
 
 def test_a_value_moves_by_equal_factors_and_from_zero_by_equal_amounts():
     before, after = with_gains(yaw_gain_per_s=0.5), with_gains(yaw_gain_per_s=0.8, gain_per_s=1.0)
-    middle = interpolated(before, after, 0.5).planner
+    middle = interpolated_config(before, after, 0.5).planner
     assert middle.gain_per_s == pytest.approx(2.0)
     assert middle.yaw_gain_per_s == pytest.approx(0.4**0.5)
-    started = interpolated(with_gains(yaw_gain_per_s=0.0), with_gains(yaw_gain_per_s=0.8), 0.25)
+    started = interpolated_config(
+        with_gains(yaw_gain_per_s=0.0), with_gains(yaw_gain_per_s=0.8), 0.25
+    )
     assert started.planner.yaw_gain_per_s == pytest.approx(0.2)
     weight = hold_weights(CONFIG).velocity
     heavier = CONFIG.guidance.model_copy(update={"velocity_weight_per_s2": 4.0 * weight})
     changed = CONFIG.model_copy(update={"guidance": heavier})
-    found = interpolated(CONFIG, changed, 0.5).guidance.velocity_weight_per_s2
+    found = interpolated_config(CONFIG, changed, 0.5).guidance.velocity_weight_per_s2
     assert found == pytest.approx(2.0 * weight)
 
 
@@ -195,7 +202,7 @@ def test_both_loops_are_made_and_answer_a_sample():
     loop.on_sample(SAMPLE)
     ((stamp, rates, thrust),) = sent
     assert (stamp, tuple(rates)) == (3000, pytest.approx((0.0, 0.0, 0.0), abs=1e-9))
-    assert thrust == hover_thrust(CONFIG).normalised(0.0, SAMPLE.q, SAMPLE.body_rates)
+    assert thrust == hover_thrust(CONFIG).normalised_thrust(0.0, SAMPLE.q, SAMPLE.body_rates)
     assert (loop.record.latency_ns, loop.record.missed_deadlines) == (3_003_000, 1)
     assert (len(trace.rates_rows()), trace.newest_latency_ns) == (1, 3_003_000)
     assert loop._deadlines == Deadlines(telemetry_stale=0.09, target_stale=0.14, deadline=0.003)
@@ -235,7 +242,7 @@ def test_thrust_and_law():
         drag=0.6,
     )
     limits = Limits(radians(30.0), radians(80.0), radians(50.0))
-    assert law_constants(CONFIG) == make_constants(4.0, 1.5, limits, radians(70.0))
+    assert planner_constants(CONFIG) == make_constants(4.0, 1.5, limits, radians(70.0))
     assert thrust_limits(CONFIG) == pytest.approx((GRAVITY / 3.0, 0.85 / 0.45 * GRAVITY))
 
 

@@ -14,7 +14,7 @@ from companion.control.hold_settings import (
     hold_weights,
     observer_settings,
 )
-from companion.control.retuning import tuning
+from companion.control.retuning import loop_settings
 from companion.files import bounded_yaml
 from companion.files.yaml_file import parse
 from tests.control.one_axis import Airframe, hold, settled
@@ -150,6 +150,9 @@ def test_a_gain_above_the_sensible_one_does_not_stiffen_the_hold():
 def test_a_higher_gain_in_flight_slows_observer_and_correction():
     quick = believed(*VEHICLES[0])
     planner = quick.planner.model_copy(update={"gain_per_s": 9.0})
-    before, after = tuning(quick), tuning(quick.model_copy(update={"planner": planner}))
+    before, after = (
+        loop_settings(quick),
+        loop_settings(quick.model_copy(update={"planner": planner})),
+    )
     assert before.observer.bandwidth_increase > after.observer.bandwidth_increase == 0.0
     assert before.correction.filter_time < after.correction.filter_time

@@ -28,7 +28,7 @@ def tumbled(lag, *, steps=(0.004, 0.008), seconds=4.0, noise=0.0, correction_deg
         x, y, z, w = (Rotation.from_euler("z", turn) * rotation).as_quat()
         told = BodyRates(*(rates(time - lag) + random.normal(0.0, noise, 3)))
         resets.on_attitude(AttitudeSample(0, time, time, 0, (w, x, y, z), told))
-        history.append(degrees(resets.corrections))
+        history.append(degrees(resets.heading_corrections))
     return resets, history
 
 

@@ -12,7 +12,7 @@ from companion.attitude.model_following import ModelFollowingPlanner
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.config.in_flight import changeable_keys, differences
-from companion.control.retuning import interpolated
+from companion.control.retuning import interpolated_config
 from companion.control.slew import SLEW_TIME
 from companion.flight.changes import ChangeRefusedError, Changes
 from companion.recording.flight_record import read_flight
@@ -103,10 +103,10 @@ def test_values_that_identify_does_not_use_are_refused(key):
 
 @pytest.mark.parametrize("fault", [ValueError("fault"), OverflowError("fault")])
 def test_a_change_without_gains_is_refused(fault, monkeypatch):
-    def tuning(_):
+    def loop_settings(_):
         raise fault
 
-    monkeypatch.setattr("companion.flight.changes.tuning", tuning)
+    monkeypatch.setattr("companion.flight.changes.loop_settings", loop_settings)
     changes = Changes(Config())
     with pytest.raises(ChangeRefusedError, match="a test: fault; nothing has changed"):
         changes.change({"planner": {"gain_per_s": 4.0}}, "a test")
@@ -117,11 +117,12 @@ def test_the_way_of_a_change_is_even_and_null_counts_as_what_it_comes_to():
     before = Config()
     after = changed(before, {"guidance": {"position_weight_per_s4": 1000.0}}, "test")
     weights = [
-        interpolated(before, after, 0.1 * k).guidance.position_weight_per_s4 for k in range(1, 11)
+        interpolated_config(before, after, 0.1 * k).guidance.position_weight_per_s4
+        for k in range(1, 11)
     ]
     ratios = [b / a for a, b in pairwise(weights)]
     assert max(ratios) == pytest.approx(min(ratios), rel=1e-6)
-    assert interpolated(before, after, 1.0) is after
+    assert interpolated_config(before, after, 1.0) is after
     assert {each.name for each in differences(before, after)} == {"guidance.position_weight_per_s4"}
 
 

@@ -210,7 +210,9 @@ def test_the_worst_moment_is_found_among_all():
         change, none = rng.uniform(-3, 3, (20, 3)), np.zeros((20, 3))
         motion = Motion(np.arange(20.0), place, speed, change, none, none[:, 0])
         each = [
-            fence.stop_breach(tuple(p), tuple(v), 5.0 - p[2], None, TRACKING_MARGIN, (a[0], a[1]))
+            fence.breach_at_stopping_point(
+                tuple(p), tuple(v), 5.0 - p[2], None, TRACKING_MARGIN, (a[0], a[1])
+            )
             for p, v, a in zip(place.tolist(), speed.tolist(), change.tolist(), strict=True)
         ]
         found = FenceCheck(fence, 5.0)(motion)

@@ -9,7 +9,7 @@ import pytest
 
 from companion.attitude import BodyRates, Target
 from companion.control.heading_frame import HeadingFrame
-from companion.control.predictive import FollowedTrajectory, Predictive
+from companion.control.predictive import FollowedTrajectory, PredictiveControl
 from companion.guidance import GRAVITY, LinearCommand, Pose
 from companion.guidance.follow import Follow
 from companion.guidance.trajectory import Laps, circle
@@ -47,7 +47,7 @@ def test_from_standing_into_the_circle_it_neither_swings_nor_leaves(tmp_path):
     async def note_pid(session):
         while session._assembled is None:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
-        pids.append(session._assembled.context.guidance_loop.maker.predictive._solver.pid)
+        pids.append(session._assembled.context.guidance_loop.maker.predictive_control._solver.pid)
 
     summary = flown(tmp_path, "circle5.yaml", note_pid)
     assert not Path(f"/proc/{pids[0]}").exists()  # the process ends with the flight
@@ -74,7 +74,8 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
             await asyncio.sleep(0.1)
         await asyncio.sleep(7.0)  # in the middle of the eight, at 5 m/s
         os.kill(
-            session._assembled.context.guidance_loop.maker.predictive._solver.pid, signal.SIGKILL
+            session._assembled.context.guidance_loop.maker.predictive_control._solver.pid,
+            signal.SIGKILL,
         )
 
     summary = flown(tmp_path, "figure8.yaml", kill)
@@ -107,7 +108,7 @@ class FakeSolver:
 
 def bench():
     notes = []
-    predictive = Predictive(FakeSolver, period=0.02, vehicle_waits=False, note=notes.append)
+    predictive = PredictiveControl(FakeSolver, period=0.02, vehicle_waits=False, note=notes.append)
     return predictive, predictive._solver, notes
 
 

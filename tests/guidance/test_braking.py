@@ -17,9 +17,9 @@ SPEEDS = st.floats(-10.0, 10.0)
 @given(st.tuples(SPEEDS, SPEEDS, SPEEDS), st.floats(0.2, 8.0))
 def test_it_is_smooth_and_ends_where_the_vehicle_is_at_rest(velocity, duration):
     braking, h = Braking(BEGUN, VehicleMotion(HERE, velocity), HEADING, duration), 1e-5
-    assert braking.at(braking.end_time + 5.0).position_ned == pytest.approx(braking.stop)
+    assert braking.at(braking.end_time + 5.0).position_ned == pytest.approx(braking.stopping_point)
     assert braking.at(braking.end_time + 5.0).velocity_ned == pytest.approx((0.0,) * 3)
-    assert braking.stop[2] == HERE[2], "the height at which it began is held"
+    assert braking.stopping_point[2] == HERE[2], "the height at which it began is held"
     assert braking.at(BEGUN)[:2] == (HERE, (*velocity[:2], 0.0))
     for time in np.linspace(BEGUN + 0.01, braking.end_time - 0.01, 7):
         before, now, after = (braking.at(time + k * h) for k in (-1.0, 0.0, 1.0))
@@ -43,7 +43,7 @@ def test_it_stops_within_what_the_monitor_of_the_fence_assumes(
     duration = braking_time(speed, acceleration, AssumedBraking(reaction, deceleration))
     braking = Braking(BEGUN, VehicleMotion(HERE, (0.0, speed, 0.0)), HEADING, duration)
     assumed = speed * max(0.0, reaction - 0.1) + speed**2 / (2.0 * deceleration)
-    assert 0.0 < braking.stop[1] - HERE[1] <= assumed + 1e-9
+    assert 0.0 < braking.stopping_point[1] - HERE[1] <= assumed + 1e-9
 
 
 def test_a_vehicle_at_rest_is_held_where_it_is():

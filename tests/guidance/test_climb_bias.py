@@ -14,7 +14,9 @@ def corrected(height, speed, seconds, noise=0.0):
     climb, random = ClimbBias(), np.random.default_rng(2)
     times = np.arange(1, round(seconds / DT)) * DT
     heights = [height(t) + random.normal(0.0, noise) for t in times]
-    rows = [climb.corrected(5.0 + t, h, speed(t)) for t, h in zip(times, heights, strict=True)]
+    rows = [
+        climb.corrected_speed(5.0 + t, h, speed(t)) for t, h in zip(times, heights, strict=True)
+    ]
     return times, np.array(rows)
 
 
@@ -46,6 +48,6 @@ def test_a_jump_of_the_height_does_not_become_a_climb():
 def test_what_is_learned_is_limited_and_survives_a_gap():
     climb = ClimbBias()
     for step in range(1000):
-        climb.corrected(5.0 + step * DT, 0.0, 2.0)
+        climb.corrected_speed(5.0 + step * DT, 0.0, 2.0)
     assert climb.bias == 0.15
-    assert climb.corrected(60.0, 3.0, 2.0) == pytest.approx(1.85)
+    assert climb.corrected_speed(60.0, 3.0, 2.0) == pytest.approx(1.85)

@@ -10,11 +10,11 @@ from companion.guidance import Doublets, Pose
 START = Pose((3.0, -2.0, -5.0), 0.7)
 DOUBLETS = Doublets(
     tilt_rate=1.0,
-    tilt_step=0.25,
+    tilt_step_time=0.25,
     yaw_rate=0.8,
-    yaw_step=1.2,
+    yaw_step_time=1.2,
     climb_acceleration=2.0,
-    climb_step=0.3,
+    climb_step_time=0.3,
     settle=1.5,
 )
 STEP = 1e-3

@@ -95,7 +95,7 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
     unknown = breach(fence=fence, origin=None)
     assert (unknown.limit, unknown.distance_outside) == ("safety.fence_polygon_deg", 0.0)
     still = (0.0, 0.0, -5.0), (0.0, 0.0, 0.0)
-    assert fence.stop_breach(*still, 10.0, HOME) is None
+    assert fence.breach_at_stopping_point(*still, 10.0, HOME) is None
     assert str(unknown) == (
         "at a place whose latitude and longitude are not known, but needed by "
         "safety.fence_polygon_deg"
@@ -126,33 +126,42 @@ def test_a_fence_on_the_map_may_lie_across_the_date_line(origin):
 
 def test_it_stops_after_the_reaction_and_the_braking():
     """v·t + v²/(2a): 5 m/s needs 2.5 + 6.25 m, 2 m/s down 1 + 1 m."""
-    stop = FENCE.stop((1.0, 2.0, -5.0), (3.0, -4.0, 2.0))
+    stop = FENCE.stopping_point((1.0, 2.0, -5.0), (3.0, -4.0, 2.0))
     assert stop == pytest.approx((1.0 + 0.6 * 8.75, 2.0 - 0.8 * 8.75, -3.0))
-    assert FENCE.stop((0.0, 0.0, 0.0), (0.0, 0.0, -2.0)) == pytest.approx((0.0, 0.0, -2.0))
+    assert FENCE.stopping_point((0.0, 0.0, 0.0), (0.0, 0.0, -2.0)) == pytest.approx(
+        (0.0, 0.0, -2.0)
+    )
 
 
 def test_an_acceleration_lasts_for_the_reaction_time_and_one_that_brakes_does_not_count():
     fence = Fence(9.0, 5.0, 1.0, (), (), 2.5, 0.3)
     still, way = (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)
-    faster = fence.stop(still, way, (4.0, 0.0))
+    faster = fence.stopping_point(still, way, (4.0, 0.0))
     assert faster[0] == pytest.approx(2.0 * 0.3 + 4.0 * 0.09 / 2.0 + 3.2**2 / 5.0)
-    assert fence.stop(still, way, (-4.0, 0.0)) == fence.stop(still, way)
-    north, east, _ = fence.stop(still, way, (0.0, 5.0))
+    assert fence.stopping_point(still, way, (-4.0, 0.0)) == fence.stopping_point(still, way)
+    north, east, _ = fence.stopping_point(still, way, (0.0, 5.0))
     assert (north > 0.0, east > 0.0) == (True, True)
     places = np.zeros(2), np.zeros(2), np.zeros(2)
     ways = np.array([2.0, 2.0]), np.zeros(2), np.zeros(2)
-    several = fence.stop(places, ways, (np.array([4.0, -4.0]), np.zeros(2)))
-    assert several[0].tolist() == pytest.approx([faster[0], fence.stop(still, way)[0]])
+    several = fence.stopping_point(places, ways, (np.array([4.0, -4.0]), np.zeros(2)))
+    assert several[0].tolist() == pytest.approx([faster[0], fence.stopping_point(still, way)[0]])
 
 
 def test_where_it_would_stop_is_judged_with_its_height_there():
     sinking = ((0.0, 0.0, -5.0), (0.0, 0.0, 2.0))  # 2 m further down
-    assert FENCE.stop_breach(*sinking, 4.0, HOME) is None
-    assert FENCE.stop_breach(*sinking, 3.5, HOME).distance_outside == pytest.approx(0.5)
-    assert FENCE.stop_breach(*sinking, 4.0, HOME, margin=0.25).limit == "limits.fence_floor_m"
-    assert FENCE.stop_breach(*sinking, None, HOME) is None
+    assert FENCE.breach_at_stopping_point(*sinking, 4.0, HOME) is None
+    assert FENCE.breach_at_stopping_point(*sinking, 3.5, HOME).distance_outside == pytest.approx(
+        0.5
+    )
+    assert (
+        FENCE.breach_at_stopping_point(*sinking, 4.0, HOME, margin=0.25).limit
+        == "limits.fence_floor_m"
+    )
+    assert FENCE.breach_at_stopping_point(*sinking, None, HOME) is None
     leaving = ((45.0, 0.0, -5.0), (5.0, 0.0, 0.0))
-    assert FENCE.stop_breach(*leaving, 10.0, HOME).distance_outside == pytest.approx(3.75)
+    assert FENCE.breach_at_stopping_point(*leaving, 10.0, HOME).distance_outside == pytest.approx(
+        3.75
+    )
 
 
 @pytest.mark.parametrize(

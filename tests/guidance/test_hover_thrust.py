@@ -41,7 +41,7 @@ class Vehicle:
         for k in range(round(seconds / STEP)):
             if k % 5 == 0:
                 self.thrust.observe(self.time, self.velocity + self.random.gauss(0.0, self.noise))
-            signal = self.thrust.normalised(command(self), self.q, STILL)
+            signal = self.thrust.normalised_thrust(command(self), self.q, STILL)
             self.thrust.note_thrust(signal, self.q)
             self.felt += STEP / self.lag * (self.specific(signal) - self.felt)
             lift = self.felt * self.cosine() + self.drag * self.velocity
@@ -185,7 +185,7 @@ def test_tilt_is_divided_out_by_us_or_by_the_autopilot():
         vehicle.divides_by_cos = compensated
         assert abs(vehicle.fly(5.0).velocity) < 0.05
         assert thrust.learned_hover == pytest.approx(0.5, rel=0.01)
-        signal = thrust.normalised(0.0, vehicle.q, STILL)
+        signal = thrust.normalised_thrust(0.0, vehicle.q, STILL)
         assert signal == pytest.approx(0.5 if compensated else 0.5 / math.cos(0.6), rel=0.01)
 
 
@@ -193,8 +193,8 @@ def test_a_lag_that_is_known_leads_the_thrust_as_the_vehicle_tilts():
     q = Rotation.from_rotvec((0.5, 0.0, 0.0)).as_quat(scalar_first=True)
     rolling = BodyRates(2.0, 0.0, 0.0)
     plain, led = HoverThrust(SETTINGS), HoverThrust(replace(SETTINGS, lag=0.05))
-    assert plain.normalised(0.0, q, rolling) == pytest.approx(0.5 / math.cos(0.5))
-    assert led.normalised(0.0, q, rolling) == pytest.approx(0.5 / math.cos(0.6), rel=0.01)
+    assert plain.normalised_thrust(0.0, q, rolling) == pytest.approx(0.5 / math.cos(0.5))
+    assert led.normalised_thrust(0.0, q, rolling) == pytest.approx(0.5 / math.cos(0.6), rel=0.01)
 
 
 def test_through_a_curved_thrust_the_motion_is_as_wanted():
@@ -202,7 +202,7 @@ def test_through_a_curved_thrust_the_motion_is_as_wanted():
         thrust = HoverThrust(replace(SETTINGS, curve_factor=known))
         vehicle = Vehicle(thrust, hover=0.4, curve=0.6, noise=0.005).fly(5.0)
         assert thrust.learned_hover == pytest.approx(0.4, rel=0.02)
-        signal = thrust.normalised(-4.0, LEVEL, STILL)
+        signal = thrust.normalised_thrust(-4.0, LEVEL, STILL)
         off = abs(vehicle.specific(signal) - GRAVITY - 4.0) / 4.0
         assert off < error if known else off > error
 
@@ -212,11 +212,11 @@ def test_the_battery_is_made_up_for_at_once():
     thrust.note_voltage(1.0, 16.0)
     for k in range(20):
         thrust.note_voltage(2.0 + k, 14.4)
-    assert thrust.normalised(0.0, LEVEL, STILL) == pytest.approx(0.5 / 0.81, rel=1e-3)
+    assert thrust.normalised_thrust(0.0, LEVEL, STILL) == pytest.approx(0.5 / 0.81, rel=1e-3)
     assert thrust.learned_hover == 0.5
     assert thrust.largest_specific_thrust == pytest.approx(0.9 / 0.5 * GRAVITY * 0.81, rel=1e-3)
     thrust.on_ground()
-    assert thrust.normalised(0.0, LEVEL, STILL) == 0.5
+    assert thrust.normalised_thrust(0.0, LEVEL, STILL) == 0.5
 
 
 def test_a_sag_that_the_voltage_tells_is_not_learned_a_second_time():
@@ -230,7 +230,7 @@ def test_a_sag_that_the_voltage_tells_is_not_learned_a_second_time():
 
 def test_what_is_given_out_stays_in_its_bounds():
     thrust = HoverThrust(SETTINGS)
-    assert thrust.normalised(-1e9, LEVEL, STILL) == 0.9
-    assert thrust.normalised(1e9, LEVEL, STILL) == 0.1
+    assert thrust.normalised_thrust(-1e9, LEVEL, STILL) == 0.9
+    assert thrust.normalised_thrust(1e9, LEVEL, STILL) == 0.1
     assert thrust.smallest_specific_thrust == pytest.approx(0.2 * GRAVITY)
     assert thrust.largest_specific_thrust == pytest.approx(1.8 * GRAVITY)

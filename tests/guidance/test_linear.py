@@ -21,10 +21,10 @@ from companion.guidance import (
     Reference,
     VehicleMotion,
     Weights,
-    chain_gains,
+    horizontal_gains,
     specific_thrust,
 )
-from companion.guidance.feedback import ChainGains
+from companion.guidance.feedback import HorizontalGains
 from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
 
 REST = (0.0, 0.0, 0.0)
@@ -32,7 +32,7 @@ THRUST = 2.0, 18.0  # m/s²
 DRAG = Drag(0.5)
 TILT = InnerResponse(5.0, 0.05, 0.05, follows_model=True)
 SETTINGS = LinearSettings(
-    gains=chain_gains(Weights(40.0, 8.0), TILT.effective_delay, DRAG.linear),
+    gains=horizontal_gains(Weights(40.0, 8.0), TILT.effective_delay, DRAG.linear),
     height=HeightGains(1.5, 3.5, 2.0, 1.0),
     tilt=TILT,
     heading=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
@@ -216,7 +216,7 @@ def test_the_heading_is_asked_for_ahead_of_its_response():
 
 
 def test_without_feedback_the_later_target_is_the_one_of_a_period_later():
-    settings = replace(SETTINGS, period=0.02, gains=ChainGains(0.0, 0.0, 0.0))
+    settings = replace(SETTINGS, period=0.02, gains=HorizontalGains(0.0, 0.0, 0.0))
     motion = VehicleMotion(circling(2.0).position_ned, circling(2.0).velocity_ned)
     situation = GuidanceInput(motion, motion, (0.0, 0.0), (0.0, 0.0), DRAG, THRUST)
     guidance = LinearGuidance(settings)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_are
 
-from companion.guidance.feedback import Weights, chain_gains
+from companion.guidance.feedback import Weights, horizontal_gains
 
 
 def chain(lag, drag):
@@ -18,14 +18,14 @@ def chain(lag, drag):
 def test_the_gains_are_those_of_scipys_riccati_solution(position, velocity, lag, drag):
     a, b = chain(lag, drag)
     riccati = solve_continuous_are(a, b, np.diag([position, velocity, 0.0]), np.eye(1))
-    gains = chain_gains(Weights(position, velocity), lag, drag)
+    gains = horizontal_gains(Weights(position, velocity), lag, drag)
     found = [gains.position, gains.velocity, gains.acceleration]
     assert found == pytest.approx((b.T @ riccati)[0], rel=1e-6)
 
 
 def test_the_chain_comes_to_rest_with_little_overshoot():
     a, b = chain(0.25, 1.0)
-    gains = chain_gains(Weights(16.0, 4.0), 0.25, 1.0)
+    gains = horizontal_gains(Weights(16.0, 4.0), 0.25, 1.0)
     closed = a - b @ [[gains.position, gains.velocity, gains.acceleration]]
     assert np.linalg.eigvals(closed).real.max() < -1.0
     state, path = np.array([1.0, 0.0, 0.0]), []
@@ -50,4 +50,4 @@ def test_the_chain_comes_to_rest_with_little_overshoot():
 )
 def test_impossible_weights_and_lags_are_refused(weights, lag):
     with pytest.raises(ValueError, match="must"):
-        chain_gains(Weights(*weights), lag)
+        horizontal_gains(Weights(*weights), lag)

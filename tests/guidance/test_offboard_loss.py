@@ -30,7 +30,9 @@ def test_a_vehicle_that_hovers_is_carried_no_farther_than_feedback_had_turned_it
 def test_level_at_a_speed_it_goes_on_for_the_time_and_then_brakes_as_the_fence_reckons():
     """A fraction over, for feedback."""
     there = reach(flown(velocity=(5.0, 0.0, 0.0)), PX4)
-    assert there.place == pytest.approx((5.0 * 1.1 + FENCE.stop(NOTHING, (5.0, 0.0, 0.0))[0], 0.0))
+    assert there.place == pytest.approx(
+        (5.0 * 1.1 + FENCE.stopping_point(NOTHING, (5.0, 0.0, 0.0))[0], 0.0)
+    )
     assert there.largest_distance == pytest.approx(there.place[0] + there.spread)
     assert 0.0 < there.spread < 5.0
 

@@ -39,7 +39,7 @@ def errors(settings, position_delay=0.0):
     """The largest errors of a position after 5 s: as measured, and corrected; m."""
     correction, measured_off, off = PositionCorrection(settings), 0.0, 0.0
     for time, truth, measured in wandering(40.0, position_delay):
-        found = correction.corrected(time, measured)
+        found = correction.corrected_motion(time, measured)
         assert found.position_ned[1:] == pytest.approx((3.0, -5.0))
         assert found.velocity_ned == measured.velocity_ned
         if time > 5.0:
@@ -66,30 +66,30 @@ def test_other_settings_count_from_the_next_position_on():
     retuned, kept = PositionCorrection(SETTINGS), PositionCorrection(SETTINGS)
     rows = wandering(6.0)
     for time, _, measured in rows[:200]:
-        assert retuned.corrected(time, measured) == kept.corrected(time, measured)
+        assert retuned.corrected_motion(time, measured) == kept.corrected_motion(time, measured)
     retuned.retune(late)
     for time, _, measured in rows[200:]:
-        (north, east, down), velocity = kept.corrected(time, measured)
+        (north, east, down), velocity = kept.corrected_motion(time, measured)
         later = (north + late.position_delay * velocity[0], east, down)
-        assert retuned.corrected(time, measured).position_ned == pytest.approx(later)
+        assert retuned.corrected_motion(time, measured).position_ned == pytest.approx(later)
 
 
 def test_at_rest_nothing_changes():
     correction = PositionCorrection(CorrectionSettings(0.7, 0.1, 0.2, position_delay=0.05))
     rest = VehicleMotion((3.0, -2.0, -5.0), (0.0, 0.0, 0.0))
     for n in range(100):
-        assert correction.corrected(n * DT, rest) == rest
+        assert correction.corrected_motion(n * DT, rest) == rest
 
 
 def test_a_gap_and_a_reset_begin_anew():
     correction = PositionCorrection(SETTINGS)
     away = VehicleMotion((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    correction.corrected(0.0, VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
-    assert correction.corrected(DT, away).position_ned[0] > 1.0
-    assert correction.corrected(5.0, away) == away
-    correction.corrected(5.0 + DT, VehicleMotion((2.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    correction.corrected_motion(0.0, VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    assert correction.corrected_motion(DT, away).position_ned[0] > 1.0
+    assert correction.corrected_motion(5.0, away) == away
+    correction.corrected_motion(5.0 + DT, VehicleMotion((2.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     correction.reset()
-    assert correction.corrected(5.0 + 2.0 * DT, away) == away
+    assert correction.corrected_motion(5.0 + 2.0 * DT, away) == away
 
 
 def noisy(metres, speed, seconds=20.0, seed=3):
@@ -98,7 +98,9 @@ def noisy(metres, speed, seconds=20.0, seed=3):
     correction, random, added = PositionCorrection(quick), Random(seed), []
     for n in range(round(seconds / DT)):
         north = speed * n * DT + random.gauss(0.0, metres)
-        found = correction.corrected(n * DT, VehicleMotion((north, 0.0, 0.0), (speed, 0.0, 0.0)))
+        found = correction.corrected_motion(
+            n * DT, VehicleMotion((north, 0.0, 0.0), (speed, 0.0, 0.0))
+        )
         added.append(abs(found.position_ned[0] - north))
     return correction, added
 
@@ -120,7 +122,7 @@ def test_a_stamp_that_slips_by_a_millisecond_hardly_moves_the_position(slip):
     for n in range(200):
         time = n * DT + (slip if n >= 100 else 0.0)
         measured = VehicleMotion((5.0 * n * DT, 0.0, 0.0), (5.0, 0.0, 0.0))
-        added.append(correction.corrected(time, measured).position_ned[0] - 5.0 * n * DT)
+        added.append(correction.corrected_motion(time, measured).position_ned[0] - 5.0 * n * DT)
     assert max(map(abs, added)) <= 0.01
 
 
@@ -136,7 +138,7 @@ def test_it_is_bounded_whatever_comes(rows):
     for dt, place, speed in rows:
         time += dt
         measured = VehicleMotion((*place, 0.0), (*speed, 0.0))
-        north, east, _ = correction.corrected(time, measured).position_ned
+        north, east, _ = correction.corrected_motion(time, measured).position_ned
         assert isfinite(north + east)
         assert hypot(north - place[0], east - place[1]) <= 0.2 * (1.0 + 1e-9) + 1e-9
 
@@ -147,7 +149,7 @@ def test_a_turning_vehicle_without_errors_is_left_alone():
         a = n * DT
         place = (5.0 * cos(a), 5.0 * sin(a), 0.0)
         speed = (-5.0 * sin(a), 5.0 * cos(a), 0.0)
-        found = correction.corrected(a, VehicleMotion(place, speed))
+        found = correction.corrected_motion(a, VehicleMotion(place, speed))
         off = hypot(found.position_ned[0] - place[0], found.position_ned[1] - place[1])
         most = max(most, off)
     assert most <= 1e-3

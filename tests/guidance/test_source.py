@@ -6,7 +6,7 @@ from companion.attitude import Coefficients
 from companion.guidance import ManeuverSequence, Pose, Reference, VehicleMotion
 from companion.guidance.maneuvers import Corners
 from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
-from companion.guidance.source import CommandedSource, ManeuverSource, extrapolated
+from companion.guidance.source import CommandedSource, ManeuverSource, extrapolated_reference
 
 POSE = Pose((1.0, 2.0, -3.0), 0.5)
 HERE = VehicleMotion((4.0, 5.0, -6.0), (1.0, 0.0, 0.0))
@@ -135,7 +135,7 @@ def test_a_reference_goes_on_with_its_velocity_acceleration_jerk_and_heading_rat
     start = Reference(
         (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.5, 1.0, 1.5), heading=0.5, heading_rate=0.25
     )
-    later = extrapolated(start, (3.0, 6.0, 9.0), 3.0)
+    later = extrapolated_reference(start, (3.0, 6.0, 9.0), 3.0)
     assert later.position_ned == pytest.approx((28.75, 48.5, 68.25))
     assert later.velocity_ned == pytest.approx((19.0, 35.0, 51.0))
     assert later.acceleration_ned == pytest.approx((9.5, 19.0, 28.5))

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates
-from companion.guidance import GRAVITY, height_first, specific_thrust
+from companion.guidance import GRAVITY, acceleration_within_thrust, specific_thrust
 from companion.guidance.thrust import TILT_THRUST_SHARE, cos_tilt_ahead
 
 SMALLEST, LARGEST = 2.0, 18.0
@@ -84,7 +84,7 @@ def test_the_lag_of_the_rotors_is_led_while_the_vehicle_tilts():
 
 @given(accelerations, accelerations, accelerations)
 def test_what_thrust_cannot_give_is_taken_from_the_horizontal_part(north, east, down):
-    found = height_first((north, east, down), SMALLEST, LARGEST)
+    found = acceleration_within_thrust((north, east, down), SMALLEST, LARGEST)
     lift, length = GRAVITY - found[2], math.hypot(*found[:2])
     assert SMALLEST - 1e-6 <= math.hypot(lift, length) <= LARGEST + 1e-6
     assert found[0] * east == pytest.approx(found[1] * north, abs=1e-6)
@@ -98,18 +98,20 @@ def test_what_thrust_cannot_give_is_taken_from_the_horizontal_part(north, east, 
 
 
 def test_the_height_comes_first():
-    assert height_first((3.0, -1.0, 0.5), SMALLEST, LARGEST) == pytest.approx((3.0, -1.0, 0.5))
-    north, east, down = height_first((20.0, 0.0, -5.0), SMALLEST, LARGEST)
+    assert acceleration_within_thrust((3.0, -1.0, 0.5), SMALLEST, LARGEST) == pytest.approx(
+        (3.0, -1.0, 0.5)
+    )
+    north, east, down = acceleration_within_thrust((20.0, 0.0, -5.0), SMALLEST, LARGEST)
     assert down == pytest.approx(-5.0)
     assert north == pytest.approx(
         math.sqrt((TILT_THRUST_SHARE * LARGEST) ** 2 - (GRAVITY + 5.0) ** 2)
     )
     assert east == 0.0
     # More lift than there is: all of it goes upwards.
-    assert height_first((5.0, 5.0, -30.0), SMALLEST, LARGEST) == pytest.approx(
+    assert acceleration_within_thrust((5.0, 5.0, -30.0), SMALLEST, LARGEST) == pytest.approx(
         (0.0, 0.0, GRAVITY - LARGEST)
     )
     # Faster down than the least thrust lets it fall.
-    assert height_first((0.0, 1.0, 20.0), SMALLEST, LARGEST) == pytest.approx(
+    assert acceleration_within_thrust((0.0, 1.0, 20.0), SMALLEST, LARGEST) == pytest.approx(
         (0.0, 1.0, GRAVITY - math.sqrt(3.0))
     )

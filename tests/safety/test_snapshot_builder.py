@@ -46,14 +46,14 @@ class Flight:
             timesync=SimpleNamespace(round_trip_s=0.04, uplink=Uplink(0.05, 1)),
         )
         self.resets = SimpleNamespace(
-            newest=SimpleNamespace(q=Q, body_rates=(0.1, 0.2, 0.3)),
-            times=[],
-            shift=(1.0, 2.0, 3.0),
+            newest_attitude=SimpleNamespace(q=Q, body_rates=(0.1, 0.2, 0.3)),
+            reset_times=[],
+            position_shift=(1.0, 2.0, 3.0),
             frame=HeadingFrame(3.0),
             largest_tilt_jump=0.7,
             on_counter=lambda *seen: self.counted.append(seen),
         )
-        self.record = LoopRecord(sent=deque([(BodyRates(0.0, 0.0, 0.0), 0.45)]))
+        self.record = LoopRecord(sent_setpoints=deque([(BodyRates(0.0, 0.0, 0.0), 0.45)]))
         command = SimpleNamespace(idle=False)
         self.loop = SimpleNamespace(resets=self.resets, record=self.record, command=command)
         self.course = SimpleNamespace(position_ned=(5.0, -6.0, -7.0), velocity=(1.0, 2.0, 0.5))
@@ -128,7 +128,7 @@ def test_what_is_not_known_is_none(command):
     flight.state.global_position.received = 8.99
     flight.builder.begin(10.0)
     flight.listen(10.0)
-    flight.resets.newest = flight.state.position = None
+    flight.resets.newest_attitude = flight.state.position = None
     flight.loop.command = command
     flight.guidance.fresh_position = lambda: None
     told = flight.snapshot()
@@ -145,7 +145,7 @@ def test_what_is_not_known_is_none(command):
 def test_before_control_begins_everything_counts_from_the_start_of_the_clock():
     flight = Flight()
     flight.record.gaps.append(0.5)
-    flight.resets.times.append(0.5)
+    flight.resets.reset_times.append(0.5)
     flight.listen(1.0, 4.0)
     told = flight.snapshot(4.0)
     assert (told.motion.offset, told.motion.origin, told.good_flags) == (None, None, 0)
@@ -159,19 +159,19 @@ def test_before_control_begins_everything_counts_from_the_start_of_the_clock():
 
 
 def test_the_newest_attitude_or_position_with_a_nan_is_known(flight):
-    flight.record.last_sample = 9.5
+    flight.record.last_sample_arrival = 9.5
     assert not flight.snapshot().control.attitude_not_finite
     flight.stats.non_finite_at = {"ATTITUDE_QUATERNION": 9.6, "LOCAL_POSITION_NED": 9.7}
     told = flight.snapshot().control
     assert (told.attitude_not_finite, told.position_not_finite) == (True, False)  # one at 9.75
     flight.stats.non_finite_at["LOCAL_POSITION_NED"] = 9.8
-    flight.record.last_sample = 9.65
+    flight.record.last_sample_arrival = 9.65
     told = flight.snapshot().control
     assert (told.attitude_not_finite, told.position_not_finite) == (False, True)
 
 
 def test_every_stage_of_a_samples_way_has_its_time(flight):
-    flight.record.last_answer, flight.record.last_sample = 9.9, 9.95
+    flight.record.last_answered_arrival, flight.record.last_sample_arrival = 9.9, 9.95
     flight.record.reason = Unanswered.LATE
     flight.stats.frames = 1
     flight.listen(10.02)
@@ -247,7 +247,7 @@ def test_deadlines_do_not_count_in_lockstep():
 
 def test_gaps_count_for_five_seconds_and_resets_for_thirty_but_none_from_before(flight):
     flight.record.gaps.extend([9.0, 10.0, 11.0, 12.0])
-    flight.resets.times.extend([9.0, 10.0, 11.0, 30.0])
+    flight.resets.reset_times.extend([9.0, 10.0, 11.0, 30.0])
     assert flight.snapshot(14.0).health.gaps == 2
     assert flight.snapshot(16.5).health.gaps == 1
     assert flight.snapshot(17.0).health.gaps == 0
@@ -257,7 +257,7 @@ def test_gaps_count_for_five_seconds_and_resets_for_thirty_but_none_from_before(
 
 def test_resets_are_summed_from_where_control_began(flight):
     assert flight.snapshot().resets == Resets(0, 0.0, 0.0, 0.0)
-    flight.resets.shift, flight.resets.frame = (1.0, 5.0, 7.0), HeadingFrame(-3.0)
+    flight.resets.position_shift, flight.resets.frame = (1.0, 5.0, 7.0), HeadingFrame(-3.0)
     flight.resets.largest_tilt_jump = 0.2
     found = flight.snapshot().resets
     assert found.position_shift == pytest.approx(5.0)

@@ -24,7 +24,7 @@ from companion.guidance.trajectory import (
 )
 from companion.guidance.trajectory.csv_file import Table
 from companion.guidance.trajectory.curves import MOST_CHECKS, PATH_STEP
-from companion.guidance.trajectory.demand import demand, sampled
+from companion.guidance.trajectory.demand import demand, sampled_motion
 from companion.guidance.trajectory.from_samples import SampleOptions, from_samples
 from tests.trajectory.finite_differences import evenly
 
@@ -83,8 +83,8 @@ def needs(motion):
 )
 def test_a_finer_look_at_all_of_it_finds_no_more(seed):
     for trajectory in some(seed):
-        fine = needs(sampled(trajectory, evenly(trajectory, trajectory.duration / 12_000)))
-        for quantity, most in needs(sampled(trajectory)).items():
+        fine = needs(sampled_motion(trajectory, evenly(trajectory, trajectory.duration / 12_000)))
+        for quantity, most in needs(sampled_motion(trajectory)).items():
             missed = fine[quantity] - most
             assert missed <= 0.003 * abs(most) + 2e-3, (trajectory.name, quantity, most, missed)
 
@@ -94,7 +94,7 @@ def test_two_looks_are_no_farther_apart_than_told(seed):
     """Where laps are left out the vehicle is at the same place of a lap."""
     for trajectory in some(seed):
         if trajectory.name not in ("circle", "helix", "gerono eight", "bernoulli eight"):
-            ways = np.linalg.norm(np.diff(sampled(trajectory).position, axis=0), axis=1)
+            ways = np.linalg.norm(np.diff(sampled_motion(trajectory).position, axis=0), axis=1)
             assert ways.max() <= 1.02 * PATH_STEP
 
 
@@ -107,7 +107,7 @@ def test_laps_without_number_cost_no_more_than_a_few():
 
 def test_the_last_lap_of_a_helix_is_looked_at():
     up = helix(3.0, 2.0, Laps(4.0, 100))
-    assert needs(sampled(up))["-1 of 2"] == pytest.approx(200.0)
+    assert needs(sampled_motion(up))["-1 of 2"] == pytest.approx(200.0)
 
 
 @pytest.mark.parametrize(

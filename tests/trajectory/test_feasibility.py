@@ -18,7 +18,7 @@ from companion.guidance.trajectory import (
     violations,
     waypoints,
 )
-from companion.guidance.trajectory.demand import demand, sampled
+from companion.guidance.trajectory.demand import demand, sampled_motion
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,
@@ -35,7 +35,7 @@ def test_the_demand_is_that_of_the_force_that_moves_the_vehicle():
     """The thrust axis and its turning, by differences of directions, with drag and in space."""
     drag, h = Drag(0.7, 0.05), 1e-5
     path = waypoints([(4.0, 0.0, -2.0), (4.0, 5.0, 0.0), (0.0, 1.0, -3.0)], 4.0, 6.0)
-    motion = sampled(path, evenly(path, 0.02))
+    motion = sampled_motion(path, evenly(path, 0.02))
     found = demand(motion, drag, G)
 
     def axis(time):
@@ -63,7 +63,7 @@ def test_the_tilt_of_a_circle_is_that_of_the_books(speed, drag):
 def test_a_violation_says_when_what_and_how_much():
     (broken,) = violations(EIGHT, Envelope(max_tilt=radians(35.0), drag=Drag(1.0)))
     assert broken.begins < broken.time
-    motion = sampled(EIGHT, evenly(EIGHT, 0.005))
+    motion = sampled_motion(EIGHT, evenly(EIGHT, 0.005))
     tilt = demand(motion, Drag(1.0), G).tilt
     first = motion.times[np.argmax(tilt > radians(35.0))]
     assert broken.begins == pytest.approx(first, abs=0.01)
@@ -125,7 +125,7 @@ def test_all_broken_limits_are_told_in_the_order_of_time():
 
 def test_free_fall_demands_no_thrust_and_no_turning():
     falling = line((0.0, 0.0, 60.0), 100.0, G, 20.0)
-    found = demand(sampled(falling, evenly(falling, 0.005)), NO_DRAG, G)
+    found = demand(sampled_motion(falling, evenly(falling, 0.005)), NO_DRAG, G)
     assert found.thrust.min() == pytest.approx(0.0, abs=1e-9)
     assert np.isfinite(found.tilt_rate).all()
 

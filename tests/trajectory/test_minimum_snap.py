@@ -7,7 +7,7 @@ from scipy.linalg import null_space
 
 from companion.guidance.trajectory.minimum_snap import FixedStates, Observations, minimum_snap
 from companion.guidance.trajectory.septic_spline import (
-    FROM_ENDS,
+    COEFFICIENTS_FROM_ENDS,
     STATE_SIZE,
     SepticSpline,
     derivative_rows,
@@ -28,8 +28,8 @@ def test_rest_to_rest_is_the_septic_of_the_literature():
 
 def test_the_coefficients_of_a_piece_are_exact():
     ends = [derivative_rows(np.array([u]), k)[0] for u in (0.0, 1.0) for k in range(STATE_SIZE)]
-    np.testing.assert_allclose(np.array(ends) @ FROM_ENDS, np.eye(8), atol=1e-12)
-    assert (np.rint(6.0 * FROM_ENDS) / 6.0 == FROM_ENDS).all()
+    np.testing.assert_allclose(np.array(ends) @ COEFFICIENTS_FROM_ENDS, np.eye(8), atol=1e-12)
+    assert (np.rint(6.0 * COEFFICIENTS_FROM_ENDS) / 6.0 == COEFFICIENTS_FROM_ENDS).all()
 
 
 def _problem(seed, count=6):

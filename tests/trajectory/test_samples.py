@@ -272,4 +272,4 @@ def test_a_comment_before_the_header_says_the_frame_and_unused_columns_are_known
     assert parse_csv(lines, "x").frame is None
     assert parse_csv(["# made by hand", "# frame: NED", *lines], "x").frame == "ned"
     assert parse_csv([*lines[:3], "# frame: ned", *lines[3:]], "x").frame is None
-    assert parse_csv(lines, "x").unused == ("battery",)
+    assert parse_csv(lines, "x").unused_columns == ("battery",)

@@ -14,7 +14,7 @@ from companion.config.trajectory_file import TrajectoryFile, load, read
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.guidance.trajectory import line
-from companion.guidance.trajectory.demand import demand, sampled
+from companion.guidance.trajectory.demand import demand, sampled_motion
 from tests.trajectory.finite_differences import (
     assert_derivatives_agree,
     assert_rests_at_both_ends,
@@ -49,7 +49,7 @@ def test_a_shipped_trajectory_flies_as_its_first_lines_say(path):
     assert_derivatives_agree(trajectory, inner_times(trajectory), jumps)
     assert_rests_at_both_ends(trajectory)
     told = re.search(r"drag of 1/s it takes ([\d.]+)° of tilt and (\d+)°/s", path.read_text())
-    needs = demand(sampled(trajectory, evenly(trajectory, 0.005)), Drag(1.0), 9.80665)
+    needs = demand(sampled_motion(trajectory, evenly(trajectory, 0.005)), Drag(1.0), 9.80665)
     if told:
         assert degrees(needs.tilt.max()) == pytest.approx(float(told[1]), abs=0.06)
         assert degrees(needs.tilt_rate.max()) == pytest.approx(float(told[2]), abs=0.6)

@@ -9,7 +9,7 @@ import pytest
 from companion.attitude import BodyRates
 from companion.config.files import changed, load, shipped
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.inner_loop import planner, slower_tilt
+from companion.control.inner_loop import planner, tilt_lag_and_dead_time
 from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.guidance import GRAVITY, Reference
 from companion.tuning import loop as loop_module
@@ -69,7 +69,7 @@ def measured(config, omega):
             estimate.note_position(position, offboard_active=False)
             inputs = estimate.guidance_input(time, guidance.acts_after, (2.0, 18.0))
             target, later, down = guidance.command(lambda _: HELD, time, inputs)
-            command = GuidanceCommand(target, down, time, later=later, period=5 * DT)
+            command = GuidanceCommand(target, down, time, later_target=later, period=5 * DT)
         answer = law.rates(q, command.target_at(time), DT, rates).roll
         if time >= begin:
             rows.append((sin(omega * time), cos(omega * time), 1.0, answer))
@@ -91,7 +91,7 @@ def test_guidance_and_planner_answer_as_the_formulas_say(name, omega):
 
 def growth(config, **vehicle):
     """Standard deviation of the position after 6 s, per that before."""
-    lag, dead_time = slower_tilt(config)
+    lag, dead_time = tilt_lag_and_dead_time(config)
     late, damping = vehicle.pop("late", 0.0), config.vehicle.axes["roll"].damping
     flown = Airframe(lag, dead_time + late, DRAG, damping=damping, **vehicle)
     places = hold(config, flown, seconds=10.0, off=0.02)

@@ -49,8 +49,8 @@ Checked
     Motion
     turned_first     a turn on the spot before a trajectory that begins with a heading
     computable       turns numerical errors into a `TrajectoryError`
-    LONGEST          longest duration that is checked, s
-    FARTHEST, FASTEST  bounds of coordinates and speeds in files, m and m/s
+    LONGEST_DURATION  longest duration that is checked, s
+    LARGEST_COORDINATE, LARGEST_SPEED  bounds of coordinates and speeds in files, m and m/s
 """
 
 # Without `__all__`: with it, help() prints the methods of every tuple. A name imported as itself is
@@ -78,9 +78,9 @@ from companion.guidance.trajectory.from_samples import HeadingFrom as HeadingFro
 from companion.guidance.trajectory.from_samples import SampleOptions as SampleOptions
 from companion.guidance.trajectory.from_samples import from_samples as from_samples
 from companion.guidance.trajectory.own_trajectory import require_trajectory as require_trajectory
-from companion.guidance.trajectory.sample import FARTHEST as FARTHEST
-from companion.guidance.trajectory.sample import FASTEST as FASTEST
-from companion.guidance.trajectory.sample import LONGEST as LONGEST
+from companion.guidance.trajectory.sample import LARGEST_COORDINATE as LARGEST_COORDINATE
+from companion.guidance.trajectory.sample import LARGEST_SPEED as LARGEST_SPEED
+from companion.guidance.trajectory.sample import LONGEST_DURATION as LONGEST_DURATION
 from companion.guidance.trajectory.sample import Sample as Sample
 from companion.guidance.trajectory.sample import Trajectory as Trajectory
 from companion.guidance.trajectory.sample import TrajectoryError as TrajectoryError

@@ -19,7 +19,7 @@ import numpy as np
 
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.guidance.trajectory.csv_header import columns_of, excerpt, rows_of, without_unit
-from companion.guidance.trajectory.sample import FARTHEST, FASTEST, TrajectoryError
+from companion.guidance.trajectory.sample import LARGEST_COORDINATE, LARGEST_SPEED, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 
 FEWEST_SAMPLES = 4
@@ -31,7 +31,7 @@ _MOST_SAMPLES = 50_000
 _MOST_BYTES = 20_000_000
 """Largest size of a file, bytes: `_MOST_SAMPLES` samples of twenty columns with all digits."""
 
-_SHORTEST_STEP, _LONGEST_STEP = 1e-4, 10.0
+_SHORTEST_PERIOD, _LONGEST_PERIOD = 1e-4, 10.0
 """Shortest and longest time between two samples, s."""
 
 _SHORTEST_DURATION = 0.1
@@ -39,8 +39,8 @@ _SHORTEST_DURATION = 0.1
 
 _LARGEST_VALUES = {
     "time": (1e10, "s"),
-    "position": (FARTHEST, "m from where it begins"),
-    "velocity": (FASTEST, "m/s"),
+    "position": (LARGEST_COORDINATE, "m from where it begins"),
+    "velocity": (LARGEST_SPEED, "m/s"),
     "acceleration": (1000.0, "m/s²"),
     "yaw": (1e4, "rad"),
     "quaternion": (2.0, "for a component"),
@@ -64,7 +64,7 @@ class Table:
         derivatives: velocity in m/s, then acceleration in m/s², (m, 3) each, if the file has them.
         yaw: tilt-yaw heading (m,), rad, unwrapped; None if the file has neither yaw nor quaternion.
         frame: the frame that the comment before the header names; None without such a comment.
-        unused: names of the columns that are not read, in lower case and without their units.
+        unused_columns: names of the columns that are not read, in lower case, without their units.
     """
 
     times: Floats
@@ -72,7 +72,7 @@ class Table:
     derivatives: tuple[Floats, ...]
     yaw: Floats | None
     frame: str | None = None
-    unused: tuple[str, ...] = ()
+    unused_columns: tuple[str, ...] = ()
 
 
 def read_csv(path: Path) -> Table:
@@ -140,8 +140,8 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
 def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str) -> None:
     """Refuse rows with more values than the header has names; decimal commas make such rows.
 
-    Some published files have them, too; they are accepted if all rows have equally many values and
-    decimals have points.
+    Some published files have such rows, too. They are accepted if all rows have equally many values
+    and decimals have points.
 
     Raises:
         TrajectoryError: a row has too many values; the message names its line.
@@ -186,9 +186,9 @@ def _numbers(
 
 
 def _require_steps(times: Floats, line_numbers: Sequence[int], name: str) -> None:
-    """Check each step in time (`_SHORTEST_STEP` to `_LONGEST_STEP`) and the duration."""
+    """Check each step in time (`_SHORTEST_PERIOD` to `_LONGEST_PERIOD`) and the duration."""
     steps = np.diff(times)
-    wrong = np.flatnonzero(~((steps >= 0.999 * _SHORTEST_STEP) & (steps <= _LONGEST_STEP)))
+    wrong = np.flatnonzero(~((steps >= 0.999 * _SHORTEST_PERIOD) & (steps <= _LONGEST_PERIOD)))
     if wrong.size:
         step, line = float(steps[wrong[0]]), line_numbers[int(wrong[0]) + 1]
         if step <= 0.0:
@@ -197,7 +197,7 @@ def _require_steps(times: Floats, line_numbers: Sequence[int], name: str) -> Non
             )
         raise TrajectoryError(
             f"{name}, line {line}: {step:.3g} s after the previous sample; write time in s, with "
-            f"steps from {_SHORTEST_STEP:g} to {_LONGEST_STEP:g} s"
+            f"steps from {_SHORTEST_PERIOD:g} to {_LONGEST_PERIOD:g} s"
         )
     if times[-1] - times[0] < _SHORTEST_DURATION:
         raise TrajectoryError(f"{name}: lasts less than {_SHORTEST_DURATION:g} s; write time in s")

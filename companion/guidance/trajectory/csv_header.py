@@ -116,7 +116,7 @@ def _is_number(text: str) -> bool:
 
 
 def _missing(group: str, header: list[str]) -> str:
-    """The message that columns of a quantity are missing, with those that were found."""
+    """A message that columns of a quantity are missing; it shows the columns that were found."""
     spellings = _SPELLINGS[group]
     expected = " or ".join(",".join(names) for names in spellings)
     nearest = max(spellings, key=lambda names: sum(column in header for column in names))

@@ -23,12 +23,12 @@ class PhaseSampling(NamedTuple):
     """Phases at which to check a curve against limits, close enough not to miss an extreme.
 
     Attributes:
-        step: phase between two checks; None if `phases` lists the checks.
+        phase_step: phase between two checks; None if `phases` lists the checks.
         period: phase after which the curve repeats, apart from a steady climb; None if it does not.
-        phases: the phases of the checks, ascending; empty if `step` is given.
+        phases: the phases of the checks, ascending; empty if `phase_step` is given.
     """
 
-    step: float | None
+    phase_step: float | None
     period: float | None = None
     phases: tuple[float, ...] = ()
 

@@ -49,7 +49,7 @@ class Motion:
         return self.retimed(self.times * factor, Progress(0.0, 1.0 / factor))  # type: ignore[arg-type]
 
 
-def sampled(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:
+def sampled_motion(trajectory: Trajectory, times: Sequence[float] | None = None) -> Motion:
     """Sample a trajectory at `times` (s); None: at its check times.
 
     Raises:

@@ -8,11 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.drag import NO_DRAG, Drag
-from companion.guidance.trajectory.demand import Floats, Motion, demand, require_finite, sampled
+from companion.guidance.trajectory.demand import (
+    Floats,
+    Motion,
+    demand,
+    require_finite,
+    sampled_motion,
+)
 from companion.guidance.trajectory.sample import Trajectory, computable
 
 _ROUNDING = 1e-9
-"""Tolerance of limits for rounding, as a share. Some trajectories just meet a limit."""
+"""Relative tolerance of limits for rounding errors. Some trajectories just meet a limit."""
 
 _TO_DEGREES = 180.0 / pi
 
@@ -137,11 +143,11 @@ def violations(trajectory: Trajectory, envelope: Envelope) -> tuple[Violation, .
         TrajectoryError: the trajectory cannot be computed, or is too long to be checked.
     """
     with computable():
-        return broken_limits(sampled(trajectory), envelope)
+        return broken_limits(sampled_motion(trajectory), envelope)
 
 
 def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
-    """Excess over each limit at each time, (m,), as a share of the limit; negative if it is kept.
+    """Relative excess over each limit at each time, (m,); negative where the limit is kept.
 
     The fence is not included, because it is checked for a whole motion.
     """

@@ -21,9 +21,9 @@ from companion.guidance.trajectory.time_laws import (
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
 _LONGEST_RAMP_SHARE = 0.5
-"""Longest ramp (time in which the rate rises or falls), as a share of the time for all laps at the
-steady rate. So a ramp covers at most a quarter of the path, and the fastest place of each figure
-lies between the ramps.
+"""Longest ramp (time in which the phase rate rises or falls), as a share of the time for all laps
+at the steady phase rate. So a ramp covers at most a quarter of the path, and the fastest place of
+each figure lies between the ramps.
 """
 
 _RAMP_ACCELERATION = 1.0
@@ -79,8 +79,8 @@ def line(
         face_path: face along the line instead of holding the heading.
 
     Raises:
-        TrajectoryError: the line has no finite length, a limit is not positive, or it is vertical
-            and `face_path` is set.
+        TrajectoryError: the line has no finite length, a limit is not positive, or the line is
+            vertical and `face_path` is set.
     """
     length = sqrt(sum(x * x for x in to))
     if not isfinite(length):
@@ -97,12 +97,13 @@ def line(
 
 @dataclass(frozen=True, slots=True)
 class Laps:
-    """How laps of a figure are flown: from rest to rest, at a steady rate between two ramps.
+    """How laps of a figure are flown: from rest to rest, at a steady phase rate between two ramps.
 
     Attributes:
         speed: speed at the fastest place, m/s.
         laps: number of laps; both ramps are part of them.
-        acceleration: largest acceleration along the path on a ramp, m/s². Few laps may need more.
+        acceleration: intended largest acceleration along the path on a ramp, m/s²; it is exceeded
+            if the laps are too short for it.
         direction: direction from the start to the figure, clockwise from north, rad.
         face_path: whether the vehicle faces along the path. Otherwise it holds its heading.
     """

@@ -14,7 +14,7 @@ from companion.guidance.trajectory.spline_curve import (
     HEADING_CHECK_STEP,
     SplineCurve,
     heading_spline,
-    smoothed,
+    smoothing_spline,
     tangent_heading,
 )
 from companion.guidance.trajectory.time_laws import SEPTIC_SLOPE, Cruise
@@ -63,7 +63,7 @@ _DERIVATIVE_QUANTITIES = (
 
 
 class Frame(Enum):
-    """World frames of published trajectories."""
+    """World frames in which files give positions and yaw."""
 
     ENU = "enu"
     """x east, y north, z up; yaw anticlockwise from east (ROS, REP 103)."""
@@ -124,7 +124,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
 
     Raises:
         TrajectoryError: velocity or acceleration is not the derivative of the position, the samples
-            last too long, or they never move horizontally and have no heading along the path; the
+            last too long, or the heading should follow a path that never moves horizontally; the
             table names another frame than the options, its arrays have other shapes than `Table`
             says or a number that is not finite; an option is out of range.
         ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.
@@ -135,11 +135,11 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     to_ned = _TO_NED[options.frame]
     position = (table.position - table.position[0]) @ to_ned.rotation.T
     derivatives = tuple(values @ to_ned.rotation.T for values in table.derivatives)
-    spline = smoothed(table.times, position, options.cutoff, derivatives)
+    spline = smoothing_spline(table.times, position, options.cutoff, derivatives)
     _require_derivatives(spline, table.times, derivatives)
     speeds = [_speed(spline, end) for end in (spline.begin, spline.end)]
     resting = speeds[0] < _REST_SPEED, speeds[1] < _REST_SPEED
-    spline = smoothed(table.times, position, options.cutoff, derivatives, resting)
+    spline = smoothing_spline(table.times, position, options.cutoff, derivatives, resting)
     rise_time, fall_time = [
         0.0
         if is_resting

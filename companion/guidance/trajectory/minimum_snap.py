@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.guidance.trajectory.septic_spline import (
-    FROM_ENDS,
+    COEFFICIENTS_FROM_ENDS,
     STATE_SIZE,
     Floats,
     SepticSpline,
@@ -101,7 +101,7 @@ def _smoothness_equations(spans: Floats, stiffness: float, series: int) -> _Equa
     # Snap of uᵏ is k!/(k−4)!·uᵏ⁻⁴, and ∫ uᵐ over a piece is 1/(m + 1).
     snap = np.array([24.0, 120.0, 360.0, 840.0])
     energy = np.outer(snap, snap) / (powers[:, None] + powers + 1.0)
-    unit = FROM_ENDS[STATE_SIZE:].T @ energy @ FROM_ENDS[STATE_SIZE:]
+    unit = COEFFICIENTS_FROM_ENDS[STATE_SIZE:].T @ energy @ COEFFICIENTS_FROM_ENDS[STATE_SIZE:]
     ends = spans[:, None] ** np.tile(powers, 2)
     blocks = stiffness * unit * ends[:, :, None] * ends[:, None, :] / spans[:, None, None] ** 7
     diagonal = np.zeros((spans.size + 1, STATE_SIZE, STATE_SIZE))
@@ -122,7 +122,7 @@ def _add_observations(
     span = spans[piece]
     fractions = (observed.times - knots[piece]) / (span * unit)
     ends = span[:, None] ** np.tile(np.arange(STATE_SIZE), 2)
-    rows = derivative_rows(fractions, observed.derivative) @ FROM_ENDS * ends
+    rows = derivative_rows(fractions, observed.derivative) @ COEFFICIENTS_FROM_ENDS * ends
     rows /= (span[:, None] * unit) ** observed.derivative
     weighted = rows * observed.weights[:, None]
     squares = weighted[:, :, None] * rows[:, None, :]

@@ -18,7 +18,7 @@ _COMPARED_TIMES = 24
 """Number of times at which derivatives are compared."""
 _GOLDEN_RATIO = 0.6180339887498949
 """Multiples of this modulo 1 are spread evenly, and miss the round times at which pieces join."""
-_STEP = 1e-3
+_DIFFERENCE_STEP = 1e-3
 """Half the span of a difference quotient, s."""
 _ALLOWED_ERROR, _ALLOWED_SHARE = 0.1, 0.02
 """Largest error of a derivative d: `_ALLOWED_ERROR` (m/s or m/s²) + `_ALLOWED_SHARE`·d."""
@@ -47,7 +47,7 @@ def require_trajectory(trajectory: Trajectory) -> None:
         raise TrajectoryError(f"its duration must be a time of 0 s or more, not {duration} s")
     _require_rest(_sample(trajectory, 0.0), _sample(trajectory, duration))
     _require_times(trajectory.check_times(), duration)
-    if duration > 4.0 * _STEP:
+    if duration > 4.0 * _DIFFERENCE_STEP:
         _require_derivatives(trajectory, "position", "velocity", "m/s")
         _require_derivatives(trajectory, "velocity", "acceleration", "m/s²")
 
@@ -125,9 +125,13 @@ def _require_times(times: Sequence[float], duration: float) -> None:
 
 def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str, unit: str) -> None:
     for k in range(_COMPARED_TIMES):
-        time = max(trajectory.duration * (k * _GOLDEN_RATIO % 1.0), _STEP)
-        before, now, after = (_sample(trajectory, time + by) for by in (-_STEP, 0.0, _STEP))
-        change = np.subtract(getattr(after, quantity), getattr(before, quantity)) / (2.0 * _STEP)
+        time = max(trajectory.duration * (k * _GOLDEN_RATIO % 1.0), _DIFFERENCE_STEP)
+        before, now, after = (
+            _sample(trajectory, time + by) for by in (-_DIFFERENCE_STEP, 0.0, _DIFFERENCE_STEP)
+        )
+        change = np.subtract(getattr(after, quantity), getattr(before, quantity)) / (
+            2.0 * _DIFFERENCE_STEP
+        )
         reported = np.asarray(getattr(now, derivative), dtype=float)
         size = float(np.linalg.norm(change))
         if np.linalg.norm(change - reported) > _ALLOWED_ERROR + _ALLOWED_SHARE * size:

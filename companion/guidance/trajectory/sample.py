@@ -10,13 +10,13 @@ Vector = tuple[float, float, float]
 """(north, east, down)."""
 
 
-LONGEST = 3600.0
+LONGEST_DURATION = 3600.0
 """Longest trajectory that is checked, s; the maneuver `circle` may last longer."""
 
-FARTHEST = 10_000.0
+LARGEST_COORDINATE = 10_000.0
 """Largest coordinate that a file may hold, m from the start."""
 
-FASTEST = 100.0
+LARGEST_SPEED = 100.0
 """Largest speed or velocity component that a file may hold, m/s."""
 
 SMALLEST_DISTANCE = 1e-3

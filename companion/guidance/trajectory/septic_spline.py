@@ -15,7 +15,7 @@ _POLYNOMIAL_DEGREE = 2 * STATE_SIZE - 1
 
 
 def derivative_rows(fractions: Floats, derivative: int) -> Floats:
-    """Derivatives (n, 8) of the order `derivative` of 1, u, … u⁷ at fractions u (n,) of a piece."""
+    """Rows (n, 8): derivatives, all of one order, of 1, u, … u⁷ at fractions u (n,) of a piece."""
     rows = np.zeros((fractions.size, _POLYNOMIAL_DEGREE + 1))
     for power in range(derivative, _POLYNOMIAL_DEGREE + 1):
         factor = np.prod(np.arange(power - derivative + 1, power + 1))
@@ -29,7 +29,7 @@ def _coefficients_from_ends() -> Floats:
     return np.round(np.linalg.inv(np.array(ends)) * 6.0) / 6.0
 
 
-FROM_ENDS = _coefficients_from_ends()
+COEFFICIENTS_FROM_ENDS = _coefficients_from_ends()
 """Matrix (8, 8) from the states at both ends of a piece to its coefficients. It is exact: its
 entries are multiples of 1/6."""
 
@@ -49,7 +49,7 @@ class SepticSpline:
         ends = np.concatenate(
             (states[:-1] * scale[:, :, None], states[1:] * scale[:, :, None]), axis=1
         )
-        unit = np.einsum("ij,kjn->kni", FROM_ENDS, ends)
+        unit = np.einsum("ij,kjn->kni", COEFFICIENTS_FROM_ENDS, ends)
         pieces = unit / (spans[:, None, None] ** np.arange(_POLYNOMIAL_DEGREE + 1))
         self._arrays = knots, pieces
         self._knots: list[float] = knots.tolist()

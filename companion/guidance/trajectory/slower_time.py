@@ -38,7 +38,7 @@ class _Piece(NamedTuple):
         return 2.0 * self.c + 6.0 * self.d * u
 
     def integral(self, u: Number) -> Number:
-        """∫ w du from 0 to u: stretched time up to u, in original durations of the piece."""
+        """∫ w du from 0 to u: stretched time up to u, divided by the piece's original duration."""
         return u * (self.a + u * (self.b / 2.0 + u * (self.c / 3.0 + u * self.d / 4.0)))
 
 

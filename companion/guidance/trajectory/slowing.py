@@ -1,14 +1,12 @@
 """Slows a trajectory down where it breaks limits.
 
-The path stays the same; only its timing changes. A moment is one of the times at which limits are
-checked.
+The path stays the same; only its timing changes. Limits are checked at times called moments.
 
 1. For each moment, find the needed factor: if the whole trajectory were slowed down by it, this
    moment would keep all limits except the fence.
 2. Find a smooth function of time, the stretch factor (`SlowerTime`), that is nowhere below the
    needed factor. With it the vehicle brakes before a slow part and speeds up after it.
-3. Braking needs acceleration, so check the limits again, and raise the stretch factor where a limit
-   is broken.
+3. Braking needs acceleration: check limits again, and raise the stretch factor where one breaks.
 
 If slowing down evenly is as quick, the whole trajectory is slowed down by one factor.
 """
@@ -18,10 +16,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from companion.guidance.trajectory.demand import Floats, Motion, sampled
+from companion.guidance.trajectory.demand import Floats, Motion, sampled_motion
 from companion.guidance.trajectory.derived import Slowed, evenly_slowed
 from companion.guidance.trajectory.feasibility import Envelope, Violation, broken_limits, excess
-from companion.guidance.trajectory.sample import LONGEST, Trajectory, TrajectoryError, computable
+from companion.guidance.trajectory.sample import (
+    LONGEST_DURATION,
+    Trajectory,
+    TrajectoryError,
+    computable,
+)
 from companion.guidance.trajectory.slower_time import SlowerTime
 
 _LARGEST_FACTOR = 64.0
@@ -30,7 +33,7 @@ _FACTOR_PRECISION = 1e-3
 """Relative precision of a factor."""
 _BISECTIONS = 16
 """Number of bisection steps in the search for the factor of one moment."""
-_WIDTHS, _FEWEST_PIECES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 4
+_PIECE_DURATIONS, _FEWEST_PIECES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 4
 """Durations of one piece of the stretch factor to try, s, and the smallest number of pieces."""
 _MOST_ROUNDS = 60
 """Largest number of times that the stretch factor is raised before the search gives up."""
@@ -51,9 +54,9 @@ _WORTHWHILE_SHARE = 0.98
 _NOTICEABLE_FACTOR = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
-"""Moments are near the slowest if their factor − 1 is at least this share of the largest one."""
+"""Moments with at least this share of the largest (factor − 1) count as near the slowest moment."""
 _FILL_STEP_GAPS = 2.0
-"""Time between the moments that fill a gap, in median gaps."""
+"""Time between the moments that fill a gap, as a multiple of the median gap."""
 
 
 class SlowedPart(NamedTuple):
@@ -62,7 +65,7 @@ class SlowedPart(NamedTuple):
     Attributes:
         begin, end: times in the slowed trajectory, s.
         factor: the largest factor by which the speed is divided.
-        time: time of the largest factor, s; if slowed evenly, that of the worst violation.
+        time: time in the slowed trajectory at which `limit` requires the largest factor, s.
         limit: configuration key of the limit that requires this factor; empty: none was found.
     """
 
@@ -97,7 +100,7 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
             long to be checked.
     """
     with computable():
-        motion = sampled(trajectory)
+        motion = sampled_motion(trajectory)
         broken = broken_limits(motion, envelope)
         if not broken:
             return SlowDown(trajectory)
@@ -106,20 +109,20 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         moments = _denser_times(motion.times)
         if moments.size > _MOST_MOMENTS:
             return even._replace(reason="it is too long to be slowed down in parts")
-        dense_motion = sampled(trajectory, moments.tolist())
+        dense_motion = sampled_motion(trajectory, moments.tolist())
         if broken_limits(dense_motion.slowed(part.factor), envelope):
             return even._replace(reason="a finer check found more limits exceeded")
         law = _best_law(dense_motion, trajectory.duration, envelope)
         if law is None or law.duration > _WORTHWHILE_SHARE * even.trajectory.duration:
             return even._replace(reason="slowing down in parts would not be quicker")
         slowed = Slowed(trajectory, law, tuple(moments.tolist()))
-        return SlowDown(slowed, tuple(_parts(dense_motion, law, envelope)))
+        return SlowDown(slowed, tuple(_slowed_parts(dense_motion, law, envelope)))
 
 
 def _slowed_evenly(
     trajectory: Trajectory, motion: Motion, broken: tuple[Violation, ...], envelope: Envelope
 ) -> SlowedPart:
-    """The whole trajectory, slowed by the least factor that is enough; an error if none is."""
+    """The whole trajectory, slowed evenly; raises `TrajectoryError` if no factor is enough."""
     for violation in broken:
         if not violation.slowing_helps:
             raise TrajectoryError(f"{trajectory.name}: {violation}; {violation.remedy}")
@@ -158,11 +161,11 @@ def _moment_step(length: float) -> float:
 
 
 def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime | None:
-    """The stretch factor among `_WIDTHS` with the shortest flight; None: none keeps the limits."""
+    """The time law by which the flight is shortest; None: none was found that keeps the limits."""
     needed = _needed_factors(motion, envelope)
     shortest = _MOMENTS_PER_PIECE * _moment_step(length)
-    widths = [w for w in _WIDTHS if w >= shortest and length / w >= _FEWEST_PIECES]
-    laws = [_law_of_width(motion, needed, length, width, envelope) for width in widths]
+    durations = [w for w in _PIECE_DURATIONS if w >= shortest and length / w >= _FEWEST_PIECES]
+    laws = [_law_with_pieces(motion, needed, length, duration, envelope) for duration in durations]
     return min((law for law in laws if law), key=lambda law: law.duration, default=None)
 
 
@@ -184,18 +187,18 @@ def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
     return over
 
 
-def _law_of_width(
-    motion: Motion, needed: Floats, length: float, width: float, envelope: Envelope
+def _law_with_pieces(
+    motion: Motion, needed: Floats, length: float, piece_duration: float, envelope: Envelope
 ) -> SlowerTime | None:
-    """The stretch factor, at least `needed` (m,), with pieces of `width` s; None: not found."""
-    count = int(np.ceil(length / width))
+    """A stretch factor of at least `needed` (m,); pieces of `piece_duration` s. None: not found."""
+    count = int(np.ceil(length / piece_duration))
     piece = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
     needed_by_piece = np.ones(count)
     np.maximum.at(needed_by_piece, piece, needed)
     coefficients = _largest_of_four(needed_by_piece, 1.0)
     for _ in range(_MOST_ROUNDS):
         law = SlowerTime(length, tuple(coefficients.tolist()))
-        if law.duration > LONGEST or coefficients.max() > _LARGEST_FACTOR:
+        if law.duration > LONGEST_DURATION or coefficients.max() > _LARGEST_FACTOR:
             return None
         slower = motion.retimed(*law.stretched(motion.times))
         over = _largest_excess(slower, envelope)
@@ -212,16 +215,13 @@ def _law_of_width(
 
 
 def _largest_of_four(values: Floats, outside: float) -> Floats:
-    """For each coefficient (n + 3,), the largest value (n,) of its four pieces.
-
-    Pieces beyond the ends have the value `outside`.
-    """
+    """Largest of four `values` (n,) for each coefficient (n + 3,); `outside` beyond the ends."""
     padded = np.concatenate(([outside] * 3, values, [outside] * 3))
     largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
     return largest
 
 
-def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
+def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
     """The parts that a stretch factor slows down, each with the limit that requires it."""
     times, progress = law.stretched(motion.times)
     factors = 1.0 / np.asarray(progress.first)
@@ -241,7 +241,7 @@ def _parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[Slow
 
 
 def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """Limit that `moments` exceed most at the original speed; if none, the fence's broken limit."""
+    """Key of the limit that `motion` exceeds most at `moments`; if none, of the fence limit."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:

@@ -86,7 +86,7 @@ class SplineHeading:
         return heading, slope
 
 
-def smoothed(
+def smoothing_spline(
     times: Floats,
     values: Floats,
     cutoff: float,
@@ -125,11 +125,13 @@ def smoothed(
 
 def heading_spline(times: Floats, headings: Floats, resting: tuple[bool, bool]) -> SplineHeading:
     """Smoothing spline of headings in rad at times in s, (m,) each."""
-    return SplineHeading(smoothed(times, headings[:, None], _HEADING_CUTOFF, resting=resting))
+    return SplineHeading(
+        smoothing_spline(times, headings[:, None], _HEADING_CUTOFF, resting=resting)
+    )
 
 
 def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineHeading:
-    """Direction of flight along a spline of positions, interpolated where it hardly moves.
+    """Direction of flight along a spline of positions, interpolated where the speed is too low.
 
     Args:
         spline: spline of the positions, m.

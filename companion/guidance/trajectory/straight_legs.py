@@ -12,7 +12,7 @@ from companion.guidance.trajectory.sample import Vector
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import LimitedJerk, Piece, Progress
 from companion.guidance.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
-from companion.guidance.trajectory.waypoints import given_headings, places_of
+from companion.guidance.trajectory.waypoints import places_of, spline_through_headings
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ def straight_legs(
     curve = Polyline(begins, _vectors(places[:-1]), tuple(map(Straight, directions)))
     heading: Heading = HeldHeading()
     if any(angle is not None for angle in headings):
-        heading = given_headings(phases, headings)
+        heading = spline_through_headings(phases, headings)
     return TimedCurve("straight legs", curve, Legs(legs, begins), heading)
 
 

@@ -92,7 +92,7 @@ Ramp = Callable[[float, float, float], Progress]
 
 
 def septic_ramp(rate: float, duration: float, time: float) -> Progress:
-    """Progress at `rate`·(35u⁴ − 84u⁵ + 70u⁶ − 20u⁷), u = time/duration; snap is continuous."""
+    """Progress at the phase rate `rate`·(35u⁴ − 84u⁵ + 70u⁶ − 20u⁷), where u = time/duration."""
     u = time / duration
     v = 1.0 - u
     u3 = u * u * u
@@ -105,7 +105,7 @@ def septic_ramp(rate: float, duration: float, time: float) -> Progress:
 
 
 def cosine_ramp(rate: float, duration: float, time: float) -> Progress:
-    """Progress with a raised cosine as rate: the jerk jumps where the ramp begins and ends."""
+    """Progress whose rate is a raised cosine: the jerk jumps where the ramp begins and ends."""
     omega = pi / duration
     phase = omega * time
     return Progress(

@@ -15,7 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from companion.guidance.trajectory.curves import Curve, CurvePoint, PhaseSampling, require_checkable
-from companion.guidance.trajectory.sample import LONGEST, Sample, TrajectoryError
+from companion.guidance.trajectory.sample import LONGEST_DURATION, Sample, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Piece, TimeLaw, derivatives
 
@@ -26,7 +26,9 @@ _TABLE_ROWS = 2048
 """Rows of the table from which the time at a phase is interpolated; this time need not be exact."""
 
 
-def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST) -> list[float]:
+def check_times(
+    sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST_DURATION
+) -> list[float]:
     """Times at which to check a curve with a time law, ascending, s.
 
     Raises:
@@ -49,7 +51,7 @@ def check_times(sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST)
     return times
 
 
-def require_duration(seconds: float, longest: float = LONGEST) -> None:
+def require_duration(seconds: float, longest: float = LONGEST_DURATION) -> None:
     """Check that a trajectory lasts at most `longest` seconds.
 
     Raises:
@@ -73,9 +75,9 @@ def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Itera
 
 
 def _check_count(sampling: PhaseSampling, begin: float, end: float) -> float:
-    if sampling.step is None:
+    if sampling.phase_step is None:
         return bisect_right(sampling.phases, end) - bisect_left(sampling.phases, begin)
-    return (end - begin) / sampling.step + _CHECKS_PER_PIECE
+    return (end - begin) / sampling.phase_step + _CHECKS_PER_PIECE
 
 
 def _check_times_in(
@@ -83,11 +85,11 @@ def _check_times_in(
 ) -> Floats:
     """The check times in a piece, both ends included."""
     begin, end = span
-    if sampling.step is None:
+    if sampling.phase_step is None:
         phases = np.array(sampling.phases)
         phases = phases[(phases >= begin) & (phases <= end)]
     else:
-        phases = np.linspace(begin, end, int(np.ceil((end - begin) / sampling.step)) + 1)
+        phases = np.linspace(begin, end, int(np.ceil((end - begin) / sampling.phase_step)) + 1)
     if piece.steady:
         rate = law.at(piece.begin).first
         ends = np.array([piece.begin, piece.end])
@@ -169,7 +171,7 @@ class TimedCurve:
     curve: Curve
     law: TimeLaw
     heading: Heading
-    longest: float = LONGEST
+    longest: float = LONGEST_DURATION
 
     @property
     def duration(self) -> float:

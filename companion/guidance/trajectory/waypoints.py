@@ -73,7 +73,7 @@ def waypoints(
         curve = SplineCurve(spline, longest_step=HEADING_CHECK_STEP)
         heading = tangent_heading(spline, (True, True))
     elif any(angle is not None for angle in headings):
-        heading = given_headings(knots, headings)
+        heading = spline_through_headings(knots, headings)
     return TimedCurve("waypoints", curve, Cruise(spline.end, 1.0), heading)
 
 
@@ -132,7 +132,7 @@ def _spline_through(knots: Floats, places: Floats) -> SepticSpline:
 
 
 def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Mask (k, 4) of a spline at rest at both ends, with the knots of known value (k,) fixed."""
+    """Mask (k, 4) of fixed states: the values where `values` (k,) is true, rest at both ends."""
     mask = np.zeros((values.size, STATE_SIZE), dtype=bool)
     mask[:, 0] = values
     mask[[0, -1], 1:] = True
@@ -142,7 +142,7 @@ def _rest_to_rest_mask(values: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _stretch_factor(
     spline: SepticSpline, knots: Floats, speed: float, acceleration: float
 ) -> float:
-    """Factor for the knots with which the spline just meets the speed or the acceleration limit.
+    """Factor that stretches the knots so that the spline just meets one of the two limits.
 
     A minimum-snap spline over knots stretched in time has the same path.
     """
@@ -157,7 +157,7 @@ def _sampled(spline: SepticSpline, knots: Floats, count: int = _SAMPLES_PER_SEGM
     return spline.along(np.interp(fine, np.arange(knots.size), knots))
 
 
-def given_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
+def spline_through_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
     """A spline through the given headings, turning the short way from one to the next.
 
     Args:

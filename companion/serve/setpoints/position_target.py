@@ -10,7 +10,7 @@ from math import hypot, isfinite, pi
 from typing import NamedTuple
 
 from companion.guidance.fence import Place, local_offset
-from companion.guidance.reference import Vector, rotated
+from companion.guidance.reference import Vector, rotate
 from companion.mavlink.messages import Message, dialect
 from companion.serve.setpoints.request import (
     AxisDemand,
@@ -165,7 +165,7 @@ def _rotate(values: _Values, angle: float) -> _Values:
     north, east, down = values
     if north is None or east is None or angle == 0.0:
         return values
-    return (*rotated(north, east, angle), down)
+    return (*rotate(north, east, angle), down)
 
 
 def _shift(values: _Values, offset: Vector) -> _Values:
