@@ -84,7 +84,7 @@ def assemble(
 def _context(
     config: Config, link: Link, plan: Plan, trace: FlightTrace, environment: Environment
 ) -> FlightContext:
-    """The loops of a flight, and what its phases share."""
+    """Make the context of a flight: its loops, and the other parts that its phases share."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
     ground = GroundContact(link.state, clock)
     loop, guidance_loop = make_loops(
@@ -151,7 +151,7 @@ def _reporter(
     *,
     real_time: bool,
 ) -> StatusReporter:
-    """The reporter of the flight's state, which is shown only if an observer uses it."""
+    """Make the reporter of the flight's state. If no observer uses states, it shows none."""
 
     def phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began

@@ -50,21 +50,22 @@ class Change(NamedTuple):
 class Changes:
     """Changes the values of a configuration in flight: checks, slews, undoes and records them.
 
-    A change passes the checks that the configuration passed at the start. It takes effect in small
-    steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
+    A change must pass the checks that the configuration passed at the start. It takes effect in
+    small steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
 
     Attributes:
-        start: the configuration before the first change, which may precede the flight.
+        start_config: the configuration before the first change; changes may precede the flight.
         wanted_config: the configuration after the newest change.
-        made: all changes, in order.
-        at_flight_start: the configuration when the flight began; the flight's record contains it.
+        all_changes: all changes, in order.
+        config_at_flight_start: the configuration when the flight began; the flight's record
+            contains it.
         note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted_config` after each change.
         on_drag: called with what is known of the vehicle's drag, once the vehicle is identified;
             some checks of a change need it.
 
     Args:
-        start: the configuration before the first change.
+        start_config: the configuration before the first change.
     """
 
     def __init__(self, start: Config) -> None:
@@ -151,7 +152,7 @@ class Changes:
     def applied_by(
         self, retuning: Retuning, note: Callable[[str], None], record: FlightRecorder | None
     ) -> Iterator[None]:
-        """Apply changes to the loops while the `with` block runs, earlier changes at once.
+        """Apply changes to the loops while the `with` block runs; apply earlier changes at once.
 
         Args:
             retuning: applies values to the control loop and to guidance.

@@ -53,7 +53,8 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
 async def fly_commanded(context: FlightContext, commands: Source) -> None:
     """Fly the commands of another program until it ends its control, then brake and hold.
 
-    The phase waits until the vehicle has stopped: the autopilot would brake it harder.
+    The phase waits until the vehicle has stopped, because the autopilot would brake a moving
+    vehicle harder than guidance does.
     """
     await _fly(context, commands, lambda: f"commanded by {commands.name}")
     context.guidance_loop.hold_here()
@@ -174,7 +175,7 @@ async def land(context: FlightContext) -> None:
 
 
 async def disarm(context: FlightContext) -> None:
-    """Wait until the autopilot disarms, else command it; leave a mode in which it cannot arm."""
+    """Wait until the autopilot disarms, else command disarming; leave modes that forbid arming."""
     context.detail = "the autopilot to disarm itself"
 
     def disarmed() -> bool:

@@ -37,7 +37,7 @@ class FenceCheck:
     not checked."""
 
     def __call__(self, motion: Motion) -> Violation | None:
-        """The worst violation, with whether a slower motion would avoid it; None: no violation."""
+        """The worst violation, and whether a slower motion would avoid it; None: no violation."""
         worst = self._worst(motion)
         if worst is None:
             return None
@@ -67,9 +67,10 @@ class FenceCheck:
         return float(time), breach
 
     def _candidate_indices(self, stops: Floats) -> list[int]:
-        """Indices of the stopping points to judge: the farthest, highest and lowest of `stops`.
+        """Indices of the stop points to judge: the farthest, highest and lowest of `stops`.
 
-        For a polygon, points at every `_POINT_DISTANCE` along the path are added.
+        A stop point is where the vehicle would stop if it braked. For a polygon, stop points at
+        every `_POINT_DISTANCE` along their path are added.
         """
         distance = np.hypot(stops[:, 0], stops[:, 1])
         indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
@@ -91,7 +92,7 @@ class FenceCheck:
         )
 
     def _begin_time(self, motion: Motion, worst: float) -> float:
-        """Time of the first breach among the checked moments, s; at most `worst`."""
+        """Time of the first breach among the checked moments, s; at most `worst_time`."""
         stride = max(1, motion.times.size // _MAX_MOMENTS)
         for k in range(0, motion.times.size, stride):
             if motion.times[k] >= worst or self._breach(motion, k) is not None:

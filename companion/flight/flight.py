@@ -85,7 +85,7 @@ class Flight:
     def fail(self, error: Exception) -> None:
         """End the flight after an exception outside the phases.
 
-        An exit that is under way continues without our setpoints, which may have caused the fault.
+        An exit that has already begun continues without setpoints: they may have caused the fault.
         """
         if self.failed_in is None:
             self.end(FlightEnded(fault_message(error, self._usual_exit())))
@@ -98,8 +98,8 @@ class Flight:
     def interrupt(self, reason: str) -> None:
         """End the flight for the user: hold if we fly, else leave by the exit of the phase.
 
-        An exit that is under way continues. While the user is asked whether to land, an interrupt
-        answers no.
+        An exit that has already begun continues. While the user is asked whether to land, an
+        interrupt answers no.
         """
         usual_exit = self._usual_exit()
         exit_ = Exit.HOLD if usual_exit is Exit.LAND else usual_exit
@@ -108,11 +108,11 @@ class Flight:
             self.end(self._interruption)
 
     def on_heartbeat(self) -> None:
-        """Judge a new HEARTBEAT at once."""
+        """On a new HEARTBEAT, check at once whether the phase may go on."""
         self._judge(self._watch.judge)
 
     def on_current_mode(self) -> None:
-        """Judge a new CURRENT_MODE at once."""
+        """On a new CURRENT_MODE, check at once whether the phase may go on."""
         self._judge(self._watch.on_current_mode)
 
     def note(self, text: str) -> None:
@@ -220,7 +220,7 @@ class Flight:
             self._asking_landing = False
 
     async def _run_repeatedly(self, work: Callable[[], Awaitable[None]]) -> None:
-        """Run a task repeatedly while the phases run; an exception in it ends the flight."""
+        """Run `work` repeatedly while the phases run; an exception in `work` ends the flight."""
         while True:
             try:
                 await work()

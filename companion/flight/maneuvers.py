@@ -36,7 +36,7 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
 
 
 def not_begun(sequence: ManeuverSequence) -> ManeuverSequence:
-    """A copy whose maneuvers have not begun: `Follow` remembers the pose where it began."""
+    """A copy of the sequence, to begin anew: a `Follow` remembers the pose where it began."""
     return ManeuverSequence(
         [
             replace(part, _with_turn=None, _pose=None) if isinstance(part, Follow) else part

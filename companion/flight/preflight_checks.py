@@ -1,4 +1,4 @@
-"""The preflight checks of a flight, repeated before each step that leads into the air."""
+"""The preflight checks of a flight, repeated before arming, take-off and takeover."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -28,8 +28,8 @@ class PreflightChecks:
     """Judges the vehicle as `companion doctor` does, for each stage of a flight.
 
     A pilot may arm minutes after the checks passed. So the same checks run in the phase `checks`,
-    before we arm, after anybody armed, before take-off, and before the takeover. The status is
-    always the newest. Rates and parameters are measured again if they are more than a second old.
+    before we arm, after anybody armed, before take-off, and before the takeover. They judge the
+    newest status of the vehicle, and rates and parameters that are at most a second old.
 
     Attributes:
         note: called once with each message on what does not block the flight: warnings, accepted

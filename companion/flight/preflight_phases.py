@@ -68,7 +68,7 @@ async def judge_vehicle(context: FlightContext, stage: Stage) -> Evidence:
 
 
 async def stream(context: FlightContext) -> None:
-    """Start to answer samples, on the ground with idle setpoints; wait until enough were sent."""
+    """Start to send setpoints (idle ones on the ground); wait until enough were sent."""
     context.loop.on = True
     enough = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
     await context.until(lambda: context.loop.record.setpoints >= enough, "setpoints to flow")

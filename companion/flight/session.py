@@ -26,7 +26,8 @@ from companion.vehicle.link import Link
 class Session:
     """One flight. Signal handlers of the event loop may call `interrupt`, `leave` and `note`.
 
-    They end the flight, but not the session, so that the recorded data are always written.
+    `interrupt` and `leave` end the flight, but not the session, so that the recorded data are
+    always written.
 
     Args:
         config: configuration of the flight.

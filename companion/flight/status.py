@@ -112,7 +112,7 @@ class StatusReporter:
         self._rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
-        """Record and show until cancelled; missed steps are not repeated."""
+        """Record and show the state until cancelled; steps that were missed are not repeated."""
         due = self._clock()
         while True:
             self.record()

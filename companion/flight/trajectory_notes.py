@@ -22,11 +22,13 @@ def overview(trajectory: Trajectory) -> str:
 
 
 def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[str, ...]:
-    """Messages for the user: where the trajectory was slowed down, and for which limit; or none.
+    """Messages for the user: where the trajectory was slowed down, and for which limit.
+
+    There are no messages if it was not slowed down.
 
     Args:
         before: the trajectory before it was slowed down.
-        slow_down: what was slowed down.
+        slow_down: the slowed-down trajectory, and its slowed parts.
         reserve: horizontal acceleration that was left below the tilt limit, m/s².
     """
     if not slow_down.parts:

@@ -108,7 +108,7 @@ class SameVehicle:
     def _sign_of_replacement(self) -> str | None:
         """The sign of a replacement, in words.
 
-        None: there is none, or a silence still lasts, which is judged when it ends.
+        None: there is no sign, or a silence still lasts; a silence is judged when it ends.
         """
         if self._peers != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"
@@ -153,7 +153,10 @@ class DragMemory:
         self.on_known: Callable[[KnownDrag], None] = lambda _: None
 
     def load(self, identity: Identity) -> KnownDrag:
-        """Return what is known of this vehicle's drag; the file is read only for a new vehicle."""
+        """Return what is known of this vehicle's drag.
+
+        The file is read at the first call, and again only for another vehicle than at the last one.
+        """
         if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid
             self._known_drag = of_vehicle(self._config, self._directory, identity.uid)

@@ -67,7 +67,7 @@ class RateRequester:
 
 
 class Watch:
-    """Detects what the control loop cannot: silence, takeovers and breaches of safety limits.
+    """Detects what the control loop cannot: silence, pilot takeovers, breaches of safety limits.
 
     Args:
         context: context of the flight.
@@ -134,14 +134,15 @@ class Watch:
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
     def ask_mode(self) -> None:
-        """After a gap in the setpoints, request a heartbeat; resume them if its mode obeys us."""
+        """After a gap in the setpoints, request a heartbeat to decide whether to resume them."""
         # Without an answer the silence monitor ends the flight.
         self._mode_request = asyncio.create_task(self._confirm_control())
 
     async def _confirm_control(self) -> None:
-        """Wait for a fresh heartbeat; resume the setpoints if its mode obeys or awaits them.
+        """Wait for a fresh heartbeat; resume the setpoints if its mode requires them.
 
-        A heartbeat from the backlog may carry an old mode.
+        That is offboard mode, or during the takeover a mode from which offboard can begin. A
+        queued heartbeat may carry an old mode.
         """
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state

@@ -14,7 +14,7 @@ from companion.vehicle.records import AttitudeSample
 
 @contextmanager
 def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
-    """Connect the link and the changes to the flight while the block runs: samples, errors, mode.
+    """Connect the link's callbacks, and changes of values, to the flight while the block runs.
 
     Only one flight at a time may be connected to a link.
     """

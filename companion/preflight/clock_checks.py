@@ -17,8 +17,9 @@ _UNSAFE_NOT_NEWER_SHARE = 0.2
 _MIN_SAMPLES = 10
 """Smallest number of samples to judge the rate of the clock."""
 _SHAKING_PRODUCT, _MAYBE_SHAKING_PRODUCT = 0.3, 0.15
-"""Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
-oscillates at the limit of the roll-pitch rate; above the second, a slow vehicle may oscillate.
+"""Limits of planner.gain_per_s times the round trip (dimensionless), measured on mock vehicles.
+Above the first, attitude oscillates at the limit of the roll-pitch rate; above the second, a slow
+vehicle may oscillate.
 """
 
 
@@ -51,9 +52,9 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def round_trip(config: Config, seconds: float) -> Finding:
     """Judge whether the gain is too high for a round trip of this many seconds.
 
-    When a setpoint takes effect, the attitude that it answers is as old as the round trip. No round
-    trip counts as too long in lockstep, where the vehicle waits, or with a planner of another
-    package, whose gain may mean something else.
+    When a setpoint takes effect, the attitude that it answers is as old as the round trip. In
+    lockstep the vehicle waits, and the gain of another package's planner may mean something else:
+    in both cases, every round trip is accepted.
     """
     gain = config.planner.gain_per_s
     gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep

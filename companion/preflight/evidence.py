@@ -70,7 +70,7 @@ class LinkQuality(NamedTuple):
 
 
 class SampleTimes(NamedTuple):
-    """Times of the attitude samples received, by both clocks."""
+    """Times of the attitude samples received, by the vehicle's clock and by ours."""
 
     sample_count: int = 0
     """Number of samples."""
@@ -106,7 +106,7 @@ class OtherNodes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """All evidence of one session."""
+    """What was received and measured in one session with the vehicle, for the checks to judge."""
 
     autopilot: Autopilot
     """The kind of autopilot."""
@@ -127,7 +127,7 @@ class Evidence:
     other_nodes: OtherNodes
     """Other nodes on the link."""
     resets: int
-    """Number of estimator resets."""
+    """Number of estimator resets while we listened."""
     identity: Identity
     """The autopilot's version and hardware."""
     stage: Stage = Stage.GROUND

@@ -1,4 +1,4 @@
-"""Listens to the link for a while: sample times, other nodes, jumps of the estimate."""
+"""Listens to the link for a while: sample times, other nodes, estimator resets."""
 
 from collections.abc import Callable
 from math import isfinite

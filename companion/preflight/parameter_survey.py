@@ -42,8 +42,8 @@ class Survey(NamedTuple):
     names: Mapping[str, str]
     """Name of each parameter in this autopilot, by newest name."""
     unread: frozenset[str] = frozenset()
-    """Newest names of the parameters without a value that the autopilot may have: it did not report
-    them as unknown."""
+    """Newest names of the parameters that were not read, although the autopilot may have them: it
+    did not report them as unknown."""
     lossy: bool = False
     """Whether the link lost frames during the survey, in either direction."""
 
@@ -125,7 +125,7 @@ class _Requests:
         self._skipped_names.update(names)
 
     def unread(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
-        """The rules without a value, except parameters that the autopilot reported as unknown."""
+        """The rules of the parameters that were not read and not reported as unknown."""
         return [
             rule
             for rule in rules

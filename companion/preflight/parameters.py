@@ -94,7 +94,7 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether the rule's parameter and its alternative have no value, though one may exist."""
+    """Whether neither the rule's parameter nor its alternative was read, but one may exist."""
     names = {rule.name, rule.alternative}
     return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread)
 

@@ -109,7 +109,7 @@ def _expected_rate(name: str, rate: StreamRate) -> float:
 
 
 def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
-    """A rate without a fault, in words; one below the requested rate says why it suffices."""
+    """A rate without a fault, in words; if it is below the requested rate, why it suffices."""
     if name in _SENT_ON_CHANGE:
         return f"{name} on change, and at {_SENT_ON_CHANGE[name]:g} Hz between"
     if not _is_countable(name, rate, evidence):

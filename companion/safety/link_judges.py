@@ -15,7 +15,8 @@ computer is named as the cause."""
 def silence(limit: float, *, heard: bool) -> Judge:
     """No setpoint was sent for longer than `limit` s.
 
-    `heard`: True: judge only while frames come from the vehicle. False: only while none come.
+    `heard`: True: the judge applies only while frames come from the vehicle; False: only while no
+    frames come.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
@@ -93,8 +94,8 @@ def round_trip(max_seconds: float) -> Judge:
 def late_setpoints(stale: float) -> Judge:
     """Every probe answered in the last 0.7 s had a round trip longer than 1.5 times `stale`, s.
 
-    `stale` is the largest age of a sample that is answered. If its setpoint takes as long again,
-    the vehicle tilts in growing swings, while all telemetry still looks good.
+    `stale` is the largest age of a sample that is answered. If setpoints take that long to reach
+    the vehicle, too, its attitude oscillates more and more, while all telemetry still looks good.
     """
     max_seconds = 1.5 * stale
 

@@ -24,8 +24,8 @@ _AFTER_HOLD = (Action.HAND_BACK, Action.LAND)
 _MAX_JUDGING_TIME = 0.003
 """Longest time that a judge may take, s: a sample comes every 4 ms, and must be answered."""
 _SLOW_DURATION = 0.5
-"""Time for which every call of a judge must be too slow before the warning, s; on a busy computer,
-only some are."""
+"""Time for which every call of a judge must be too slow before the warning, s; a busy computer
+makes only some calls slow."""
 
 MonitorFactory = Callable[[Config], Monitor]
 """Makes a monitor for a configuration; entry points in `companion.monitors` name such functions."""

@@ -92,7 +92,7 @@ class SnapshotBuilder:
         return FenceCentre(minus(self.fence_centre_ned, to_autopilot_frame), self._fence_place)
 
     def unheard(self, now: float) -> float | None:
-        """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
+        """Silence of the vehicle at `now`, s; None if it is not longer than `UNHEARD_S`."""
         self.listen(now)
         silence = now - self._heard_at
         return silence if silence > UNHEARD_S else None

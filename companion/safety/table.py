@@ -14,7 +14,7 @@ from companion.safety.monitor import Monitor
 from companion.safety.plugin_monitors import plugin_monitors
 
 _BACKLOG_TIME = 0.2
-"""Time after a stall in which queued telemetry is read, s; until then it looks old."""
+"""Time after a stall in which queued telemetry is read, s; until then telemetry looks old."""
 _MAX_GAPS = 2
 """Largest number of gaps in the setpoints within 5 s."""
 _MAX_UNANSWERED = 7
@@ -32,8 +32,8 @@ _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HO
 def monitors(config: Config) -> tuple[Monitor, ...]:
     """The monitors of a flight; among equally severe breaches the first row decides.
 
-    The table does not contain a takeover by the pilot or an unknown mode: `companion.flight.watch`
-    detects both, and releases control.
+    No monitor detects a takeover by the pilot or an unknown mode: `companion.flight.watch` detects
+    both, and releases control.
 
     Raises:
         ConfigError: a monitor of another package cannot be used; see `plugin_monitors`.

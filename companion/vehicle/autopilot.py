@@ -93,7 +93,7 @@ class Autopilot(Protocol):
             `companion.mavlink.parameters`.
         wanted_rates: Messages that a flight needs, with the rate to request, Hz.
         interval_step_us: SET_MESSAGE_INTERVAL is rounded down to a whole multiple of this, us.
-        rates_about_target_axes: True: body rates are taken about the axes of the attitude setpoint
+        rates_about_target_axes: True: body rates act about the axes of the attitude setpoint
             (ATTITUDE_TARGET), which leads the body. False: about the axes of the body.
         body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
             from the present yaw, not from north.

@@ -1,8 +1,8 @@
 """The vehicle's clock, compared with the event loop's: ages of samples, and jumps of the clock.
 
-The offset is vehicle time minus event-loop time. An attitude sample shows the offset less its own
-delay. So the largest value comes from the sample with the smallest delay, the "quickest" sample.
-TIMESYNC measures the delay of the quickest sample.
+The offset is vehicle time minus event-loop time. The stamp of an attitude sample minus its arrival
+is the offset minus the sample's delay. So the largest difference comes from the sample with the
+smallest delay, the "quickest" sample. TIMESYNC measures the delay of the quickest sample.
 """
 
 from collections.abc import Callable
@@ -169,7 +169,7 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _adapt_to(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Adapt to a misfit or to the first stamp after misfits; return the misfit, or None."""
+        """Handle a stamp that may not fit the clock; return why it must not be used, or None."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.ahead
@@ -192,9 +192,9 @@ class VehicleClock:
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
 
-        A sample of a quicker link seems ahead by at most the delay that TIMESYNC measured before.
-        Exchanges after the last sample that fitted do not count, because the clock may have jumped
-        before them.
+        Then it is ahead by at most the delay that TIMESYNC measured on the slower link. Exchanges
+        after the last sample that fitted the clock do not count, because the clock may have jumped
+        before those exchanges.
         """
         largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
         return stamp.time > self._newest and stamp.ahead - quickest <= largest_delay
@@ -213,9 +213,9 @@ class VehicleClock:
         return None
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
-        """End the misfits with a sample that fits the clock; it came `late` seconds late.
+        """End the misfits with a sample that fits the clock and came `late` seconds late.
 
-        If all misfits before it repeated the newest stamp that fitted, the clock stood still.
+        If all misfits repeated the newest stamp that fitted the clock, the clock stood still.
         """
         if not self._misfits.stamps:
             return
@@ -226,7 +226,7 @@ class VehicleClock:
             self._accept_jump(-late, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
-        """Drop the misfits; report the first one ever that is stamped ahead of the clock."""
+        """Drop the misfits; report, only once, a sample that was stamped ahead of the clock."""
         ahead = any(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True

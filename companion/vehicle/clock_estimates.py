@@ -58,7 +58,7 @@ class ClockRate:
     def note(self, now: float, offset: float) -> None:
         """Take the quickest sample's offset (vehicle time minus event-loop time) once a second.
 
-        Two points far apart suffice, since each is the best of a second's samples.
+        Two offsets far apart suffice for the rate, because each is from the quickest sample.
 
         Args:
             now: Event-loop time, s.
@@ -94,20 +94,20 @@ class _Exchange(NamedTuple):
     at: float
     """Event-loop time of the answer, s."""
     initial_error: float
-    """Largest error of `delay` at the time `at`, s."""
+    """Largest possible error of `delay` at the time of the answer, s."""
     delay: float
     """TIMESYNC's offset minus the quickest sample's, s."""
 
     def error(self, now: float) -> float:
-        """Largest error of the delay at the event-loop time `now`, s."""
+        """Largest possible error of `delay` at the event-loop time `now`, s."""
         return self.initial_error + MOST_DRIFT * (now - self.at)
 
 
 class TelemetryDelay:
-    """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error.
+    """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error bound.
 
-    The largest error of an exchange grows with its age, by `MOST_DRIFT`: samples that a growing
-    queue delays look like those of a slower clock.
+    The error bound of an exchange grows with its age, by `MOST_DRIFT` per second: a growing
+    queue that delays all samples looks like a slower clock of the vehicle.
 
     Attributes:
         known: Whether the delay is known.
@@ -123,11 +123,11 @@ class TelemetryDelay:
         self._implausible: _Exchange | None = None
 
     def take_exchange(self, now: float, error: float, delay: float) -> float | None:
-        """Take an exchange; one with a plausible delay is kept.
+        """Take an exchange, and store it if its delay is plausible.
 
         A single implausible delay is ignored. Two in a row that agree show that a clock changed. If
-        exchanges are kept and the new delay is negative, TIMESYNC has fallen behind the samples'
-        stamps, and the caller finds out why. Otherwise TIMESYNC uses another clock, and all
+        exchanges are stored and the new delay is negative, TIMESYNC has fallen behind the samples'
+        stamps, and the caller must find out why. Otherwise TIMESYNC uses another clock, and all
         exchanges are forgotten.
 
         Args:
@@ -169,10 +169,10 @@ class TelemetryDelay:
         return best.delay + best.error(before)
 
     def shorten(self, decrease: float, now: float) -> None:
-        """Shorten all delays: a quicker sample than before has come.
+        """Shorten all delays, because a sample came that was quicker than the quickest so far.
 
         Args:
-            decrease: How much quicker it is than the quickest sample before, s.
+            decrease: How much quicker the new sample was than the quickest so far, s.
             now: Event-loop time, s.
         """
         self._exchanges = deque(

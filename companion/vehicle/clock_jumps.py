@@ -45,7 +45,7 @@ class Stamp(NamedTuple):
     time: float
     """Vehicle time, s."""
     ahead: float
-    """`time` minus `received`, s: the offset of the clocks less the sample's delay."""
+    """`time` minus `received`, s: the offset of the clocks minus the sample's delay."""
     received: float
     """Event-loop time of the sample's arrival, s."""
 

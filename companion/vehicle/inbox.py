@@ -125,7 +125,7 @@ class Inbox:
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
         """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
 
-        Without a valid claim in the bytes, no frame in them is accepted. Never raises.
+        If none of the frames entitles `sender` to become the peer, none is accepted. Never raises.
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._is_admitted(frame)]
@@ -142,7 +142,7 @@ class Inbox:
         return True
 
     def may_prove_date(self, sender: str) -> bool:
-        """Whether `sender`, refused for its signature's date, could prove it by answering TIMESYNC.
+        """Whether `sender`, refused for the date of its signature, may prove the date by TIMESYNC.
 
         If so, the transport sends to `sender`, and the next frame that `receive` accepts makes
         `sender` the peer.
@@ -153,7 +153,7 @@ class Inbox:
         return True
 
     def claim_lapsed(self) -> bool:
-        """Whether another sender may become the peer."""
+        """Whether another sender may become the peer although the present one still sends."""
         return self._peer_rule.lapsed()
 
     def note_stranger(self, sender: str) -> None:
@@ -229,7 +229,7 @@ class Inbox:
             self._pass_on(frame, received_ns)
 
     def _deliver_samples(self) -> None:
-        """In lockstep: pass the samples of a step to the control loop, after its tasks have run."""
+        """In lockstep: after a step's tasks have run, pass its samples to the control loop."""
         samples, self._samples = self._samples, []
         for sample in samples:
             self._call_on_attitude(sample)
