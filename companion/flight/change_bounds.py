@@ -24,7 +24,7 @@ _WITHOUT_EFFECT_IN_IDENTIFY = frozenset(
 """Keys without effect in the maneuver `identify`, which has its own weights and bandwidth."""
 
 
-def require_moderate(before: Config, after: Config, name: str) -> None:
+def require_moderate_change(before: Config, after: Config, name: str) -> None:
     """Check that a change is not too large for a vehicle in the air.
 
     Args:

@@ -16,7 +16,7 @@ from companion.config.known_drag import KnownDrag
 from companion.control.retuning import Retuning, fixed_because, tuning
 from companion.control.slew import Slew
 from companion.files.yaml_file import ConfigError
-from companion.flight.change_bounds import require_moderate
+from companion.flight.change_bounds import require_moderate_change
 from companion.recording.recorder import FlightRecorder
 from companion.safety.actions import fault_message
 
@@ -68,15 +68,15 @@ class Changes:
         start_config: the configuration before the first change.
     """
 
-    def __init__(self, start: Config) -> None:
-        self.wanted_config = start
-        self.made: list[Change] = []
-        self.at_flight_start = start
+    def __init__(self, start_config: Config) -> None:
+        self.wanted_config = start_config
+        self.all_changes: list[Change] = []
+        self.config_at_flight_start = start_config
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
         self.on_drag: Callable[[KnownDrag], None] = lambda _: None
-        self.start = start
-        self._slew = Slew(start)
+        self.start_config = start_config
+        self._slew = Slew(start_config)
         self._earlier_configs: list[Config] = []
         self._count_before_flight = 0
         self._retuning: Retuning | None = None
@@ -91,12 +91,13 @@ class Changes:
     @property
     def made_in_flight(self) -> tuple[Change, ...]:
         """The changes since the flight began, in order."""
-        return tuple(self.made[self._count_before_flight :])
+        return tuple(self.all_changes[self._count_before_flight :])
 
     def begin_flight(self) -> Config:
         """Begin a flight; return the configuration at its start, for its record."""
-        self.at_flight_start, self._count_before_flight = self.wanted_config, len(self.made)
-        return self.at_flight_start
+        self.config_at_flight_start = self.wanted_config
+        self._count_before_flight = len(self.all_changes)
+        return self.config_at_flight_start
 
     def change(self, values: Values, by: str) -> str:
         """Begin to change to `values`; return the change in words.
@@ -108,9 +109,9 @@ class Changes:
                 is too large. Nothing is changed.
         """
         try:
-            wanted = changed_in_flight(self.start, self.wanted_config, values, by)
-            require_moderate(self._slew.settled_config, wanted, by)
-            require_moderate(self.wanted_config, wanted, by)
+            wanted = changed_in_flight(self.start_config, self.wanted_config, values, by)
+            require_moderate_change(self._slew.settled_config, wanted, by)
+            require_moderate_change(self.wanted_config, wanted, by)
         except ConfigError as error:
             raise ChangeRefusedError(str(error)) from error
         except (ValueError, ArithmeticError) as error:
@@ -160,11 +161,11 @@ class Changes:
             record: records the values for a replay, or None.
         """
         self._retuning, self._record = retuning, record
-        if self.wanted_config is not self.start:
+        if self.wanted_config is not self.start_config:
             self._slew.jump(self.wanted_config)
             retuning.apply(tuning(self.wanted_config))
-        if self.wanted_config is not self.at_flight_start:
-            self._record_change(self.at_flight_start, at_once=True)
+        if self.wanted_config is not self.config_at_flight_start:
+            self._record_change(self.config_at_flight_start, at_once=True)
         note_before, self.note = self.note, note
         try:
             with retuning.before_each_step(self.step):
@@ -192,7 +193,7 @@ class Changes:
         Raises:
             ChangeRefusedError: nothing can change in this flight, or the values are equal.
         """
-        why_fixed = fixed_because(self.start)
+        why_fixed = fixed_because(self.start_config)
         if why_fixed is not None:
             raise ChangeRefusedError(f"{by}: {why_fixed}; nothing has changed")
         keys = tuple(differences(self.wanted_config, wanted))
@@ -215,7 +216,7 @@ class Changes:
             self._slew.begin(wanted, now)
             self._record_change(before, at_once=False)
         change = Change(now, by, keys)
-        self.made.append(change)
+        self.all_changes.append(change)
         self.note(str(change))
         return str(change)
 

@@ -91,7 +91,7 @@ async def command_if_ours(
     """
     for attempt in range(_MAX_TRIES):
         await context.fresh_heartbeat()
-        context.same_vehicle.require()
+        context.replacement_detector.require()
         if attempt > 0 and done():
             return
         require_ours()

@@ -12,7 +12,7 @@ from companion.control.control_loop import ControlLoop
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight.preflight_checks import PreflightChecks
-from companion.flight.vehicle_identity import SameVehicle
+from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
 from companion.guidance.fence import FenceCentre
 from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
@@ -49,7 +49,7 @@ class FlightContext:
     maneuvers: ManeuverSequence
     ground: GroundContact
     preflight: PreflightChecks
-    same_vehicle: SameVehicle
+    replacement_detector: ReplacementDetector
     known_drag: KnownDrag = field(default_factory=KnownDrag)
     """What was known of the vehicle's drag when the checks ended."""
     detail: str = ""
@@ -130,11 +130,11 @@ class FlightContext:
                 fresh.set_result(None)
 
         unsubscribe = self.link.subscribe("HEARTBEAT", on_heartbeat)
-        question = asyncio.create_task(ask())
+        request_task = asyncio.create_task(ask())
         try:
             await fresh
         finally:
-            question.cancel()
+            request_task.cancel()
             unsubscribe()
 
     def fresh_position(self) -> LocalPosition | None:

@@ -75,7 +75,7 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
     tilt_margin.check()
     context.guidance_loop.follow(source)
 
-    def over() -> bool:
+    def is_over() -> bool:
         elapsed = now() - began
         context.setpoint_rate_hz = (
             (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
@@ -88,7 +88,7 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
         context.detail = progress()
         return context.guidance_loop.finished
 
-    await context.until(over)
+    await context.until(is_over)
 
 
 class _TiltMargin:
@@ -165,13 +165,13 @@ async def land(context: FlightContext) -> None:
     context.detail = "the autopilot to accept the landing"
     await hand_over_to_landing(context)
 
-    def down() -> bool:
+    def touched_down() -> bool:
         height = context.link.state.height
         context.detail = "touchdown" + ("" if height is None else f", now {height:.1f} m")
         _require_landing(context)
         return context.ground.touched_down
 
-    await context.until(down)
+    await context.until(touched_down)
 
 
 async def disarm(context: FlightContext) -> None:

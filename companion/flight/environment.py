@@ -23,7 +23,7 @@ class Environment:
     realtime: bool = True
     """Whether the flight runs in real time, and requests the settings of section `realtime` from
     the operating system. False: a virtual clock."""
-    stream: SendBatch | None = None
+    send_batch: SendBatch | None = None
     """Sends batches of the messages that the flight records, in the recording thread; or None."""
 
 

@@ -136,7 +136,7 @@ class Flight:
                 self.note(f"{void.reason}; the checks are repeated")
                 self._context.release()
                 self._context.link.state.forget()
-                self._context.same_vehicle.begin()
+                self._context.replacement_detector.begin()
                 self._end = self._new_end()
                 if self._interruption is not None:  # it came after the checks became void
                     raise self._interruption from void

@@ -83,7 +83,7 @@ class FlightFiles:
                 loop.time,
                 on_failure,
                 on_bad_entry,
-                environment.stream,
+                environment.send_batch,
             )
 
     def open(self) -> None:

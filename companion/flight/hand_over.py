@@ -24,7 +24,7 @@ a refusal may have ended by then."""
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 """Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
 
-_OBEYS_OR_LANDS = frozenset({Role.OFFBOARD, Role.LAND})
+_OFFBOARD_OR_LAND = frozenset({Role.OFFBOARD, Role.LAND})
 
 _PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
 """Called with the error of a mode command: raises it, or returns `require_ours` for the retry."""
@@ -75,7 +75,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         if was_offboard and not landing():
             await _hold_meanwhile(context, landing)
         is_offboard = in_role(context.link, Role.OFFBOARD)
-        return requiring_roles(context.link, _OBEYS_OR_LANDS) if is_offboard else require_ours
+        return requiring_roles(context.link, _OFFBOARD_OR_LAND) if is_offboard else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 
@@ -92,7 +92,7 @@ async def _hand_over(
     A command that has no effect is sent again until the phase is over: a vehicle whose uplink loses
     frames must not be left in the air. Before each try, the vehicle is held at its present place.
     """
-    release_task = asyncio.create_task(_release_once_left(context))
+    release_task = asyncio.create_task(_release_when_offboard_ends(context))
     try:
         while True:
             _stop_moving(context)
@@ -109,7 +109,7 @@ async def _hand_over(
     context.release()
 
 
-async def _release_once_left(context: FlightContext) -> None:
+async def _release_when_offboard_ends(context: FlightContext) -> None:
     """Stop the setpoints as soon as the autopilot does not obey them, whoever changed its mode."""
     if in_role(context.link, Role.OFFBOARD):
         await context.until(lambda: not in_role(context.link, Role.OFFBOARD))

@@ -35,7 +35,7 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
     return ManeuverSequence([_maneuver(config, name, drag) for name in config.flight.maneuvers])
 
 
-def not_begun(sequence: ManeuverSequence) -> ManeuverSequence:
+def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
     """A copy of the sequence, to begin anew: a `Follow` remembers the pose where it began."""
     return ManeuverSequence(
         [

@@ -144,7 +144,7 @@ class StatusReporter:
             self._height(now),
             self._speed(now),
             None if tilt is None else degrees(tilt),
-            self._error(),
+            self._tracking_error(),
         )
         finite_row = (nan if value is None else value for value in row)
         self._trace.add_motion(now, (now - self._began, *finite_row))
@@ -167,7 +167,7 @@ class StatusReporter:
             height=self._height(now),
             speed=self._speed(now),
             tilt=self._tilt(now),
-            tracking_error=self._error(),
+            tracking_error=self._tracking_error(),
             setpoint_rate=self._setpoint_rate(now, record),
             latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
             missed_deadlines=record.missed_deadlines if self.real_time else None,
@@ -204,6 +204,6 @@ class StatusReporter:
             return None
         return tilt_angle(sample.q[1], sample.q[2])
 
-    def _error(self) -> float | None:
+    def _tracking_error(self) -> float | None:
         loop = self._context.loop
         return self._context.guidance_loop.tracking_error if loop.offboard_active else None

@@ -10,11 +10,11 @@ from companion.flight.context import FlightContext
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
 from companion.safety import SafetyLadder
-from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, Stream
+from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, StreamEffect
 from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
-from companion.vehicle.records import outdated
+from companion.vehicle.records import is_outdated
 
 _CURRENT_MODE_PERIOD = 0.45
 """A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
@@ -102,8 +102,8 @@ class Watch:
         now = self._clock()
         self._context.snapshot_builder.listen(now)
         self._context.ground.update()
-        self._context.same_vehicle.update()
-        self._context.same_vehicle.require()
+        self._context.replacement_detector.update()
+        self._context.replacement_detector.require()
         if phase.allowed_roles:
             require_role(self._context.link, phase.allowed_roles, self._context.released_by())
         if phase.monitored and self._context.loop.offboard_active:
@@ -167,11 +167,11 @@ class Watch:
         if verdict.action is Action.HOLD:
             self._context.guidance_loop.give_up()
             return
-        if verdict.stream is Stream.STOPS:
+        if verdict.stream is StreamEffect.STOPS:
             self._context.release()
-        elif verdict.stream is Stream.ENDS:
+        elif verdict.stream is StreamEffect.ENDS:
             self._context.end_stream()
-        self._stopped_in_control |= verdict.stream is not Stream.CONTINUES
+        self._stopped_in_control |= verdict.stream is not StreamEffect.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self, now: float) -> None:
@@ -193,7 +193,7 @@ class Watch:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )
-        if state.heartbeat is None or outdated(now - age(state.heartbeat.received), now):
+        if state.heartbeat is None or is_outdated(now - age(state.heartbeat.received), now):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so whether it is armed is not known any more",
                 exit_,

@@ -41,7 +41,7 @@ class Survey(NamedTuple):
     """Values by newest name."""
     names: Mapping[str, str]
     """Name of each parameter in this autopilot, by newest name."""
-    unread: frozenset[str] = frozenset()
+    unread_names: frozenset[str] = frozenset()
     """Newest names of the parameters that were not read, although the autopilot may have them: it
     did not report them as unknown."""
     lossy: bool = False
@@ -76,7 +76,7 @@ async def survey(
     rules, requests = tuple(rules), _Requests(link)
     unread: frozenset[str] = frozenset()
     if earlier_survey is not None:
-        unread = earlier_survey.unread
+        unread = earlier_survey.unread_names
         rules = tuple(rule for rule in rules if rule.name in earlier_survey.values)
         requests.leave_out(
             name for rule in rules for name in rule.names if name != earlier_survey.names[rule.name]
@@ -84,11 +84,11 @@ async def survey(
     await requests.ask(rules, first_round)
     # An autopilot that answered nothing at all is a finding of its own.
     if requests.values and requests.lossy:
-        await requests.ask(requests.unread(rules), second_round)
+        await requests.ask(requests.unread_rules(rules), second_round)
     return Survey(
         requests.values,
         requests.names,
-        unread.union(rule.name for rule in requests.unread(rules)),
+        unread.union(rule.name for rule in requests.unread_rules(rules)),
         requests.lossy,
     )
 
@@ -124,7 +124,7 @@ class _Requests:
         """Do not request these names, because this autopilot uses other names."""
         self._skipped_names.update(names)
 
-    def unread(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
+    def unread_rules(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
         """The rules of the parameters that were not read and not reported as unknown."""
         return [
             rule

@@ -100,7 +100,7 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
 
 def _is_countable(name: str, rate: StreamRate, evidence: Evidence) -> bool:
     """Whether enough messages are expected to judge the rate by counting them."""
-    return _expected_rate(name, rate) * evidence.window >= _MIN_EXPECTED_COUNT
+    return _expected_rate(name, rate) * evidence.counting_time >= _MIN_EXPECTED_COUNT
 
 
 def _expected_rate(name: str, rate: StreamRate) -> float:

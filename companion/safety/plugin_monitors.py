@@ -13,7 +13,7 @@ from time import perf_counter
 from companion import plugins
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
-from companion.safety.actions import Action, Stream
+from companion.safety.actions import Action, StreamEffect
 from companion.safety.monitor import Monitor, with_hysteresis
 from companion.safety.snapshot import Snapshot
 from companion.user_code import UserCodeError, naming_user_code
@@ -62,7 +62,7 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
         raise ConfigError(
             f"{setting} cannot be used where a value is not known: {guarded_judge.fault}"
         )
-    watching = replace(monitor, name=name, judge=guarded_judge.judge, stream=Stream.CONTINUES)
+    watching = replace(monitor, name=name, judge=guarded_judge.judge, stream=StreamEffect.CONTINUES)
     return (
         watching,
         replace(

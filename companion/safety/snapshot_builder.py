@@ -79,7 +79,7 @@ class SnapshotBuilder:
         self._frame_at_begin, self._shift_at_begin = resets.frame, resets.shift
         resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
-        self._clock_changes = self._link.clock.changes
+        self._clock_changes = self._link.clock.change_count
         self.counters.clear()
         self.echo.begin(self._link.autopilot)
 
@@ -131,7 +131,7 @@ class SnapshotBuilder:
                 refused_at.get("LOCAL_POSITION_NED", -inf) > position_received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
-                None if clock.changes == self._clock_changes else clock.last_change,
+                None if clock.change_count == self._clock_changes else clock.last_change,
                 self.counters.stall_time(since=record.last_answer),
             ),
             self._health(now),

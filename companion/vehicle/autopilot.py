@@ -129,7 +129,7 @@ class Autopilot(Protocol):
     def set_mode(self, name: str) -> Command:
         """Command that enters a mode of `modes`. Raises `KeyError` for any other mode."""
 
-    def not_ready(self, readiness: Readiness) -> str | None:
+    def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing before the vehicle can be armed and flown, in words; `None`: nothing."""
 
     def arm(self) -> tuple[Command, ...]:

@@ -44,17 +44,17 @@ class VehicleClock:
     Attributes:
         rate: Estimates the rate of the vehicle's clock.
         delay: Estimates the delay of the quickest sample, by TIMESYNC.
-        changes: Counts jumps, wraps, standstills and restarts of the clock.
-        restarts: Counts restarts of the autopilot, after which its time since boot continues from a
-            smaller value.
-        last_change: The newest change counted in `changes`, in words; empty before the first.
+        change_count: Counts jumps, wraps, standstills and restarts of the clock.
+        restart_count: Counts restarts of the autopilot, after which its time since boot continues
+            from a smaller value.
+        last_change: The newest change counted in `change_count`, in words; empty before the first.
         on_event: Called with a sentence for the user.
     """
 
     def __init__(self, *, lockstep: bool = False) -> None:
         self.rate = ClockRate(same_clock=lockstep)
         self.delay = TelemetryDelay()
-        self.changes = self.restarts = 0
+        self.change_count = self.restart_count = 0
         self.last_change = ""
         self.on_event: Callable[[str], None] = lambda _: None
         self._lockstep = lockstep
@@ -172,13 +172,13 @@ class VehicleClock:
         """Handle a stamp that may not fit the clock; return why it must not be used, or None."""
         if self._began == inf:
             self._began = self._received = stamp.received
-            self._quickest = 0.0 if self._lockstep else stamp.ahead
+            self._quickest = 0.0 if self._lockstep else stamp.apparent_offset
         elif self._drift_explains(stamp, quickest):
             self._quickest = quickest
-            self._end_misfits(time_boot_ms, quickest - stamp.ahead)
+            self._end_misfits(time_boot_ms, quickest - stamp.apparent_offset)
         elif self._link_got_quicker(stamp, quickest):
             self._quickest = quickest
-            self.delay.shorten(stamp.ahead - quickest, stamp.received)
+            self.delay.shorten(stamp.apparent_offset - quickest, stamp.received)
             self._drop_misfits()
         else:
             return self._take_misfit(stamp, time_boot_ms, quickest)
@@ -186,8 +186,8 @@ class VehicleClock:
 
     def _drift_explains(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` is newer, and ahead of the clock by no more than the largest drift."""
-        drift = self.rate.spread(stamp.received - self._received)
-        return stamp.time > self._newest and stamp.ahead <= quickest + SMALLEST_JUMP + drift
+        limit = quickest + SMALLEST_JUMP + self.rate.spread(stamp.received - self._received)
+        return stamp.time > self._newest and stamp.apparent_offset <= limit
 
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
@@ -197,7 +197,7 @@ class VehicleClock:
         before those exchanges.
         """
         largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
-        return stamp.time > self._newest and stamp.ahead - quickest <= largest_delay
+        return stamp.time > self._newest and stamp.apparent_offset - quickest <= largest_delay
 
     def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
         """Add a misfit; if the misfits show a jump of the clock, accept it and return None."""
@@ -206,7 +206,7 @@ class VehicleClock:
         self._misfits.stamps.append(stamp)
         if not self._misfits.confirmed(quickest):
             return Misfit.AHEAD if stamp.time > self._newest else Misfit.NOT_NEWER
-        jump = self._misfits.most_ahead() - quickest
+        jump = self._misfits.largest_offset() - quickest
         self._misfits.stamps.clear()
         self._quickest, self._newest = quickest, -inf
         self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
@@ -230,7 +230,7 @@ class VehicleClock:
         ahead = any(stamp.time > self._newest for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True
-            lead = self._misfits.most_ahead() - self._quickest
+            lead = self._misfits.largest_offset() - self._quickest
             self.on_event(
                 f"a sample stamped {lead:.1f} s ahead of the vehicle's clock was dropped; such "
                 "samples are counted"
@@ -244,7 +244,7 @@ class VehicleClock:
         self.delay.forget_after(self._received - self.delay.seconds - SAME_CLOCK_SPREAD)
         if self._received - self._began < _SETTLING_TIME and jump > -RESTART_SETBACK:
             return
-        self.changes += 1
-        self.restarts += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
+        self.change_count += 1
+        self.restart_count += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
         self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, set_back=set_back)
         self.on_event(self.last_change)

@@ -49,7 +49,7 @@ class ClockRate:
         self.note_due = inf if same_clock else -inf
         self._rate_error = 0.0 if same_clock else MOST_DRIFT
         self.lowest_rate = -self._rate_error
-        self._noted: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
+        self._noted_offsets: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
 
     def spread(self, seconds: float) -> float:
         """Difference between the fastest and the slowest possible clock after `seconds`, s."""
@@ -64,15 +64,15 @@ class ClockRate:
             now: Event-loop time, s.
             offset: The offset, s.
         """
-        if self._noted:
-            noted_at, noted_offset = self._noted[-1]
+        if self._noted_offsets:
+            noted_at, noted_offset = self._noted_offsets[-1]
             if offset - noted_offset > MOST_DRIFT * (now - noted_at) + _LATE_SAMPLES_RISE:
-                self._noted.clear()  # the noted offsets are of late samples
+                self._noted_offsets.clear()  # the noted offsets are of late samples
                 self.rate, self._rate_error = 0.0, MOST_DRIFT
                 self.lowest_rate = -MOST_DRIFT
         self.note_due = now + _NOTE_PERIOD
-        self._noted.append((now, offset))
-        noted_at, noted_offset = self._noted[0]
+        self._noted_offsets.append((now, offset))
+        noted_at, noted_offset = self._noted_offsets[0]
         if now - noted_at < _MIN_WINDOW * _NOTE_PERIOD:
             return
         self._rate_error = _RATE_UNCERTAINTY
@@ -91,7 +91,7 @@ class DelayUnknown(Enum):
 class _Exchange(NamedTuple):
     """A TIMESYNC exchange."""
 
-    at: float
+    answered_at: float
     """Event-loop time of the answer, s."""
     initial_error: float
     """Largest possible error of `delay` at the time of the answer, s."""
@@ -100,7 +100,7 @@ class _Exchange(NamedTuple):
 
     def error(self, now: float) -> float:
         """Largest possible error of `delay` at the event-loop time `now`, s."""
-        return self.initial_error + MOST_DRIFT * (now - self.at)
+        return self.initial_error + MOST_DRIFT * (now - self.answered_at)
 
 
 class TelemetryDelay:
@@ -162,7 +162,7 @@ class TelemetryDelay:
 
         It is 0 without such an exchange.
         """
-        earlier = [each for each in self._exchanges if each.at <= before]
+        earlier = [each for each in self._exchanges if each.answered_at <= before]
         if not earlier:
             return 0.0
         best = min(earlier, key=lambda each: each.error(before))
@@ -183,7 +183,7 @@ class TelemetryDelay:
 
     def forget_after(self, since: float) -> None:
         """Forget the exchanges after event-loop time `since` (s): the clock may have changed."""
-        while self._exchanges and self._exchanges[-1].at > since:
+        while self._exchanges and self._exchanges[-1].answered_at > since:
             self._exchanges.pop()
         self.expire(since)
 
@@ -196,7 +196,7 @@ class TelemetryDelay:
     def expire(self, now: float) -> None:
         """Forget exchanges too old at event-loop time `now` (s); use the best of the others."""
         exchanges = self._exchanges
-        while exchanges and now - exchanges[0].at > EXCHANGE_LIFETIME:
+        while exchanges and now - exchanges[0].answered_at > EXCHANGE_LIFETIME:
             exchanges.popleft()
         if not exchanges:
             self.forget(self.why_unknown)

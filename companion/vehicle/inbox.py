@@ -66,7 +66,7 @@ class Inbox:
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
         self._candidate: str | None = None
-        self._held: list[tuple[Frame, int]] = []
+        self._held_frames: list[tuple[Frame, int]] = []
         self._samples: list[AttitudeSample] = []
         self.on_attitude: Callable[[AttitudeSample], None] | None = None
         self.on_foreign: Callable[[Frame], None] | None = None
@@ -179,7 +179,7 @@ class Inbox:
             return
         beacon = decode_beacon(frame.payload) if frame.message_id == SYSTEM_TIME else None
         if beacon is None:
-            self._held.append((frame, received_ns))
+            self._held_frames.append((frame, received_ns))
         else:  # not counted as telemetry: beacons have sequence numbers of their own
             self.lockstep.take_beacon(beacon)
 
@@ -224,7 +224,7 @@ class Inbox:
 
     def _pass_on_held(self) -> None:
         """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""
-        held, self._held = self._held, []
+        held, self._held_frames = self._held_frames, []
         for frame, received_ns in held:
             self._pass_on(frame, received_ns)
 

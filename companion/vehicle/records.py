@@ -16,7 +16,7 @@ _MAX_CHARGE_AGE = 1.5
 The charge is in SYS_STATUS and BATTERY_STATUS, which come at 1 Hz or faster."""
 
 
-def outdated(received: float, now: float) -> bool:
+def is_outdated(received: float, now: float) -> bool:
     """Whether telemetry received at `received` is too old at `now`; both are loop times, s."""
     return now - received > _MAX_TELEMETRY_AGE
 
@@ -169,7 +169,7 @@ class Gps(NamedTuple):
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
     """Fault of a GPS that had a 3D fix, in words, at loop time `now` (s); `None`: no fault."""
-    if gps is None or outdated(gps.received, now):
+    if gps is None or is_outdated(gps.received, now):
         return "GPS is not reported any more"
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None
 
@@ -179,7 +179,7 @@ class Prearm(NamedTuple):
 
     received: float
     """Event-loop time of arrival, s."""
-    good: bool
+    passed: bool
     """Whether the checks pass."""
 
 

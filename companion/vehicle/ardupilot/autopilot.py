@@ -99,7 +99,7 @@ class ArduPilot:
         """DO_SET_MODE with the mode's number. Raises `KeyError` for an unknown name."""
         return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(self.modes[name]))
 
-    def not_ready(self, readiness: Readiness) -> str | None:
+    def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: estimator, position, home or ArduPilot's own pre-arm checks.
 
         ArduPilot boots in STABILIZE, whose pre-arm checks need no position, but GUIDED needs one.

@@ -117,7 +117,7 @@ class Px4:
         main, sub = number >> 16 & 0xFF, number >> 24 & 0xFF
         return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(main), float(sub))
 
-    def not_ready(self, readiness: Readiness) -> str | None:
+    def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: position, estimator, home or PX4's own pre-arm checks."""
         if not readiness.has_position:
             return "a local position (LOCAL_POSITION_NED)"
