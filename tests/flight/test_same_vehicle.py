@@ -16,7 +16,7 @@ class Link(SimpleNamespace):
         super().__init__(
             now=0.0,
             stats=SimpleNamespace(peers=0, frames=0),
-            clock=SimpleNamespace(restarts=0, last_change="its clock went back by 40.0 s"),
+            clock=SimpleNamespace(restart_count=0, last_change="its clock went back by 40.0 s"),
         )
         self.vehicle = ReplacementDetector(self, lambda: self.now)
 

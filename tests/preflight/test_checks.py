@@ -367,7 +367,7 @@ def untold(*names, autopilot=PX4, values=GOOD.survey.values, **link):
     """What is found where the link lost what it was told of these."""
     evidence = replace(GOOD, autopilot=autopilot, **link)
     read = evidence.survey._replace(values=values, names={name: name for name in values})
-    return found(parameters, replace(evidence, survey=read._replace(unread=frozenset(names))))
+    return found(parameters, replace(evidence, survey=read._replace(unread_names=frozenset(names))))
 
 
 @pytest.mark.parametrize("link", [LOSSY_LINK, LOSSY_SURVEY])

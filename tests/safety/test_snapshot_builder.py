@@ -36,7 +36,7 @@ class Flight:
             position_count=0,
             gps_was_good=True,
         )
-        self.clock = SimpleNamespace(changes=2, last_change="it jumped")
+        self.clock = SimpleNamespace(change_count=2, last_change="it jumped")
         self.stats = SimpleNamespace(frames=0, lost=0, non_finite_at={})
         link = SimpleNamespace(
             state=self.state,
