@@ -70,8 +70,8 @@ async def judge_vehicle(context: FlightContext, stage: Stage) -> Evidence:
 async def stream(context: FlightContext) -> None:
     """Start to send setpoints (idle ones on the ground); wait until enough were sent."""
     context.loop.on = True
-    enough = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.record.setpoints >= enough, "setpoints to flow")
+    wanted_count = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
+    await context.until(lambda: context.loop.record.setpoints >= wanted_count, "setpoints to flow")
 
 
 async def arm(context: FlightContext) -> None:

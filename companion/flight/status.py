@@ -109,7 +109,7 @@ class StatusReporter:
         self.real_time = real_time
         self._began, self._phase, self._show, self._clock = began, phase, show, clock
         self._setpoint_counts: deque[tuple[float, int]] = deque()
-        self._rows = StatusRows(context, trace.recorder, clock)
+        self._status_rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
         """Record and show the state until cancelled; steps that were missed are not repeated."""
@@ -137,7 +137,7 @@ class StatusReporter:
         if self.takeoff is None and ground.takeoff_commanded and not ground.standing:
             self.takeoff = now
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
-        self._rows.record(now)
+        self._status_rows.record(now)
         vehicle_time, tilt = context.loop.record.last_vehicle_time, self._tilt(now)
         row = (
             None if vehicle_time == -inf else vehicle_time,

@@ -155,7 +155,7 @@ class DragMemory:
     def load(self, identity: Identity) -> KnownDrag:
         """Return what is known of this vehicle's drag.
 
-        The file is read at the first call, and again only for another vehicle than at the last one.
+        The file is read at the first call, and again whenever the hardware id has changed.
         """
         if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid

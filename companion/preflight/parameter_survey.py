@@ -39,7 +39,7 @@ class Survey(NamedTuple):
 
     values: Values
     """Values by newest name."""
-    names: Mapping[str, str]
+    present_names: Mapping[str, str]
     """Name of each parameter in this autopilot, by newest name."""
     unread_names: frozenset[str] = frozenset()
     """Newest names of the parameters that were not read, although the autopilot may have them: it
@@ -79,7 +79,10 @@ async def survey(
         unread = earlier_survey.unread_names
         rules = tuple(rule for rule in rules if rule.name in earlier_survey.values)
         requests.leave_out(
-            name for rule in rules for name in rule.names if name != earlier_survey.names[rule.name]
+            name
+            for rule in rules
+            for name in rule.names
+            if name != earlier_survey.present_names[rule.name]
         )
     await requests.ask(rules, first_round)
     # An autopilot that answered nothing at all is a finding of its own.
@@ -87,7 +90,7 @@ async def survey(
         await requests.ask(requests.unread_rules(rules), second_round)
     return Survey(
         requests.values,
-        requests.names,
+        requests.present_names,
         unread.union(rule.name for rule in requests.unread_rules(rules)),
         requests.lossy,
     )
@@ -97,12 +100,12 @@ class _Requests:
     """The parameter requests to a vehicle, and its answers.
 
     Attributes:
-        values, names: See `Survey`.
+        values, present_names: See `Survey`.
     """
 
     def __init__(self, link: Link) -> None:
         self.values: dict[str, float] = {}
-        self.names: dict[str, str] = {}
+        self.present_names: dict[str, str] = {}
         self._link = link
         self._frames, self._lost = link.stats.frames, link.stats.lost
         self._request_slots = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
@@ -143,7 +146,7 @@ class _Requests:
                     None if name in self._skipped_names else await self._read_value(name, policy)
                 )
                 if value is not None:
-                    self.values[rule.name], self.names[rule.name] = value, name
+                    self.values[rule.name], self.present_names[rule.name] = value, name
                     return
 
     async def _read_value(self, name: str, policy: RetryPolicy) -> float | None:

@@ -56,7 +56,7 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
             )
     yield from _missing_parameters(evidence)
     for result in judge(rules, survey.values, companion_settings(config)):
-        yield _finding(result, survey.names[result.rule.name])
+        yield _finding(result, survey.present_names[result.rule.name])
 
 
 def _unknown_value_finding(rule: ParameterRule, found: str, fix: str) -> Finding:

@@ -1,4 +1,4 @@
-"""Shares and rates over the last second, from the counters of the link and of the control loop."""
+"""Shares of lost frames, missed deadlines and CPU starvation, and rates, over the last second."""
 
 from collections import deque
 from typing import NamedTuple

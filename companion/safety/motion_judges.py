@@ -93,7 +93,7 @@ def thrust(lowest: float, highest: float) -> Judge:
 def outside(fence: Fence) -> Judge:
     """The vehicle is outside the fence.
 
-    It counts as outside a fence in latitude and longitude if its own are unknown.
+    A vehicle of unknown latitude and longitude counts as outside a fence in these coordinates.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:

@@ -62,18 +62,20 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
         raise ConfigError(
             f"{setting} cannot be used where a value is not known: {guarded_judge.fault}"
         )
-    watching = replace(monitor, name=name, judge=guarded_judge.judge, stream=StreamEffect.CONTINUES)
+    guarded_monitor = replace(
+        monitor, name=name, judge=guarded_judge.judge, stream=StreamEffect.CONTINUES
+    )
     return (
-        watching,
+        guarded_monitor,
         replace(
-            watching,
+            guarded_monitor,
             name=f"{name} (its fault)",
             judge=guarded_judge.judge_fault,
             action=Action.HAND_BACK,
             lasts=0.0,
         ),
         replace(
-            watching,
+            guarded_monitor,
             name=f"{name} (its time)",
             judge=guarded_judge.judge_time,
             action=Action.WARN,

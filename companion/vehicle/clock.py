@@ -45,8 +45,7 @@ class VehicleClock:
         rate: Estimates the rate of the vehicle's clock.
         delay: Estimates the delay of the quickest sample, by TIMESYNC.
         change_count: Counts jumps, wraps, standstills and restarts of the clock.
-        restart_count: Counts restarts of the autopilot, after which its time since boot continues
-            from a smaller value.
+        restart_count: Counts restarts of the autopilot, each of which sets its clock back.
         last_change: The newest change counted in `change_count`, in words; empty before the first.
         on_event: Called with a sentence for the user.
     """
@@ -60,8 +59,8 @@ class VehicleClock:
         self._lockstep = lockstep
         self._began = inf
         self._shift = 0.0
-        self._quickest = self._newest = -inf
-        self._received = self._late = 0.0
+        self._quickest = self._newest_time = -inf
+        self._received = self._lateness = 0.0
         self._misfits = MisfitRun()
         self._reported_unknown = self._reported_outlier = False
 
@@ -104,7 +103,7 @@ class VehicleClock:
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
         quickest = self._quickest + self.rate.lowest_rate * (received - self._received)
-        fits = time > self._newest and ahead <= quickest + SMALLEST_JUMP
+        fits = time > self._newest_time and ahead <= quickest + SMALLEST_JUMP
         if not fits or self._misfits.stamps:
             misfit = self._adapt_to(Stamp(time, ahead, received), time_boot_ms, quickest)
             if misfit is not None:
@@ -114,7 +113,8 @@ class VehicleClock:
         late = quickest - ahead
         if late < 0.0:
             quickest, late = ahead, 0.0
-        self._quickest, self._received, self._newest, self._late = quickest, received, time, late
+        self._quickest, self._received = quickest, received
+        self._newest_time, self._lateness = time, late
         if received >= self.rate.note_due:
             self.rate.note(received, quickest)
         return SampleTiming(time, late + self.delay.seconds)
@@ -135,7 +135,7 @@ class VehicleClock:
         time = vehicle_ns % WRAP_PERIOD_NS * 1e-9 + self._shift  # wraps as the samples' stamps do
         middle_time, half_round_trip = 0.5 * (sent + received), 0.5 * (received - sent)
         quickest = self._quickest + self.rate.rate * (middle_time - self._received)
-        attitude_fits = received - self._received < 1.0 and self._late < SMALLEST_JUMP
+        attitude_fits = received - self._received < 1.0 and self._lateness < SMALLEST_JUMP
         error = half_round_trip + self.rate.spread(max(0.0, received - self._received))
         delay = time - middle_time - quickest
         setback = self.delay.take_exchange(received, error, delay)
@@ -147,7 +147,7 @@ class VehicleClock:
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
             # The answer may be a little older than the newest sample.
-            was_set_back = time < self._newest - _MIN_CLOCK_SETBACK
+            was_set_back = time < self._newest_time - _MIN_CLOCK_SETBACK
             self._accept_jump(-setback, round(vehicle_ns * 1e-6), set_back=was_set_back)
 
     def update(self, now: float) -> None:
@@ -187,7 +187,7 @@ class VehicleClock:
     def _drift_explains(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` is newer, and ahead of the clock by no more than the largest drift."""
         limit = quickest + SMALLEST_JUMP + self.rate.spread(stamp.received - self._received)
-        return stamp.time > self._newest and stamp.apparent_offset <= limit
+        return stamp.time > self._newest_time and stamp.apparent_offset <= limit
 
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
@@ -197,7 +197,7 @@ class VehicleClock:
         before those exchanges.
         """
         largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
-        return stamp.time > self._newest and stamp.apparent_offset - quickest <= largest_delay
+        return stamp.time > self._newest_time and stamp.apparent_offset - quickest <= largest_delay
 
     def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
         """Add a misfit; if the misfits show a jump of the clock, accept it and return None."""
@@ -205,10 +205,10 @@ class VehicleClock:
             self._drop_misfits()
         self._misfits.stamps.append(stamp)
         if not self._misfits.confirmed(quickest):
-            return Misfit.AHEAD if stamp.time > self._newest else Misfit.NOT_NEWER
+            return Misfit.AHEAD if stamp.time > self._newest_time else Misfit.NOT_NEWER
         jump = self._misfits.largest_offset() - quickest
         self._misfits.stamps.clear()
-        self._quickest, self._newest = quickest, -inf
+        self._quickest, self._newest_time = quickest, -inf
         self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
         return None
 
@@ -219,7 +219,7 @@ class VehicleClock:
         """
         if not self._misfits.stamps:
             return
-        clock_stopped = self._misfits.clock_stopped(self._newest)
+        clock_stopped = self._misfits.clock_stopped(self._newest_time)
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
         if clock_stopped and min(lasted, late) >= SMALLEST_JUMP:
@@ -227,7 +227,7 @@ class VehicleClock:
 
     def _drop_misfits(self) -> None:
         """Drop the misfits; report, only once, a sample that was stamped ahead of the clock."""
-        ahead = any(stamp.time > self._newest for stamp in self._misfits.stamps)
+        ahead = any(stamp.time > self._newest_time for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True
             lead = self._misfits.largest_offset() - self._quickest

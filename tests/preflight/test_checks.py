@@ -366,7 +366,7 @@ LOSSY_SURVEY = {"survey": GOOD.survey._replace(lossy=True)}
 def untold(*names, autopilot=PX4, values=GOOD.survey.values, **link):
     """What is found where the link lost what it was told of these."""
     evidence = replace(GOOD, autopilot=autopilot, **link)
-    read = evidence.survey._replace(values=values, names={name: name for name in values})
+    read = evidence.survey._replace(values=values, present_names={name: name for name in values})
     return found(parameters, replace(evidence, survey=read._replace(unread_names=frozenset(names))))
 
 
@@ -408,7 +408,7 @@ def test_a_parameter_that_is_no_number_is_told_and_nothing_is_proposed():
 
 def test_a_change_is_proposed_under_the_name_that_this_autopilot_knows():
     old = Survey({"MAV_GCS_SYSID": 1.0, "FS_GCS_ENABLE": 1.0}, {"MAV_GCS_SYSID": "SYSID_MYGCS"})
-    old = old._replace(names={**old.names, "FS_GCS_ENABLE": "FS_GCS_ENABLE"})
+    old = old._replace(present_names={**old.present_names, "FS_GCS_ENABLE": "FS_GCS_ENABLE"})
     evidence = replace(GOOD, autopilot=ARDUPILOT, survey=old)
     (finding,) = (f for f in parameters(CONFIG, evidence) if f.key == "MAV_GCS_SYSID")
     assert finding.change[:3] == ("SYSID_MYGCS", 1.0, 255.0)
@@ -444,7 +444,7 @@ def _write_dead_time(folder, roll, gain=CONFIG.planner.gain_per_s, uid=GOOD.iden
 
 
 def test_an_exception_lets_one_finding_pass_and_no_other():
-    evidence = replace(GOOD, survey=Survey({"COM_OF_LOSS_T": 5.0}, GOOD.survey.names))
+    evidence = replace(GOOD, survey=Survey({"COM_OF_LOSS_T": 5.0}, GOOD.survey.present_names))
     evidence = replace(evidence, link=QUALITY._replace(round_trip=0.5))
     accepting = changed(CONFIG, {"flight": {"accept": ("COM_OF_LOSS_T",)}}, "test")
     refused = [
