@@ -72,4 +72,4 @@ def environment(helper: Helper | None) -> Environment:
     """The `Environment` of a flight: this computer, and the live stream of the helper process."""
     if helper is None or helper.feed is None:
         return THIS_COMPUTER
-    return replace(THIS_COMPUTER, stream=helper.feed.send)
+    return replace(THIS_COMPUTER, send_batch=helper.feed.send)

@@ -17,13 +17,13 @@ from companion.flight.dead_time_watch import DeadTimeWatch
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.flown_config import description, flattened
-from companion.flight.maneuvers import not_begun
+from companion.flight.maneuvers import fresh_copy
 from companion.flight.observer import EventRecorder
 from companion.flight.phases import Phase
 from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
 from companion.flight.status import StatusReporter
-from companion.flight.vehicle_identity import DragMemory, SameVehicle
+from companion.flight.vehicle_identity import DragMemory, ReplacementDetector
 from companion.flight.watch import RateRequester, Watch
 from companion.guidance.follow import Follow
 from companion.recording.recorder import FlightRecorder
@@ -70,8 +70,12 @@ def assemble(
     memory = _drag_memory(context, folder, flight.note, changes)
     _prepare_trajectories(context, flight.note, real_time=real_time)
     if record is not None:
-        record.metadata("configuration", flattened(changes.at_flight_start.model_dump(mode="json")))
-        record.begin(flight.began, description(changes.at_flight_start, plan, real_time=real_time))
+        record.metadata(
+            "configuration", flattened(changes.config_at_flight_start.model_dump(mode="json"))
+        )
+        record.begin(
+            flight.began, description(changes.config_at_flight_start, plan, real_time=real_time)
+        )
         ladder.on_change = record.alarm
         memory.on_begin = partial(_record_drag, record, clock)
     dead_time_watch = DeadTimeWatch(trace, config.vehicle.axes, flight.note)
@@ -84,7 +88,7 @@ def assemble(
 def _context(
     config: Config, link: Link, plan: Plan, trace: FlightTrace, environment: Environment
 ) -> FlightContext:
-    """The loops of a flight, and what its phases share."""
+    """Make the context of a flight: its loops, and the other parts that its phases share."""
     clock: Callable[[], float] = asyncio.get_running_loop().time
     ground = GroundContact(link.state, clock)
     loop, guidance_loop = make_loops(
@@ -101,9 +105,9 @@ def _context(
     snapshot_builder = SnapshotBuilder(
         link, loop, guidance_loop, real_time=not config.link.lockstep
     )
-    same_vehicle = SameVehicle(link, clock)
-    loop.is_same_vehicle = lambda: same_vehicle.same
-    preflight = PreflightChecks(config, link, same_vehicle, not_begun(plan.maneuvers))
+    replacement_detector = ReplacementDetector(link, clock)
+    loop.is_same_vehicle = lambda: replacement_detector.is_same_vehicle
+    preflight = PreflightChecks(config, link, replacement_detector, fresh_copy(plan.maneuvers))
     return FlightContext(
         config,
         link,
@@ -113,7 +117,7 @@ def _context(
         plan.maneuvers,
         ground,
         preflight,
-        same_vehicle,
+        replacement_detector,
     )
 
 
@@ -151,7 +155,7 @@ def _reporter(
     *,
     real_time: bool,
 ) -> StatusReporter:
-    """The reporter of the flight's state, which is shown only if an observer uses it."""
+    """Make the reporter of the flight's state. If no observer uses states, it shows none."""
 
     def phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began

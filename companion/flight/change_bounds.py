@@ -11,7 +11,8 @@ from companion.files.yaml_file import ConfigError
 LARGEST_CHANGE_FACTOR = 3.0
 """Largest factor by which a change may multiply or divide a value."""
 _SMALLEST_VALUES = {"limits.max_tilt_deg": 5.0, "limits.max_tilt_rate_deg_s": 20.0}
-"""Smallest values in flight; with less tilt or tilt rate the vehicle cannot hold against wind."""
+"""Smallest values in flight, in the unit of the key: with less tilt or tilt rate, the vehicle
+cannot hold its position in wind."""
 _NEVER_ZERO_KEYS = frozenset(
     {"planner.yaw_gain_per_s", "guidance.height_gain_per_s", "guidance.climb_gain_per_s"}
 )
@@ -20,10 +21,10 @@ _BANDWIDTH_KEY = "guidance.disturbance_bandwidth_rad_s"
 _WITHOUT_EFFECT_IN_IDENTIFY = frozenset(
     {"guidance.position_weight_per_s4", "guidance.velocity_weight_per_s2", _BANDWIDTH_KEY}
 )
-"""Keys without effect in `identify`, which has its own weights and bandwidth."""
+"""Keys without effect in the maneuver `identify`, which has its own weights and bandwidth."""
 
 
-def require_moderate(before: Config, after: Config, name: str) -> None:
+def require_moderate_change(before: Config, after: Config, name: str) -> None:
     """Check that a change is not too large for a vehicle in the air.
 
     Args:

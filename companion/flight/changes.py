@@ -16,7 +16,7 @@ from companion.config.known_drag import KnownDrag
 from companion.control.retuning import Retuning, loop_settings, reason_against_changes
 from companion.control.slew import Slew
 from companion.files.yaml_file import ConfigError
-from companion.flight.change_bounds import require_moderate
+from companion.flight.change_bounds import require_moderate_change
 from companion.recording.recorder import FlightRecorder
 from companion.safety.actions import fault_message
 
@@ -50,32 +50,33 @@ class Change(NamedTuple):
 class Changes:
     """Changes the values of a configuration in flight: checks, slews, undoes and records them.
 
-    A change passes the checks that the configuration passed at the start. It takes effect in small
-    steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
+    A change must pass the checks that the configuration passed at the start. It takes effect in
+    small steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
 
     Attributes:
-        start: the configuration before the first change, which may precede the flight.
+        start_config: the configuration before the first change; changes may precede the flight.
         wanted_config: the configuration after the newest change.
-        made: all changes, in order.
-        at_flight_start: the configuration when the flight began; the flight's record contains it.
+        all_changes: all changes, in order.
+        config_at_flight_start: the configuration when the flight began; the flight's record
+            contains it.
         note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted_config` after each change.
         on_drag: called with what is known of the vehicle's drag, once the vehicle is identified;
             some checks of a change need it.
 
     Args:
-        start: the configuration before the first change.
+        start_config: the configuration before the first change.
     """
 
-    def __init__(self, start: Config) -> None:
-        self.wanted_config = start
-        self.made: list[Change] = []
-        self.at_flight_start = start
+    def __init__(self, start_config: Config) -> None:
+        self.wanted_config = start_config
+        self.all_changes: list[Change] = []
+        self.config_at_flight_start = start_config
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
         self.on_drag: Callable[[KnownDrag], None] = lambda _: None
-        self.start = start
-        self._slew = Slew(start)
+        self.start_config = start_config
+        self._slew = Slew(start_config)
         self._earlier_configs: list[Config] = []
         self._count_before_flight = 0
         self._retuning: Retuning | None = None
@@ -90,12 +91,13 @@ class Changes:
     @property
     def made_in_flight(self) -> tuple[Change, ...]:
         """The changes since the flight began, in order."""
-        return tuple(self.made[self._count_before_flight :])
+        return tuple(self.all_changes[self._count_before_flight :])
 
     def begin_flight(self) -> Config:
         """Begin a flight; return the configuration at its start, for its record."""
-        self.at_flight_start, self._count_before_flight = self.wanted_config, len(self.made)
-        return self.at_flight_start
+        self.config_at_flight_start = self.wanted_config
+        self._count_before_flight = len(self.all_changes)
+        return self.config_at_flight_start
 
     def change(self, values: Values, by: str) -> str:
         """Begin to change to `values`; return the change in words.
@@ -107,9 +109,9 @@ class Changes:
                 is too large. Nothing is changed.
         """
         try:
-            wanted = changed_in_flight(self.start, self.wanted_config, values, by)
-            require_moderate(self._slew.settled_config, wanted, by)
-            require_moderate(self.wanted_config, wanted, by)
+            wanted = changed_in_flight(self.start_config, self.wanted_config, values, by)
+            require_moderate_change(self._slew.settled_config, wanted, by)
+            require_moderate_change(self.wanted_config, wanted, by)
         except ConfigError as error:
             raise ChangeRefusedError(str(error)) from error
         except (ValueError, ArithmeticError) as error:
@@ -151,7 +153,7 @@ class Changes:
     def applied_by(
         self, retuning: Retuning, note: Callable[[str], None], record: FlightRecorder | None
     ) -> Iterator[None]:
-        """Apply changes to the loops while the `with` block runs, earlier changes at once.
+        """Apply changes to the loops while the `with` block runs; apply earlier changes at once.
 
         Args:
             retuning: applies values to the control loop and to guidance.
@@ -159,11 +161,11 @@ class Changes:
             record: records the values for a replay, or None.
         """
         self._retuning, self._record = retuning, record
-        if self.wanted_config is not self.start:
+        if self.wanted_config is not self.start_config:
             self._slew.jump(self.wanted_config)
             retuning.apply(loop_settings(self.wanted_config))
-        if self.wanted_config is not self.at_flight_start:
-            self._record_change(self.at_flight_start, at_once=True)
+        if self.wanted_config is not self.config_at_flight_start:
+            self._record_change(self.config_at_flight_start, at_once=True)
         note_before, self.note = self.note, note
         try:
             with retuning.before_each_step(self.step):
@@ -191,7 +193,7 @@ class Changes:
         Raises:
             ChangeRefusedError: nothing can change in this flight, or the values are equal.
         """
-        why_fixed = reason_against_changes(self.start)
+        why_fixed = reason_against_changes(self.start_config)
         if why_fixed is not None:
             raise ChangeRefusedError(f"{by}: {why_fixed}; nothing has changed")
         keys = tuple(differences(self.wanted_config, wanted))
@@ -214,7 +216,7 @@ class Changes:
             self._slew.begin(wanted, now)
             self._record_change(before, at_once=False)
         change = Change(now, by, keys)
-        self.made.append(change)
+        self.all_changes.append(change)
         self.note(str(change))
         return str(change)
 

@@ -16,7 +16,8 @@ from companion.vehicle.link import Link
 
 _MAX_TRIES = 4
 _EFFECT_TIMEOUT = 3.0
-"""Longest time from a command to its effect, s; a take-off takes longer than a mode change."""
+"""After a refused repetition, longest wait for the effect of the first try, s. A take-off shows its
+effect later than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
@@ -72,7 +73,7 @@ async def command_if_ours(
 ) -> None:
     """Send a command until it is answered; before each try, check who controls the vehicle.
 
-    A command is never repeated blindly. The vehicle may have obeyed the first one whose answer was
+    A command is never repeated blindly. The vehicle may have obeyed a command whose answer was
     lost, and a pilot may have taken over since.
 
     Args:
@@ -90,7 +91,7 @@ async def command_if_ours(
     """
     for attempt in range(_MAX_TRIES):
         await context.fresh_heartbeat()
-        context.same_vehicle.require()
+        context.replacement_detector.require()
         if attempt > 0 and done():
             return
         require_ours()
@@ -163,9 +164,9 @@ async def leave_offboard(
 ) -> None:
     """Ask a vehicle that stands disarmed in offboard to hold, because it could not be armed again.
 
-    When PX4 disarms, it returns to the last mode that its user chose. After a landing that began in
-    OFFBOARD, that is OFFBOARD, where its pre-arm checks fail without setpoints (measured). They
-    also fail in AUTO.LAND. Other modes and armed vehicles are left alone.
+    When PX4 disarms, it returns to the last mode that its user chose: OFFBOARD, if the landing
+    began there. PX4's pre-arm checks fail in AUTO.LAND, and in OFFBOARD without setpoints
+    (measured). Other modes and armed vehicles are left alone.
 
     Args:
         context: context of the flight.

@@ -12,7 +12,7 @@ from companion.control.control_loop import ControlLoop
 from companion.control.ground_contact import GroundContact
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight.preflight_checks import PreflightChecks
-from companion.flight.vehicle_identity import SameVehicle
+from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
 from companion.guidance.fence import FenceCentre
 from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
@@ -28,10 +28,10 @@ _POLL_PERIOD = 0.02
 """Period with which a condition is checked, s; telemetry is slower."""
 
 _LAST_SETPOINT_TIMEOUT = 0.1
-"""Longest wait for a sample that the last setpoint of a flight can answer, s."""
+"""Longest wait for a last attitude sample, s; the last setpoint of a flight answers it."""
 
 _BACKLOG_DRAIN_TIME = 0.5
-"""After a stall the backlog is drained within this time, s."""
+"""Time after a stall of this program within which the queued telemetry is read, s."""
 
 _HEARTBEAT_ID = 0.0
 """Message id of HEARTBEAT, as a float for the command that requests a message."""
@@ -49,7 +49,7 @@ class FlightContext:
     maneuvers: ManeuverSequence
     ground: GroundContact
     preflight: PreflightChecks
-    same_vehicle: SameVehicle
+    replacement_detector: ReplacementDetector
     known_drag: KnownDrag = field(default_factory=KnownDrag)
     """What was known of the vehicle's drag when the checks ended."""
     detail: str = ""
@@ -63,7 +63,8 @@ class FlightContext:
     """The mode when the checks ended. If the mode differs before we command arming, the pilot or
     another station has changed it, and the flight ends."""
     must_disarm: bool = False
-    """Whether the flight must disarm the vehicle on the ground: we commanded arming or take-off."""
+    """Whether the flight must disarm the vehicle on the ground, because we commanded arming or
+    take-off."""
     fence_centre: FenceCentre | None = None
     """Centre of the fence in an earlier flight, if the vehicle has not been disarmed since; None:
     the fence is centred where control begins."""
@@ -78,7 +79,7 @@ class FlightContext:
         self.guidance_loop.stand_by()
 
     def end_stream(self) -> None:
-        """Stop answering samples; if the autopilot obeys us, the last answer has zero body rates.
+        """Stop the setpoints; if the autopilot obeys us, the last setpoint has zero body rates.
 
         Call this if we end the control. If the pilot has taken over, or data are doubtful, call
         `release`.
@@ -87,7 +88,7 @@ class FlightContext:
         self.guidance_loop.stand_by()
 
     async def stop(self, tasks: Iterable[asyncio.Task[Any]]) -> None:
-        """Stop the tasks beside the phases, then the setpoints, and wait for the last setpoint."""
+        """Cancel `tasks`, end the setpoints, and wait until the last setpoint was sent."""
         try:
             for task in tasks:
                 await cancel(task)
@@ -108,8 +109,8 @@ class FlightContext:
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that left the vehicle after this call.
 
-        After a stall of our process, frames from the backlog look new. So we request a heartbeat.
-        The heartbeat after the answer is fresh; without an answer, a heartbeat after
+        After a stall of this program, queued frames look new, so a heartbeat is requested. The
+        heartbeat after the answer is fresh; without an answer, a heartbeat after
         `_BACKLOG_DRAIN_TIME` is fresh.
         """
         loop = asyncio.get_running_loop()
@@ -129,11 +130,11 @@ class FlightContext:
                 fresh.set_result(None)
 
         unsubscribe = self.link.subscribe("HEARTBEAT", on_heartbeat)
-        question = asyncio.create_task(ask())
+        request_task = asyncio.create_task(ask())
         try:
             await fresh
         finally:
-            question.cancel()
+            request_task.cancel()
             unsubscribe()
 
     def fresh_position(self) -> LocalPosition | None:

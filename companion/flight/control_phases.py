@@ -53,7 +53,8 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
 async def fly_commanded(context: FlightContext, commands: Source) -> None:
     """Fly the commands of another program until it ends its control, then brake and hold.
 
-    The phase waits until the vehicle has stopped: the autopilot would brake it harder.
+    The phase waits until the vehicle has stopped, because the autopilot would brake a moving
+    vehicle harder than guidance does.
     """
     await _fly(context, commands, lambda: f"commanded by {commands.name}")
     context.guidance_loop.hold_here()
@@ -74,7 +75,7 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
     tilt_margin.check()
     context.guidance_loop.follow(source)
 
-    def over() -> bool:
+    def is_over() -> bool:
         elapsed = now() - began
         context.setpoint_rate_hz = (
             (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
@@ -87,7 +88,7 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
         context.detail = progress()
         return context.guidance_loop.finished
 
-    await context.until(over)
+    await context.until(is_over)
 
 
 class _TiltMargin:
@@ -164,17 +165,17 @@ async def land(context: FlightContext) -> None:
     context.detail = "the autopilot to accept the landing"
     await hand_over_to_landing(context)
 
-    def down() -> bool:
+    def touched_down() -> bool:
         height = context.link.state.height
         context.detail = "touchdown" + ("" if height is None else f", now {height:.1f} m")
         _require_landing(context)
         return context.ground.touched_down
 
-    await context.until(down)
+    await context.until(touched_down)
 
 
 async def disarm(context: FlightContext) -> None:
-    """Wait until the autopilot disarms, else command it; leave a mode in which it cannot arm."""
+    """Wait until the autopilot disarms, else command disarming; leave modes that forbid arming."""
     context.detail = "the autopilot to disarm itself"
 
     def disarmed() -> bool:

@@ -16,7 +16,8 @@ from companion.safety.actions import fault_message
 _MEASURING_PERIOD = 2.0
 """Time between two measurements, s; the axes take turns."""
 _WINDOW_PERIODS = 4
-"""Length of the window of a measurement, in `_MEASURING_PERIOD`; the first one is one shorter."""
+"""Length of the window of a measurement, in periods of `_MEASURING_PERIOD`; the first window is one
+period shorter."""
 _MIN_ROW_AGE = 1.5
 """Smallest age of the rows used, s: in newer ones the autopilot may already have left offboard."""
 _MAX_ROWS = 75_000
@@ -30,8 +31,8 @@ class DeadTimeWatch:
     """Correlates commanded and measured rates; warns once if a configured dead time is wrong.
 
     It measures right after a setpoint was sent, when the time until the next sample is longest. A
-    measurement takes 1 ms (2 to 3 ms with an acceleration limit). A thread for it could delay the
-    answer to a sample by 5 ms.
+    measurement takes 1 ms (2 to 3 ms on an axis with an acceleration limit). In its own thread
+    it could delay the answer to a sample by 5 ms.
 
     Args:
         trace: records of the flight, with the commanded and the measured body rates.
@@ -48,38 +49,41 @@ class DeadTimeWatch:
         self._trace = trace
         self._axes = axes
         self._note = note
-        self._due = -inf
+        self._due_at = -inf
         self._measurements = 0
         # Number of rows at each of the latest measurements.
-        self._rows = deque([0], maxlen=_WINDOW_PERIODS + 1)
-        self._suspected: set[str] = set()
+        self._row_counts = deque([0], maxlen=_WINDOW_PERIODS + 1)
+        self._suspected_axes: set[str] = set()
         self._warned = False
         time = np.arange(0.0, 3.0, 0.01)
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_answer(self, now: float) -> None:
-        """Measure the next axis, if one is due at `now`, s on our clock."""
-        if now < self._due:
+        """Measure the dead time of the next axis if that is due at `now`, s on our clock."""
+        if now < self._due_at:
             return
-        self._due = now + _MEASURING_PERIOD
+        self._due_at = now + _MEASURING_PERIOD
         try:
             self._measure_next_axis()
         except Exception as error:  # a mere measurement must not end a flight
-            self._due = inf
+            self._due_at = inf
             self._note(f"the dead time is no longer measured: {fault_message(error)}")
 
     def _measure_next_axis(self) -> None:
-        self._rows.append(len(self._trace.rates))
-        if len(self._rows) > _WINDOW_PERIODS:
-            first = self._rows[0]
+        self._row_counts.append(len(self._trace.rates))
+        if len(self._row_counts) > _WINDOW_PERIODS:
+            first_row = self._row_counts[0]
             name = _AXES[self._measurements % len(_AXES)]
             self._measurements += 1
-            self._judge_axis(name, self._dead_time(name, self._trace.rates_rows(first)))
+            self._judge_axis(name, self._dead_time(name, self._trace.rates_rows(first_row)))
 
     def measure_whole_flight(self) -> DeadTimes:
-        """Measure over the flight (its last `_MAX_ROWS` rows); warn if no warning was given yet."""
-        first = max(0, len(self._trace.rates) - _MAX_ROWS)
-        rows = self._trace.rates_rows(first)
+        """Measure the dead times over the last `_MAX_ROWS` rows of the flight.
+
+        Warn if a configured dead time is wrong, unless a warning was given already.
+        """
+        first_row = max(0, len(self._trace.rates) - _MAX_ROWS)
+        rows = self._trace.rates_rows(first_row)
         ages = rows[:, _AGE_COLUMN]
         ages = ages[np.isfinite(ages)]
         measured = DeadTimes(
@@ -111,13 +115,13 @@ class DeadTimeWatch:
         return AxisDeadTime(dead_time, axis.dead_time)
 
     def _judge_axis(self, name: str, dead_time: AxisDeadTime) -> None:
-        """Warn at the second wrong measurement in a row; a gust may cause a single one."""
+        """Warn at the second wrong dead time in a row; a gust may cause a single wrong one."""
         if not dead_time.is_wrong:
-            self._suspected.discard(name)
-        elif name in self._suspected:
+            self._suspected_axes.discard(name)
+        elif name in self._suspected_axes:
             self._warn_once(DeadTimes({name: dead_time}))
         else:
-            self._suspected.add(name)
+            self._suspected_axes.add(name)
 
     def _warn_once(self, dead_times: DeadTimes) -> None:
         warning = dead_times.warning()

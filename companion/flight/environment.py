@@ -21,10 +21,10 @@ class Environment:
     clock_ns: Callable[[], int] = perf_counter_ns
     """Clock for latencies and for the arrival stamps of transports, ns."""
     realtime: bool = True
-    """Whether the flight runs in real time, and requests the section `realtime` from the operating
-    system. False: a virtual clock."""
-    stream: SendBatch | None = None
-    """Takes batches of the messages that the flight records, in the recording thread; or None."""
+    """Whether the flight runs in real time, and requests the settings of section `realtime` from
+    the operating system. False: a virtual clock."""
+    send_batch: SendBatch | None = None
+    """Sends batches of the messages that the flight records, in the recording thread; or None."""
 
 
 THIS_COMPUTER = Environment()

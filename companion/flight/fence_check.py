@@ -37,20 +37,20 @@ class FenceCheck:
     not checked."""
 
     def __call__(self, motion: Motion) -> Violation | None:
-        """The worst violation, with whether a slower motion would avoid it; None: no violation."""
-        worst = self._worst(motion)
+        """The worst violation, and whether a slower motion would avoid it; None: no violation."""
+        worst = self._worst_breach(motion)
         if worst is None:
             return None
         zeros = np.zeros_like(motion.velocity)
         still = replace(motion, velocity=zeros, acceleration=zeros)
-        worst_at_rest = self._worst(still)
+        worst_at_rest = self._worst_breach(still)
         time, breach = worst if worst_at_rest is None else worst_at_rest
         begin = self._begin_time(motion if worst_at_rest is None else still, time)
         slowing_helps = worst_at_rest is None
         text, remedy = _breach_text(breach, begin, slowing_helps), _remedy(slowing_helps)
         return Violation(breach.limit, begin, time, text, remedy, slowing_helps=slowing_helps)
 
-    def _worst(self, motion: Motion) -> tuple[float, Breach] | None:
+    def _worst_breach(self, motion: Motion) -> tuple[float, Breach] | None:
         """The worst breach and its time, s."""
         columns = self.fence.stopping_point(
             _columns(motion.position), _columns(motion.velocity), _horizontal(motion.acceleration)
@@ -67,9 +67,10 @@ class FenceCheck:
         return float(time), breach
 
     def _candidate_indices(self, stops: Floats) -> list[int]:
-        """Indices of the stopping points to judge: the farthest, highest and lowest of `stops`.
+        """Indices of the stop points to judge: the farthest, highest and lowest of `stops`.
 
-        For a polygon, points at every `_POINT_DISTANCE` along the path are added.
+        A stop point is where the vehicle would stop if it braked. For a polygon, stop points at
+        every `_POINT_DISTANCE` along their path are added.
         """
         distance = np.hypot(stops[:, 0], stops[:, 1])
         indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
@@ -90,13 +91,13 @@ class FenceCheck:
             offset, velocity, height, self.origin, TRACKING_MARGIN, (north, east)
         )
 
-    def _begin_time(self, motion: Motion, worst: float) -> float:
-        """Time of the first breach among the checked moments, s; at most `worst`."""
+    def _begin_time(self, motion: Motion, worst_time: float) -> float:
+        """Time of the first breach among the checked moments, s; at most `worst_time`."""
         stride = max(1, motion.times.size // _MAX_MOMENTS)
         for k in range(0, motion.times.size, stride):
-            if motion.times[k] >= worst or self._breach(motion, k) is not None:
-                return float(min(motion.times[k], worst))
-        return worst
+            if motion.times[k] >= worst_time or self._breach(motion, k) is not None:
+                return float(min(motion.times[k], worst_time))
+        return worst_time
 
 
 def _breach_text(breach: Breach, time: float, slowing_helps: bool) -> str:

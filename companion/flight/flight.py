@@ -56,7 +56,7 @@ class Flight:
         self.began = self._phase_began = self._clock()
         self._interruption: FlightEnded | None = None
         self._asking_landing = False
-        self._end = self._new_end()
+        self._end_future = self._new_end_future()
 
     async def run(self) -> str:
         """Fly; returns "ok" or the reason why the flight ended early."""
@@ -79,13 +79,13 @@ class Flight:
         """End the running phase from outside; only the first reason counts."""
         if ended.exit is not None and not ended.exit.sends_setpoints:
             self._context.release()
-        if not self._end.done():
-            self._end.set_result(ended)
+        if not self._end_future.done():
+            self._end_future.set_result(ended)
 
     def fail(self, error: Exception) -> None:
         """End the flight after an exception outside the phases.
 
-        An exit that is under way continues without our setpoints, which may have caused the fault.
+        An exit that has already begun continues without setpoints: they may have caused the fault.
         """
         if self.failed_in is None:
             self.end(FlightEnded(fault_message(error, self._usual_exit())))
@@ -98,8 +98,8 @@ class Flight:
     def interrupt(self, reason: str) -> None:
         """End the flight for the user: hold if we fly, else leave by the exit of the phase.
 
-        An exit that is under way continues. While the user is asked whether to land, an interrupt
-        answers no.
+        An exit that has already begun continues. While the user is asked whether to land, an
+        interrupt answers no.
         """
         usual_exit = self._usual_exit()
         exit_ = Exit.HOLD if usual_exit is Exit.LAND else usual_exit
@@ -108,11 +108,11 @@ class Flight:
             self.end(self._interruption)
 
     def on_heartbeat(self) -> None:
-        """Judge a new HEARTBEAT at once."""
+        """On a new HEARTBEAT, check at once whether the phase may go on."""
         self._judge(self._watch.judge)
 
     def on_current_mode(self) -> None:
-        """Judge a new CURRENT_MODE at once."""
+        """On a new CURRENT_MODE, check at once whether the phase may go on."""
         self._judge(self._watch.on_current_mode)
 
     def note(self, text: str) -> None:
@@ -136,8 +136,8 @@ class Flight:
                 self.note(f"{void.reason}; the checks are repeated")
                 self._context.release()
                 self._context.link.state.forget()
-                self._context.same_vehicle.begin()
-                self._end = self._new_end()
+                self._context.replacement_detector.begin()
+                self._end_future = self._new_end_future()
                 if self._interruption is not None:  # it came after the checks became void
                     raise self._interruption from void
             except FlightEnded:
@@ -155,21 +155,21 @@ class Flight:
         """Run one phase; every failure becomes a `FlightEnded`."""
         self.phase, self._phase_began = phase, self._clock()
         self._observer.phase(phase.name, phase.waits_for)
-        if not self._end.done():
+        if not self._end_future.done():
             self._judge(self._watch.judge)  # before the phase commands anything
-        if not self._end.done():
+        if not self._end_future.done():
             await self._run_until_end(phase.work(self._context), phase.timeout)
-        if self._end.done():
-            raise self._end.result()
+        if self._end_future.done():
+            raise self._end_future.result()
 
     async def _run_until_end(self, work: Coroutine[Any, Any, Any], seconds: float) -> Any:
         """Run `work` until it is done, the flight is ended, or `seconds` are over."""
         task = asyncio.create_task(work)
-        awaited: set[asyncio.Future[Any]] = {task, self._end}
+        awaited: set[asyncio.Future[Any]] = {task, self._end_future}
         try:
             timeout = None if seconds == inf else seconds
             await asyncio.wait(awaited, timeout=timeout, return_when=asyncio.FIRST_COMPLETED)
-            if self._end.done():
+            if self._end_future.done():
                 return None
             if not task.done():
                 raise FlightEnded(
@@ -200,7 +200,7 @@ class Flight:
     async def _fly_exit(self, exit_: Exit) -> None:
         """Fly the phases of an exit; if one fails, fly the exit of that phase."""
         self.note(exit_.value)
-        self._end = self._new_end()
+        self._end_future = self._new_end_future()
         try:
             for phase in exit_phases(self._context.config.flight, exit_):
                 await self._fly(phase)
@@ -220,7 +220,7 @@ class Flight:
             self._asking_landing = False
 
     async def _run_repeatedly(self, work: Callable[[], Awaitable[None]]) -> None:
-        """Run a task repeatedly while the phases run; an exception in it ends the flight."""
+        """Run `work` repeatedly while the phases run; an exception in `work` ends the flight."""
         while True:
             try:
                 await work()
@@ -246,5 +246,5 @@ class Flight:
             self._observer.waiting(phase.name, self._context.detail, elapsed, phase.timeout)
 
     @staticmethod
-    def _new_end() -> asyncio.Future[FlightEnded]:
+    def _new_end_future() -> asyncio.Future[FlightEnded]:
         return asyncio.get_running_loop().create_future()

@@ -67,7 +67,7 @@ def facts_of(
         phases=tuple((at - began, name) for at, name in phases),
         takeoff=takeoff,
         early_end=early_end,
-        vehicle_uid=context.same_vehicle.uid,
+        vehicle_uid=context.replacement_detector.uid,
         armed=state.armed,
         mode=state.mode,
         silence=_silence_duration(context, now),

@@ -83,7 +83,7 @@ class FlightFiles:
                 loop.time,
                 on_failure,
                 on_bad_entry,
-                environment.stream,
+                environment.send_batch,
             )
 
     def open(self) -> None:
@@ -116,7 +116,7 @@ class FlightFiles:
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """An observer that records phases and events, as STATUSTEXTs, too, and passes them on."""
+        """An observer that records phases and events, also as STATUSTEXT, and passes them on."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
@@ -140,10 +140,10 @@ class FlightFiles:
         result: str,
         grants: tuple[realtime.SettingResult, ...],
     ) -> Summary:
-        """The summary of a finished flight whose log is still open; saves the learned drag, too.
+        """The summary of a finished flight, before its log is closed. Also saves the learned drag.
 
         Args:
-            stats: counters of its link.
+            stats: counters of the flight's link.
             assembled: the flight.
             recorder: has recorded the phases.
             result: "ok", or the reason why it ended early.

@@ -18,19 +18,20 @@ from companion.safety.actions import FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _REPETITION_PAUSE = 1.0
-"""Time from a refused or unanswered landing command to the next one, s: the reason may be gone."""
+"""Time from a refused or unanswered landing command to the next landing command, s. The reason for
+a refusal may have ended by then."""
 
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 """Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
 
-_OBEYS_OR_LANDS = frozenset({Role.OFFBOARD, Role.LAND})
+_OFFBOARD_OR_LAND = frozenset({Role.OFFBOARD, Role.LAND})
 
 _PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
 """Called with the error of a mode command: raises it, or returns `require_ours` for the retry."""
 
 
 async def hand_over_to_hold(context: FlightContext) -> None:
-    """Ask the autopilot to hold until it does; then release.
+    """Command hold mode until the autopilot holds; then release control.
 
     Raises:
         FlightEnded: somebody else has the vehicle.
@@ -50,7 +51,7 @@ async def hand_over_to_hold(context: FlightContext) -> None:
 
 
 async def hand_over_to_landing(context: FlightContext) -> None:
-    """Ask the autopilot to land until it does, even if it refuses; then release.
+    """Command the landing until the autopilot lands, even after refusals; then release control.
 
     Before each repetition, a vehicle that still obeys us is asked to hold: ArduPilot would not hold
     its position after our last setpoint. If others command a hold meanwhile, they keep control.
@@ -74,7 +75,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         if was_offboard and not landing():
             await _hold_meanwhile(context, landing)
         is_offboard = in_role(context.link, Role.OFFBOARD)
-        return requiring_roles(context.link, _OBEYS_OR_LANDS) if is_offboard else require_ours
+        return requiring_roles(context.link, _OFFBOARD_OR_LAND) if is_offboard else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 
@@ -86,12 +87,12 @@ async def _hand_over(
     done: IsDone,
     prepare_repetition: _PrepareRepetition,
 ) -> None:
-    """Stop the motion, and command a mode until the autopilot has entered it; then release.
+    """Stop the motion, command a mode until the autopilot has entered it, and release control.
 
     A command that has no effect is sent again until the phase is over: a vehicle whose uplink loses
     frames must not be left in the air. Before each try, the vehicle is held at its present place.
     """
-    release_task = asyncio.create_task(_release_once_left(context))
+    release_task = asyncio.create_task(_release_when_offboard_ends(context))
     try:
         while True:
             _stop_moving(context)
@@ -108,7 +109,7 @@ async def _hand_over(
     context.release()
 
 
-async def _release_once_left(context: FlightContext) -> None:
+async def _release_when_offboard_ends(context: FlightContext) -> None:
     """Stop the setpoints as soon as the autopilot does not obey them, whoever changed its mode."""
     if in_role(context.link, Role.OFFBOARD):
         await context.until(lambda: not in_role(context.link, Role.OFFBOARD))
@@ -116,7 +117,10 @@ async def _release_once_left(context: FlightContext) -> None:
 
 
 async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
-    """Ask the autopilot to hold, then release; do nothing more if that fails or it lands."""
+    """Command hold mode, then release control.
+
+    Control is not released if the command fails or the autopilot has begun to land.
+    """
     try:
         await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
     except (CommandRefused, CommandTimeout, LinkLost):

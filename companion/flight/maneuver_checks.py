@@ -34,7 +34,7 @@ _SLOWER_REMEDY = "make it slower or smaller, or change the limit"
 
 
 def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
-    """Check a maneuver that is not a trajectory against the fence; a circle also against limits.
+    """Check a maneuver other than a trajectory against the fence; a circle also against limits.
 
     Args:
         config: configuration of the flight.
@@ -56,7 +56,7 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
 def require_inside(
     config: Config, parts: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
 ) -> None:
-    """Check that all maneuvers stay inside the fence, also if it is in latitude and longitude.
+    """Check that all maneuvers stay inside the fence, including one in latitude and longitude.
 
     Args:
         config: configuration of the flight.
@@ -199,7 +199,7 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
 
 
 def with_reserve(config: Config, envelope: Envelope) -> Envelope:
-    """The limits with a tilt that keeps `flight.slow_down_reserve_m_s2` of acceleration unused."""
+    """The limits, with a tilt limit lower by `flight.slow_down_reserve_m_s2` of acceleration."""
     max_acceleration = (
         config.limits.max_horizontal_acceleration - config.flight.slow_down_reserve_m_s2
     )

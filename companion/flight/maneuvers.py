@@ -35,8 +35,8 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
     return ManeuverSequence([_maneuver(config, name, drag) for name in config.flight.maneuvers])
 
 
-def not_begun(sequence: ManeuverSequence) -> ManeuverSequence:
-    """A copy whose maneuvers have not begun: `Follow` remembers the pose where it began."""
+def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
+    """A copy of the sequence, to begin anew: a `Follow` remembers the pose where it began."""
     return ManeuverSequence(
         [
             replace(part, _with_turn=None, _pose=None) if isinstance(part, Follow) else part

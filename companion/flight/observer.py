@@ -83,8 +83,8 @@ class EventRecorder:
     """An observer that records phases and events, and passes everything to another observer.
 
     A fault in the other observer must not cost control of the vehicle. After an exception in its
-    `status`, that observer receives no more states, but everything else. After any other exception
-    it receives nothing more.
+    method `status`, the other observer receives no more states, but still phases and events. After
+    any other exception it receives nothing more.
 
     Attributes:
         phases: (begin in s on our clock, name) of each phase.

@@ -42,10 +42,10 @@ class Phase:
     on_failure: Exit = Exit.LEAVE
     """The exit if the phase fails."""
     on_failure_on_ground: Exit | None = None
-    """The exit while the vehicle is on the ground; None: `on_failure`."""
+    """The exit if the phase fails while the vehicle is on the ground; None: `on_failure`."""
     allowed_roles: frozenset[Role] = frozenset()
-    """Roles of the allowed modes; a mode without one of them is a takeover, and so is an unknown
-    mode. Empty: any mode."""
+    """Roles of the allowed modes; any other or unknown mode counts as a takeover by the pilot.
+    Empty: any mode is allowed."""
     monitored: bool = False
     """Whether the safety monitors may end the phase. The phases of an exit are not monitored: the
     breach that caused the exit would end them, too."""
@@ -133,7 +133,7 @@ def _takeoff(config: FlightConfig) -> Phase:
 
 
 def _takeover(on_failure: Exit) -> Phase:
-    """The takeover; after a failure the vehicle lands, or its autopilot keeps holding it."""
+    """The phase of the takeover; after a failure, `on_failure` lands or holds the vehicle."""
     return Phase(
         "offboard",
         "the autopilot to obey our rates",
@@ -174,7 +174,7 @@ def landing_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 
 def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
-    """The phases that an exit flies."""
+    """The phases that the flight runs for an exit."""
     return {
         Exit.LEAVE: (),
         Exit.LISTEN: (_listen(),),
@@ -217,7 +217,10 @@ def _land(config: FlightConfig) -> Phase:
 
 
 def _undo_arming() -> Phase:
-    """The exit that disarms; its own exit is to land, as a refusal means that the vehicle flies."""
+    """The phase of the exit that disarms.
+
+    If it fails, the vehicle lands, because an autopilot that refuses to disarm is in the air.
+    """
     return Phase(
         "disarm", "the motors to stop", preflight_phases.undo_arming, _COMMAND_TIMEOUT, Exit.LAND
     )

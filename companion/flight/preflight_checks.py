@@ -1,4 +1,4 @@
-"""The preflight checks of a flight, repeated before each step that leads into the air."""
+"""The preflight checks of a flight, repeated before arming, take-off and takeover."""
 
 import asyncio
 from collections.abc import Callable, Mapping
@@ -7,9 +7,9 @@ from math import inf
 
 from companion.config import Config
 from companion.config.known_drag import KnownDrag
-from companion.flight.vehicle_identity import SameVehicle
+from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
-from companion.preflight.all_checks import blocking, run_checks, unsafe
+from companion.preflight.all_checks import blocking_findings, run_checks, unsafe_findings
 from companion.preflight.evidence import Evidence, Identity, Stage
 from companion.preflight.finding import Finding
 from companion.preflight.session import gather, wanted_rates
@@ -28,8 +28,8 @@ class PreflightChecks:
     """Judges the vehicle as `companion doctor` does, for each stage of a flight.
 
     A pilot may arm minutes after the checks passed. So the same checks run in the phase `checks`,
-    before we arm, after anybody armed, before take-off, and before the takeover. The status is
-    always the newest. Rates and parameters are measured again if they are more than a second old.
+    before we arm, after anybody armed, before take-off, and before the takeover. They judge the
+    newest status of the vehicle, and rates and parameters that are at most a second old.
 
     Attributes:
         note: called once with each message on what does not block the flight: warnings, accepted
@@ -39,22 +39,26 @@ class PreflightChecks:
     Args:
         config: configuration of the flight.
         link: link to the vehicle.
-        same_vehicle: detects a replaced vehicle.
+        replacement_detector: detects a replaced vehicle.
         maneuvers: copy of the maneuvers of the flight, used only by the checks.
     """
 
     def __init__(
-        self, config: Config, link: Link, same_vehicle: SameVehicle, maneuvers: ManeuverSequence
+        self,
+        config: Config,
+        link: Link,
+        replacement_detector: ReplacementDetector,
+        maneuvers: ManeuverSequence,
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
         self.drag_of: Callable[[Identity], KnownDrag] = lambda _: KnownDrag()
-        self._config, self._link, self._same_vehicle = config, link, same_vehicle
+        self._config, self._link, self._replacement_detector = config, link, replacement_detector
         self._maneuvers = maneuvers
         self._clock = asyncio.get_running_loop().time
-        self._granted: Mapping[str, StreamRate] = {}
+        self._granted_rates: Mapping[str, StreamRate] = {}
         self._evidence: Evidence | None = None
         self._gathered_at = -inf
-        self._noted: set[str] = set()
+        self._noted_texts: set[str] = set()
 
     async def ask_for_telemetry(self) -> None:
         """Request the telemetry that a flight needs, and report rates that the autopilot refuses.
@@ -65,8 +69,8 @@ class PreflightChecks:
         """
         self._evidence = None  # the old evidence may belong to another vehicle
         wanted = wanted_rates(self._config, self._link)
-        self._granted = await self._link.set_rates(wanted, window_s=0.1)
-        for message, rate in self._granted.items():
+        self._granted_rates = await self._link.set_rates(wanted, window_s=0.1)
+        for message, rate in self._granted_rates.items():
             if rate.granted < rate.requested:
                 self._note_once(
                     f"{message}: asked for {rate.requested:g} Hz, granted {rate.granted:g} Hz"
@@ -84,14 +88,14 @@ class PreflightChecks:
         if evidence is None or self._clock() - self._gathered_at > _MAX_EVIDENCE_AGE:
             evidence = await gather(
                 self._link,
-                self._granted,
+                self._granted_rates,
                 _COUNTING_TIME,
                 stage=stage,
                 earlier_survey=None if before is None else before.survey,
             )
             self._evidence, self._gathered_at = evidence, self._clock()
-            self._same_vehicle.note_identity(evidence.identity)
-        self._same_vehicle.require()
+            self._replacement_detector.note_identity(evidence.identity)
+        self._replacement_detector.require()
         drag = self.drag_of(evidence.identity)
         planned = self._maneuvers if self._maneuvers.parts else None
         evidence = replace(evidence, stage=stage, maneuvers=planned, known_drag=drag)
@@ -100,7 +104,7 @@ class PreflightChecks:
 
     def _act_on(self, findings: list[Finding]) -> None:
         """End the flight for findings that block it; report other unsafe and ineffective ones."""
-        refused = blocking(self._config, findings)
+        refused = blocking_findings(self._config, findings)
         warnings = [
             finding.key
             for finding in findings
@@ -108,13 +112,13 @@ class PreflightChecks:
         ]
         if warnings:
             self._note_once(f"preflight warnings: {', '.join(warnings)}; see `companion doctor`")
-        for finding in unsafe(findings):
+        for finding in unsafe_findings(findings):
             if finding not in refused:
                 self._note_once(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
         if refused:
             raise FlightEnded("; and ".join(finding.sentence() for finding in refused))
 
     def _note_once(self, text: str) -> None:
-        if text not in self._noted:
-            self._noted.add(text)
+        if text not in self._noted_texts:
+            self._noted_texts.add(text)
             self.note(text)

@@ -31,7 +31,7 @@ async def connect(context: FlightContext) -> None:
 
 async def checks(context: FlightContext) -> None:
     """Request telemetry, wait until the vehicle is ready, and run the preflight checks."""
-    context.same_vehicle.begin()
+    context.replacement_detector.begin()
     await request_telemetry(context)
     if context.config.flight.arm:  # a pilot who arms may have chosen the mode by a switch
         await leave_offboard(context, context.link.autopilot.cannot_arm_in)
@@ -68,10 +68,10 @@ async def judge_vehicle(context: FlightContext, stage: Stage) -> Evidence:
 
 
 async def stream(context: FlightContext) -> None:
-    """Start to answer samples, on the ground with idle setpoints; wait until enough were sent."""
+    """Start to send setpoints (idle ones on the ground); wait until enough were sent."""
     context.loop.on = True
-    enough = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.record.setpoints >= enough, "setpoints to flow")
+    wanted_count = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
+    await context.until(lambda: context.loop.record.setpoints >= wanted_count, "setpoints to flow")
 
 
 async def arm(context: FlightContext) -> None:
@@ -137,13 +137,13 @@ async def _arm(context: FlightContext) -> None:
             raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
         return context.armed()
 
-    def ready() -> None:
+    def require_ours() -> None:
         _refuse_unsafe(vehicle_checks.armed(state))
         require_role(context.link, {Role.READY})
         context.must_disarm = True  # only now: a vehicle that somebody else armed is not disarmed
 
-    context.same_vehicle.commit()
-    await command_if_ours(context, command, ready, armed)
+    context.replacement_detector.commit()
+    await command_if_ours(context, command, require_ours, armed)
     await context.until(armed, "the vehicle to be armed")
 
 
@@ -179,7 +179,7 @@ def _ready(context: FlightContext) -> bool:
     state = context.link.state
     _refuse_unsafe(vehicle_checks.armed(state))
     _refuse_unsafe(vehicle_checks.battery(context.config, state))
-    missing = context.link.autopilot.not_ready(state.readiness)
+    missing = context.link.autopilot.why_not_ready(state.readiness)
     context.detail = "" if missing is None else f"{missing}, in mode {state.mode}"
     return missing is None
 

@@ -26,7 +26,8 @@ from companion.vehicle.link import Link
 class Session:
     """One flight. Signal handlers of the event loop may call `interrupt`, `leave` and `note`.
 
-    They end the flight, but not the session, so that the recorded data are always written.
+    `interrupt` and `leave` end the flight, but not the session, so that the recorded data are
+    always written.
 
     Args:
         config: configuration of the flight.
@@ -57,7 +58,7 @@ class Session:
         self._plan = plan
         self._environment = environment
         self._assembled: AssembledFlight | None = None
-        self._flying: asyncio.Task[str] | None = None
+        self._flight_task: asyncio.Task[str] | None = None
         self._early_notes: list[str] = []
 
     def interrupt(self, reason: str) -> bool:
@@ -69,8 +70,8 @@ class Session:
 
     def leave(self) -> None:
         """Stop sending and end the flight at once; without a flight, do nothing."""
-        if self._flying is not None and not self._flying.cancelling():
-            self._flying.cancel()
+        if self._flight_task is not None and not self._flight_task.cancelling():
+            self._flight_task.cancel()
 
     def note(self, text: str) -> None:
         """Record an event and show it; before the flight begins, keep it until then."""
@@ -125,10 +126,10 @@ class Session:
         flight = assembled.flight
         with connected(link, assembled):
             # In a task of its own: `leave` ends the flight but not the writing of the files.
-            self._flying = asyncio.ensure_future(flight.run())
+            self._flight_task = asyncio.ensure_future(flight.run())
             reporting = asyncio.create_task(self._report_status(assembled))
             try:
-                return await self._flying
+                return await self._flight_task
             except asyncio.CancelledError:
                 flight.failed_in = flight.failed_in or flight.phase
                 return LEFT_BY_USER

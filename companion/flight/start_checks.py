@@ -1,4 +1,4 @@
-"""Checks of a configuration before the flight begins; one that cannot be used is refused."""
+"""Checks that refuse an unusable configuration before the flight begins."""
 
 from companion.config import Config
 from companion.control.inner_loop import planner

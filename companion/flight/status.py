@@ -109,10 +109,10 @@ class StatusReporter:
         self.real_time = real_time
         self._began, self._phase, self._show, self._clock = began, phase, show, clock
         self._setpoint_counts: deque[tuple[float, int]] = deque()
-        self._rows = StatusRows(context, trace.recorder, clock)
+        self._status_rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
-        """Record and show until cancelled; missed steps are not repeated."""
+        """Record and show the state until cancelled; steps that were missed are not repeated."""
         due = self._clock()
         while True:
             self.record()
@@ -137,14 +137,14 @@ class StatusReporter:
         if self.takeoff is None and ground.takeoff_commanded and not ground.standing:
             self.takeoff = now
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
-        self._rows.record(now)
+        self._status_rows.record(now)
         vehicle_time, tilt = context.loop.record.last_vehicle_time, self._tilt(now)
         row = (
             None if vehicle_time == -inf else vehicle_time,
             self._height(now),
             self._speed(now),
             None if tilt is None else degrees(tilt),
-            self._error(),
+            self._tracking_error(),
         )
         finite_row = (nan if value is None else value for value in row)
         self._trace.add_motion(now, (now - self._began, *finite_row))
@@ -167,7 +167,7 @@ class StatusReporter:
             height=self._height(now),
             speed=self._speed(now),
             tilt=self._tilt(now),
-            tracking_error=self._error(),
+            tracking_error=self._tracking_error(),
             setpoint_rate=self._setpoint_rate(now, record),
             latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
             missed_deadlines=record.missed_deadlines if self.real_time else None,
@@ -204,6 +204,6 @@ class StatusReporter:
             return None
         return tilt_angle(sample.q[1], sample.q[2])
 
-    def _error(self) -> float | None:
+    def _tracking_error(self) -> float | None:
         loop = self._context.loop
         return self._context.guidance_loop.tracking_error if loop.offboard_active else None

@@ -21,7 +21,7 @@ _ARRIVAL_TIME = 2.0
 async def takeoff(context: FlightContext) -> None:
     """Let the autopilot take off, and wait for the height."""
     state = context.link.state
-    context.same_vehicle.commit()
+    context.replacement_detector.commit()
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     await context.preflight.require(Stage.ARMED)
     await context.fresh_heartbeat()
@@ -33,12 +33,12 @@ async def takeoff(context: FlightContext) -> None:
     context.loop.drop_command()  # the idle command must not be sent from here on
     context.guidance_loop.step()
 
-    def ready() -> None:
+    def require_ours() -> None:
         # Before each try: a disarmed PX4 stores the command and takes off once armed.
         _require_ground(context)
         context.must_disarm = True
 
-    await command_if_ours(context, command, ready, lambda: not state.landed)
+    await command_if_ours(context, command, require_ours, lambda: not state.landed)
     climb = _Climb(context, height)
     await context.until(climb.is_over)
 

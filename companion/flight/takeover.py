@@ -60,8 +60,8 @@ async def _check_stage(
     context: FlightContext, stage: Stage, require: Callable[[FlightContext], None]
 ) -> None:
     """Run the checks of a stage; before and after them, `require` raises if the state is wrong."""
-    context.same_vehicle.begin()
-    context.same_vehicle.commit()
+    context.replacement_detector.begin()
+    context.replacement_detector.commit()
     await request_telemetry(context)
     state = context.link.state
     await context.until(
@@ -129,7 +129,7 @@ def _is_held(context: FlightContext) -> bool:
 async def _take_over(context: FlightContext) -> None:
     """Take over, by a command or by the first setpoint, as the autopilot needs."""
     # An idle command from the ground, obeyed in the air, would let the vehicle fall.
-    await context.until(lambda: _commands_flight(context), "a target from guidance")
+    await context.until(lambda: _has_flight_command(context), "a target from guidance")
     autopilot = context.link.autopilot
     if autopilot.control_entry is ControlEntry.BY_COMMAND and not context.loop.on:
         await stream(context)
@@ -147,5 +147,5 @@ async def _take_over(context: FlightContext) -> None:
     await change_mode(context, command, require_ours, lambda: in_role(context.link, Role.OFFBOARD))
 
 
-def _commands_flight(context: FlightContext) -> bool:
+def _has_flight_command(context: FlightContext) -> bool:
     return context.loop.command is not None and not context.loop.command.idle

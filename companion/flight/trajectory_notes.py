@@ -12,29 +12,32 @@ _MOST_PARTS_SHOWN = 4
 def overview(trajectory: Trajectory) -> str:
     """One sentence: duration, largest speed and extent of the trajectory."""
     motion = sampled_motion(trajectory)
-    fastest = float(np.linalg.norm(motion.velocity, axis=1).max())
+    largest_speed = float(np.linalg.norm(motion.velocity, axis=1).max())
     lows, highs = motion.position.min(axis=0), motion.position.max(axis=0)
     north, east = (_range_text(low, high) for low, high in zip(lows[:2], highs[:2], strict=True))
     return (
-        f"{trajectory.name}: {trajectory.duration:.1f} s, at most {fastest:.2f} m/s; from its "
-        f"start {north} m north, {east} m east, {_range_text(-highs[2], -lows[2])} m up"
+        f"{trajectory.name}: {trajectory.duration:.1f} s, at most {largest_speed:.2f} m/s; from "
+        f"its start {north} m north, {east} m east, {_range_text(-highs[2], -lows[2])} m up"
     )
 
 
 def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[str, ...]:
-    """Messages for the user: where the trajectory was slowed down, and for which limit; or none.
+    """Messages for the user: where the trajectory was slowed down, and for which limit.
+
+    There are no messages if it was not slowed down.
 
     Args:
         before: the trajectory before it was slowed down.
-        slow_down: what was slowed down.
+        slow_down: the slowed-down trajectory, and its slowed parts.
         reserve: horizontal acceleration that was left below the tilt limit, m/s².
     """
     if not slow_down.parts:
         return ()
     after = slow_down.trajectory
+    speed, speed_before = _largest_speed(after), _largest_speed(before)
     result = (
         f"{before.name} now lasts {after.duration:.1f} s instead of {before.duration:.1f} s, and "
-        f"its highest speed is {_fastest(after):.2f} m/s instead of {_fastest(before):.2f} m/s"
+        f"its highest speed is {speed:.2f} m/s instead of {speed_before:.2f} m/s"
     )
     if slow_down.even:
         (whole,) = slow_down.parts
@@ -64,7 +67,7 @@ def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) ->
     )
 
 
-def _fastest(trajectory: Trajectory) -> float:
+def _largest_speed(trajectory: Trajectory) -> float:
     return float(np.linalg.norm(sampled_motion(trajectory).velocity, axis=1).max())
 
 

@@ -22,7 +22,7 @@ class ChecksVoid(FlightEnded):
     """The checked vehicle may have been replaced before arming, so the checks must be repeated."""
 
 
-class SameVehicle:
+class ReplacementDetector:
     """Detects that another vehicle, or a restarted one, may have replaced the checked one.
 
     Two vehicles may have the same system and component ids. So the checks are void after a new peer
@@ -47,7 +47,7 @@ class SameVehicle:
         """Begin to watch: from now on, every frame must come from one vehicle."""
         self._begun, self._committed = True, False
         self._uid = self._other_uid = None
-        self._peers, self._restarts = self._link.stats.peers, self._link.clock.restarts
+        self._peers, self._restarts = self._link.stats.peers, self._link.clock.restart_count
         self._frames, self._updated_at = self._link.stats.frames, self._clock()
         self._silence = self._long_silence = 0.0
 
@@ -82,11 +82,11 @@ class SameVehicle:
         return self._uid
 
     @property
-    def same(self) -> bool:
+    def is_same_vehicle(self) -> bool:
         """Whether there is no sign of a replacement; the control loop asks at every sample."""
         return (
             self._peers == self._link.stats.peers
-            and self._restarts == self._link.clock.restarts
+            and self._restarts == self._link.clock.restart_count
             and self._other_uid is None
             and not self._long_silence
             and (self._silence <= LONGEST_SILENCE or self._committed)
@@ -99,7 +99,7 @@ class SameVehicle:
             ChecksVoid: it may be another vehicle, and nothing is armed yet.
             FlightEnded: it may be another vehicle; control is released.
         """
-        if self.same or (reason := self._sign_of_replacement()) is None:
+        if self.is_same_vehicle or (reason := self._sign_of_replacement()) is None:
             return
         if self._committed:
             raise FlightEnded(reason, Exit.RELEASE)
@@ -108,11 +108,11 @@ class SameVehicle:
     def _sign_of_replacement(self) -> str | None:
         """The sign of a replacement, in words.
 
-        None: there is none, or a silence still lasts, which is judged when it ends.
+        None: there is no sign, or a silence still lasts; a silence is judged when it ends.
         """
         if self._peers != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"
-        if self._restarts != self._link.clock.restarts:
+        if self._restarts != self._link.clock.restart_count:
             return f"the autopilot may have restarted: {self._link.clock.last_change}"
         if self._other_uid is not None:
             return f"another vehicle answers: hardware id {self._other_uid}, not {self._uid}"
@@ -153,7 +153,10 @@ class DragMemory:
         self.on_known: Callable[[KnownDrag], None] = lambda _: None
 
     def load(self, identity: Identity) -> KnownDrag:
-        """Return what is known of this vehicle's drag; the file is read only for a new vehicle."""
+        """Return what is known of this vehicle's drag.
+
+        The file is read at the first call, and again whenever the hardware id has changed.
+        """
         if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid
             self._known_drag = of_vehicle(self._config, self._directory, identity.uid)

@@ -10,11 +10,11 @@ from companion.flight.context import FlightContext
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
 from companion.safety import SafetyLadder
-from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, Stream
+from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, StreamEffect
 from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
-from companion.vehicle.records import outdated
+from companion.vehicle.records import is_outdated
 
 _CURRENT_MODE_PERIOD = 0.45
 """A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
@@ -67,7 +67,7 @@ class RateRequester:
 
 
 class Watch:
-    """Detects what the control loop cannot: silence, takeovers and breaches of safety limits.
+    """Detects what the control loop cannot: silence, pilot takeovers, breaches of safety limits.
 
     Args:
         context: context of the flight.
@@ -102,8 +102,8 @@ class Watch:
         now = self._clock()
         self._context.snapshot_builder.listen(now)
         self._context.ground.update()
-        self._context.same_vehicle.update()
-        self._context.same_vehicle.require()
+        self._context.replacement_detector.update()
+        self._context.replacement_detector.require()
         if phase.allowed_roles:
             require_role(self._context.link, phase.allowed_roles, self._context.released_by())
         if phase.monitored and self._context.loop.offboard_active:
@@ -134,14 +134,15 @@ class Watch:
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
     def ask_mode(self) -> None:
-        """After a gap in the setpoints, request a heartbeat; resume them if its mode obeys us."""
+        """After a gap in the setpoints, request a heartbeat to decide whether to resume them."""
         # Without an answer the silence monitor ends the flight.
         self._mode_request = asyncio.create_task(self._confirm_control())
 
     async def _confirm_control(self) -> None:
-        """Wait for a fresh heartbeat; resume the setpoints if its mode obeys or awaits them.
+        """Wait for a fresh heartbeat; resume the setpoints if its mode requires them.
 
-        A heartbeat from the backlog may carry an old mode.
+        That is offboard mode, or during the takeover a mode from which offboard can begin. A
+        queued heartbeat may carry an old mode.
         """
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state
@@ -166,11 +167,11 @@ class Watch:
         if verdict.action is Action.HOLD:
             self._context.guidance_loop.give_up()
             return
-        if verdict.stream is Stream.STOPS:
+        if verdict.stream is StreamEffect.STOPS:
             self._context.release()
-        elif verdict.stream is Stream.ENDS:
+        elif verdict.stream is StreamEffect.ENDS:
             self._context.end_stream()
-        self._stopped_in_control |= verdict.stream is not Stream.CONTINUES
+        self._stopped_in_control |= verdict.stream is not StreamEffect.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self, now: float) -> None:
@@ -192,7 +193,7 @@ class Watch:
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )
-        if state.heartbeat is None or outdated(now - age(state.heartbeat.received), now):
+        if state.heartbeat is None or is_outdated(now - age(state.heartbeat.received), now):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so whether it is armed is not known any more",
                 exit_,

@@ -14,7 +14,7 @@ from companion.vehicle.records import AttitudeSample
 
 @contextmanager
 def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
-    """Connect the link and the changes to the flight while the block runs: samples, errors, mode.
+    """Connect the link's callbacks, and changes of values, to the flight while the block runs.
 
     Only one flight at a time may be connected to a link.
     """
@@ -46,7 +46,7 @@ def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
     link.on_attitude = on_attitude
     link.on_error = flight.fail
     on_event, link.clock.on_event = link.clock.on_event, flight.note
-    ends = (
+    unsubscribers = (
         link.subscribe("HEARTBEAT", on_heartbeat),
         link.subscribe("CURRENT_MODE", on_current_mode),
         link.subscribe("ATTITUDE_TARGET", on_attitude_target),
@@ -58,6 +58,6 @@ def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
     finally:
         link.on_attitude = link.on_error = None
         link.clock.on_event = on_event
-        for end in ends:
-            end()
+        for unsubscribe in unsubscribers:
+            unsubscribe()
         state_logger.log_changes()

@@ -12,7 +12,7 @@ from companion.config.known_drag import KnownDrag, before_connecting
 from companion.control.retuning import reason_against_changes
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
-from companion.flight.change_bounds import require_moderate
+from companion.flight.change_bounds import require_moderate_change
 from companion.flight.maneuver_checks import require_still_flyable
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import ManeuverSequence
@@ -80,7 +80,7 @@ class ChangeChecks:
         if reason is not None:
             raise ConfigError(f"{name}: {reason}")
         try:
-            require_moderate(self.current, wanted, name)
+            require_moderate_change(self.current, wanted, name)
             _require_margins(self.start, wanted, name)
         except (ValueError, ArithmeticError) as error:
             raise ConfigError(f"{name}: {error}") from error

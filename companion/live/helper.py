@@ -143,7 +143,7 @@ class Helper:
             self.note(f"{self._name} has ended by itself; the flight goes on without it")
 
     def _tell_change(self, config: Config) -> None:
-        change = str(self.changes.made[-1])
+        change = str(self.changes.all_changes[-1])
         self._send("config", config=_as_json(config), can_undo=self.changes.can_undo, text=change)
 
     def _tell_drag(self, known_drag: KnownDrag) -> None:

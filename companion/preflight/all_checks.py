@@ -60,16 +60,18 @@ def run_checks(config: Config, evidence: Evidence, *, repeated: bool = False) ->
     ]
 
 
-def blocking(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+def blocking_findings(config: Config, findings: Iterable[Finding]) -> list[Finding]:
     """The findings that forbid a flight: unsafe and not accepted, or not ready."""
     findings = tuple(findings)
     not_ready = (finding for finding in findings if finding.result is CheckResult.NOT_READY)
-    return [*not_accepted(config, findings), *not_ready]
+    return [*unaccepted_findings(config, findings), *not_ready]
 
 
-def not_accepted(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+def unaccepted_findings(config: Config, findings: Iterable[Finding]) -> list[Finding]:
     """The unsafe findings that `flight.accept` does not list."""
-    return [finding for finding in unsafe(findings) if finding.key not in config.flight.accept]
+    return [
+        finding for finding in unsafe_findings(findings) if finding.key not in config.flight.accept
+    ]
 
 
 def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
@@ -78,11 +80,11 @@ def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
     results = {finding.result for finding in findings}
     if CheckResult.NOT_CONNECTED in results:
         return CheckResult.NOT_CONNECTED
-    if not_accepted(config, findings):
+    if unaccepted_findings(config, findings):
         return CheckResult.UNSAFE
     return CheckResult.NOT_READY if CheckResult.NOT_READY in results else CheckResult.SAFE
 
 
-def unsafe(findings: Iterable[Finding]) -> list[Finding]:
+def unsafe_findings(findings: Iterable[Finding]) -> list[Finding]:
     """The unsafe findings: somebody may be hurt, or the vehicle lost."""
     return [finding for finding in findings if finding.result is CheckResult.UNSAFE]

@@ -16,9 +16,10 @@ _UNSAFE_NOT_NEWER_SHARE = 0.2
 """Unsafe above this share of samples whose stamp is not later than that of the sample before."""
 _MIN_SAMPLES = 10
 """Smallest number of samples to judge the rate of the clock."""
-_SHAKING_PRODUCT, _MAYBE_SHAKING_PRODUCT = 0.3, 0.15
-"""Products of planner.gain_per_s and the round trip, from mock vehicles. Above the first, attitude
-oscillates at the limit of the roll-pitch rate; above the second, a slow vehicle may oscillate.
+_UNSAFE_PRODUCT, _SAFE_PRODUCT = 0.3, 0.15
+"""Limits of planner.gain_per_s times the round trip (dimensionless), measured on mock vehicles.
+Above the first, attitude oscillates at the limit of the roll-pitch rate; above the second, a slow
+vehicle may oscillate.
 """
 
 
@@ -51,21 +52,21 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def round_trip(config: Config, seconds: float) -> Finding:
     """Judge whether the gain is too high for a round trip of this many seconds.
 
-    When a setpoint takes effect, the attitude that it answers is as old as the round trip. No round
-    trip counts as too long in lockstep, where the vehicle waits, or with a planner of another
-    package, whose gain may mean something else.
+    When a setpoint takes effect, the attitude that it answers is as old as the round trip. In
+    lockstep the vehicle waits, and the gain of another package's planner may mean something else:
+    in both cases, every round trip is accepted.
     """
     gain = config.planner.gain_per_s
     gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
     product = gain * seconds if gain_matters else 0.0
-    is_late = product > _MAYBE_SHAKING_PRODUCT
+    is_late = product > _SAFE_PRODUCT
     return Finding(
         Key.ROUND_TRIP,
-        UNSAFE if product > _SHAKING_PRODUCT else INEFFECTIVE if is_late else SAFE,
+        UNSAFE if product > _UNSAFE_PRODUCT else INEFFECTIVE if is_late else SAFE,
         f"the link's round trip takes {1e3 * seconds:.1f} ms"
         + (f", long for planner.gain_per_s {gain:g}" if is_late else ""),
         "the vehicle shakes, because the attitude is corrected too late" if is_late else "",
-        f"use a faster link, or lower planner.gain_per_s to {_MAYBE_SHAKING_PRODUCT / seconds:.1f}"
+        f"use a faster link, or lower planner.gain_per_s to {_SAFE_PRODUCT / seconds:.1f}"
         if is_late
         else "",
         "TIMESYNC",
@@ -108,7 +109,7 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
     """
     lag_per_s = 1.0 - rate - MOST_DRIFT
     stale_after = config.deadman.telemetry_stale / lag_per_s if lag_per_s > 0.0 else inf
-    uncertainty = evidence.samples.longest_pause / max(evidence.window, 1e-3)
+    uncertainty = evidence.samples.longest_pause / max(evidence.counting_time, 1e-3)
     too_slow = lag_per_s > uncertainty
     differs = abs(rate - 1.0) > MOST_DRIFT
     because = "time limits, such as those of `deadman`, are longer or shorter than configured"

@@ -44,15 +44,15 @@ class Identity(NamedTuple):
 class LinkQuality(NamedTuple):
     """Quality of the link while we listened."""
 
-    frames: int
+    frame_count: int
     """Number of accepted frames."""
-    lost: int
+    lost_count: int
     """Number of frames missing in the vehicle's sequence numbers."""
-    damaged: int
+    damaged_count: int
     """Number of frames with a wrong checksum."""
-    not_finite: int
+    not_finite_count: int
     """Messages refused for a NaN or infinity."""
-    reconnects: int
+    reconnect_count: int
     """Number of times that the connection was opened again."""
     round_trip: float | None
     """Shortest recent TIMESYNC round trip, s; `None` if none was answered."""
@@ -66,11 +66,11 @@ class LinkQuality(NamedTuple):
     @property
     def loss(self) -> float:
         """Share of the vehicle's messages that were lost."""
-        return share_lost(self.frames, self.lost)
+        return share_lost(self.frame_count, self.lost_count)
 
 
 class SampleTimes(NamedTuple):
-    """Times of the attitude samples received, by both clocks."""
+    """Times of the attitude samples received, by the vehicle's clock and by ours."""
 
     sample_count: int = 0
     """Number of samples."""
@@ -106,7 +106,7 @@ class OtherNodes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """All evidence of one session."""
+    """What was received and measured in one session with the vehicle, for the checks to judge."""
 
     autopilot: Autopilot
     """The kind of autopilot."""
@@ -118,7 +118,7 @@ class Evidence:
     """Rates requested, granted and counted, by message."""
     received_counts: Mapping[str, int]
     """Number of messages since the link was opened, for each message of `streams`."""
-    window: float
+    counting_time: float
     """Time over which messages were counted, s."""
     link: LinkQuality
     """Quality of the link."""
@@ -126,8 +126,8 @@ class Evidence:
     """Times of the attitude samples."""
     other_nodes: OtherNodes
     """Other nodes on the link."""
-    resets: int
-    """Number of estimator resets."""
+    reset_count: int
+    """Number of estimator resets while we listened."""
     identity: Identity
     """The autopilot's version and hardware."""
     stage: Stage = Stage.GROUND
@@ -144,10 +144,12 @@ class Evidence:
         """Whether the vehicle has no position yet, or its estimator is not ready."""
         readiness = self.state.readiness
         estimator_only = readiness._replace(has_position=True, has_home=True, prearm_passed=True)
-        return not readiness.has_position or self.autopilot.not_ready(estimator_only) is not None
+        return (
+            not readiness.has_position or self.autopilot.why_not_ready(estimator_only) is not None
+        )
 
     @property
-    def booting(self) -> bool:
+    def is_booting(self) -> bool:
         """Whether no recent estimator status is known; ArduPilot sends little before the first."""
         return self.state.readiness.estimator_flags is None
 
@@ -161,5 +163,5 @@ class Evidence:
             for name, rate in self.streams.items()
             if rate.achieved == 0.0
             and not rate.refusal
-            and (self.booting or name in _POSITION_MESSAGES)
+            and (self.is_booting or name in _POSITION_MESSAGES)
         )

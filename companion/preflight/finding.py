@@ -26,7 +26,7 @@ class Key(StrEnum):
     HOME = "vehicle.home"
     BATTERY = "vehicle.battery"
     VERSION = "vehicle.version"
-    WORDS = "vehicle.words"
+    AUTOPILOT_TEXTS = "vehicle.words"
     ESTIMATOR_RESETS = "vehicle.estimator_resets"
     PARAMETERS = "vehicle.parameters"
     STREAMS = "link.streams"

@@ -34,29 +34,29 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
         else "",
         "gaps in MAVLink sequence numbers",
     )
-    if link.damaged > _MAX_DAMAGED_SHARE * max(1, link.frames):
+    if link.damaged_count > _MAX_DAMAGED_SHARE * max(1, link.frame_count):
         yield Finding(
             Key.DAMAGE,
             INEFFECTIVE,
-            f"{link.damaged} damaged messages in {evidence.window:g} s",
+            f"{link.damaged_count} damaged messages in {evidence.counting_time:g} s",
             "such messages are rejected, and so lost",
             "check the wiring, its ground and the baud rate",
             "checksums",
         )
-    if link.not_finite:
+    if link.not_finite_count:
         yield Finding(
             Key.NOT_FINITE,
             INEFFECTIVE,
-            f"{link.not_finite} messages with a number that is NaN or infinite",
+            f"{link.not_finite_count} messages with a number that is NaN or infinite",
             "such messages are rejected, and so lost",
             "let the estimator settle; if this goes on, do not fly",
             "decoded messages",
         )
-    if link.reconnects:
+    if link.reconnect_count:
         yield Finding(
             Key.RECONNECTS,
             UNSAFE,
-            f"the connection dropped {link.reconnects} times in {evidence.window:g} s",
+            f"the connection dropped {link.reconnect_count} times in {evidence.counting_time:g} s",
             "it will drop in flight, too",
             "check plugs, cables and power",
             "the operating system",

@@ -1,4 +1,4 @@
-"""Listens to the link for a while: sample times, other nodes, jumps of the estimate."""
+"""Listens to the link for a while: sample times, other nodes, estimator resets."""
 
 from collections.abc import Callable
 from math import isfinite
@@ -38,7 +38,7 @@ class LinkListener:
         clock: Our clock, s.
 
     Attributes:
-        resets: Number of estimator resets, counted by ODOMETRY's `reset_counter`.
+        reset_count: Number of estimator resets, counted by ODOMETRY's `reset_counter`.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
@@ -46,14 +46,14 @@ class LinkListener:
         # Arrival by our clock, and time stamp of the vehicle, s.
         self._stamps: list[tuple[float, float]] = []
         self._ages: list[float] = []
-        self._clock_changes = link.clock.changes
+        self._clock_changes = link.clock.change_count
         self._unusable_count = 0
         self._sources: set[tuple[int, int]] = set()
         self._companions: set[tuple[int, int]] = set()
         self._setpoint_senders: set[tuple[int, int]] = set()
         self._target_is_foreign = False
         self._resets_before: int | None = None
-        self.resets = 0
+        self.reset_count = 0
 
     def __enter__(self) -> "LinkListener":
         self._on_foreign_before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
@@ -87,7 +87,7 @@ class LinkListener:
             unusable_count=self._unusable_count,
             clock_rate=(last_stamp - first_stamp) / (last - first) if enough else None,
             age=median(self._ages) if self._ages and clock.age_known else None,
-            clock_change=clock.last_change if clock.changes != self._clock_changes else "",
+            clock_change=clock.last_change if clock.change_count != self._clock_changes else "",
             rate=arrivals.rate_since(IntervalSums()) if enough else None,
         )
 
@@ -130,4 +130,4 @@ class LinkListener:
     def _on_odometry(self, message: Message) -> None:
         before, self._resets_before = self._resets_before, message.reset_counter
         if before is not None:
-            self.resets += (message.reset_counter - before) & 0xFF
+            self.reset_count += (message.reset_counter - before) & 0xFF

@@ -31,7 +31,7 @@ _POINT_PERIOD = 0.05
 _MAX_POINTS = 1500
 """Largest number of checked points; long maneuvers are checked at longer intervals."""
 _DERIVATIVE_STEP = 0.02
-"""Time over which the rate of change of the thrust is taken, s."""
+"""Time step of the finite difference for the rate of change of the thrust, s."""
 _START_POSE = Pose((0.0, 0.0, 0.0), 0.0)
 
 
@@ -39,14 +39,15 @@ class WorstReach(NamedTuple):
     """How far the vehicle can be carried if our setpoints stop at any moment of the maneuvers.
 
     Attributes:
-        away, up, down: Largest horizontal distance, climb and fall after the setpoints stop, m.
-        breach: The first breach of the fence, as the end of a sentence; `None`: none.
+        largest_distance, climb, fall: Largest horizontal distance, climb and fall after the
+            setpoints stop, m.
+        breach: The first breach of the fence, as the end of a sentence; `None`: no breach.
         time: When setpoints must stop to cause `breach`, s after control begins.
     """
 
-    away: float = 0.0
-    up: float = 0.0
-    down: float = 0.0
+    largest_distance: float = 0.0
+    climb: float = 0.0
+    fall: float = 0.0
     breach: str | None = None
     time: float = 0.0
 
@@ -61,8 +62,8 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     worst = worst_reach(config, maneuvers, hold_time, drag, brakes=failsafe.brakes)
     reach_text = (
         f"if our setpoints stop, the autopilot holds the last rates for {hold_time:g} s "
-        f"({failsafe.parameter}); that can carry the vehicle {worst.away:.0f} m away, "
-        f"{worst.up:.0f} m up and {worst.down:.0f} m down"
+        f"({failsafe.parameter}); that can carry the vehicle "
+        f"{worst.largest_distance:.0f} m away, {worst.climb:.0f} m up and {worst.fall:.0f} m down"
     )
     source = "worst case of docs/exits.md"
     if worst.breach is None:
@@ -100,9 +101,9 @@ def worst_reach(
         if breach is None:
             breach, breach_time = _breach(config, motion.offset, reached, loss.fence), time
         worst = WorstReach(
-            max(worst.away, reached.largest_distance),
-            max(worst.up, reached.up),
-            max(worst.down, reached.down),
+            max(worst.largest_distance, reached.largest_distance),
+            max(worst.climb, reached.up),
+            max(worst.fall, reached.down),
             breach,
             breach_time,
         )

@@ -126,7 +126,7 @@ class ChangeOutcome(NamedTuple):
 
 
 class VehicleArmedError(LinkError):
-    """The vehicle is armed, or that is unknown, so no parameter is set."""
+    """The vehicle is armed or may be armed, so no parameter is set."""
 
 
 async def apply_fixes(
@@ -146,8 +146,8 @@ async def apply_fixes(
         report: Called with the outcome of each accepted change.
 
     Raises:
-        VehicleArmedError: The vehicle is armed, or that is unknown; no more was set.
-        ConfigError: The undo file cannot be written; no more was set.
+        VehicleArmedError: The vehicle is armed or may be armed; nothing more was set.
+        ConfigError: The undo file cannot be written; nothing more was set.
         LinkLost: The connection was lost.
     """
     answer = Answer.NO
@@ -175,7 +175,7 @@ async def restore(link: Link, undo: Undo, report: Callable[[ChangeOutcome], None
         report: Called with the outcome of each parameter.
 
     Raises:
-        VehicleArmedError: The vehicle is armed, or that is unknown; no more was set.
+        VehicleArmedError: The vehicle is armed or may be armed; nothing more was set.
         LinkLost: The connection was lost.
     """
     for parameter, old in reversed(undo.parameters.items()):

@@ -39,11 +39,11 @@ class Survey(NamedTuple):
 
     values: Values
     """Values by newest name."""
-    names: Mapping[str, str]
+    present_names: Mapping[str, str]
     """Name of each parameter in this autopilot, by newest name."""
-    unread: frozenset[str] = frozenset()
-    """Newest names of the parameters without a value that the autopilot may have: it did not report
-    them as unknown."""
+    unread_names: frozenset[str] = frozenset()
+    """Newest names of the parameters that were not read, although the autopilot may have them: it
+    did not report them as unknown."""
     lossy: bool = False
     """Whether the link lost frames during the survey, in either direction."""
 
@@ -76,19 +76,22 @@ async def survey(
     rules, requests = tuple(rules), _Requests(link)
     unread: frozenset[str] = frozenset()
     if earlier_survey is not None:
-        unread = earlier_survey.unread
+        unread = earlier_survey.unread_names
         rules = tuple(rule for rule in rules if rule.name in earlier_survey.values)
         requests.leave_out(
-            name for rule in rules for name in rule.names if name != earlier_survey.names[rule.name]
+            name
+            for rule in rules
+            for name in rule.names
+            if name != earlier_survey.present_names[rule.name]
         )
     await requests.ask(rules, first_round)
     # An autopilot that answered nothing at all is a finding of its own.
     if requests.values and requests.lossy:
-        await requests.ask(requests.unread(rules), second_round)
+        await requests.ask(requests.unread_rules(rules), second_round)
     return Survey(
         requests.values,
-        requests.names,
-        unread.union(rule.name for rule in requests.unread(rules)),
+        requests.present_names,
+        unread.union(rule.name for rule in requests.unread_rules(rules)),
         requests.lossy,
     )
 
@@ -97,12 +100,12 @@ class _Requests:
     """The parameter requests to a vehicle, and its answers.
 
     Attributes:
-        values, names: See `Survey`.
+        values, present_names: See `Survey`.
     """
 
     def __init__(self, link: Link) -> None:
         self.values: dict[str, float] = {}
-        self.names: dict[str, str] = {}
+        self.present_names: dict[str, str] = {}
         self._link = link
         self._frames, self._lost = link.stats.frames, link.stats.lost
         self._request_slots = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
@@ -124,8 +127,8 @@ class _Requests:
         """Do not request these names, because this autopilot uses other names."""
         self._skipped_names.update(names)
 
-    def unread(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
-        """The rules without a value, except parameters that the autopilot reported as unknown."""
+    def unread_rules(self, rules: Iterable[ParameterRule]) -> list[ParameterRule]:
+        """The rules of the parameters that were not read and not reported as unknown."""
         return [
             rule
             for rule in rules
@@ -143,7 +146,7 @@ class _Requests:
                     None if name in self._skipped_names else await self._read_value(name, policy)
                 )
                 if value is not None:
-                    self.values[rule.name], self.names[rule.name] = value, name
+                    self.values[rule.name], self.present_names[rule.name] = value, name
                     return
 
     async def _read_value(self, name: str, policy: RetryPolicy) -> float | None:

@@ -48,7 +48,7 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
         return
     for rule in rules:
         if rule.vital and rule.name not in survey.values:
-            yield _unknown(
+            yield _unknown_value_finding(
                 rule,
                 f"the autopilot has no parameter {rule.name}, or did not send it",
                 "fix the link; if the autopilot really has no such parameter, update "
@@ -56,10 +56,10 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
             )
     yield from _missing_parameters(evidence)
     for result in judge(rules, survey.values, companion_settings(config)):
-        yield _finding(result, survey.names[result.rule.name])
+        yield _finding(result, survey.present_names[result.rule.name])
 
 
-def _unknown(rule: ParameterRule, found: str, fix: str) -> Finding:
+def _unknown_value_finding(rule: ParameterRule, found: str, fix: str) -> Finding:
     because = f"it is unknown {rule.meaning}"
     return Finding(rule.name, CheckResult.UNSAFE, found, because, fix, rule.source)
 
@@ -78,8 +78,8 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
     if lossy:
         for rule in unread_rules:
             found = f"{rule.name} was not received, and the link loses frames"
-            yield _unknown(rule, found, "fix the link")
-        others = (rule.name for rule in rules if rule.name in survey.unread)
+            yield _unknown_value_finding(rule, found, "fix the link")
+        others = (rule.name for rule in rules if rule.name in survey.unread_names)
         missing_names = [name for name in others if name not in missing_names]
     if missing_names:
         yield Finding(
@@ -94,9 +94,9 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether the rule's parameter and its alternative have no value, though one may exist."""
+    """Whether neither the rule's parameter nor its alternative was read, but one may exist."""
     names = {rule.name, rule.alternative}
-    return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread)
+    return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread_names)
 
 
 def _finding(result: ParameterFinding, name: str) -> Finding:

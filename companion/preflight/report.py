@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from companion.config import Config
-from companion.preflight.all_checks import not_accepted, overall_result, unsafe
+from companion.preflight.all_checks import overall_result, unaccepted_findings, unsafe_findings
 from companion.preflight.finding import Finding
 from companion.preflight.parameter_fixes import ChangeOutcome
 from companion.vehicle.parameter_rules import CheckResult
@@ -61,7 +61,7 @@ def _entries(findings: Iterable[Finding], accepted: Sequence[str]) -> Renderable
 
 
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
-    refused, unsafe_count = not_accepted(config, findings), len(unsafe(findings))
+    refused, unsafe_count = unaccepted_findings(config, findings), len(unsafe_findings(findings))
     result = overall_result(config, findings)
     if result is CheckResult.NOT_CONNECTED:
         return Text("not connected: nothing was checked", style="bold red")

@@ -83,11 +83,11 @@ async def gather(
         survey=parameters_read,
         streams={name: rate._replace(achieved=achieved[name]) for name, rate in granted.items()},
         received_counts={name: counts.get(message_id(name), 0) for name in granted},
-        window=seconds,
+        counting_time=seconds,
         link=_link_quality(link, before, tuple(notices)),
         samples=listener.samples,
         other_nodes=listener.other_nodes,
-        resets=listener.resets,
+        reset_count=listener.reset_count,
         identity=identity,
         stage=stage,
         warnings=_warnings(link, began),
@@ -131,11 +131,11 @@ async def _identity_and_texts(link: Link) -> Identity:
 def _link_quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:
     now = link.stats
     return LinkQuality(
-        frames=now.frames - before.frames,
-        lost=now.lost - before.lost,
-        damaged=now.bad_crc - before.bad_crc,
-        not_finite=now.non_finite - before.non_finite,
-        reconnects=now.reconnects - before.reconnects,
+        frame_count=now.frames - before.frames,
+        lost_count=now.lost - before.lost,
+        damaged_count=now.bad_crc - before.bad_crc,
+        not_finite_count=now.non_finite - before.non_finite,
+        reconnect_count=now.reconnects - before.reconnects,
         round_trip=link.timesync.round_trip_s,
         jitter=link.timesync.jitter_s,
         notices=notices,
@@ -207,7 +207,7 @@ class PreflightSession:
 
     def _is_waiting(self) -> bool:
         state = self.link.state
-        return not state.armed and self.link.autopilot.not_ready(state.readiness) is not None
+        return not state.armed and self.link.autopilot.why_not_ready(state.readiness) is not None
 
 
 @asynccontextmanager

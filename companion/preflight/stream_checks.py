@@ -100,7 +100,7 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
 
 def _is_countable(name: str, rate: StreamRate, evidence: Evidence) -> bool:
     """Whether enough messages are expected to judge the rate by counting them."""
-    return _expected_rate(name, rate) * evidence.window >= _MIN_EXPECTED_COUNT
+    return _expected_rate(name, rate) * evidence.counting_time >= _MIN_EXPECTED_COUNT
 
 
 def _expected_rate(name: str, rate: StreamRate) -> float:
@@ -109,7 +109,7 @@ def _expected_rate(name: str, rate: StreamRate) -> float:
 
 
 def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
-    """A rate without a fault, in words; one below the requested rate says why it suffices."""
+    """A rate without a fault, in words; if it is below the requested rate, why it suffices."""
     if name in _SENT_ON_CHANGE:
         return f"{name} on change, and at {_SENT_ON_CHANGE[name]:g} Hz between"
     if not _is_countable(name, rate, evidence):

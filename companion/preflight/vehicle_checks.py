@@ -72,7 +72,7 @@ def disarmed_on_ground(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def battery_charge(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the battery has enough charge; not ready while a booting vehicle reports none."""
-    if evidence.booting and evidence.state.battery is None:
+    if evidence.is_booting and evidence.state.battery is None:
         yield Finding(
             Key.BATTERY, NOT_READY, "the vehicle has not reported its battery's charge yet"
         )
@@ -100,7 +100,7 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     ready = state.readiness
     if stage is Stage.AIRBORNE:  # the pre-arm checks no longer apply
         ready = ready._replace(prearm_passed=True)
-    missing = evidence.autopilot.not_ready(ready)
+    missing = evidence.autopilot.why_not_ready(ready)
     texts = "; ".join(dict.fromkeys(evidence.warnings))
     if missing is not None:
         awaited = evidence.awaited_messages
@@ -118,7 +118,9 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     found = f"ready {stage.value}, estimator flags 0x{flags:x}"
     yield Finding(Key.READY, SAFE, found, source="SYS_STATUS, estimator flags")
     if texts:
-        yield Finding(Key.WORDS, SAFE, f"the autopilot says: {texts}", source="STATUSTEXT, EVENT")
+        yield Finding(
+            Key.AUTOPILOT_TEXTS, SAFE, f"the autopilot says: {texts}", source="STATUSTEXT, EVENT"
+        )
 
 
 def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
@@ -180,11 +182,11 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def estimator(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the estimator was reset while we listened."""
-    if evidence.resets:
+    if evidence.reset_count:
         yield Finding(
             Key.ESTIMATOR_RESETS,
             INEFFECTIVE,
-            f"the estimate jumped {evidence.resets} times in {evidence.window:g} s",
+            f"the estimate jumped {evidence.reset_count} times in {evidence.counting_time:g} s",
             "in flight, repeated jumps raise the alarm of the monitor `resets`",
             "wait until compass and GPS have settled",
             "ODOMETRY reset_counter",

@@ -52,7 +52,7 @@ class Exit(Enum):
         return self not in (Exit.LISTEN, Exit.RELEASE)
 
 
-class Stream(Enum):
+class StreamEffect(Enum):
     """What a breach that ends control does to the stream of setpoints, before the exit begins."""
 
     CONTINUES = "continues"

@@ -7,7 +7,7 @@ from math import degrees
 
 from companion.safety.monitor import Judge
 from companion.safety.snapshot import Snapshot
-from companion.vehicle.records import gps_fault, outdated
+from companion.vehicle.records import gps_fault, is_outdated
 
 ATTITUDE_FLAG, VELOCITY_FLAGS = 0x1, 0x2 | 0x4
 HORIZONTAL_POSITION_FLAGS = 0x8 | 0x10
@@ -39,11 +39,12 @@ def battery(min_charge: float) -> Judge:
         newest = snapshot.autopilot.battery
         if newest is None:
             return None
-        if outdated(newest.received, snapshot.now):  # the battery may have become empty meanwhile
+        # The battery may have become empty since the last message.
+        if is_outdated(newest.received, snapshot.now):
             return "the battery's state is not reported any more"
         if newest.remaining is None:
             known_at = newest.charge_received
-            if known_at is None or not outdated(known_at, snapshot.now):
+            if known_at is None or not is_outdated(known_at, snapshot.now):
                 return None
             return "the battery's charge is not reported any more"
         if newest.remaining >= min_charge:
@@ -69,7 +70,7 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
     estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
     if estimator is None:
         return None
-    if outdated(estimator.received, snapshot.now):
+    if is_outdated(estimator.received, snapshot.now):
         return "the estimator's state is not reported any more"
     quantities = ("attitude", ATTITUDE_FLAG), ("velocity", VELOCITY_FLAGS)
     lost = [name for name, bits in quantities if good & bits & ~estimator.flags]

@@ -1,4 +1,4 @@
-"""Shares and rates over the last second, from the counters of the link and of the control loop."""
+"""Shares of lost frames, missed deadlines and CPU starvation, and rates, over the last second."""
 
 from collections import deque
 from typing import NamedTuple
@@ -22,9 +22,9 @@ class _Counters(NamedTuple):
 
     now: float
     frames: int
-    lost: int
+    lost_frames: int
     setpoints: int
-    missed: int
+    missed_deadlines: int
     late_by: float
     setpoint_intervals: IntervalSums
     positions: int
@@ -80,8 +80,10 @@ class CounterWindow:
         if span < _FILLED_SHARE * _AVERAGING_TIME:
             return Health()
         stalled = sum(reading.late_by for reading in self._readings) - first.late_by
-        missed = (last.missed - first.missed) / max(1, last.setpoints - first.setpoints)
-        lost = last.lost - first.lost
+        missed = (last.missed_deadlines - first.missed_deadlines) / max(
+            1, last.setpoints - first.setpoints
+        )
+        lost = last.lost_frames - first.lost_frames
         return Health(
             lost_share=share_lost(last.frames - first.frames, lost),
             missed_share=missed if self._real_time else None,

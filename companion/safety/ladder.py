@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from companion.safety.actions import Action, Stream
+from companion.safety.actions import Action, StreamEffect
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import Snapshot
 
@@ -15,7 +15,7 @@ class Verdict(NamedTuple):
     """HOLD, or an action that ends the flight."""
     reason: str
     """Description of the breach."""
-    stream: Stream = Stream.CONTINUES
+    stream: StreamEffect = StreamEffect.CONTINUES
     """What becomes of the setpoints if `action` ends control."""
 
 

@@ -15,7 +15,8 @@ computer is named as the cause."""
 def silence(limit: float, *, heard: bool) -> Judge:
     """No setpoint was sent for longer than `limit` s.
 
-    `heard`: True: judge only while frames come from the vehicle. False: only while none come.
+    `heard`: True: the judge applies only while frames come from the vehicle; False: only while no
+    frames come.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
@@ -90,13 +91,13 @@ def round_trip(max_seconds: float) -> Judge:
     return judge
 
 
-def late_setpoints(stale: float) -> Judge:
-    """Every probe answered in the last 0.7 s had a round trip longer than 1.5 times `stale`, s.
+def late_setpoints(max_sample_age: float) -> Judge:
+    """Every probe answered in the last 0.7 s had a round trip over 1.5 times `max_sample_age`, s.
 
-    `stale` is the largest age of a sample that is answered. If its setpoint takes as long again,
-    the vehicle tilts in growing swings, while all telemetry still looks good.
+    `max_sample_age` is the largest age of a sample that is answered. If setpoints take that long to
+    reach the vehicle, too, its attitude oscillates more and more, but all telemetry looks good.
     """
-    max_seconds = 1.5 * stale
+    max_seconds = 1.5 * max_sample_age
 
     def judge(snapshot: Snapshot, raised: bool) -> str | None:
         seconds = snapshot.health.uplink.round_trip

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from companion.safety.actions import Action, Stream
+from companion.safety.actions import Action, StreamEffect
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
@@ -43,7 +43,7 @@ class Monitor:
     """Time without the breach before the alarm ends, s."""
     then: Action = Action.LAND
     """Action that follows if a hold does not end the breach."""
-    stream: Stream = Stream.CONTINUES
+    stream: StreamEffect = StreamEffect.CONTINUES
     """What becomes of the setpoints if the breach ends control."""
 
 

@@ -91,7 +91,10 @@ def thrust(lowest: float, highest: float) -> Judge:
 
 
 def outside(fence: Fence) -> Judge:
-    """The vehicle is outside the fence, or its place is unknown and the fence is in degrees."""
+    """The vehicle is outside the fence.
+
+    A vehicle of unknown latitude and longitude counts as outside a fence in these coordinates.
+    """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion

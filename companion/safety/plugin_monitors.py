@@ -13,7 +13,7 @@ from time import perf_counter
 from companion import plugins
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
-from companion.safety.actions import Action, Stream
+from companion.safety.actions import Action, StreamEffect
 from companion.safety.monitor import Monitor, with_hysteresis
 from companion.safety.snapshot import Snapshot
 from companion.user_code import UserCodeError, naming_user_code
@@ -24,8 +24,8 @@ _AFTER_HOLD = (Action.HAND_BACK, Action.LAND)
 _MAX_JUDGING_TIME = 0.003
 """Longest time that a judge may take, s: a sample comes every 4 ms, and must be answered."""
 _SLOW_DURATION = 0.5
-"""Time for which every call of a judge must be too slow before the warning, s; on a busy computer,
-only some are."""
+"""Time for which every call of a judge must be too slow before the warning, s; a busy computer
+makes only some calls slow."""
 
 MonitorFactory = Callable[[Config], Monitor]
 """Makes a monitor for a configuration; entry points in `companion.monitors` name such functions."""
@@ -62,18 +62,20 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
         raise ConfigError(
             f"{setting} cannot be used where a value is not known: {guarded_judge.fault}"
         )
-    watching = replace(monitor, name=name, judge=guarded_judge.judge, stream=Stream.CONTINUES)
+    guarded_monitor = replace(
+        monitor, name=name, judge=guarded_judge.judge, stream=StreamEffect.CONTINUES
+    )
     return (
-        watching,
+        guarded_monitor,
         replace(
-            watching,
+            guarded_monitor,
             name=f"{name} (its fault)",
             judge=guarded_judge.judge_fault,
             action=Action.HAND_BACK,
             lasts=0.0,
         ),
         replace(
-            watching,
+            guarded_monitor,
             name=f"{name} (its time)",
             judge=guarded_judge.judge_time,
             action=Action.WARN,

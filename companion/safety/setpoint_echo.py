@@ -22,7 +22,7 @@ class SetpointEcho:
     setpoint of ours shows that another program sends setpoints, too; the autopilot obeys both.
 
     Args:
-        sent: the latest setpoints of this program, the newest last; they are appended elsewhere.
+        sent: the latest setpoints of this program, the newest last; the control loop appends them.
     """
 
     def __init__(self, sent: deque[tuple[BodyRates, float]]) -> None:

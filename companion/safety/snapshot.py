@@ -27,7 +27,7 @@ class AutopilotStatus(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion of the vehicle, in the frame without estimator resets."""
+    """Motion of the vehicle, in a frame that stays continuous when the estimator is reset."""
 
     q: Quaternion | None = None
     """Attitude (w, x, y, z) as the autopilot reports it, with estimator resets, or None."""
@@ -50,7 +50,7 @@ class Motion(NamedTuple):
 
 
 class Control(NamedTuple):
-    """When data last arrived, which sample was last answered, and why the newest sample is not.
+    """Times of the last data and of the last answer, and why the newest sample is unanswered.
 
     Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
     """

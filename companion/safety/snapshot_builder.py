@@ -79,7 +79,7 @@ class SnapshotBuilder:
         self._frame_at_begin, self._shift_at_begin = resets.frame, resets.position_shift
         resets.largest_tilt_jump = 0.0
         self._good_flags = 0 if state.estimator is None else state.estimator.flags
-        self._clock_changes = self._link.clock.changes
+        self._clock_changes = self._link.clock.change_count
         self.counters.clear()
         self.echo.begin(self._link.autopilot)
 
@@ -92,7 +92,7 @@ class SnapshotBuilder:
         return FenceCentre(minus(self.fence_centre_ned, to_autopilot_frame), self._fence_place)
 
     def unheard(self, now: float) -> float | None:
-        """How long no frame has come from the vehicle at `now`, s; None: it is heard."""
+        """Silence of the vehicle at `now`, s; None if it is not longer than `UNHEARD_S`."""
         self.listen(now)
         silence = now - self._heard_at
         return silence if silence > UNHEARD_S else None
@@ -131,7 +131,7 @@ class SnapshotBuilder:
                 refused_at.get("LOCAL_POSITION_NED", -inf) > position_received,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
-                None if clock.changes == self._clock_changes else clock.last_change,
+                None if clock.change_count == self._clock_changes else clock.last_change,
                 self.counters.stall_time(since=record.last_answered_arrival),
             ),
             self._health(now),

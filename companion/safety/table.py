@@ -9,12 +9,12 @@ from dataclasses import replace
 from companion.config import Config
 from companion.guidance.fence import Fence
 from companion.safety import autopilot_judges, link_judges, motion_judges
-from companion.safety.actions import Action, Stream
+from companion.safety.actions import Action, StreamEffect
 from companion.safety.monitor import Monitor
 from companion.safety.plugin_monitors import plugin_monitors
 
 _BACKLOG_TIME = 0.2
-"""Time after a stall in which queued telemetry is read, s; until then it looks old."""
+"""Time after a stall in which queued telemetry is read, s; until then telemetry looks old."""
 _MAX_GAPS = 2
 """Largest number of gaps in the setpoints within 5 s."""
 _MAX_UNANSWERED = 7
@@ -32,8 +32,8 @@ _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HO
 def monitors(config: Config) -> tuple[Monitor, ...]:
     """The monitors of a flight; among equally severe breaches the first row decides.
 
-    The table does not contain a takeover by the pilot or an unknown mode: `companion.flight.watch`
-    detects both, and releases control.
+    No monitor detects a takeover by the pilot or an unknown mode: `companion.flight.watch` detects
+    both, and releases control.
 
     Raises:
         ConfigError: a monitor of another package cannot be used; see `plugin_monitors`.
@@ -53,9 +53,9 @@ def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
     unheard = link_judges.silence(limit, heard=False)
     silence = link_judges.silence(limit, heard=True)
     return (
-        Monitor("unheard", unheard, Action.LISTEN, stream=Stream.STOPS),
-        Monitor("silence", silence, _HAND_BACK, stream=Stream.STOPS),
-        Monitor("clock", link_judges.clock_changed, _HAND_BACK, stream=Stream.STOPS),
+        Monitor("unheard", unheard, Action.LISTEN, stream=StreamEffect.STOPS),
+        Monitor("silence", silence, _HAND_BACK, stream=StreamEffect.STOPS),
+        Monitor("clock", link_judges.clock_changed, _HAND_BACK, stream=StreamEffect.STOPS),
         Monitor("disarmed", autopilot_judges.disarmed, _RELEASE),
         Monitor("landed", autopilot_judges.landed, _LAND),
         # This is for failsafes that do not change the mode: a change of mode is a takeover.
@@ -117,8 +117,8 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
         Monitor("answer gaps", link_judges.gaps(_MAX_GAPS), _HAND_BACK),
         Monitor("answer rate", answers, _HAND_BACK, lasts=1.0),
         Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
-        Monitor("late setpoints", late, _HAND_BACK, stream=Stream.ENDS),
-        Monitor("lost setpoints", lost, _HAND_BACK, stream=Stream.ENDS),
+        Monitor("late setpoints", late, _HAND_BACK, stream=StreamEffect.ENDS),
+        Monitor("lost setpoints", lost, _HAND_BACK, stream=StreamEffect.ENDS),
         # In a mode of the pilot the autopilot reports its own setpoints; `lasts` leaves time for
         # the requested heartbeat, which tells the mode.
         Monitor("foreign setpoints", foreign, _HAND_BACK, lasts=0.3),

@@ -93,7 +93,7 @@ class Autopilot(Protocol):
             `companion.mavlink.parameters`.
         wanted_rates: Messages that a flight needs, with the rate to request, Hz.
         interval_step_us: SET_MESSAGE_INTERVAL is rounded down to a whole multiple of this, us.
-        rates_about_target_axes: True: body rates are taken about the axes of the attitude setpoint
+        rates_about_target_axes: True: body rates act about the axes of the attitude setpoint
             (ATTITUDE_TARGET), which leads the body. False: about the axes of the body.
         body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
             from the present yaw, not from north.
@@ -129,7 +129,7 @@ class Autopilot(Protocol):
     def set_mode(self, name: str) -> Command:
         """Command that enters a mode of `modes`. Raises `KeyError` for any other mode."""
 
-    def not_ready(self, readiness: Readiness) -> str | None:
+    def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing before the vehicle can be armed and flown, in words; `None`: nothing."""
 
     def arm(self) -> tuple[Command, ...]:

@@ -1,8 +1,8 @@
 """The vehicle's clock, compared with the event loop's: ages of samples, and jumps of the clock.
 
-The offset is vehicle time minus event-loop time. An attitude sample shows the offset less its own
-delay. So the largest value comes from the sample with the smallest delay, the "quickest" sample.
-TIMESYNC measures the delay of the quickest sample.
+The offset is vehicle time minus event-loop time. The stamp of an attitude sample minus its arrival
+is the offset minus the sample's delay. So the largest difference comes from the sample with the
+smallest delay, the "quickest" sample. TIMESYNC measures the delay of the quickest sample.
 """
 
 from collections.abc import Callable
@@ -44,24 +44,23 @@ class VehicleClock:
     Attributes:
         rate: Estimates the rate of the vehicle's clock.
         delay: Estimates the delay of the quickest sample, by TIMESYNC.
-        changes: Counts jumps, wraps, standstills and restarts of the clock.
-        restarts: Counts restarts of the autopilot, after which its time since boot continues from a
-            smaller value.
-        last_change: The newest change counted in `changes`, in words; empty before the first.
+        change_count: Counts jumps, wraps, standstills and restarts of the clock.
+        restart_count: Counts restarts of the autopilot, each of which sets its clock back.
+        last_change: The newest change counted in `change_count`, in words; empty before the first.
         on_event: Called with a sentence for the user.
     """
 
     def __init__(self, *, lockstep: bool = False) -> None:
         self.rate = ClockRate(same_clock=lockstep)
         self.delay = TelemetryDelay()
-        self.changes = self.restarts = 0
+        self.change_count = self.restart_count = 0
         self.last_change = ""
         self.on_event: Callable[[str], None] = lambda _: None
         self._lockstep = lockstep
         self._began = inf
         self._shift = 0.0
-        self._quickest = self._newest = -inf
-        self._received = self._late = 0.0
+        self._quickest = self._newest_time = -inf
+        self._received = self._lateness = 0.0
         self._misfits = MisfitRun()
         self._reported_unknown = self._reported_outlier = False
 
@@ -104,7 +103,7 @@ class VehicleClock:
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
         quickest = self._quickest + self.rate.lowest_rate * (received - self._received)
-        fits = time > self._newest and ahead <= quickest + SMALLEST_JUMP
+        fits = time > self._newest_time and ahead <= quickest + SMALLEST_JUMP
         if not fits or self._misfits.stamps:
             misfit = self._adapt_to(Stamp(time, ahead, received), time_boot_ms, quickest)
             if misfit is not None:
@@ -114,7 +113,8 @@ class VehicleClock:
         late = quickest - ahead
         if late < 0.0:
             quickest, late = ahead, 0.0
-        self._quickest, self._received, self._newest, self._late = quickest, received, time, late
+        self._quickest, self._received = quickest, received
+        self._newest_time, self._lateness = time, late
         if received >= self.rate.note_due:
             self.rate.note(received, quickest)
         return SampleTiming(time, late + self.delay.seconds)
@@ -135,7 +135,7 @@ class VehicleClock:
         time = vehicle_ns % WRAP_PERIOD_NS * 1e-9 + self._shift  # wraps as the samples' stamps do
         middle_time, half_round_trip = 0.5 * (sent + received), 0.5 * (received - sent)
         quickest = self._quickest + self.rate.rate * (middle_time - self._received)
-        attitude_fits = received - self._received < 1.0 and self._late < SMALLEST_JUMP
+        attitude_fits = received - self._received < 1.0 and self._lateness < SMALLEST_JUMP
         error = half_round_trip + self.rate.spread(max(0.0, received - self._received))
         delay = time - middle_time - quickest
         setback = self.delay.take_exchange(received, error, delay)
@@ -147,7 +147,7 @@ class VehicleClock:
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
             # The answer may be a little older than the newest sample.
-            was_set_back = time < self._newest - _MIN_CLOCK_SETBACK
+            was_set_back = time < self._newest_time - _MIN_CLOCK_SETBACK
             self._accept_jump(-setback, round(vehicle_ns * 1e-6), set_back=was_set_back)
 
     def update(self, now: float) -> None:
@@ -169,16 +169,16 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _adapt_to(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Adapt to a misfit or to the first stamp after misfits; return the misfit, or None."""
+        """Handle a stamp that may not fit the clock; return why it must not be used, or None."""
         if self._began == inf:
             self._began = self._received = stamp.received
-            self._quickest = 0.0 if self._lockstep else stamp.ahead
+            self._quickest = 0.0 if self._lockstep else stamp.apparent_offset
         elif self._drift_explains(stamp, quickest):
             self._quickest = quickest
-            self._end_misfits(time_boot_ms, quickest - stamp.ahead)
+            self._end_misfits(time_boot_ms, quickest - stamp.apparent_offset)
         elif self._link_got_quicker(stamp, quickest):
             self._quickest = quickest
-            self.delay.shorten(stamp.ahead - quickest, stamp.received)
+            self.delay.shorten(stamp.apparent_offset - quickest, stamp.received)
             self._drop_misfits()
         else:
             return self._take_misfit(stamp, time_boot_ms, quickest)
@@ -186,18 +186,18 @@ class VehicleClock:
 
     def _drift_explains(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` is newer, and ahead of the clock by no more than the largest drift."""
-        drift = self.rate.spread(stamp.received - self._received)
-        return stamp.time > self._newest and stamp.ahead <= quickest + SMALLEST_JUMP + drift
+        limit = quickest + SMALLEST_JUMP + self.rate.spread(stamp.received - self._received)
+        return stamp.time > self._newest_time and stamp.apparent_offset <= limit
 
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
 
-        A sample of a quicker link seems ahead by at most the delay that TIMESYNC measured before.
-        Exchanges after the last sample that fitted do not count, because the clock may have jumped
-        before them.
+        Then it is ahead by at most the delay that TIMESYNC measured on the slower link. Exchanges
+        after the last sample that fitted the clock do not count, because the clock may have jumped
+        before those exchanges.
         """
         largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
-        return stamp.time > self._newest and stamp.ahead - quickest <= largest_delay
+        return stamp.time > self._newest_time and stamp.apparent_offset - quickest <= largest_delay
 
     def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
         """Add a misfit; if the misfits show a jump of the clock, accept it and return None."""
@@ -205,32 +205,32 @@ class VehicleClock:
             self._drop_misfits()
         self._misfits.stamps.append(stamp)
         if not self._misfits.confirmed(quickest):
-            return Misfit.AHEAD if stamp.time > self._newest else Misfit.NOT_NEWER
-        jump = self._misfits.most_ahead() - quickest
+            return Misfit.AHEAD if stamp.time > self._newest_time else Misfit.NOT_NEWER
+        jump = self._misfits.largest_offset() - quickest
         self._misfits.stamps.clear()
-        self._quickest, self._newest = quickest, -inf
+        self._quickest, self._newest_time = quickest, -inf
         self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
         return None
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
-        """End the misfits with a sample that fits the clock; it came `late` seconds late.
+        """End the misfits with a sample that fits the clock and came `late` seconds late.
 
-        If all misfits before it repeated the newest stamp that fitted, the clock stood still.
+        If all misfits repeated the newest stamp that fitted the clock, the clock stood still.
         """
         if not self._misfits.stamps:
             return
-        clock_stopped = self._misfits.clock_stopped(self._newest)
+        clock_stopped = self._misfits.clock_stopped(self._newest_time)
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
         if clock_stopped and min(lasted, late) >= SMALLEST_JUMP:
             self._accept_jump(-late, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
-        """Drop the misfits; report the first one ever that is stamped ahead of the clock."""
-        ahead = any(stamp.time > self._newest for stamp in self._misfits.stamps)
+        """Drop the misfits; report, only once, a sample that was stamped ahead of the clock."""
+        ahead = any(stamp.time > self._newest_time for stamp in self._misfits.stamps)
         if ahead and not self._reported_outlier:
             self._reported_outlier = True
-            lead = self._misfits.most_ahead() - self._quickest
+            lead = self._misfits.largest_offset() - self._quickest
             self.on_event(
                 f"a sample stamped {lead:.1f} s ahead of the vehicle's clock was dropped; such "
                 "samples are counted"
@@ -244,7 +244,7 @@ class VehicleClock:
         self.delay.forget_after(self._received - self.delay.seconds - SAME_CLOCK_SPREAD)
         if self._received - self._began < _SETTLING_TIME and jump > -RESTART_SETBACK:
             return
-        self.changes += 1
-        self.restarts += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
+        self.change_count += 1
+        self.restart_count += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
         self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, set_back=set_back)
         self.on_event(self.last_change)

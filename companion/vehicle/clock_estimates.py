@@ -49,7 +49,7 @@ class ClockRate:
         self.note_due = inf if same_clock else -inf
         self._rate_error = 0.0 if same_clock else MOST_DRIFT
         self.lowest_rate = -self._rate_error
-        self._noted: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
+        self._noted_offsets: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
 
     def spread(self, seconds: float) -> float:
         """Difference between the fastest and the slowest possible clock after `seconds`, s."""
@@ -58,21 +58,21 @@ class ClockRate:
     def note(self, now: float, offset: float) -> None:
         """Take the quickest sample's offset (vehicle time minus event-loop time) once a second.
 
-        Two points far apart suffice, since each is the best of a second's samples.
+        Two offsets far apart suffice for the rate, because each is from the quickest sample.
 
         Args:
             now: Event-loop time, s.
             offset: The offset, s.
         """
-        if self._noted:
-            noted_at, noted_offset = self._noted[-1]
+        if self._noted_offsets:
+            noted_at, noted_offset = self._noted_offsets[-1]
             if offset - noted_offset > MOST_DRIFT * (now - noted_at) + _LATE_SAMPLES_RISE:
-                self._noted.clear()  # the noted offsets are of late samples
+                self._noted_offsets.clear()  # the noted offsets are of late samples
                 self.rate, self._rate_error = 0.0, MOST_DRIFT
                 self.lowest_rate = -MOST_DRIFT
         self.note_due = now + _NOTE_PERIOD
-        self._noted.append((now, offset))
-        noted_at, noted_offset = self._noted[0]
+        self._noted_offsets.append((now, offset))
+        noted_at, noted_offset = self._noted_offsets[0]
         if now - noted_at < _MIN_WINDOW * _NOTE_PERIOD:
             return
         self._rate_error = _RATE_UNCERTAINTY
@@ -91,23 +91,23 @@ class DelayUnknown(Enum):
 class _Exchange(NamedTuple):
     """A TIMESYNC exchange."""
 
-    at: float
+    answered_at: float
     """Event-loop time of the answer, s."""
     initial_error: float
-    """Largest error of `delay` at the time `at`, s."""
+    """Largest possible error of `delay` at the time of the answer, s."""
     delay: float
     """TIMESYNC's offset minus the quickest sample's, s."""
 
     def error(self, now: float) -> float:
-        """Largest error of the delay at the event-loop time `now`, s."""
-        return self.initial_error + MOST_DRIFT * (now - self.at)
+        """Largest possible error of `delay` at the event-loop time `now`, s."""
+        return self.initial_error + MOST_DRIFT * (now - self.answered_at)
 
 
 class TelemetryDelay:
-    """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error.
+    """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error bound.
 
-    The largest error of an exchange grows with its age, by `MOST_DRIFT`: samples that a growing
-    queue delays look like those of a slower clock.
+    The error bound of an exchange grows with its age, by `MOST_DRIFT` per second: a growing
+    queue that delays all samples looks like a slower clock of the vehicle.
 
     Attributes:
         known: Whether the delay is known.
@@ -123,11 +123,11 @@ class TelemetryDelay:
         self._implausible: _Exchange | None = None
 
     def take_exchange(self, now: float, error: float, delay: float) -> float | None:
-        """Take an exchange; one with a plausible delay is kept.
+        """Take an exchange, and store it if its delay is plausible.
 
         A single implausible delay is ignored. Two in a row that agree show that a clock changed. If
-        exchanges are kept and the new delay is negative, TIMESYNC has fallen behind the samples'
-        stamps, and the caller finds out why. Otherwise TIMESYNC uses another clock, and all
+        exchanges are stored and the new delay is negative, TIMESYNC has fallen behind the samples'
+        stamps, and the caller must find out why. Otherwise TIMESYNC uses another clock, and all
         exchanges are forgotten.
 
         Args:
@@ -162,17 +162,17 @@ class TelemetryDelay:
 
         It is 0 without such an exchange.
         """
-        earlier = [each for each in self._exchanges if each.at <= before]
+        earlier = [each for each in self._exchanges if each.answered_at <= before]
         if not earlier:
             return 0.0
         best = min(earlier, key=lambda each: each.error(before))
         return best.delay + best.error(before)
 
     def shorten(self, decrease: float, now: float) -> None:
-        """Shorten all delays: a quicker sample than before has come.
+        """Shorten all delays, because a sample came that was quicker than the quickest so far.
 
         Args:
-            decrease: How much quicker it is than the quickest sample before, s.
+            decrease: How much quicker the new sample was than the quickest so far, s.
             now: Event-loop time, s.
         """
         self._exchanges = deque(
@@ -183,7 +183,7 @@ class TelemetryDelay:
 
     def forget_after(self, since: float) -> None:
         """Forget the exchanges after event-loop time `since` (s): the clock may have changed."""
-        while self._exchanges and self._exchanges[-1].at > since:
+        while self._exchanges and self._exchanges[-1].answered_at > since:
             self._exchanges.pop()
         self.expire(since)
 
@@ -196,7 +196,7 @@ class TelemetryDelay:
     def expire(self, now: float) -> None:
         """Forget exchanges too old at event-loop time `now` (s); use the best of the others."""
         exchanges = self._exchanges
-        while exchanges and now - exchanges[0].at > EXCHANGE_LIFETIME:
+        while exchanges and now - exchanges[0].answered_at > EXCHANGE_LIFETIME:
             exchanges.popleft()
         if not exchanges:
             self.forget(self.why_unknown)

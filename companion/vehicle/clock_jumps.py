@@ -44,8 +44,8 @@ class Stamp(NamedTuple):
 
     time: float
     """Vehicle time, s."""
-    ahead: float
-    """`time` minus `received`, s: the offset of the clocks less the sample's delay."""
+    apparent_offset: float
+    """`time` minus `received`, s: the offset of the clocks minus the sample's delay."""
     received: float
     """Event-loop time of the sample's arrival, s."""
 
@@ -65,7 +65,10 @@ class MisfitRun:
         if not self.stamps:
             return True
         last = self.stamps[-1]
-        return stamp.time >= last.time and abs(stamp.ahead - last.ahead) < SAME_CLOCK_SPREAD
+        return (
+            stamp.time >= last.time
+            and abs(stamp.apparent_offset - last.apparent_offset) < SAME_CLOCK_SPREAD
+        )
 
     def confirmed(self, quickest: float) -> bool:
         """Whether the misfits show a jump of the clock away from `quickest`, the old offset, s."""
@@ -74,12 +77,12 @@ class MisfitRun:
             len(self.stamps) >= _MIN_JUMP_SAMPLES
             and last.time > first.time
             and last.received - first.received >= _MIN_JUMP_SPAN
-            and abs(self.most_ahead() - quickest) >= SMALLEST_JUMP
+            and abs(self.largest_offset() - quickest) >= SMALLEST_JUMP
         )
 
-    def most_ahead(self) -> float:
+    def largest_offset(self) -> float:
         """The largest offset of the misfits (vehicle time minus event-loop time), s."""
-        return max(stamp.ahead for stamp in self.stamps)
+        return max(stamp.apparent_offset for stamp in self.stamps)
 
     def clock_stopped(self, newest: float) -> bool:
         """Whether all misfits repeat `newest`, the stamp of the last sample that fitted, s."""

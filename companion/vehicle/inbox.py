@@ -66,7 +66,7 @@ class Inbox:
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
         self._candidate: str | None = None
-        self._held: list[tuple[Frame, int]] = []
+        self._held_frames: list[tuple[Frame, int]] = []
         self._samples: list[AttitudeSample] = []
         self.on_attitude: Callable[[AttitudeSample], None] | None = None
         self.on_foreign: Callable[[Frame], None] | None = None
@@ -125,7 +125,7 @@ class Inbox:
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
         """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
 
-        Without a valid claim in the bytes, no frame in them is accepted. Never raises.
+        If none of the frames entitles `sender` to become the peer, none is accepted. Never raises.
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._is_admitted(frame)]
@@ -142,7 +142,7 @@ class Inbox:
         return True
 
     def may_prove_date(self, sender: str) -> bool:
-        """Whether `sender`, refused for its signature's date, could prove it by answering TIMESYNC.
+        """Whether `sender`, refused for the date of its signature, may prove the date by TIMESYNC.
 
         If so, the transport sends to `sender`, and the next frame that `receive` accepts makes
         `sender` the peer.
@@ -153,7 +153,7 @@ class Inbox:
         return True
 
     def claim_lapsed(self) -> bool:
-        """Whether another sender may become the peer."""
+        """Whether another sender may become the peer although the present one still sends."""
         return self._peer_rule.claim_lapsed()
 
     def note_stranger(self, sender: str) -> None:
@@ -179,7 +179,7 @@ class Inbox:
             return
         beacon = decode_beacon(frame.payload) if frame.message_id == SYSTEM_TIME else None
         if beacon is None:
-            self._held.append((frame, received_ns))
+            self._held_frames.append((frame, received_ns))
         else:  # not counted as telemetry: beacons have sequence numbers of their own
             self.lockstep.take_beacon(beacon)
 
@@ -224,12 +224,12 @@ class Inbox:
 
     def _pass_on_held(self) -> None:
         """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""
-        held, self._held = self._held, []
+        held, self._held_frames = self._held_frames, []
         for frame, received_ns in held:
             self._pass_on(frame, received_ns)
 
     def _deliver_samples(self) -> None:
-        """In lockstep: pass the samples of a step to the control loop, after its tasks have run."""
+        """In lockstep: after a step's tasks have run, pass its samples to the control loop."""
         samples, self._samples = self._samples, []
         for sample in samples:
             self._call_on_attitude(sample)

@@ -3,7 +3,8 @@
 _MAX_UNEVENNESS = 2.0
 """Largest ratio of Σg²/Σg to the mean interval at which the effective rate is the mean rate.
 
-g is each interval. The ratio is 1 for equal intervals. A larger one lowers the effective rate.
+g are the intervals. The ratio is 1 for equal intervals. Above the limit, the effective rate is
+lower than the mean rate.
 """
 
 

@@ -182,7 +182,7 @@ def system_id(value: float, _: Values, settings: CompanionSettings) -> Problem |
 
 
 def acceleration_limit(unit: float, axis: str) -> Check:
-    """A check that the configured angular acceleration limit of an axis is the autopilot's.
+    """A check that the configured angular acceleration limit of an axis equals the autopilot's.
 
     Args:
         unit: the parameter's unit as a multiple of 1 °/s².

@@ -16,7 +16,7 @@ _MAX_CHARGE_AGE = 1.5
 The charge is in SYS_STATUS and BATTERY_STATUS, which come at 1 Hz or faster."""
 
 
-def outdated(received: float, now: float) -> bool:
+def is_outdated(received: float, now: float) -> bool:
     """Whether telemetry received at `received` is too old at `now`; both are loop times, s."""
     return now - received > _MAX_TELEMETRY_AGE
 
@@ -75,7 +75,7 @@ class CurrentMode(NamedTuple):
     mode: str
     """The autopilot's name for the mode."""
     intended: str
-    """The mode that the user commanded last; it differs while a failsafe acts."""
+    """The mode that the user commanded last; it differs from `mode` while a failsafe acts."""
 
 
 class LocalPosition(NamedTuple):
@@ -124,9 +124,9 @@ class Battery(NamedTuple):
     """Event-loop time at which a charge was last received, s."""
 
     def replaced_by(self, newer: "Battery") -> "Battery":
-        """The newer record; a charge that it lacks is taken from this one.
+        """The newer record; if it lacks a charge, with the charge of this record.
 
-        Some vehicles send the charge in one of the two messages only. It is kept for
+        Some vehicles send the charge in one of the two messages only. A charge is kept for
         `_MAX_CHARGE_AGE`.
         """
         if newer.remaining is not None:
@@ -146,7 +146,7 @@ class AttitudeTargetThrust(NamedTuple):
 
 
 class AttitudeTarget(NamedTuple):
-    """ATTITUDE_TARGET: the attitude about whose axes the autopilot takes body rates."""
+    """ATTITUDE_TARGET: the attitude about whose axes body rates act."""
 
     time_boot_ms: int
     """The vehicle's time stamp as received, ms since its boot."""
@@ -169,7 +169,7 @@ class Gps(NamedTuple):
 
 def gps_fault(gps: Gps | None, now: float) -> str | None:
     """Fault of a GPS that had a 3D fix, in words, at loop time `now` (s); `None`: no fault."""
-    if gps is None or outdated(gps.received, now):
+    if gps is None or is_outdated(gps.received, now):
         return "GPS is not reported any more"
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None
 
@@ -179,7 +179,7 @@ class Prearm(NamedTuple):
 
     received: float
     """Event-loop time of arrival, s."""
-    good: bool
+    passed: bool
     """Whether the checks pass."""
 
 

@@ -26,7 +26,7 @@ from companion.vehicle.records import (
     LocalPosition,
     Prearm,
     gps_fault,
-    outdated,
+    is_outdated,
 )
 
 GROUND_HEIGHT = 1.5
@@ -128,7 +128,7 @@ class VehicleState(ModeState, _Values):
         """Whether the battery, or its charge, was reported before and is no longer reported."""
         battery, now = self.battery, self._clock()
         times = () if battery is None else (battery.received, battery.charge_received)
-        return any(time is not None and outdated(time, now) for time in times)
+        return any(time is not None and is_outdated(time, now) for time in times)
 
     @property
     def height(self) -> float | None:
@@ -143,9 +143,9 @@ class VehicleState(ModeState, _Values):
         now = self._clock()
         prearm, estimator, position = self.prearm, self.estimator, self.position
         return Readiness(
-            None if prearm is None or outdated(prearm.received, now) else prearm.good,
-            None if estimator is None or outdated(estimator.received, now) else estimator.flags,
-            position is not None and not outdated(position.received, now),
+            None if prearm is None or is_outdated(prearm.received, now) else prearm.passed,
+            None if estimator is None or is_outdated(estimator.received, now) else estimator.flags,
+            position is not None and not is_outdated(position.received, now),
             self.home is not None,
         )
 
@@ -158,8 +158,8 @@ class VehicleState(ModeState, _Values):
         self.landed_state = LandedState(self._clock(), message.landed_state)
 
     def _landed_state(self) -> int | None:
-        landed = self.landed_state
-        return None if landed is None or outdated(landed.received, self._clock()) else landed.state
+        landed, now = self.landed_state, self._clock()
+        return None if landed is None or is_outdated(landed.received, now) else landed.state
 
     def _on_local_position(self, message: Message) -> None:
         values = (message.x, message.y, message.z, message.vx, message.vy, message.vz)

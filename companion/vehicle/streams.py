@@ -72,7 +72,7 @@ async def set_rates(
 async def _request(
     commands: CommandClient, number: int, rate: float, interval_step_us: int
 ) -> tuple[float, str]:
-    """Request one message; return the granted rate in Hz, and, if it is 0, the last refusal."""
+    """Request a message rate (Hz); return the granted rate, and the last refusal if it is 0."""
     refusal = ""
     for _ in range(_MAX_HALVINGS + 1):
         interval_us = _DISABLED_INTERVAL

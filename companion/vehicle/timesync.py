@@ -24,7 +24,7 @@ _NS_PER_S, _S_PER_NS = 1e9, 1e-9
 _PROBE_PERIOD = 0.1 * _NS_PER_S
 _UPLINK_WINDOW = 0.7 * _NS_PER_S
 """Window of `Uplink.round_trip`, ns: it uses only probes answered in the last 0.7 s. A link that
-becomes slow is noticed after about this time: until then the answers from before still count."""
+becomes slow is noticed after about this time: until then, earlier answers still count."""
 _MIN_PROBES = 6
 """Smallest number of probes sent in `_UPLINK_WINDOW` to judge the link: with fewer, probing has
 just begun."""
@@ -36,8 +36,8 @@ class Uplink(NamedTuple):
     """Present delay and loss on the link to the vehicle."""
 
     round_trip: float | None = None
-    """Shortest round trip of the probes answered in the last 0.7 s, s; None: none was, or fewer
-    than six were sent."""
+    """Shortest round trip of the probes answered in the last 0.7 s, s; None: no probe was
+    answered, or fewer than six were sent."""
     unanswered_count: int | None = None
     """Number of probes sent since the newest request that was answered, at most 16; None: the
     vehicle has not answered any TIMESYNC request."""

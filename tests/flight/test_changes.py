@@ -61,7 +61,7 @@ def test_a_bad_change_changes_nothing_and_is_explained(values):
     with pytest.raises(ChangeRefusedError) as refused:
         changes.change(values, "a test")
     assert changes.wanted_config == Config()
-    assert not changes.made
+    assert not changes.all_changes
     assert not changes.can_undo
     told = str(refused.value)
     assert told.startswith("a test: ")
@@ -110,7 +110,7 @@ def test_a_change_without_gains_is_refused(fault, monkeypatch):
     changes = Changes(Config())
     with pytest.raises(ChangeRefusedError, match="a test: fault; nothing has changed"):
         changes.change({"planner": {"gain_per_s": 4.0}}, "a test")
-    assert not changes.made
+    assert not changes.all_changes
 
 
 def test_the_way_of_a_change_is_even_and_null_counts_as_what_it_comes_to():

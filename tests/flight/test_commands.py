@@ -42,7 +42,7 @@ class Vehicle:
         self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
         self.link = self.autopilot = self.state = self
         self.now = 0.0
-        self.same_vehicle = SimpleNamespace(require=lambda: None)
+        self.replacement_detector = SimpleNamespace(require=lambda: None)
 
     @property
     def mode_received(self):

@@ -76,7 +76,7 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
     context = SimpleNamespace(
         snapshot_builder=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(update=lambda: None),
-        same_vehicle=SimpleNamespace(update=lambda: None, require=lambda: None),
+        replacement_detector=SimpleNamespace(update=lambda: None, require=lambda: None),
         fresh_heartbeat=fresh_heartbeat,
     )
 
@@ -128,7 +128,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
     context = SimpleNamespace(
         snapshot_builder=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(update=lambda: None),
-        same_vehicle=SimpleNamespace(update=lambda: None, require=lambda: None),
+        replacement_detector=SimpleNamespace(update=lambda: None, require=lambda: None),
         loop=loop,
         link=SimpleNamespace(state=state, autopilot=autopilot),
         fresh_heartbeat=answer.wait,

@@ -37,7 +37,7 @@ class Bench:
             link=SimpleNamespace(autopilot=None, state=SimpleNamespace(forget=lambda: None)),
             guidance_loop=SimpleNamespace(run=lambda: asyncio.sleep(60.0)),
             ground=SimpleNamespace(standing=False),
-            same_vehicle=SimpleNamespace(begin=self.begin),
+            replacement_detector=SimpleNamespace(begin=self.begin),
             release=lambda: None,
             end_stream=lambda: None,
             stop=self.stop,

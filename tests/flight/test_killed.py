@@ -111,10 +111,10 @@ def bound(autopilot, speed, held):
 
 def compare(measured, model):
     """Bounded, and not by a factor of ten; vertical ways of a few centimetres are noise."""
-    assert measured.away <= model.away < 10.0 * measured.away
-    assert measured.up <= model.up + 0.2
-    assert measured.down <= model.down + 0.2
-    assert model.down < max(10.0 * measured.down, 10.0)
+    assert measured.away <= model.largest_distance < 10.0 * measured.away
+    assert measured.up <= model.climb + 0.2
+    assert measured.down <= model.fall + 0.2
+    assert model.fall < max(10.0 * measured.down, 10.0)
 
 
 @pytest.mark.parametrize("autopilot", HELD)
@@ -134,6 +134,6 @@ def test_the_table_of_the_exits(autopilot, held):
         model = bound(autopilot, speed, held)
         print(
             f"| {autopilot} | {held:g} | {speed:g} | {measured.away:.1f} | {measured.down:.1f} "
-            f"| {model.away:.0f} | {model.down:.0f} |"
+            f"| {model.largest_distance:.0f} | {model.fall:.0f} |"
         )
         compare(measured, model)

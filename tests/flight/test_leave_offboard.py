@@ -40,7 +40,7 @@ class Vehicle:
         self.sent, self.notes, self.mode_by_failsafe, self.detail = 0, [], False, ""
         self.link = self.autopilot = self.state = self
         self.note = self.notes.append
-        self.same_vehicle = SimpleNamespace(require=lambda: None)
+        self.replacement_detector = SimpleNamespace(require=lambda: None)
 
     mode_received = 0.0
 

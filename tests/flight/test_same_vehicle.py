@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.vehicle_identity import ChecksVoid, SameVehicle
+from companion.flight.vehicle_identity import ChecksVoid, ReplacementDetector
 from companion.preflight.evidence import Identity
 from companion.safety.actions import Exit, FlightEnded
 
@@ -16,9 +16,9 @@ class Link(SimpleNamespace):
         super().__init__(
             now=0.0,
             stats=SimpleNamespace(peers=0, frames=0),
-            clock=SimpleNamespace(restarts=0, last_change="its clock went back by 40.0 s"),
+            clock=SimpleNamespace(restart_count=0, last_change="its clock went back by 40.0 s"),
         )
-        self.vehicle = SameVehicle(self, lambda: self.now)
+        self.vehicle = ReplacementDetector(self, lambda: self.now)
 
     def pass_time(self, seconds, *, heard=True, step=0.02):
         """Look as the watch does."""
@@ -41,7 +41,7 @@ def another_peer(link):
 
 
 def a_restart(link):
-    link.clock.restarts += 1
+    link.clock.restart_count += 1
 
 
 def another_id(link):
@@ -66,12 +66,12 @@ def test_before_arming_it_voids_the_checks_which_can_be_made_anew(change):
     link, vehicle = checked()
     vehicle.require()
     change(link)
-    assert not vehicle.same
+    assert not vehicle.is_same_vehicle
     with pytest.raises(ChecksVoid, match=CHANGES[change]):
         vehicle.require()
     vehicle.begin()
     vehicle.require()
-    assert vehicle.same
+    assert vehicle.is_same_vehicle
 
 
 @pytest.mark.parametrize("change", [another_peer, a_restart, another_id])
@@ -90,14 +90,14 @@ def test_once_armed_silence_is_the_watchs_matter():
     vehicle.commit()
     a_silence(link)
     vehicle.require()
-    assert vehicle.same
+    assert vehicle.is_same_vehicle
 
 
 def test_a_sample_after_a_silence_is_not_answered_before_the_watch_looked():
     link, vehicle = checked()
     link.pass_time(2.1, heard=False)
     vehicle.require()  # it may come back, and then it counts
-    assert not vehicle.same
+    assert not vehicle.is_same_vehicle
 
 
 def test_the_same_vehicle_is_the_same():
@@ -108,7 +108,7 @@ def test_the_same_vehicle_is_the_same():
         vehicle.note_identity(Identity(uid="a1"))
         vehicle.note_identity(Identity())  # not told this time
     vehicle.require()
-    assert vehicle.same
+    assert vehicle.is_same_vehicle
 
 
 def test_a_stall_of_our_own_is_no_silence():
@@ -116,7 +116,7 @@ def test_a_stall_of_our_own_is_no_silence():
     link.pass_time(5.0, heard=False, step=5.0)
     link.pass_time(0.02)
     vehicle.require()
-    assert vehicle.same
+    assert vehicle.is_same_vehicle
 
 
 def test_what_was_before_the_checks_does_not_count():
@@ -126,4 +126,4 @@ def test_what_was_before_the_checks_does_not_count():
     link.vehicle.require()
     link.vehicle.begin()
     link.vehicle.require()
-    assert link.vehicle.same
+    assert link.vehicle.is_same_vehicle

@@ -46,7 +46,7 @@ def flown(tmp_path_factory):
     config = quick_flight(
         "px4", {"flight": {"maneuvers": ["circle"]}, "circle": {"radius_m": 2.0, "laps": 1}}
     )
-    streaming = replace(environment, stream=datagrams.append)
+    streaming = replace(environment, send_batch=datagrams.append)
     session = Session(config, folder, SilentObserver(), decline_landing, environment=streaming)
     assert run(QuickVehicle(lockstep=False), session.fly()).result == "ok"
     return read_flight(folder), datagrams

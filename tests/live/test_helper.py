@@ -61,7 +61,7 @@ def test_edits_of_the_file_reach_the_flight(tmp_path):
         await until("planner.gain_per_s from 5 to 4")
 
     asyncio.run(helper.run_while_serving(edit()))
-    assert [str(change) for change in helper.changes.made] == [
+    assert [str(change) for change in helper.changes.all_changes] == [
         "changed by flown.yaml: planner.gain_per_s from 5 to 4"
     ]
     helper.close("over")

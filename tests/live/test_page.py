@@ -58,7 +58,7 @@ def _watch_and_change(new_tab, page, folder):
     tab.click("unlock")
     tab.wait(f"{_SAID}.includes('this is not the token')")
     _change(tab, "limits.max_climb_m_s", "1.5", "refused: give the token first")
-    assert page.helper.changes.made == []
+    assert page.helper.changes.all_changes == []
     tab.type("token", page.page_socket.token)
     tab.click("unlock")
     tab.wait(f"{_SAID}.includes('can be changed')")
@@ -97,7 +97,7 @@ def test_the_page(tmp_path):
             _change(second, "limits.max_climb_m_s", "1.0", "refused: give the token first")
             tab.click("undo")
             tab.wait(f"{_SAID}.includes('from 1.5 to 2')")
-            assert len(page.helper.changes.made) == 2
+            assert len(page.helper.changes.all_changes) == 2
             page.end()
             tab.wait(
                 "document.getElementById('live-over').innerText.includes('the flight is over')"

@@ -16,7 +16,7 @@ from companion.preflight import (
     stream_checks,
     vehicle_checks,
 )
-from companion.preflight.all_checks import blocking, overall_result, run_checks
+from companion.preflight.all_checks import blocking_findings, overall_result, run_checks
 from companion.preflight.evidence import Evidence, Identity, LinkQuality, OtherNodes, SampleTimes
 from companion.preflight.finding import Key
 from companion.preflight.parameter_survey import Survey
@@ -65,11 +65,11 @@ GOOD = Evidence(
         "HOME_POSITION": StreamRate(1.0, 1.0, 0.0),
     },
     received_counts={"ATTITUDE_QUATERNION": 900, "LOCAL_POSITION_NED": 200, "HOME_POSITION": 1},
-    window=1.0,
+    counting_time=1.0,
     link=QUALITY,
     samples=SampleTimes(200, 0.006, 0, 1.0001),
     other_nodes=OtherNodes(),
-    resets=0,
+    reset_count=0,
     identity=Identity("1.18.0", ATTITUDE_TARGET_CAPABILITY, "00ab"),
 )
 TIMES = {"lag_ms": 47.0, "dead_time_ms": 40.0, "identified": "a flight"}
@@ -88,14 +88,14 @@ def test_nothing_is_amiss_with_good_evidence():
 @pytest.mark.parametrize(
     ("quality", "key", "verdict"),
     [
-        ({"lost": 15}, None, None),
-        ({"lost": 30}, Key.LOSS, INEFFECTIVE),
-        ({"lost": 400}, Key.LOSS, UNSAFE),
-        ({"damaged": 9}, None, None),
-        ({"damaged": 11}, Key.DAMAGE, INEFFECTIVE),
-        ({"not_finite": 1}, Key.NOT_FINITE, INEFFECTIVE),
-        ({"reconnects": 1}, Key.RECONNECTS, UNSAFE),
-        ({"frames": 0}, None, None),
+        ({"lost_count": 15}, None, None),
+        ({"lost_count": 30}, Key.LOSS, INEFFECTIVE),
+        ({"lost_count": 400}, Key.LOSS, UNSAFE),
+        ({"damaged_count": 9}, None, None),
+        ({"damaged_count": 11}, Key.DAMAGE, INEFFECTIVE),
+        ({"not_finite_count": 1}, Key.NOT_FINITE, INEFFECTIVE),
+        ({"reconnect_count": 1}, Key.RECONNECTS, UNSAFE),
+        ({"frame_count": 0}, None, None),
     ],
 )
 def test_what_is_lost_on_the_way(quality, key, verdict):
@@ -212,7 +212,7 @@ def test_a_rate_below_the_requested_one_that_is_safe_says_why():
         **GOOD.streams,  # 197 Hz of 250; 50 of 50; a HOME_POSITION, which did not come
         "CURRENT_MODE": StreamRate(20.0, 20.0, 2.0),
     }
-    evidence = replace(GOOD, streams=streams, window=4.0)
+    evidence = replace(GOOD, streams=streams, counting_time=4.0)
     evidence = replace(evidence, received_counts={**GOOD.received_counts, "CURRENT_MODE": 8})
     (finding,) = stream_checks.streams(CONFIG, evidence)
     assert finding.result is CheckResult.SAFE
@@ -289,7 +289,7 @@ def test_a_vehicle_without_a_position_yet_is_not_ready_and_nothing_else(readines
     evidence = without_position(readiness)
     findings = run_checks(CONFIG, evidence)
     assert amiss(findings) == {Key.READY: NOT_READY}
-    assert [finding.key for finding in blocking(CONFIG, findings)] == [Key.READY]
+    assert [finding.key for finding in blocking_findings(CONFIG, findings)] == [Key.READY]
     assert overall_result(CONFIG, findings) is NOT_READY
     fenced = changed(CONFIG, {"safety": {"fence_polygon_deg": SQUARE}}, "test")
     assert amiss(run_checks(fenced, evidence)) == {Key.READY: NOT_READY, Key.FENCE: NOT_READY}
@@ -343,7 +343,7 @@ def test_a_fence_on_the_map_must_have_the_vehicle_inside(place, verdict):
 
 
 def test_an_estimate_that_jumps_and_an_autopilot_that_does_not_say_what_it_is():
-    assert found(vehicle_checks.estimator, replace(GOOD, resets=2)) == {
+    assert found(vehicle_checks.estimator, replace(GOOD, reset_count=2)) == {
         Key.ESTIMATOR_RESETS: INEFFECTIVE
     }
     for identity in (Identity(), Identity("1.0.0", 0, None)):
@@ -359,15 +359,15 @@ def test_silence_about_all_parameters_or_the_vital_ones_is_unsafe():
     assert without == {"GUID_OPTIONS": UNSAFE, "ATC_ANGLE_BOOST": UNSAFE}
 
 
-LOSSY_LINK = {"link": QUALITY._replace(lost=30)}
+LOSSY_LINK = {"link": QUALITY._replace(lost_count=30)}
 LOSSY_SURVEY = {"survey": GOOD.survey._replace(lossy=True)}
 
 
 def untold(*names, autopilot=PX4, values=GOOD.survey.values, **link):
     """What is found where the link lost what it was told of these."""
     evidence = replace(GOOD, autopilot=autopilot, **link)
-    read = evidence.survey._replace(values=values, names={name: name for name in values})
-    return found(parameters, replace(evidence, survey=read._replace(unread=frozenset(names))))
+    read = evidence.survey._replace(values=values, present_names={name: name for name in values})
+    return found(parameters, replace(evidence, survey=read._replace(unread_names=frozenset(names))))
 
 
 @pytest.mark.parametrize("link", [LOSSY_LINK, LOSSY_SURVEY])
@@ -408,7 +408,7 @@ def test_a_parameter_that_is_no_number_is_told_and_nothing_is_proposed():
 
 def test_a_change_is_proposed_under_the_name_that_this_autopilot_knows():
     old = Survey({"MAV_GCS_SYSID": 1.0, "FS_GCS_ENABLE": 1.0}, {"MAV_GCS_SYSID": "SYSID_MYGCS"})
-    old = old._replace(names={**old.names, "FS_GCS_ENABLE": "FS_GCS_ENABLE"})
+    old = old._replace(present_names={**old.present_names, "FS_GCS_ENABLE": "FS_GCS_ENABLE"})
     evidence = replace(GOOD, autopilot=ARDUPILOT, survey=old)
     (finding,) = (f for f in parameters(CONFIG, evidence) if f.key == "MAV_GCS_SYSID")
     assert finding.change[:3] == ("SYSID_MYGCS", 1.0, 255.0)
@@ -444,12 +444,14 @@ def _write_dead_time(folder, roll, gain=CONFIG.planner.gain_per_s, uid=GOOD.iden
 
 
 def test_an_exception_lets_one_finding_pass_and_no_other():
-    evidence = replace(GOOD, survey=Survey({"COM_OF_LOSS_T": 5.0}, GOOD.survey.names))
+    evidence = replace(GOOD, survey=Survey({"COM_OF_LOSS_T": 5.0}, GOOD.survey.present_names))
     evidence = replace(evidence, link=QUALITY._replace(round_trip=0.5))
     accepting = changed(CONFIG, {"flight": {"accept": ("COM_OF_LOSS_T",)}}, "test")
-    refused = [finding.key for finding in blocking(accepting, run_checks(accepting, evidence))]
+    refused = [
+        finding.key for finding in blocking_findings(accepting, run_checks(accepting, evidence))
+    ]
     assert refused == [Key.ROUND_TRIP]
-    assert len(blocking(CONFIG, run_checks(CONFIG, evidence))) == 2
+    assert len(blocking_findings(CONFIG, run_checks(CONFIG, evidence))) == 2
 
 
 def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
@@ -468,7 +470,7 @@ def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
 
 def test_px4_is_not_expected_to_divide_thrust_by_the_cosine_of_the_tilt():
     config = changed(CONFIG, {"thrust": {"autopilot_compensates_tilt": True}}, "test")
-    (found,) = blocking(config, run_checks(config, GOOD))
+    (found,) = blocking_findings(config, run_checks(config, GOOD))
     assert found.key == Key.TILT_COMPENSATION
     assert list(configuration_checks.tilt_compensation(CONFIG, GOOD)) == []
     other = replace(GOOD, autopilot=ARDUPILOT)

@@ -68,7 +68,7 @@ def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
                 vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
                 await until(lambda: link.state.reset_counter == 9)
                 assert not listener.other_nodes.target_is_foreign
-                assert listener.resets == 2
+                assert listener.reset_count == 2
                 vehicle.send(heartbeat(), target(0.4), odometry(9))
                 await until(lambda: listener.other_nodes.target_is_foreign)
 

@@ -7,7 +7,7 @@ import pytest
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.config.known_drag import KnownDrag
-from companion.flight.maneuvers import configured_maneuvers, not_begun
+from companion.flight.maneuvers import configured_maneuvers, fresh_copy
 from companion.preflight.finding import Key
 from companion.preflight.offboard_loss import offboard_loss
 from companion.preflight.parameter_survey import Survey
@@ -113,7 +113,7 @@ def test_a_trajectory_is_weighed_without_being_begun():
     )
     flown = configured_maneuvers(config)
     duration = flown.duration
-    evidence = replace(GOOD, maneuvers=not_begun(flown))
+    evidence = replace(GOOD, maneuvers=fresh_copy(flown))
     (finding,) = offboard_loss(config, evidence)
     assert "carry the vehicle" in finding.found
     assert flown.duration == duration

@@ -111,7 +111,7 @@ def test_on_a_good_link_what_gets_no_answer_is_not_asked_for_once_more():
     """An older PX4 says nothing of what it has not, and that must not cost time twice."""
     vehicle = Lossy({})
     read = vehicle.survey()
-    assert (set(read.values), read.unread, read.lossy) == (
+    assert (set(read.values), read.unread_names, read.lossy) == (
         set(Lossy.VALUES),
         {"MAN_OVERRIDE_SPD"},
         False,
@@ -123,7 +123,7 @@ def test_where_a_question_was_lost_the_others_are_asked_for_once_more_after_all(
     vehicle = Lossy({"COM_OF_LOSS_T": 1, "COM_OBL_RC_ACT": 4})
     read = vehicle.survey()
     assert read.values == {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 1.0}
-    assert (read.unread, read.lossy) == ({"MAN_OVERRIDE_SPD"}, True)
+    assert (read.unread_names, read.lossy) == ({"MAN_OVERRIDE_SPD"}, True)
     assert vehicle.asked.count("COM_OF_LOSS_T") == 2
     assert vehicle.asked.count("COM_OBL_RC_ACT") == 2 + 3
 
@@ -137,7 +137,7 @@ def test_where_the_vehicles_frames_are_lost_they_are_too():
 def test_what_the_autopilot_says_it_has_not_is_neither_untold_nor_asked_for_again():
     vehicle = Lossy({"COM_OF_LOSS_T": 1, "COM_OBL_RC_ACT": 9}, says_no=True)
     read = vehicle.survey()
-    assert (read.unread, read.lossy) == ({"COM_OBL_RC_ACT"}, True)
+    assert (read.unread_names, read.lossy) == ({"COM_OBL_RC_ACT"}, True)
     assert vehicle.asked.count("MAN_OVERRIDE_SPD") == 1
     assert vehicle.asked.count("COM_OBL_RC_ACT") == 2 + 3  # and no more: it is bounded
 
@@ -145,5 +145,5 @@ def test_what_the_autopilot_says_it_has_not_is_neither_untold_nor_asked_for_agai
 def test_who_answers_nothing_is_not_asked_for_long():
     vehicle = Lossy(dict.fromkeys(Lossy.VALUES, 99), gaps=True)
     read = vehicle.survey()
-    assert (read.values, len(read.unread)) == ({}, 3)
+    assert (read.values, len(read.unread_names)) == ({}, 3)
     assert len(vehicle.asked) == 3 * 2

@@ -15,7 +15,7 @@ from companion.safety import (
     link_judges,
     motion_judges,
 )
-from companion.safety.actions import Exit, FlightEnded, Stream
+from companion.safety.actions import Exit, FlightEnded, StreamEffect
 from companion.safety.link_judges import silence
 from companion.safety.monitor import Monitor
 from companion.safety.motion_judges import braking
@@ -239,7 +239,7 @@ def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_
     at_the_limit = Snapshot(0.3, control=Control(last_answer=-1.0, last_heard=0.0))
     assert silence(0.5, heard=False)(at_the_limit, False)
     verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
-    assert (verdict.action, verdict.stream) == (Action.LISTEN, Stream.STOPS)
+    assert (verdict.action, verdict.stream) == (Action.LISTEN, StreamEffect.STOPS)
 
 
 def test_it_brakes_in_time_before_a_fence_on_the_map():

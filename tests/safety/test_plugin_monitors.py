@@ -9,7 +9,7 @@ from companion.cli.main import main
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.safety import Action, SafetyLadder, monitors
-from companion.safety.actions import Stream
+from companion.safety.actions import StreamEffect
 from companion.safety.snapshot import AutopilotStatus, Motion, Snapshot
 from companion.testing import fly
 from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
@@ -19,7 +19,7 @@ CODE = """
 
 import asyncio
 import sys
-from companion.safety.actions import Stream
+from companion.safety.actions import StreamEffect
 
 def made(config, judge, action=Action.WARN, **rest):
     return Monitor("theirs", judge, action, **rest)
@@ -45,7 +45,7 @@ def blocking(config):
     return made(config, judge)
 
 def silent(config):
-    return made(config, lambda snapshot, raised: None, stream=Stream.STOPS)
+    return made(config, lambda snapshot, raised: None, stream=StreamEffect.STOPS)
 
 def slow(config):
     return made(config, lambda snapshot, raised: wait())
@@ -168,7 +168,7 @@ def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
 
 def test_it_can_only_choose_among_the_actions():
     (row,) = (each for each in monitors(configured("silent")) if each.name == "silent")
-    assert (row.action, row.stream) == (Action.WARN, Stream.CONTINUES)
+    assert (row.action, row.stream) == (Action.WARN, StreamEffect.CONTINUES)
     ours = monitors(Config())
     beside = monitors(configured("silent"))[: len(ours)]
     assert [each.name for each in beside] == [each.name for each in ours]

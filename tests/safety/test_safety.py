@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
-from companion.safety.actions import Stream
+from companion.safety.actions import StreamEffect
 from companion.safety.counter_window import CounterWindow
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import AutopilotStatus, Control, Health, Motion, Resets, Snapshot
@@ -213,12 +213,12 @@ def test_what_the_rows_of_the_table_say_besides_action_and_time():
     assert {row.name: row.calm for row in table} == {
         row.name: calm.get(row.name, 1.0) for row in table
     }
-    assert [row.name for row in table if row.stream is Stream.STOPS] == [
+    assert [row.name for row in table if row.stream is StreamEffect.STOPS] == [
         "unheard",
         "silence",
         "clock",
     ]
-    assert [row.name for row in table if row.stream is Stream.ENDS] == [
+    assert [row.name for row in table if row.stream is StreamEffect.ENDS] == [
         "late setpoints",
         "lost setpoints",
     ]
@@ -295,9 +295,9 @@ def test_an_action_can_be_set_but_not_everywhere_to_a_warning():
 
 def test_in_silence_nothing_is_sent_any_more():
     verdict, _ = Climb().see(control(**SILENT), 0.0)
-    assert verdict.stream is Stream.STOPS
+    assert verdict.stream is StreamEffect.STOPS
     verdict, _ = Climb().see(autopilot(landed=True), 0.0)
-    assert verdict.stream is Stream.CONTINUES
+    assert verdict.stream is StreamEffect.CONTINUES
 
 
 L_SHAPE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, -1.0), (1.0, -1.0), (1.0, -10.0))

@@ -36,7 +36,7 @@ class Flight:
             position_count=0,
             gps_was_good=True,
         )
-        self.clock = SimpleNamespace(changes=2, last_change="it jumped")
+        self.clock = SimpleNamespace(change_count=2, last_change="it jumped")
         self.stats = SimpleNamespace(frames=0, lost=0, non_finite_at={})
         link = SimpleNamespace(
             state=self.state,
@@ -152,7 +152,7 @@ def test_before_control_begins_everything_counts_from_the_start_of_the_clock():
     assert flight.builder.fence_centre_ned is None
     assert told.control.last_heard == 0.0
     assert told.control.clock_change == "it jumped"
-    flight.clock.changes = 0
+    flight.clock.change_count = 0
     assert flight.snapshot(4.0).control.clock_change is None
     assert told.health.gaps == 1
     assert told.resets[:3] == (1, pytest.approx(14.0**0.5), 3.0)
@@ -182,7 +182,7 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     assert (told.last_position, told.last_heard) == (9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
     assert told.stall_time == pytest.approx(0.17)
-    flight.clock.changes = 3
+    flight.clock.change_count = 3
     assert flight.snapshot().control.clock_change == "it jumped"
     assert flight.counted == [(3, now) for now in (10.0, 10.02, 10.04, 10.24)]
 

@@ -143,7 +143,7 @@ def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path,
         assert "gain_per_s: 4.9" in (folder / "config.yaml").read_text()
         (change,) = changes.made_in_flight
         assert change.keys[0].after == 4.8
-        assert changes.at_flight_start.planner.gain_per_s == 4.9
+        assert changes.config_at_flight_start.planner.gain_per_s == 4.9
 
     asyncio.run(scene())
 

@@ -88,7 +88,7 @@ def test_a_family_is_complete(autopilot):
 
 @EVERY_AUTOPILOT
 def test_it_is_ready_only_when_nothing_is_missing(autopilot):
-    assert autopilot.not_ready(GOOD) is None
+    assert autopilot.why_not_ready(GOOD) is None
     for missing, told in (
         ({"prearm_passed": False}, "the autopilot's pre-arm checks"),
         ({"prearm_passed": None}, "the autopilot's pre-arm checks"),
@@ -98,13 +98,13 @@ def test_it_is_ready_only_when_nothing_is_missing(autopilot):
         ({"has_position": False}, "a local position (LOCAL_POSITION_NED)"),
         ({"has_home": False}, "the home position (HOME_POSITION)"),
     ):
-        assert autopilot.not_ready(GOOD._replace(**missing)).startswith(told)
+        assert autopilot.why_not_ready(GOOD._replace(**missing)).startswith(told)
 
 
 def test_ardupilot_is_not_ready_with_a_position_it_only_assumes():
     """Before it uses GPS; the pre-arm checks of STABILIZE are good by then."""
-    assert "0xa7" in ARDUPILOT.not_ready(GOOD._replace(estimator_flags=0xA7))
-    assert "0x3bf" in ARDUPILOT.not_ready(GOOD._replace(estimator_flags=0x3BF))
+    assert "0xa7" in ARDUPILOT.why_not_ready(GOOD._replace(estimator_flags=0xA7))
+    assert "0x3bf" in ARDUPILOT.why_not_ready(GOOD._replace(estimator_flags=0x3BF))
 
 
 def test_other_autopilots_and_vehicles_are_refused():

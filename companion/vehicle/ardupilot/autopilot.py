@@ -99,10 +99,10 @@ class ArduPilot:
         """DO_SET_MODE with the mode's number. Raises `KeyError` for an unknown name."""
         return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(self.modes[name]))
 
-    def not_ready(self, readiness: Readiness) -> str | None:
+    def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: estimator, position, home or ArduPilot's own pre-arm checks.
 
-        ArduPilot boots in STABILIZE, whose pre-arm checks need no position, and GUIDED needs one.
+        ArduPilot boots in STABILIZE, whose pre-arm checks need no position, but GUIDED needs one.
         """
         flags = readiness.estimator_flags
         if flags is None:
@@ -118,21 +118,21 @@ class ArduPilot:
         return None
 
     def arm(self) -> tuple[Command, ...]:
-        """Enter GUIDED, then arm with all of GUIDED's checks."""
+        """Commands that enter GUIDED, then arm with all of GUIDED's checks."""
         return self.set_mode("GUIDED"), Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def disarm(self) -> Command:
-        """Disarm on the ground; ArduPilot refuses this in the air."""
+        """Command that disarms on the ground; ArduPilot refuses it in the air."""
         return Command(MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
-        """Take off here, to a height above home (m)."""
+        """Command that takes off here, to a height above home (m)."""
         return Command(MAV_CMD_NAV_TAKEOFF, p7=height_m)
 
     def hold(self) -> Command:
-        """Enter BRAKE, which stops and holds; LOITER would follow the transmitter's sticks."""
+        """Command for BRAKE, which stops and holds; LOITER would follow the pilot's sticks."""
         return self.set_mode("BRAKE")
 
     def land(self) -> Command:
-        """Land here."""
+        """Command that lands here."""
         return self.set_mode("LAND")

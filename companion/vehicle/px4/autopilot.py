@@ -117,7 +117,7 @@ class Px4:
         main, sub = number >> 16 & 0xFF, number >> 24 & 0xFF
         return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(main), float(sub))
 
-    def not_ready(self, readiness: Readiness) -> str | None:
+    def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: position, estimator, home or PX4's own pre-arm checks."""
         if not readiness.has_position:
             return "a local position (LOCAL_POSITION_NED)"
@@ -132,22 +132,22 @@ class Px4:
         return None
 
     def arm(self) -> tuple[Command, ...]:
-        """Enter AUTO.LOITER, then arm with all checks."""
+        """Commands that enter AUTO.LOITER, then arm with all checks."""
         return (self.hold(), Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0))
 
     def disarm(self) -> Command:
-        """Disarm on the ground; PX4 refuses this in the air."""
+        """Command that disarms on the ground; PX4 refuses it in the air."""
         return Command(MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
-        """Take off here, to a height above home (m), keeping the heading: NaN means no change."""
+        """Command that takes off here, to a height above home (m), and keeps the heading (NaN)."""
         altitude = home_altitude_m + height_m
         return Command(MAV_CMD_NAV_TAKEOFF, p4=nan, p5=nan, p6=nan, p7=altitude)
 
     def hold(self) -> Command:
-        """Enter AUTO.LOITER."""
+        """Command that enters AUTO.LOITER."""
         return self.set_mode("AUTO.LOITER")
 
     def land(self) -> Command:
-        """Land here, keeping the heading."""
+        """Command that lands here and keeps the heading."""
         return Command(MAV_CMD_NAV_LAND, p4=nan, p5=nan, p6=nan)
