@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.attitude import Coefficients
-from companion.drag import ROUND, AxisDrag, Drag
+from companion.drag import ROUND_BODY, AxisDrag, Drag
 from companion.guidance import (
     GRAVITY,
     IMMEDIATE,
@@ -58,7 +58,7 @@ def circling(time):
     )
 
 
-def flown(settings, reference_at, seconds, wind=REST, start=None, has=ROUND, told=ROUND):
+def flown(settings, reference_at, seconds, wind=REST, start=None, has=ROUND_BODY, told=ROUND_BODY):
     """(S, 2) position errors of a point mass whose coefficients follow the inner response.
 
     It `has` a drag along its axes; guidance is `told` of another.
@@ -103,7 +103,7 @@ def test_drag_along_the_axes_is_fed_forward():
     has = AxisDrag(0.06, 0.4)
     known, unknown = (
         np.hypot(*flown(SETTINGS, circling, 12.0, has=has, told=told)[-3000:].T).max()
-        for told in (has, ROUND)
+        for told in (has, ROUND_BODY)
     )
     assert known <= 0.012
     assert unknown >= 3.0 * known
