@@ -131,7 +131,7 @@ class Stubborn:
 
 def test_a_mock_vehicle_that_does_not_end_is_killed(tmp_path):
     process = Stubborn()
-    demo._end(process, tmp_path / "mock.log")
+    demo._end_vehicle(process, tmp_path / "mock.log")
     assert process.done == ["terminate", "kill", "wait"]
 
 

@@ -86,7 +86,7 @@ def test_a_stream_that_lost_its_port_is_noted_and_the_flight_goes_on(monkeypatch
             )
         )  # fmt: skip
         with started(foxglove="127.0.0.1:0") as helper:
-            assert environment(helper).stream == helper.feed.send
+            assert environment(helper).send_batch == helper.feed.send
             note = noted(helper)
     assert note.startswith("there is no live stream: ")
     assert note.endswith("; the flight goes on without it")
