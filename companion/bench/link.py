@@ -53,9 +53,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     """Measure all programs, in interleaved rounds of about 1 s.
 
     Args:
-        seconds: Time for which each program is measured, s.
-        rate_hz: Rate of the attitude samples, Hz.
-        as_json: Print nothing; the caller prints the result.
+        seconds: time for which each program is measured, s.
+        rate_hz: rate of the attitude samples, Hz.
+        as_json: print nothing; the caller prints the result.
 
     Returns:
         For each of `echo`, `companion`, `pymavlink`, `companion_mavsdk` and `mavsdk`: `p50_us`,
@@ -66,7 +66,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     Raises:
         MissingExtraError: MAVSDK is not installed.
         BenchmarkError: A program failed.
-        LinkError: There are no free ports.
+        LinkError: there are no free ports.
     """
     require("mavsdk", "mavsdk", "this benchmark")
     with ExitStack() as stack:

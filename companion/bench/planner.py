@@ -55,8 +55,8 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
     """Measure every planner that keeps no state, interleaved with the baselines.
 
     Args:
-        seconds: Duration of the measurement without compilation, s; at least one round is measured.
-        as_json: Print nothing; the caller prints the result.
+        seconds: duration of the measurement without compilation, s; at least one round is measured.
+        as_json: print nothing; the caller prints the result.
 
     Returns:
         - `compiled`: whether numba compiled the batches.

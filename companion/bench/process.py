@@ -18,9 +18,9 @@ class BenchmarkedProgram:
     """A program that is measured, run as `python -m MODULE PORT …` in its own process.
 
     Args:
-        name: Name to show to users.
+        name: name to show to users.
         module: A module that listens on the UDP port given to it.
-        arguments: Further arguments of the module.
+        arguments: further arguments of the module.
     """
 
     def __init__(self, name: str, module: str, *arguments: str) -> None:

@@ -41,16 +41,16 @@ class Sender:
     """Simulates one vehicle for one program.
 
     Args:
-        program: The program that answers; `close` stops it.
-        read_stamp: Reads from a setpoint the time stamp of its sample.
-        modulus: Value at which the time stamps in setpoints wrap, ms.
-        extra_messages: Messages that follow each sample, each in a datagram of its own.
+        program: the program that answers; `close` stops it.
+        read_stamp: reads from a setpoint the time stamp of its sample.
+        modulus: value at which the time stamps in setpoints wrap, ms.
+        extra_messages: messages that follow each sample, each in a datagram of its own.
 
     Attributes:
-        round_trips_ns: Times from sample to setpoint, ns.
-        sent_samples: Number of samples sent in measured rounds.
-        cpu_ns: Processor time of the program in measured rounds, ns.
-        wall_ns: Duration of the measured rounds, ns.
+        round_trips_ns: times from sample to setpoint, ns.
+        sent_samples: number of samples sent in measured rounds.
+        cpu_ns: processor time of the program in measured rounds, ns.
+        wall_ns: duration of the measured rounds, ns.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Sender:
         """Send samples until the program answers one.
 
         Raises:
-            BenchmarkError: The program ended, or did not answer within 30 s.
+            BenchmarkError: the program ended, or did not answer within 30 s.
         """
         deadline = time.monotonic() + _READY_TIMEOUT_S
         heartbeat_due = 0.0
@@ -122,7 +122,7 @@ class Sender:
         """Send samples at `rate_hz` for `seconds`, and record the round trips.
 
         Raises:
-            BenchmarkError: The program ended.
+            BenchmarkError: the program ended.
         """
         self._program.check_running()
         self.send_heartbeat()

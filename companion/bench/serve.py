@@ -40,9 +40,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     """Measure with and without clients, in interleaved rounds of about 1 s.
 
     Args:
-        seconds: Time of each of the two measurements, s.
-        rate_hz: Rate of the attitude samples and of each of five telemetry messages, Hz.
-        as_json: Print nothing; the caller prints the result.
+        seconds: time of each of the two measurements, s.
+        rate_hz: rate of the attitude samples and of each of five telemetry messages, Hz.
+        as_json: print nothing; the caller prints the result.
 
     Returns:
         `alone`, `with_clients`: figures like those of a program in `companion bench link`;
@@ -51,7 +51,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
     Raises:
         BenchmarkError: A program failed.
-        LinkError: There are no free ports.
+        LinkError: there are no free ports.
     """
     with ExitStack() as stack:
         ports = {key: free_port() for key in _TITLES}

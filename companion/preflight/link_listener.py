@@ -34,11 +34,11 @@ class LinkListener:
     """Collects what comes over the link while its `with` block runs.
 
     Args:
-        link: Link to listen on. The block replaces its `on_foreign`.
-        clock: Our clock, s.
+        link: link to listen on. The block replaces its `on_foreign`.
+        clock: our clock, s.
 
     Attributes:
-        reset_count: Number of estimator resets, counted by ODOMETRY's `reset_counter`.
+        reset_count: number of estimator resets, counted by ODOMETRY's `reset_counter`.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:

@@ -39,10 +39,10 @@ class WorstReach(NamedTuple):
     """How far the vehicle can be carried if our setpoints stop at any moment of the maneuvers.
 
     Attributes:
-        largest_distance, climb, fall: Largest horizontal distance, climb and fall after the
+        largest_distance, climb, fall: largest horizontal distance, climb and fall after the
             setpoints stop, m.
-        breach: The first breach of the fence, as the end of a sentence; `None`: no breach.
-        time: When setpoints must stop to cause `breach`, s after control begins.
+        breach: the first breach of the fence, as the end of a sentence; `None`: no breach.
+        time: when setpoints must stop to cause `breach`, s after control begins.
     """
 
     largest_distance: float = 0.0
@@ -114,10 +114,10 @@ def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str
     """The breach of the fence at a place that the vehicle can reach after the setpoints stop.
 
     Args:
-        config: Configuration of the flight.
-        offset: Position when the setpoints stop, relative to where control began, m NED.
-        reached: How far the vehicle can be carried from there.
-        fence: The fence.
+        config: configuration of the flight.
+        offset: position when the setpoints stop, relative to where control began, m NED.
+        reached: how far the vehicle can be carried from there.
+        fence: the fence.
 
     Returns:
         The breach, as the end of a sentence; `None`: none.

@@ -51,12 +51,12 @@ class UndoFile:
     """The undo file: stores each parameter's old value before that parameter is set.
 
     Args:
-        directory: Folder for the file.
-        link: Link to the vehicle.
-        identity: The vehicle's AUTOPILOT_VERSION.
+        directory: folder for the file.
+        link: link to the vehicle.
+        identity: the vehicle's AUTOPILOT_VERSION.
 
     Attributes:
-        path: The file; it does not exist before the first `add`.
+        path: the file; it does not exist before the first `add`.
     """
 
     def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
@@ -139,16 +139,16 @@ async def apply_fixes(
     """Propose each change, and make those that the user accepts.
 
     Args:
-        link: Link to the vehicle.
-        findings: The findings; those without a change are skipped.
-        ask: Asks the user before each change, until the answer is ALL.
-        undo: Stores the old value before it is overwritten.
-        report: Called with the outcome of each accepted change.
+        link: link to the vehicle.
+        findings: the findings; those without a change are skipped.
+        ask: asks the user before each change, until the answer is ALL.
+        undo: stores the old value before it is overwritten.
+        report: called with the outcome of each accepted change.
 
     Raises:
-        VehicleArmedError: The vehicle is armed or may be armed; nothing more was set.
-        ConfigError: The undo file cannot be written; nothing more was set.
-        LinkLost: The connection was lost.
+        VehicleArmedError: the vehicle is armed or may be armed; nothing more was set.
+        ConfigError: the undo file cannot be written; nothing more was set.
+        LinkLost: the connection was lost.
     """
     answer = Answer.NO
     for finding in findings:
@@ -170,13 +170,13 @@ async def restore(link: Link, undo: Undo, report: Callable[[ChangeOutcome], None
     """Restore the values of the undo file, the last change first.
 
     Args:
-        link: Link to the vehicle.
-        undo: Contents of the undo file.
-        report: Called with the outcome of each parameter.
+        link: link to the vehicle.
+        undo: contents of the undo file.
+        report: called with the outcome of each parameter.
 
     Raises:
-        VehicleArmedError: The vehicle is armed or may be armed; nothing more was set.
-        LinkLost: The connection was lost.
+        VehicleArmedError: the vehicle is armed or may be armed; nothing more was set.
+        LinkLost: the connection was lost.
     """
     for parameter, old in reversed(undo.parameters.items()):
         require_disarmed(link)
@@ -194,7 +194,7 @@ def require_disarmed(link: Link) -> None:
     """Raise unless the vehicle is known to be disarmed.
 
     Raises:
-        VehicleArmedError: The vehicle is armed, or its last heartbeat is too old.
+        VehicleArmedError: the vehicle is armed, or its last heartbeat is too old.
     """
     heartbeat, now = link.state.heartbeat, asyncio.get_running_loop().time()
     if heartbeat is None or now - heartbeat.received > _MAX_HEARTBEAT_AGE:

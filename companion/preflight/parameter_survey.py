@@ -63,15 +63,15 @@ async def survey(
     parameter was answered. Without losses, no answer means that the autopilot lacks the parameter.
 
     Args:
-        link: Link to the vehicle.
-        rules: Rules of its autopilot.
-        earlier_survey: Survey of the same vehicle. Parameters without a value in it are not
+        link: link to the vehicle.
+        rules: rules of its autopilot.
+        earlier_survey: survey of the same vehicle. Parameters without a value in it are not
             requested again, because each costs seconds on a link that loses frames.
-        first_round: Policy of the first round of requests.
-        second_round: Policy of the second round.
+        first_round: policy of the first round of requests.
+        second_round: policy of the second round.
 
     Raises:
-        LinkLost: The connection was lost.
+        LinkLost: the connection was lost.
     """
     rules, requests = tuple(rules), _Requests(link)
     unread: frozenset[str] = frozenset()
@@ -100,7 +100,7 @@ class _Requests:
     """The parameter requests to a vehicle, and its answers.
 
     Attributes:
-        values, present_names: See `Survey`.
+        values, present_names: see `Survey`.
     """
 
     def __init__(self, link: Link) -> None:

@@ -57,16 +57,16 @@ async def gather(
     """Listen for `seconds`, and read the parameters at the same time.
 
     Args:
-        link: Link to a vehicle whose heartbeat was received.
-        granted: The message rates that were requested and granted, by message.
-        seconds: Time for counting messages, s.
-        stage: The next step of the vehicle.
-        prearm_checks: Also run the autopilot's pre-arm checks, so that it says what forbids arming.
-        notices: Notices of the link; they are read at the end.
-        earlier_survey: The same vehicle's parameters, if they were read before.
+        link: link to a vehicle whose heartbeat was received.
+        granted: the message rates that were requested and granted, by message.
+        seconds: time for counting messages, s.
+        stage: the next step of the vehicle.
+        prearm_checks: also run the autopilot's pre-arm checks, so that it says what forbids arming.
+        notices: notices of the link; they are read at the end.
+        earlier_survey: the same vehicle's parameters, if they were read before.
 
     Raises:
-        LinkLost: The connection was lost.
+        LinkLost: the connection was lost.
     """
     loop = asyncio.get_running_loop()
     before, began = replace(link.stats), loop.time()
@@ -104,7 +104,7 @@ async def request_identity(link: Link) -> Identity:
     """Request AUTOPILOT_VERSION; return an empty `Identity` if it does not come.
 
     Raises:
-        LinkLost: The connection was lost.
+        LinkLost: the connection was lost.
     """
     try:
         received = await link.request_message("AUTOPILOT_VERSION")
@@ -147,9 +147,9 @@ class PreflightSession:
     """Checks one vehicle over an open link.
 
     Args:
-        config: Configuration of the flight.
-        link: Link to the vehicle.
-        notices: Notices of the link.
+        config: configuration of the flight.
+        link: link to the vehicle.
+        notices: notices of the link.
     """
 
     def __init__(self, config: Config, link: Link, notices: Sequence[str]) -> None:
@@ -160,7 +160,7 @@ class PreflightSession:
         """Wait for the heartbeat; return findings only if further checks are impossible.
 
         Raises:
-            LinkLost: The connection was lost.
+            LinkLost: the connection was lost.
         """
         try:
             await self.link.wait_connected(self._config.flight.connect_timeout_s)
@@ -192,8 +192,8 @@ class PreflightSession:
         """Request telemetry, wait up to `ready_within` s for readiness, and listen.
 
         Raises:
-            CommandTimeout: The vehicle does not answer commands; see `unanswered_findings`.
-            LinkLost: The connection was lost; see `unanswered_findings`.
+            CommandTimeout: the vehicle does not answer commands; see `unanswered_findings`.
+            LinkLost: the connection was lost; see `unanswered_findings`.
         """
         link = self.link
         granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
@@ -217,8 +217,8 @@ async def open_session(
     """Open the link. Until the session requests something, we send only heartbeats and TIMESYNC.
 
     Args:
-        config: Configuration of the flight.
-        make_link: Makes the link; its argument takes the link's notices.
+        config: configuration of the flight.
+        make_link: makes the link; its argument takes the link's notices.
 
     Raises:
         EndpointError: the endpoint cannot be opened.

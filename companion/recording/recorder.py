@@ -40,7 +40,7 @@ class FlightRecorder(BackgroundFile[Entry]):
 
     Args:
         path: file that `open` creates.
-        epoch: Unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
+        epoch: unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
         clock: clock of the flight, s.
         on_failure: see `BackgroundFile`.
         on_bad_entry: called with a message, from the writing thread, at the first entry that cannot

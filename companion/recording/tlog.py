@@ -26,7 +26,7 @@ class TlogWriter(BackgroundFile[TimedFrame]):
 
     Args:
         path: file that `open` creates.
-        epoch: Unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
+        epoch: unix time at which the flight's clock read 0, s; 0 if that clock is the vehicle's.
         on_failure: see `BackgroundFile`.
     """
 

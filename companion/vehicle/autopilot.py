@@ -83,25 +83,25 @@ class Autopilot(Protocol):
     for a while. It obeys a later setpoint again, unless a mode was commanded in between.
 
     Attributes:
-        name: Name to show to users, such as `PX4`.
+        name: name to show to users, such as `PX4`.
         mav_autopilot: MAV_AUTOPILOT number.
         modes: `custom_mode` of each mode that may be commanded, by name.
-        ready_mode: Name of the mode that a pilot who has armed enters to hand over control.
-        offboard_mode: Name of the mode in which the autopilot obeys setpoints.
-        control_entry: How the autopilot begins to obey setpoints.
-        bytewise_parameters: Whether integer parameters are sent as bytes; see
+        ready_mode: name of the mode that a pilot who has armed enters to hand over control.
+        offboard_mode: name of the mode in which the autopilot obeys setpoints.
+        control_entry: how the autopilot begins to obey setpoints.
+        bytewise_parameters: whether integer parameters are sent as bytes; see
             `companion.mavlink.parameters`.
-        wanted_rates: Messages that a flight needs, with the rate to request, Hz.
+        wanted_rates: messages that a flight needs, with the rate to request, Hz.
         interval_step_us: SET_MESSAGE_INTERVAL is rounded down to a whole multiple of this, us.
         rates_about_target_axes: True: body rates act about the axes of the attitude setpoint
             (ATTITUDE_TARGET), which leads the body. False: about the axes of the body.
-        body_yaw_is_relative: Whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
+        body_yaw_is_relative: whether a yaw in a body frame of SET_POSITION_TARGET_LOCAL_NED counts
             from the present yaw, not from north.
-        can_compensate_tilt: Whether the autopilot can divide thrust by cos(tilt) itself; a rule in
+        can_compensate_tilt: whether the autopilot can divide thrust by cos(tilt) itself; a rule in
             `parameters` then compares its setting with the configuration.
-        offboard_loss_failsafe: What the autopilot does when setpoints stop.
-        cannot_arm_in: Roles of the modes in which a disarmed vehicle cannot be armed.
-        parameters: Rules for the parameters that matter to a flight by body rates.
+        offboard_loss_failsafe: what the autopilot does when setpoints stop.
+        cannot_arm_in: roles of the modes in which a disarmed vehicle cannot be armed.
+        parameters: rules for the parameters that matter to a flight by body rates.
     """
 
     name: str
@@ -142,8 +142,8 @@ class Autopilot(Protocol):
         """Command by which the armed vehicle takes off from the ground.
 
         Args:
-            height_m: Height to reach, above home, m.
-            home_altitude_m: Altitude of home above mean sea level, m.
+            height_m: height to reach, above home, m.
+            home_altitude_m: altitude of home above mean sea level, m.
         """
 
     def hold(self) -> Command:

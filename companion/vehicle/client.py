@@ -23,17 +23,17 @@ class VehicleClient:
     """The part of a link that sends requests and subscribes to messages.
 
     Args:
-        settings: The endpoint, and the ids of the vehicle and of this program.
-        outbox: Sends the requests.
-        dispatcher: Delivers the messages received.
-        stats: Counters of the link.
-        clock: Returns the event-loop time, s.
-        vehicle_clock: Converts the time stamps of positions.
+        settings: the endpoint, and the ids of the vehicle and of this program.
+        outbox: sends the requests.
+        dispatcher: delivers the messages received.
+        stats: counters of the link.
+        clock: returns the event-loop time, s.
+        vehicle_clock: converts the time stamps of positions.
 
     Attributes:
-        settings: The endpoint, and the ids of the vehicle and of this program.
-        stats: Counters of the link.
-        state: The vehicle's telemetry.
+        settings: the endpoint, and the ids of the vehicle and of this program.
+        stats: counters of the link.
+        state: the vehicle's telemetry.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class VehicleClient:
         """The vehicle's autopilot.
 
         Raises:
-            NotConnected: No heartbeat of an autopilot that this program flies has come yet.
+            NotConnected: no heartbeat of an autopilot that this program flies has come yet.
         """
         if self.state.autopilot is None:
             raise NotConnected("no heartbeat yet; wait_connected() comes first")
@@ -71,7 +71,7 @@ class VehicleClient:
         """Call `callback` with each message of that name; return a function to unsubscribe.
 
         Raises:
-            UnknownMessage: The dialect has no such message.
+            UnknownMessage: the dialect has no such message.
         """
         return self._dispatcher.subscribe(name, callback)
 
@@ -89,9 +89,9 @@ class VehicleClient:
         """Send a MAV_CMD with up to seven parameters and wait until it is accepted.
 
         Raises:
-            CommandRefused: The autopilot refused; the error has its result and its texts.
-            CommandTimeout: No answer came after `retries` repetitions.
-            LinkLost: The connection dropped while waiting.
+            CommandRefused: the autopilot refused; the error has its result and its texts.
+            CommandTimeout: no answer came after `retries` repetitions.
+            LinkLost: the connection dropped while waiting.
         """
         await self._commands.send(command, params, timeout_s, retries)
 
@@ -99,11 +99,11 @@ class VehicleClient:
         """Request one message and return it.
 
         Raises:
-            UnknownMessage: The dialect has no such message.
-            CommandRefused: The autopilot refused the request.
-            CommandTimeout: The autopilot did not answer the request.
-            LinkTimeout: The autopilot accepted the request, but the message did not come.
-            LinkLost: The connection dropped while waiting.
+            UnknownMessage: the dialect has no such message.
+            CommandRefused: the autopilot refused the request.
+            CommandTimeout: the autopilot did not answer the request.
+            LinkTimeout: the autopilot accepted the request, but the message did not come.
+            LinkLost: the connection dropped while waiting.
         """
         with AnswerQueue[Message](self._registry) as answers:
             unsubscribe = self._dispatcher.subscribe(name, answers.put)
@@ -124,12 +124,12 @@ class VehicleClient:
         """Read a parameter of the autopilot.
 
         Raises:
-            NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
-            UnansweredParameter: No answer came; some autopilots do not answer for unknown names.
-            UnknownParameter: The autopilot answered that it has no such parameter, or the name is
+            NotConnected: no heartbeat has come yet, so the encoding of parameters is unknown.
+            UnansweredParameter: no answer came; some autopilots do not answer for unknown names.
+            UnknownParameter: the autopilot answered that it has no such parameter, or the name is
                 not 1 to 16 ASCII characters.
-            ParameterRefused: The autopilot answered with another error.
-            LinkLost: The connection dropped while waiting.
+            ParameterRefused: the autopilot answered with another error.
+            LinkLost: the connection dropped while waiting.
         """
         return await self._parameters.read(name, timeout_s, retries)
 
@@ -139,11 +139,11 @@ class VehicleClient:
         """Write a parameter in its own type, and return the value that it then has.
 
         Raises:
-            NotConnected: No heartbeat has come yet, so the encoding of parameters is unknown.
-            UnansweredParameter, UnknownParameter: As for `read_parameter`.
-            ParameterRefused: The value does not fit the type, or the autopilot keeps another value
+            NotConnected: no heartbeat has come yet, so the encoding of parameters is unknown.
+            UnansweredParameter, UnknownParameter: as for `read_parameter`.
+            ParameterRefused: the value does not fit the type, or the autopilot keeps another value
                 or answered with an error.
-            LinkLost: The connection dropped while waiting.
+            LinkLost: the connection dropped while waiting.
         """
         return await self._parameters.write(name, value, timeout_s, retries)
 
@@ -153,10 +153,10 @@ class VehicleClient:
         """Request message rates in Hz (0 stops a message), then count arrivals for `window_s`.
 
         Raises:
-            NotConnected: No heartbeat has come yet.
+            NotConnected: no heartbeat has come yet.
             UnknownMessage: A name is not in the dialect; nothing was sent.
-            CommandTimeout: The autopilot did not answer a request.
-            LinkLost: The connection dropped while waiting.
+            CommandTimeout: the autopilot did not answer a request.
+            LinkLost: the connection dropped while waiting.
         """
         step_us = self.autopilot.interval_step_us
         return await set_rates(self._commands, self.stats, rates, window_s, step_us)

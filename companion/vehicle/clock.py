@@ -38,16 +38,16 @@ class VehicleClock:
     If the clock jumps, the vehicle times returned here continue without the jump.
 
     Args:
-        lockstep: Whether the event loop runs on the vehicle's clock, so that ages are known without
+        lockstep: whether the event loop runs on the vehicle's clock, so that ages are known without
             TIMESYNC.
 
     Attributes:
-        rate: Estimates the rate of the vehicle's clock.
-        delay: Estimates the delay of the quickest sample, by TIMESYNC.
-        change_count: Counts jumps, wraps, standstills and restarts of the clock.
-        restart_count: Counts restarts of the autopilot, each of which sets its clock back.
-        last_change: The newest change counted in `change_count`, in words; empty before the first.
-        on_event: Called with a sentence for the user.
+        rate: estimates the rate of the vehicle's clock.
+        delay: estimates the delay of the quickest sample, by TIMESYNC.
+        change_count: counts jumps, wraps, standstills and restarts of the clock.
+        restart_count: counts restarts of the autopilot, each of which sets its clock back.
+        last_change: the newest change counted in `change_count`, in words; empty before the first.
+        on_event: called with a sentence for the user.
     """
 
     def __init__(self, *, lockstep: bool = False) -> None:
@@ -97,8 +97,8 @@ class VehicleClock:
         """Take the times of an attitude sample; return its vehicle time and age.
 
         Args:
-            time_boot_ms: Time stamp of the sample, ms.
-            received: Event-loop time of its arrival, s.
+            time_boot_ms: time stamp of the sample, ms.
+            received: event-loop time of its arrival, s.
         """
         time = time_boot_ms / 1000.0 + self._shift
         ahead = time - received
@@ -126,9 +126,9 @@ class VehicleClock:
         time and do not catch up. From a slip until the next exchange, samples seem late.
 
         Args:
-            sent: Event-loop time of the request, s.
-            received: Event-loop time of the answer, s.
-            vehicle_ns: The vehicle's time in the answer, ns.
+            sent: event-loop time of the request, s.
+            received: event-loop time of the answer, s.
+            vehicle_ns: the vehicle's time in the answer, ns.
         """
         if self._lockstep or self._began == inf:
             return
@@ -154,7 +154,7 @@ class VehicleClock:
         """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
 
         Args:
-            now: Event-loop time, s.
+            now: event-loop time, s.
         """
         self.delay.expire(now)
         if now - self._began < _TIMESYNC_WAIT or self.age_known is not self._reported_unknown:

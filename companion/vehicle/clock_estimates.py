@@ -36,12 +36,12 @@ class ClockRate:
     """Estimates the rate of the vehicle's clock.
 
     Args:
-        same_clock: Whether the vehicle and the loop have the same clock.
+        same_clock: whether the vehicle and the loop have the same clock.
 
     Attributes:
-        rate: Rate of the vehicle's clock minus that of the loop's clock, s per s.
-        lowest_rate: The lowest rate that is possible now, s per s.
-        note_due: Event-loop time at which the next offset should be noted, s.
+        rate: rate of the vehicle's clock minus that of the loop's clock, s per s.
+        lowest_rate: the lowest rate that is possible now, s per s.
+        note_due: event-loop time at which the next offset should be noted, s.
     """
 
     def __init__(self, *, same_clock: bool = False) -> None:
@@ -61,8 +61,8 @@ class ClockRate:
         Two offsets far apart suffice for the rate, because each is from the quickest sample.
 
         Args:
-            now: Event-loop time, s.
-            offset: The offset, s.
+            now: event-loop time, s.
+            offset: the offset, s.
         """
         if self._noted_offsets:
             noted_at, noted_offset = self._noted_offsets[-1]
@@ -110,9 +110,9 @@ class TelemetryDelay:
     queue that delays all samples looks like a slower clock of the vehicle.
 
     Attributes:
-        known: Whether the delay is known.
-        seconds: The delay, s; 0 while it is not known.
-        why_unknown: Why the delay is not known; without meaning while it is known.
+        known: whether the delay is known.
+        seconds: the delay, s; 0 while it is not known.
+        why_unknown: why the delay is not known; without meaning while it is known.
     """
 
     def __init__(self) -> None:
@@ -131,8 +131,8 @@ class TelemetryDelay:
         exchanges are forgotten.
 
         Args:
-            now: Event-loop time, s.
-            error: Largest error of `delay`, s: half the round trip, and the clock's drift since the
+            now: event-loop time, s.
+            error: largest error of `delay`, s: half the round trip, and the clock's drift since the
                 newest sample.
             delay: TIMESYNC's offset minus the quickest sample's, s.
 
@@ -172,8 +172,8 @@ class TelemetryDelay:
         """Shorten all delays, because a sample came that was quicker than the quickest so far.
 
         Args:
-            decrease: How much quicker the new sample was than the quickest so far, s.
-            now: Event-loop time, s.
+            decrease: how much quicker the new sample was than the quickest so far, s.
+            now: event-loop time, s.
         """
         self._exchanges = deque(
             (each._replace(delay=each.delay - decrease) for each in self._exchanges),

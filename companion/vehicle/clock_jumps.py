@@ -54,7 +54,7 @@ class MisfitRun:
     """The misfits in a row since the last sample that fitted.
 
     Attributes:
-        stamps: The times of each misfit, oldest first.
+        stamps: the times of each misfit, oldest first.
     """
 
     def __init__(self) -> None:
@@ -93,8 +93,8 @@ def has_wrapped(jump: float, before: float) -> bool:
     """Whether a clock has wrapped.
 
     Args:
-        jump: How far the clock moved, s.
-        before: Time since boot before the change, s.
+        jump: how far the clock moved, s.
+        before: time since boot before the change, s.
     """
     return (
         jump < 0.0
@@ -107,10 +107,10 @@ def describe_change(jump: float, before: float, now: float, *, set_back: bool) -
     """A change of the vehicle's clock in words.
 
     Args:
-        jump: How far the clock moved, s.
-        before: Time since boot before the change, s.
-        now: Time since boot after the change, s.
-        set_back: With a negative `jump`: True if the clock was set back, False if it stood still.
+        jump: how far the clock moved, s.
+        before: time since boot before the change, s.
+        now: time since boot after the change, s.
+        set_back: with a negative `jump`: True if the clock was set back, False if it stood still.
     """
     if has_wrapped(jump, before):
         return "the vehicle's time since boot wrapped around after 49.7 days"

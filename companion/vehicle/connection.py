@@ -23,12 +23,12 @@ class Connection:
     called.
 
     Args:
-        endpoint: The endpoint to open.
-        inbox: Takes the bytes that arrive.
-        outbox: Sends over the open transport; drops frames while none is open.
-        stats: Counts the reconnects.
-        on_dropped: Called with the reason when the connection drops.
-        opener: Opens the transport.
+        endpoint: the endpoint to open.
+        inbox: takes the bytes that arrive.
+        outbox: sends over the open transport; drops frames while none is open.
+        stats: counts the reconnects.
+        on_dropped: called with the reason when the connection drops.
+        opener: opens the transport.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Connection:
         """Open the transport.
 
         Raises:
-            EndpointError: The transport cannot be opened; the message says why and what to do.
+            EndpointError: the transport cannot be opened; the message says why and what to do.
         """
         # First, because bytes may arrive before this coroutine resumes.
         self._inbox.start_connection(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))

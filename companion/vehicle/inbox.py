@@ -33,21 +33,21 @@ class Inbox:
     """Passes attitude samples to the control loop, and all accepted frames to the dispatcher.
 
     Args:
-        settings: Ids of the vehicle, and the signing key.
-        stats: Counters of the link.
-        dispatcher: Takes every accepted frame.
-        tap: Called with every accepted frame, for recordings.
-        notice: Called once with each notice about signatures, their time stamps and the peer.
-        clock: The vehicle's clock; takes the time stamp of every sample.
-        last_setpoint: Returns the event-loop time of the last setpoint sent, s.
+        settings: ids of the vehicle, and the signing key.
+        stats: counters of the link.
+        dispatcher: takes every accepted frame.
+        tap: called with every accepted frame, for recordings.
+        notice: called once with each notice about signatures, their time stamps and the peer.
+        clock: the vehicle's clock; takes the time stamp of every sample.
+        last_setpoint: returns the event-loop time of the last setpoint sent, s.
 
     Attributes:
-        on_attitude: Called with each attitude sample, synchronously.
-        on_foreign: Called with each frame of another system or component than the vehicle's.
-        on_frame: Called with each frame of the peer, from any system and of any message, after the
+        on_attitude: called with each attitude sample, synchronously.
+        on_foreign: called with each frame of another system or component than the vehicle's.
+        on_frame: called with each frame of the peer, from any system and of any message, after the
             control loop and all subscribers. Beacons, and frames of the vehicle with a refused
             signature, are left out.
-        lockstep: Handles beacons, with which the vehicle begins each step of lockstep
+        lockstep: handles beacons, with which the vehicle begins each step of lockstep
             (SYSTEM_TIME without the time of day); None without lockstep.
     """
 
@@ -85,7 +85,7 @@ class Inbox:
         """Prepare for a new connection: forget an incomplete frame and the last sequence number.
 
         Args:
-            streaming: Whether a frame may continue in the bytes received next.
+            streaming: whether a frame may continue in the bytes received next.
         """
         self._scanner = FrameScanner(
             CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True

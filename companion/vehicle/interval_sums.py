@@ -12,9 +12,9 @@ class IntervalSums:
     """Sums over the intervals between consecutive setpoints or samples.
 
     Attributes:
-        intervals: Number of intervals.
-        seconds: Sum of the intervals, s.
-        squares: Sum of the squared intervals, s².
+        intervals: number of intervals.
+        seconds: sum of the intervals, s.
+        squares: sum of the squared intervals, s².
     """
 
     __slots__ = ("intervals", "seconds", "squares")

@@ -38,21 +38,21 @@ class Link(VehicleClient):
     setpoint: each one is sent by one call of `send_setpoint`.
 
     Args:
-        settings: The endpoint, and the ids of the vehicle and of this program.
-        tap: Called with every frame accepted from and sent to the vehicle, for recordings.
-        opener: Opens the transport.
-        notice: Called once with each notice about signatures, their time stamps and the peer; by
+        settings: the endpoint, and the ids of the vehicle and of this program.
+        tap: called with every frame accepted from and sent to the vehicle, for recordings.
+        opener: opens the transport.
+        notice: called once with each notice about signatures, their time stamps and the peer; by
             default it logs a warning.
 
     Attributes:
-        stats: Counters of the link.
-        state: The vehicle's telemetry.
-        clock: The vehicle's clock: the age of samples, and jumps or restarts of the clock.
-        timesync: Round trip and jitter.
+        stats: counters of the link.
+        state: the vehicle's telemetry.
+        clock: the vehicle's clock: the age of samples, and jumps or restarts of the clock.
+        timesync: round trip and jitter.
 
     Raises:
-        EndpointError: The endpoint cannot be parsed.
-        LinkError: The settings demand lockstep on an event loop other than `LockstepEventLoop`.
+        EndpointError: the endpoint cannot be parsed.
+        LinkError: the settings demand lockstep on an event loop other than `LockstepEventLoop`.
     """
 
     def __init__(
@@ -119,9 +119,9 @@ class Link(VehicleClient):
         """Wait for the autopilot's first heartbeat; return the newest heartbeat.
 
         Raises:
-            LinkTimeout: No heartbeat came; the message says what came instead.
-            LinkLost: The connection dropped while waiting.
-            UnsupportedAutopilot: This program cannot fly the autopilot.
+            LinkTimeout: no heartbeat came; the message says what came instead.
+            LinkLost: the connection dropped while waiting.
+            UnsupportedAutopilot: this program cannot fly the autopilot.
         """
         with AnswerQueue[None](self._registry) as heard:
             unsubscribe = self._dispatcher.subscribe("HEARTBEAT", lambda _: heard.put(None))
@@ -201,9 +201,9 @@ class Link(VehicleClient):
         In lockstep, the setpoint for the sample of the open step is sent last and closes the step.
 
         Args:
-            time_boot_ms: Time stamp of the sample to which the setpoint responds, ms.
+            time_boot_ms: time stamp of the sample to which the setpoint responds, ms.
             rates: rad/s about body x, y, z (FRD).
-            thrust: Collective thrust, 0..1.
+            thrust: collective thrust, 0..1.
 
         Returns:
             Whether it was sent; False if the connection is down or the kernel refuses it.

@@ -20,18 +20,18 @@ class ModeState:
     """The newest heartbeat and mode; each is `None` until its message has come.
 
     Args:
-        dispatcher: Delivers HEARTBEAT and CURRENT_MODE.
-        clock: Returns the event-loop time, s.
+        dispatcher: delivers HEARTBEAT and CURRENT_MODE.
+        clock: returns the event-loop time, s.
 
     Attributes:
-        heartbeat: The newest HEARTBEAT of the autopilot.
-        current_mode: The newest CURRENT_MODE. The property `mode` takes the newer of the two.
-        heartbeat_is_newest: Whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
+        heartbeat: the newest HEARTBEAT of the autopilot.
+        current_mode: the newest CURRENT_MODE. The property `mode` takes the newer of the two.
+        heartbeat_is_newest: whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
             `mode`.
-        armings: Number of times that a heartbeat showed a newly armed vehicle.
-        autopilot: How to command the vehicle; known from the first heartbeat of an autopilot that
+        armings: number of times that a heartbeat showed a newly armed vehicle.
+        autopilot: how to command the vehicle; known from the first heartbeat of an autopilot that
             this program flies.
-        unsupported_error: The error to raise if this program cannot fly the autopilot.
+        unsupported_error: the error to raise if this program cannot fly the autopilot.
     """
 
     def __init__(self, dispatcher: MessageDispatcher, clock: Callable[[], float]) -> None:

@@ -28,7 +28,7 @@ def autopilot_for(mav_autopilot: int, vehicle_type: int) -> Autopilot:
     """The autopilot of a heartbeat with these `autopilot` and `type` fields.
 
     Raises:
-        UnsupportedAutopilot: This program cannot fly the autopilot, or the vehicle is not a
+        UnsupportedAutopilot: this program cannot fly the autopilot, or the vehicle is not a
             multirotor: on a plane the same mode numbers mean something else.
     """
     if vehicle_type not in MULTIROTORS:

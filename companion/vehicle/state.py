@@ -65,11 +65,11 @@ class VehicleState(ModeState, _Values):
         attitude_target: `AttitudeTarget`; only of an autopilot with `rates_about_target_axes`, and
             only with a unit quaternion.
         global_position: `GlobalPosition`; `None` until the vehicle knows it.
-        attitude_target_thrust, battery, gps, home, estimator, prearm: See the record of each.
-        position_count: Number of positions accepted.
-        gps_was_good: Whether GPS has had a 3D fix since the link was opened.
-        reset_counter: Counter in ODOMETRY that rises whenever the estimate jumps.
-        texts: Texts of the autopilot, newest last.
+        attitude_target_thrust, battery, gps, home, estimator, prearm: see the record of each.
+        position_count: number of positions accepted.
+        gps_was_good: whether GPS has had a 3D fix since the link was opened.
+        reset_counter: counter in ODOMETRY that rises whenever the estimate jumps.
+        texts: texts of the autopilot, newest last.
     """
 
     def __init__(

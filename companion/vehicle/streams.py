@@ -46,16 +46,16 @@ async def set_rates(
     and requested again, up to three times.
 
     Args:
-        commands: Sends the requests.
-        stats: Counts the messages that arrive.
-        rates: Rate of each message, Hz; 0 stops the message.
-        window_s: Time of counting, s.
-        interval_step_us: Intervals are rounded down to a whole multiple of this, us.
+        commands: sends the requests.
+        stats: counts the messages that arrive.
+        rates: rate of each message, Hz; 0 stops the message.
+        window_s: time of counting, s.
+        interval_step_us: intervals are rounded down to a whole multiple of this, us.
 
     Raises:
         UnknownMessage: A name is not in the dialect; nothing was sent.
-        CommandTimeout: The autopilot did not answer a request.
-        LinkLost: The connection dropped while waiting.
+        CommandTimeout: the autopilot did not answer a request.
+        LinkLost: the connection dropped while waiting.
     """
     numbers = {name: message_id(name) for name in rates}
     answers = {

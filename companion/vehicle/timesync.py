@@ -84,10 +84,10 @@ class TimeSync:
     """Sends TIMESYNC requests, gives the answers to `VehicleClock`, and answers the vehicle's own.
 
     Args:
-        outbox: Sends requests and answers.
-        dispatcher: Delivers TIMESYNC.
-        clock: Returns the event-loop time, s.
-        vehicle_clock: Takes each exchange of request and answer.
+        outbox: sends requests and answers.
+        dispatcher: delivers TIMESYNC.
+        clock: returns the event-loop time, s.
+        vehicle_clock: takes each exchange of request and answer.
     """
 
     def __init__(

@@ -75,7 +75,7 @@ class Signing:
         key: 32 bytes.
         link_id: id of this link in our signatures, 0..255.
         accept_unsigned: whether to accept frames without a signature.
-        clock: Unix time in s.
+        clock: unix time in s.
     """
 
     def __init__(
