@@ -22,14 +22,15 @@ def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
 
 
 class PlannedTilt(NamedTuple):
-    """The plan of the tilt at one time.
+    """The planned tilt at one time.
 
     Attributes:
-        north, east: coefficients.
-        still_angle: integral of `still_rate` since the start, rad.
+        north, east: planned coefficients: horizontal components of the thrust's direction.
+        still_angle: integral of `still_rate` (below) since the start, rad.
         x_rate, y_rate: planned roll and pitch rate at heading 0, rad/s.
         x_slope, y_slope: derivatives of `x_rate` and `y_rate`, rad/s².
-        still_rate: R_z, the yaw rate that keeps the heading still while the tilt changes, rad/s.
+        still_rate: yaw rate that keeps the heading constant while the tilt changes, rad/s (R_z in
+            the paper).
     """
 
     north: float

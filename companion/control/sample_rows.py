@@ -84,8 +84,8 @@ class SampleRows:
     """
 
     def __init__(self, limits: Limits, thrust_limits: tuple[float, float]) -> None:
-        self._tilt_rate = _LIMIT_REACHED_SHARE * limits.tilt_rate
-        self._yaw_rate = _LIMIT_REACHED_SHARE * limits.yaw_rate
+        self._tilt_rate_threshold = _LIMIT_REACHED_SHARE * limits.tilt_rate
+        self._yaw_rate_threshold = _LIMIT_REACHED_SHARE * limits.yaw_rate
         self._thrust_limits = thrust_limits
 
     def sample(self, writer: McapWriter, time_ns: int, entry: SampleEntry) -> None:
@@ -135,8 +135,8 @@ class SampleRows:
             2.0 * ax,
             *((nan, nan) if planned_tilt is None else planned_tilt[:2]),
             # A program's own rates may be NumPy's, whose truth values cannot be packed.
-            bool(sqrt(roll * roll + pitch * pitch) >= self._tilt_rate),
-            bool(abs(yaw) >= self._yaw_rate),
+            bool(sqrt(roll * roll + pitch * pitch) >= self._tilt_rate_threshold),
+            bool(abs(yaw) >= self._yaw_rate_threshold),
             not idle and thrust in self._thrust_limits,
             bool(flags.offboard_active),
             bool(is_step),

@@ -26,7 +26,8 @@ _LEVELLING_RATE = 3.0
 _VERTICAL_BRAKING = 4.0
 """Deceleration with which the autopilot ends a climb or a fall, m/s² (PX4: MPC_ACC_UP_MAX)."""
 _SMALLEST_DRAG = 0.2
-"""Smallest linear drag of any multirotor, 1/s (measured: 0.25 and more); it ends a level drift."""
+"""Linear drag that any multirotor is assumed to have at least, 1/s; the smallest measured one is
+0.25. Drag alone stops the drift of a level vehicle."""
 
 
 class MotionAtLoss(NamedTuple):

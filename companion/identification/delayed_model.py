@@ -101,8 +101,8 @@ class SecondOrderFit:
     explained: float
     """R², share of the measurements' variance that the model explains."""
     misfit: float
-    """RMS of the part of the residual that the commands explain, as a share of the standard
-    deviation of the measurements."""
+    """RMS of the error of the model, which is the part of the residual that correlates with the
+    commands and so is no noise; a share of the standard deviation of the measurements."""
     dead_time_error: float
     """Standard error of the dead time due to noise, s."""
     lag_error: float

@@ -95,7 +95,7 @@ def constants_symbols(own_count: int = 0) -> ca.SX:
 
 
 def own_constant(constants: ca.SX) -> ca.SX:
-    """The first constant after `Conditions`."""
+    """Symbol of the first constant of a model that is not in `Conditions`; it follows them."""
     return constants[len(Conditions._fields)]
 
 

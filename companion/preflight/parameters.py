@@ -67,8 +67,8 @@ def _unknown_value_finding(rule: ParameterRule, found: str, fix: str) -> Finding
 def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
     """Findings about parameters that were not received.
 
-    On a link that loses frames, a missing parameter that every version has is unsafe. The other
-    missing parameters are only named.
+    If the link loses frames, a missing parameter that every version of the autopilot has is unsafe.
+    One finding names all other missing parameters.
     """
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > TOLERABLE_LOSS

@@ -1,4 +1,4 @@
-"""Two flights before the search that measure the vehicle, for one of the start candidates."""
+"""Two flights that measure the vehicle before the search, and the candidate that follows."""
 
 import tempfile
 from dataclasses import replace

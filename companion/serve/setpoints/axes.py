@@ -116,7 +116,7 @@ class CommandFollower:
         if demand.position is not None:
             self._follow_position(demand, current, now)
         else:
-            self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
+            self._follow_motion(demand, _moved_near_vehicle(current, actual, demand), now)
         self._newest_demand, self._commanded_at = demand, now
 
     def _repeat(self, demand: AxisDemand, now: float, actual: AxisMotion | None) -> None:
@@ -142,7 +142,7 @@ class CommandFollower:
         )
         still_accelerates = demand.acceleration is None and any(self._commanded_state.acceleration)
         if demand.velocity is None or is_far_away or still_accelerates:
-            self._follow_motion(demand, _near_vehicle(current, actual, demand), now)
+            self._follow_motion(demand, _moved_near_vehicle(current, actual, demand), now)
 
     def _follow_position(self, demand: AxisDemand, current: AxisState, now: float) -> None:
         assert demand.position is not None
@@ -218,7 +218,9 @@ def _blend(old: AxisValues, new: AxisValues) -> AxisValues:
     return tuple(a + _DERIVATIVE_WEIGHT * (b - a) for a, b in zip(old, new, strict=True))
 
 
-def _near_vehicle(current: AxisState, actual: AxisMotion | None, demand: AxisDemand) -> AxisState:
+def _moved_near_vehicle(
+    current: AxisState, actual: AxisMotion | None, demand: AxisDemand
+) -> AxisState:
     """The state `current`; its position or velocity is that of `actual` if the two are far apart.
 
     `actual` is the motion of the vehicle. A commanded velocity is never replaced.

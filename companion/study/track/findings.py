@@ -41,7 +41,7 @@ def find(flights: TrackedFlights) -> tuple[Finding, ...]:
             flights,
             "In still air no planner has a smaller position error by telemetry than"
             " model-following.",
-            _telemetry_rms,
+            _rms_error_in_telemetry,
         ),
         _smallest_error_finding(
             flights,
@@ -54,7 +54,7 @@ def find(flights: TrackedFlights) -> tuple[Finding, ...]:
     )
 
 
-def _telemetry_rms(flight: TrackedFlight) -> float:
+def _rms_error_in_telemetry(flight: TrackedFlight) -> float:
     """RMS error of the position that guidance received, m."""
     return flight.telemetry_error.rms
 
@@ -100,7 +100,7 @@ def _smallest_error_finding(
 def _wind_finding(flights: TrackedFlights) -> Finding:
     pairs = {
         trajectory: tuple(
-            _telemetry_rms(flights[Task(trajectory, planner, wind=WINDY)])
+            _rms_error_in_telemetry(flights[Task(trajectory, planner, wind=WINDY)])
             for planner in (MODEL_FOLLOWING, FIRST_ORDER)
         )
         for trajectory in TRAJECTORIES
@@ -124,9 +124,9 @@ def _lead_finding(flights: TrackedFlights, wind: float) -> Finding:
     ratios = {}
     for trajectory in (CIRCLE_AT_5, EIGHT_AT_5):
         task = Task(trajectory, MODEL_FOLLOWING, LINEAR, wind)
-        ratios[trajectory] = _telemetry_rms(flights[task._replace(lead=False)]) / _telemetry_rms(
-            flights[task]
-        )
+        ratios[trajectory] = _rms_error_in_telemetry(
+            flights[task._replace(lead=False)]
+        ) / _rms_error_in_telemetry(flights[task])
     return Finding(
         "ours",
         f"At 5 m/s in {f'{wind:g} m/s of wind' if wind else 'still air'} the error without lead is"
@@ -137,7 +137,7 @@ def _lead_finding(flights: TrackedFlights, wind: float) -> Finding:
 
 
 def _required_errors_finding(flights: TrackedFlights) -> Finding:
-    errors_m = {task: _telemetry_rms(flights[task]) for task in _LARGEST_ERRORS_M}
+    errors_m = {task: _rms_error_in_telemetry(flights[task]) for task in _LARGEST_ERRORS_M}
     errors = (
         f"{task}: {_in_mm(errors_m[task])} of {_in_mm(limit)}"
         for task, limit in _LARGEST_ERRORS_M.items()
