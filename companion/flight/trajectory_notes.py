@@ -3,7 +3,7 @@
 import numpy as np
 
 from companion.guidance.trajectory import SlowDown, SlowedPart, Trajectory
-from companion.guidance.trajectory.demand import sampled_motion
+from companion.guidance.trajectory.demand import Motion, sampled_motion
 from companion.guidance.trajectory.feasibility import TILT_LIMIT
 
 _MOST_PARTS_SHOWN = 4
@@ -12,11 +12,11 @@ _MOST_PARTS_SHOWN = 4
 def overview(trajectory: Trajectory) -> str:
     """One sentence: duration, largest speed and extent of the trajectory."""
     motion = sampled_motion(trajectory)
-    largest_speed = float(np.linalg.norm(motion.velocity, axis=1).max())
+    speed = _largest_speed(motion)
     lows, highs = motion.position.min(axis=0), motion.position.max(axis=0)
     north, east = (_range_text(low, high) for low, high in zip(lows[:2], highs[:2], strict=True))
     return (
-        f"{trajectory.name}: {trajectory.duration:.1f} s, at most {largest_speed:.2f} m/s; from "
+        f"{trajectory.name}: {trajectory.duration:.1f} s, at most {speed:.2f} m/s; from "
         f"its start {north} m north, {east} m east, {_range_text(-highs[2], -lows[2])} m up"
     )
 
@@ -34,7 +34,7 @@ def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> 
     if not slow_down.parts:
         return ()
     after = slow_down.trajectory
-    speed, speed_before = _largest_speed(after), _largest_speed(before)
+    speed, speed_before = (_largest_speed(sampled_motion(each)) for each in (after, before))
     result = (
         f"{before.name} now lasts {after.duration:.1f} s instead of {before.duration:.1f} s, and "
         f"its highest speed is {speed:.2f} m/s instead of {speed_before:.2f} m/s"
@@ -67,8 +67,8 @@ def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) ->
     )
 
 
-def _largest_speed(trajectory: Trajectory) -> float:
-    return float(np.linalg.norm(sampled_motion(trajectory).velocity, axis=1).max())
+def _largest_speed(motion: Motion) -> float:
+    return float(np.linalg.norm(motion.velocity, axis=1).max())
 
 
 def _range_text(low: float, high: float) -> str:
