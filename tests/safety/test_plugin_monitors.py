@@ -166,6 +166,16 @@ def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
     )
 
 
+def test_a_judge_that_raised_is_not_called_slow(monkeypatch):
+    clock = iter((0.0, 0.001, 1.0, 1.015))
+    monkeypatch.setattr("companion.safety.plugin_monitors.perf_counter", lambda: next(clock))
+    ladder = SafetyLadder(monitors(configured("high")), 3.0)
+    for step in range(60):
+        ladder.step(Snapshot(10.0 + 0.02 * step, motion=Motion(height=9.0)))
+    assert "high (its fault)" in ladder.raised_alarms
+    assert "high (its time)" not in ladder.raised_alarms
+
+
 def test_it_can_only_choose_among_the_actions():
     (row,) = (each for each in monitors(configured("silent")) if each.name == "silent")
     assert (row.action, row.stream) == (Action.WARN, StreamEffect.CONTINUES)
