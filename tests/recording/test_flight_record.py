@@ -20,7 +20,7 @@ from companion.recording.mcap_file.loop_channels import ACTION, INPUT, SETPOINT,
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import derived_summary, summary_of
-from companion.recording.recorder import _McapEntryFile
+from companion.recording.recorder import FlightRecorder
 from companion.replay.entries import recorded_inputs
 
 ROWS = 50
@@ -324,7 +324,7 @@ def test_a_full_batch_is_sent_at_once_and_an_empty_one_never():
     assert len(sent) == 1
 
 
-def test_a_full_disk_ends_the_record_but_a_bad_entry_does_not():
+def test_a_full_disk_ends_the_record_but_a_bad_entry_does_not(tmp_path):
     def encode(value):
         def encoder(*_):
             if isinstance(value, Exception):
@@ -337,11 +337,13 @@ def test_a_full_disk_ends_the_record_but_a_bad_entry_does_not():
         def stream(self):
             written.append("streamed")
 
-    written, dropped = [], []
-    file = _McapEntryFile(Writer(), 0.0, dropped.append)
+    written, told = [], []
+    file = FlightRecorder(tmp_path / "flight.mcap", 0.0, lambda: 1.0, None, told.append)
+    file._writer = Writer()
     bad = ValueError("no such row")
-    file.write([(1.0, encode(1), ()), (2.0, encode(bad), ()), (3.0, encode(3), ())])
+    file._write([(1.0, encode(1), ()), (2.0, encode(bad), ()), (3.0, encode(3), ())])
     assert written == [1, 3, "streamed"]
-    assert dropped == [bad]
+    assert file.dropped == 1
+    assert "no such row" in told[0]
     with pytest.raises(OSError, match="No space"):
-        file.write([(1.0, encode(OSError(28, "No space left on device")), ())])
+        file._write([(1.0, encode(OSError(28, "No space left on device")), ())])
