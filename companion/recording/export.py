@@ -4,6 +4,7 @@ Three more tables join several channels: `tracking`, `rates` and `response` (see
 figures of the summary are computed from them.
 """
 
+import csv
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -56,10 +57,10 @@ def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
     row_counts = {}
     for name, columns in tables(record):
         path = folder / f"{name}.csv"
-        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         with path.open("w", encoding="utf-8") as file:
-            file.write(",".join(columns) + "\n")
-            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
         row_counts[path] = _row_count(columns)
     return row_counts
 
