@@ -54,7 +54,7 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     Returns:
         value by name of the outcome; empty without a closed-loop maneuver or without `truth`.
     """
-    rows = summary.trace.tracking_rows()
+    rows = summary.trace.tracking.rows()
     parts = settled_parts(rows, summary.trace.maneuvers)
     figures: dict[str, float] = {}
     if len(truth) and parts:

@@ -107,7 +107,7 @@ class Summary:
 
     @cached_property
     def _response(self) -> StepResponse | None:
-        return measure_response(self.trace.response_rows(), self.gain)
+        return measure_response(self.trace.response.rows(), self.gain)
 
     def latency_us(self) -> dict[str, float]:
         """Latency from sample to setpoint in this process: p50, p99 and maximum, µs."""
@@ -119,7 +119,7 @@ class Summary:
 
     def tracking(self) -> dict[str, float]:
         """Errors of position and height under control, m: see `tracking_errors`."""
-        return tracking_errors(self.trace.tracking_rows())
+        return tracking_errors(self.trace.tracking.rows())
 
     def maneuvers(self) -> tuple[ManeuverFigures, ...]:
         """The figures of each maneuver that was flown, in order."""
@@ -128,8 +128,8 @@ class Summary:
     @cached_property
     def _maneuvers(self) -> tuple[ManeuverFigures, ...]:
         trace = self.trace
-        rates = trace.rates_rows()[:, _ROLL_AND_PITCH]
-        return measure_maneuvers(trace.tracking_rows(), rates, trace.maneuvers, self.facts.began)
+        rates = trace.rates.rows()[:, _ROLL_AND_PITCH]
+        return measure_maneuvers(trace.tracking.rows(), rates, trace.maneuvers, self.facts.began)
 
     def extent(self) -> dict[str, float]:
         """The largest height (m), speed (m/s) and tilt (°), and the time under control (s).
@@ -137,9 +137,9 @@ class Summary:
         Speed and tilt are given for the whole flight and for its maneuvers. They come from rows ten
         times a second; during steps, the tilt comes from every sample.
         """
-        rows, tracked = self.trace.motion.rows(), self.trace.tracking_rows()
+        rows, tracked = self.trace.motion.rows(), self.trace.tracking.rows()
         maneuvers = rows[in_maneuvers(rows[:, 1], self.trace.maneuvers)]
-        tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response_rows()])
+        tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response.rows()])
         return {
             "height_max_m": _largest_known(rows[:, _HEIGHT]),
             "speed_max_m_s": _largest_known(rows[:, _SPEED]),
