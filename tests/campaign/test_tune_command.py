@@ -23,8 +23,8 @@ from companion.campaign.tune.candidates import (
     tune_section,
 )
 from companion.campaign.tune.certainty import compare
-from companion.campaign.tune.scores import score_of
-from companion.campaign.tune.search import Candidate, Search, SearchResults
+from companion.campaign.tune.scores import Candidate, SearchResults, score_of
+from companion.campaign.tune.search import Search
 from companion.campaign.tune.writing import CheckedResult, result_text, summary_lines
 from companion.campaign.versions import VersionError
 from companion.cli.main import main

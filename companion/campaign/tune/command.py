@@ -29,9 +29,8 @@ from companion.campaign.tune.candidates import (
     unseen_campaign,
 )
 from companion.campaign.tune.certainty import compare
-from companion.campaign.tune.scores import Row, score_of
-from companion.campaign.tune.search import Fly, Search, SearchResults
-from companion.campaign.tune.storage import StorageError
+from companion.campaign.tune.scores import Row, SearchResults, score_of
+from companion.campaign.tune.search import Fly, Search, StorageError
 from companion.campaign.tune.writing import (
     CheckedResult,
     best_so_far_text,

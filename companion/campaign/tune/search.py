@@ -1,7 +1,7 @@
 """The search with Optuna; it can be interrupted at any time and continued."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
-    Values,
     candidates_near,
     cases,
     clamped_to_search,
@@ -19,8 +18,14 @@ from companion.campaign.tune.candidates import (
     suggested_values,
 )
 from companion.campaign.tune.first_flight import learned_config
-from companion.campaign.tune.scores import Row, Score, pooled_rms, score_of
-from companion.campaign.tune.storage import storage_errors
+from companion.campaign.tune.scores import (
+    Candidate,
+    Row,
+    Score,
+    SearchResults,
+    pooled_rms,
+    score_of,
+)
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 
@@ -54,31 +59,25 @@ _VIOLATION_KEY, _COMPLETE_KEY = "violation", "complete"
 """Attributes of a trial: violation of the constraint, and whether all cases were flown."""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A candidate that has flown all its cases."""
-
-    number: int
-    """Number of the trial."""
-    values: Values
-    score: Score
-    """Score on the cases of the search."""
+class StorageError(Exception):
+    """The storage is damaged or cannot be written; the message gives the reason."""
 
 
-@dataclass
-class SearchResults:
-    """The results of a search so far."""
+@contextmanager
+def _storage_errors(path: Path) -> Iterator[None]:
+    """In the context, turn the errors of the storage at `path` into a `StorageError`.
 
-    tried_count: int = 0
-    """Number of all candidates, including those of `stopped_early_count`."""
-    stopped_early_count: int = 0
-    """Number of candidates that were abandoned, or whose keys were refused."""
-    best: Candidate | None = None
-    """Candidate with the smallest error of those that met the constraint, `inside_share`; None:
-    none met it."""
-    near_best: list[Candidate] = field(default_factory=list)
-    """The best tenth, or at least the best three, of the candidates that met the constraint
-    `inside_share`; the best first."""
+    Optuna wraps SQLAlchemy's errors in its own, and their text only guesses at the cause.
+    """
+    from optuna.exceptions import StorageInternalError  # noqa: PLC0415  an extra
+    from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna
+
+    try:
+        yield
+    except (DBAPIError, StorageInternalError) as error:
+        cause = error.__cause__ if isinstance(error, StorageInternalError) else error
+        reason = cause.orig if isinstance(cause, DBAPIError) else cause
+        raise StorageError(f"{path}: cannot be used: {reason}") from error
 
 
 class Search:
@@ -114,7 +113,7 @@ class Search:
         self._optuna = optuna
         self._campaign, self._tune, self._fly = campaign, tune, fly
         self.path = folder / STORAGE
-        with storage_errors(self.path):
+        with _storage_errors(self.path):
             self._study: Study = optuna.create_study(
                 storage=f"sqlite:///{self.path}",
                 study_name=_STUDY_NAME,
@@ -131,7 +130,7 @@ class Search:
         Raises:
             StorageError: the storage cannot be used any more, perhaps because the disk is full.
         """
-        with storage_errors(self.path):
+        with _storage_errors(self.path):
             while len(self._ended_trials()) < trials:
                 on_trial(self.results())
                 # Each trial has its own seed, so an interruption does not change the candidates.
