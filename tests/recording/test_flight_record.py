@@ -279,19 +279,6 @@ def test_a_chunk_that_would_not_fit_into_memory_is_damage(tmp_path, monkeypatch)
     assert content.damage
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [("- 1\n", "not a configuration"), ("a: [", "config.yaml: "), (None, "No such file")],
-)
-def test_a_configuration_that_cannot_be_read_is_named(tmp_path, text, words):
-    write(tmp_path)
-    (tmp_path / "config.yaml").unlink(missing_ok=True)
-    if text is not None:
-        (tmp_path / "config.yaml").write_text(text)
-    with pytest.raises(RecordError, match=rf"config\.yaml: .*{words}|{words}"):
-        read_flight(tmp_path).configuration  # noqa: B018
-
-
 def test_a_folder_of_a_flight_is_a_new_one_or_an_error(tmp_path, monkeypatch):
     first, second = flight_folder(tmp_path), flight_folder(tmp_path)
     assert first != second
