@@ -7,7 +7,6 @@ begins level and without rotation, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
-from collections.abc import Sequence
 from functools import lru_cache
 from math import inf, isfinite, radians
 from statistics import fmean
@@ -32,19 +31,6 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance import Corners, Steps
 from companion.guidance.reference import Pose
 from companion.recording.measurements.verdict import MAX_LINE_DISTANCE
-
-
-def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
-    """Simulate cases one after the other; return a row for each, in order.
-
-    `ok` is true if in every step the acceleration coefficients stayed close to the straight line
-    from start to target, within the bound that flights must keep.
-
-    Raises:
-        ConfigError: a case cannot be flown in a batch; see `check_case`.
-        MissingExtraError: numba is not installed.
-    """
-    return [_run_case(case) for case in cases]
 
 
 def check_case(case: Case) -> None:
@@ -78,7 +64,16 @@ def _why_unflyable(case: Case) -> str | None:
     return None
 
 
-def _run_case(case: Case) -> dict[str, Value]:
+def run_case(case: Case) -> dict[str, Value]:
+    """Simulate one case; return its row of results.
+
+    `ok` is true if in every step the acceleration coefficients stayed close to the straight line
+    from start to target, within the bound that flights must keep.
+
+    Raises:
+        ConfigError: the case cannot be flown in a batch; see `check_case`.
+        MissingExtraError: numba is not installed.
+    """
     check_case(case)
     config = case.config
     law_planner = planner(config)

@@ -13,6 +13,7 @@ from companion.attitude.kinematics import tilt_angle
 from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.flight_facts import FlightFacts
 from companion.recording.measurements.maneuver_figures import (
+    Floats,
     ManeuverFigures,
     in_maneuvers,
     largest,
@@ -178,7 +179,7 @@ class Summary:
         return json.dumps(self.as_dict(), allow_nan=False)
 
 
-def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
+def tracking_errors(rows: Floats) -> dict[str, float]:
     """RMS and largest position error, and RMS height error, m.
 
     `rows` are the (N, 7) rows of `FlightTrace.tracking`; those without a reference position or
@@ -188,7 +189,7 @@ def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, 
     distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)
     return {
         "position_rms_m": rms(distance),
-        "position_max_m": float(distance.max()) if len(distance) else math.nan,
+        "position_max_m": largest(distance),
         "height_rms_m": rms(error[~np.isnan(error[:, 2]), 2]),
     }
 
@@ -201,7 +202,7 @@ def _dead_times_as_dict(dead_times: DeadTimes) -> dict[str, float | None]:
     }
 
 
-def _largest_known(*columns: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+def _largest_known(*columns: Floats) -> float:
     """The largest number of all columns (n,); NaN: they contain none."""
     values = np.concatenate(columns)
     return largest(values[~np.isnan(values)])
