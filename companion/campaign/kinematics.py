@@ -8,9 +8,9 @@ begins level and without rotation, at the heading `mock.home.heading_deg`.
 
 import hashlib
 from functools import lru_cache
+from itertools import pairwise
 from math import inf, isfinite, radians
 from statistics import fmean
-from typing import NamedTuple
 
 import numpy as np
 
@@ -154,27 +154,24 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
         steps = config.steps
         amplitude = steps.coefficient, steps.coefficient
         unit_maneuver = Steps(1.0, steps.duration_s, steps.settle_s)
-    pattern = _pattern(unit_maneuver, config.link.attitude_rate_hz)
-    targets = np.zeros((pattern.samples, 4))
+    parts = _parts(unit_maneuver, config.link.attitude_rate_hz)
+    targets = np.zeros((parts[-1][1], 4))
     targets[:, 2] = heading
-    for begin, end, (north, east) in pattern.parts:
+    for begin, end, (north, east) in parts:
         unlimited_target = Target(north * amplitude[0], east * amplitude[1], heading)
         targets[begin:end] = limited_target(unlimited_target, longest_target)
     return targets
 
 
-class _Pattern(NamedTuple):
-    """The open-loop steps of a maneuver and the level parts between them, by sample number."""
-
-    samples: int
-    parts: tuple[tuple[int, int, Coefficients], ...]
-    """For each step and each level part: its first sample, the sample after its last, and its
-    acceleration coefficients."""
-
-
 @lru_cache(maxsize=64)
-def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
-    """The pattern of a maneuver; at amplitude 1, so that cases of all amplitudes share it."""
+def _parts(maneuver: Corners | Steps, rate_hz: float) -> tuple[tuple[int, int, Coefficients], ...]:
+    """The open-loop steps of a maneuver and the level parts between them.
+
+    The maneuver has amplitude 1, so that cases of all amplitudes share them.
+
+    Returns:
+        for each part: its first sample, the sample after its last, its acceleration coefficients.
+    """
     pose = Pose((0.0, 0.0, 0.0), 0.0)
     times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
     commanded_coefficients = [maneuver.at(float(time), pose).coefficients for time in times]
@@ -184,5 +181,5 @@ def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
         coefficients or level for coefficients in commanded_coefficients[steps[0] : steps[-1] + 1]
     ]
     ends = [k for k in range(1, len(targets)) if targets[k] != targets[k - 1]]
-    parts = zip((0, *ends), (*ends, len(targets)), strict=True)
-    return _Pattern(len(targets), tuple((begin, end, targets[begin]) for begin, end in parts))
+    bounds = pairwise((0, *ends, len(targets)))
+    return tuple((begin, end, targets[begin]) for begin, end in bounds)

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
@@ -25,14 +25,8 @@ Encoder = Callable[[McapWriter, int, Any], None]
 runs in vehicle time: since the vehicle's boot); the values."""
 
 
-class Entry(NamedTuple):
-    """One entry, from which the thread makes messages."""
-
-    time: float
-    """Time on our clock, s."""
-    encoder: Encoder
-    values: Any
-    """Arguments of the encoder; they must not change any more."""
+Entry = tuple[float, Encoder, Any]
+"""Time on our clock, s; an encoder; and its values, which must not change any more."""
 
 
 class FlightRecorder(BackgroundFile[Entry]):
@@ -90,7 +84,7 @@ class FlightRecorder(BackgroundFile[Entry]):
 
     def add(self, time: float, encoder: Encoder, values: Any) -> None:
         """Record an entry at `time`, s on our clock."""
-        self.put(Entry(time, encoder, values))
+        self.put((time, encoder, values))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Record metadata."""

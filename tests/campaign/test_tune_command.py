@@ -3,7 +3,6 @@
 import errno
 import os
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -44,7 +43,7 @@ def quick(connected, monkeypatch):
     """Candidates are flown by `row_of` on a worker in this process."""
 
     monkeypatch.setattr(command, "cluster_client", connected)
-    monkeypatch.setattr(command, "Search", partial(Search, learning_flight=lambda _: None))
+    monkeypatch.setattr("companion.campaign.tune.search.learned_config", lambda _: None)
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     monkeypatch.setattr(unit, "fly_case", row_of)
 
@@ -234,7 +233,8 @@ def test_a_candidate_whose_keys_do_not_fit_together_is_not_flown(tmp_path, monke
     made = campaign(tmp_path)
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     fly = pytest.fail
-    search = Search(made, tune_section(made), tmp_path, fly, learning_flight=lambda _: None)
+    monkeypatch.setattr("companion.campaign.tune.search.learned_config", lambda _: None)
+    search = Search(made, tune_section(made), tmp_path, fly)
 
     def refuse(*_):
         raise ConfigError("a minimum above a maximum")

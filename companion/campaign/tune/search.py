@@ -26,7 +26,6 @@ from companion.campaign.tune.scores import (
     pooled_rms,
     score_of,
 )
-from companion.config import Config
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -81,15 +80,13 @@ def _storage_errors(path: Path) -> Iterator[None]:
 
 
 class Search:
-    """A search that keeps its state in a folder.
+    """A search that keeps its state in a folder; a new one first flies `learned_config`.
 
     Args:
         campaign: the campaign; gives the cases.
         tune: section `tune` of the campaign.
         folder: folder for the storage.
         fly: flies cases.
-        learning_flight: flies the vehicle before a new search; returns the configuration with the
-            measured values, or None if there are none.
 
     Raises:
         ConfigError: the first case cannot be flown.
@@ -105,7 +102,6 @@ class Search:
         tune: Tune,
         folder: Path,
         fly: Fly,
-        learning_flight: Callable[[Campaign], Config | None] = learned_config,
     ) -> None:
         import optuna  # noqa: PLC0415  an extra
 
@@ -120,7 +116,8 @@ class Search:
                 sampler=self._sampler(0),
                 load_if_exists=True,
             )
-            self._enqueue_starts(learning_flight)
+            if not self._study.trials:
+                self._enqueue_starts()
 
     def run(
         self, trials: int, on_trial: Callable[[SearchResults], None] = lambda _: None
@@ -171,14 +168,13 @@ class Search:
             n_startup_trials=_MOST_STARTS + self._neighbour_count,
         )
 
-    def _enqueue_starts(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
+    def _enqueue_starts(self) -> None:
         """Enqueue the start candidates of a new search, and candidates near the last of them."""
-        if not self._study.trials:
-            config, search = learning_flight(self._campaign), self._tune.search
-            initial = list(start_candidates(self._campaign, self._tune, config))
-            count, seed = self._neighbour_count, self._campaign.file.seed
-            for start in (*initial, *candidates_near(initial[-1], search, count, seed)):
-                self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
+        config, search = learned_config(self._campaign), self._tune.search
+        initial = list(start_candidates(self._campaign, self._tune, config))
+        count, seed = self._neighbour_count, self._campaign.file.seed
+        for start in (*initial, *candidates_near(initial[-1], search, count, seed)):
+            self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted_trial(self) -> "Trial | None":
         """The trial whose flights were interrupted, to be tried again; None: there is none."""
