@@ -52,12 +52,10 @@ def write(folder):
     writer.message(
         "/tf",
         second,
-        cdr.PoseEncoder("world", "vehicle").message(
-            second + 7, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0)
-        ),
+        cdr.pose_message(second + 7, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0), "world", "vehicle"),
     )
     for topic in ("/pose", "/reference"):
-        pose = cdr.PoseEncoder("world").message(second, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0))
+        pose = cdr.pose_message(second, (1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0), "world")
         writer.message(topic, second, pose)
     for topic in ("/scene", "/paths", "/fence"):
         writer.message(topic, second, scene_message(second, (Entity(topic, "world"),)))
