@@ -240,7 +240,7 @@ def test_a_candidate_whose_keys_do_not_fit_together_is_not_flown(tmp_path, monke
         raise ConfigError("a minimum above a maximum")
 
     monkeypatch.setattr("companion.campaign.tune.search.cases", refuse)
-    found = search.run(2)
+    *_, found = search.run(2)
     assert (found.tried_count, found.stopped_early_count, found.best) == (2, 2, None)
 
 

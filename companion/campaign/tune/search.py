@@ -119,21 +119,22 @@ class Search:
             if not self._study.trials:
                 self._enqueue_starts()
 
-    def run(
-        self, trials: int, on_trial: Callable[[SearchResults], None] = lambda _: None
-    ) -> SearchResults:
+    def run(self, trials: int) -> Iterator[SearchResults]:
         """Try candidates until there are `trials` of them, including those of earlier runs.
+
+        Yields:
+            the results so far, before each candidate and at the end.
 
         Raises:
             StorageError: the storage cannot be used any more, perhaps because the disk is full.
         """
         with _storage_errors(self.path):
-            while len(self._ended_trials()) < trials:
-                on_trial(self.results())
+            yield (results := self.results())
+            while results.tried_count < trials:
                 # Each trial has its own seed, so an interruption does not change the candidates.
-                self._study.sampler = self._sampler(len(self._ended_trials()))
+                self._study.sampler = self._sampler(results.tried_count)
                 self._try_candidate(self._interrupted_trial() or self._study.ask())
-            return self.results()
+                yield (results := self.results())
 
     def results(self) -> SearchResults:
         """The results of all trials so far, including those of earlier runs."""
