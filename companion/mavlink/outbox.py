@@ -6,7 +6,7 @@ from math import inf
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SYSTEM_TIME, SetpointEncoder, encode_system_time
 from companion.mavlink.framing import build_frame
-from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
+from companion.mavlink.messages import Message, dialect, encode
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.base import Tap, Transport
@@ -113,7 +113,6 @@ class Outbox:
         return build_frame(
             message_id,
             payload,
-            CRC_EXTRA[message_id],
             sequence=self._sequence,
             system=self._settings.source_system,
             component=self._settings.source_component,

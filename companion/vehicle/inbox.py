@@ -87,9 +87,7 @@ class Inbox:
         Args:
             streaming: whether a frame may continue in the bytes received next.
         """
-        self._scanner = FrameScanner(
-            CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True
-        )
+        self._scanner = FrameScanner(streaming=streaming, stats=self._stats, keep_unknown=True)
         self._counter.reset()
 
     def follow_vehicle_time(
