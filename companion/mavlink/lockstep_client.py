@@ -17,6 +17,7 @@ class LockstepClient:
 
     Attributes:
         first_beacon: a future that is done when the first beacon has come.
+        open_step_time_ms: vehicle time of the open step, ms; `None` while no step is open.
     """
 
     def __init__(
@@ -28,23 +29,18 @@ class LockstepClient:
     ) -> None:
         self._loop = loop
         self._process, self._deliver, self._answer = process, deliver, answer
-        self._open_step_time_ms: int | None = None
+        self.open_step_time_ms: int | None = None
         self._closed = False
         self.first_beacon: asyncio.Future[None] = loop.create_future()
 
-    @property
-    def open_step_time_ms(self) -> int | None:
-        """Vehicle time of the open step, ms; `None` while no step is open."""
-        return self._open_step_time_ms
-
     def take_beacon(self, time_boot_ms: int) -> None:
         """Take a beacon: start a step, or answer a repeated beacon again."""
-        if self._open_step_time_ms is not None:
+        if self.open_step_time_ms is not None:
             return  # a beacon repeated during the step; the answer to the step will follow
         if not self._loop.advance(time_boot_ms / 1000.0):
             self._answer(time_boot_ms)
             return
-        self._open_step_time_ms = time_boot_ms
+        self.open_step_time_ms = time_boot_ms
         if not self.first_beacon.done():
             self.first_beacon.set_result(None)
         self._process()
@@ -62,6 +58,6 @@ class LockstepClient:
         self._loop.settle(self._close_step)
 
     def _close_step(self) -> None:
-        step, self._open_step_time_ms = self._open_step_time_ms, None
+        step, self.open_step_time_ms = self.open_step_time_ms, None
         if step is not None and not self._closed:
             self._answer(step)

@@ -143,7 +143,7 @@ class Link(VehicleClient):
     @property
     def local_address(self) -> tuple[str, int] | None:
         """(host, port) to which the socket is bound, for UDP and a TCP server; else `None`."""
-        return self._connection.local_address
+        return getattr(self._outbox.transport, "local", None)
 
     # --- control
 
