@@ -8,7 +8,7 @@ from companion.mavlink.errors import EndpointError
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.endpoint import Endpoint, UdpIn, UdpOut
-from companion.mavlink.transport.opening import OpenTransport, open_transport
+from companion.mavlink.transport.opening import OpenTransport
 from companion.vehicle.inbox import Inbox
 
 _LOG = logging.getLogger(__name__)
@@ -38,17 +38,12 @@ class Connection:
         outbox: Outbox,
         stats: LinkStats,
         on_dropped: Callable[[str], None],
-        opener: OpenTransport = open_transport,
+        opener: OpenTransport,
     ) -> None:
         self._endpoint, self._inbox, self._outbox = endpoint, inbox, outbox
         self._stats, self._on_dropped, self._opener = stats, on_dropped, opener
         self._reopening: asyncio.Task[None] | None = None
         self._lost_early: str | None = None
-
-    @property
-    def local_address(self) -> tuple[str, int] | None:
-        """(host, port) to which the socket is bound, for UDP and a TCP server; else `None`."""
-        return getattr(self._outbox.transport, "local", None)
 
     async def open(self) -> None:
         """Open the transport.

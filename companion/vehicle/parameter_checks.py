@@ -18,7 +18,7 @@ _MAX_LIMIT_RATIO = 1.15
 """Acceleration limits that differ by less than this factor have the same effect."""
 
 
-def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float | None = None) -> Check:
+def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float) -> Check:
     """A check that forbids the values in `bad`, which gives the consequence of each."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
