@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 
 from companion.files.ascii_text import ascii_for
-from companion.mavlink.commands import MAV_CMD_DO_SET_MODE
 from companion.mavlink.framing import Frame, build_frame
 from companion.mavlink.messages import Message, decode, dialect, encode
 from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
@@ -148,7 +147,7 @@ def _acknowledgement(frame: Frame, result: int) -> Message | None:
     if frame.message_id in MISSION_ITEMS:
         return dialect.MAVLink_mission_ack_message(**sender, type=dialect.MAV_MISSION_DENIED)
     if frame.message_id == dialect.MAVLINK_MSG_ID_SET_MODE:
-        command = MAV_CMD_DO_SET_MODE
+        command = dialect.MAV_CMD_DO_SET_MODE
     elif frame.message_id in _COMMAND_IDS:
         command = decode(frame.message_id, frame.payload).command
     else:

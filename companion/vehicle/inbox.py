@@ -7,7 +7,6 @@ and samples then wait until the event loop has run the tasks of that step.
 
 import asyncio
 from collections.abc import Callable
-from math import inf
 
 from companion.mavlink.codec import (
     ATTITUDE_QUATERNION,
@@ -29,6 +28,22 @@ from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample
 
 
+class LinkCallbacks:
+    """What a link calls, synchronously, as frames arrive; None: nothing.
+
+    An exception that a callback raises goes to `Link.on_error`.
+    """
+
+    on_attitude: Callable[[AttitudeSample], None] | None = None
+    """Called with each attitude sample; in lockstep after the tasks of the step have run."""
+    on_foreign: Callable[[Frame], None] | None = None
+    """Called with each frame of another system or component than the vehicle's."""
+    on_frame: Callable[[Frame], None] | None = None
+    """Called with each frame of the peer, from any system and of any message, after the control
+    loop and all subscribers. Beacons, and frames of the vehicle with a refused signature, are left
+    out. The checksum of a message that the dialect does not know is not checked."""
+
+
 class Inbox:
     """Passes attitude samples to the control loop, and all accepted frames to the dispatcher.
 
@@ -36,17 +51,13 @@ class Inbox:
         settings: ids of the vehicle, and the signing key.
         stats: counters of the link.
         dispatcher: takes every accepted frame.
+        callbacks: take samples and frames.
         tap: called with every accepted frame, for recordings.
         notice: called once with each notice about signatures, their time stamps and the peer.
         clock: the vehicle's clock; takes the time stamp of every sample.
         last_setpoint: returns the event-loop time of the last setpoint sent, s.
 
     Attributes:
-        on_attitude: called with each attitude sample, synchronously.
-        on_foreign: called with each frame of another system or component than the vehicle's.
-        on_frame: called with each frame of the peer, from any system and of any message, after the
-            control loop and all subscribers. Beacons, and frames of the vehicle with a refused
-            signature, are left out.
         lockstep: handles beacons, with which the vehicle begins each step of lockstep
             (SYSTEM_TIME without the time of day); None without lockstep.
     """
@@ -56,21 +67,20 @@ class Inbox:
         settings: LinkSettings,
         stats: LinkStats,
         dispatcher: MessageDispatcher,
+        callbacks: LinkCallbacks,
         tap: Tap | None,
         notice: Notice,
         clock: VehicleClock,
-        last_setpoint: Callable[[], float] = lambda: -inf,
+        last_setpoint: Callable[[], float],
     ) -> None:
         self._stats, self._dispatcher, self._tap, self._clock = stats, dispatcher, tap, clock
+        self._callbacks = callbacks
         self._loop = asyncio.get_running_loop()
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
         self._candidate: str | None = None
         self._held_frames: list[tuple[Frame, int]] = []
         self._samples: list[AttitudeSample] = []
-        self.on_attitude: Callable[[AttitudeSample], None] | None = None
-        self.on_foreign: Callable[[Frame], None] | None = None
-        self.on_frame: Callable[[Frame], None] | None = None
         self.lockstep: LockstepClient | None = None
         self._peer_rule = PeerRule(
             stats,
@@ -82,11 +92,7 @@ class Inbox:
         self.start_connection(streaming=False)
 
     def start_connection(self, *, streaming: bool) -> None:
-        """Prepare for a new connection: forget an incomplete frame and the last sequence number.
-
-        Args:
-            streaming: whether a frame may continue in the bytes received next.
-        """
+        """Prepare for a new connection; see `Receiver`."""
         self._scanner = FrameScanner(streaming=streaming, stats=self._stats, keep_unknown=True)
         self._counter.reset()
 
@@ -142,8 +148,7 @@ class Inbox:
     def may_prove_date(self, sender: str) -> bool:
         """Whether `sender`, refused for the date of its signature, may prove the date by TIMESYNC.
 
-        If so, the transport sends to `sender`, and the next frame that `receive` accepts makes
-        `sender` the peer.
+        See `Receiver`.
         """
         if not self._filter.awaits_answer:
             return False
@@ -165,8 +170,8 @@ class Inbox:
     def _is_admitted(self, frame: Frame) -> bool:
         if self._filter.admits_source(frame):
             return self._filter.has_good_signature(frame)
-        if self.on_foreign is not None:
-            self._dispatcher.guard(self.on_foreign, frame)
+        if self._callbacks.on_foreign is not None:
+            self._dispatcher.guard(self._callbacks.on_foreign, frame)
         return False
 
     def _accept(self, frame: Frame, received_ns: int) -> None:
@@ -199,8 +204,8 @@ class Inbox:
         self._call_on_frame(frame)
 
     def _call_on_frame(self, frame: Frame) -> None:
-        if self.on_frame is not None:
-            self._dispatcher.guard(self.on_frame, frame)
+        if self._callbacks.on_frame is not None:
+            self._dispatcher.guard(self._callbacks.on_frame, frame)
 
     def _take_sample(self, payload: bytes, now: float, received_ns: int) -> None:
         decoded = decode_attitude(payload)
@@ -217,8 +222,8 @@ class Inbox:
             self._samples.append(sample)
 
     def _call_on_attitude(self, sample: AttitudeSample) -> None:
-        if self.on_attitude is not None:
-            self._dispatcher.guard(self.on_attitude, sample)
+        if self._callbacks.on_attitude is not None:
+            self._dispatcher.guard(self._callbacks.on_attitude, sample)
 
     def _pass_on_held(self) -> None:
         """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""

@@ -9,7 +9,6 @@ from companion.attitude.types import BodyRates
 from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import LinkError, LinkTimeout
 from companion.mavlink.frame_filter import Notice
-from companion.mavlink.framing import Frame
 from companion.mavlink.lockstep import LockstepEventLoop
 from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.outbox import Outbox
@@ -22,16 +21,15 @@ from companion.mavlink.transport.endpoint import parse_endpoint
 from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.connection import Connection
-from companion.vehicle.inbox import Inbox
-from companion.vehicle.records import AttitudeSample, Heartbeat
-from companion.vehicle.silence import no_beacon_message, no_heartbeat_message
+from companion.vehicle.connection import Connection, no_beacon_message, no_heartbeat_message
+from companion.vehicle.inbox import Inbox, LinkCallbacks
+from companion.vehicle.records import Heartbeat
 from companion.vehicle.timesync import TimeSync
 
 _LOG = logging.getLogger(__name__)
 
 
-class Link(VehicleClient):
+class Link(VehicleClient, LinkCallbacks):
     """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
 
     It sends heartbeats and TIMESYNC requests, and reopens a dropped connection. It never repeats a
@@ -70,7 +68,14 @@ class Link(VehicleClient):
         self.clock = VehicleClock(lockstep=settings.lockstep)
         super().__init__(settings, outbox, dispatcher, stats, self._loop.time, self.clock)
         self._inbox = Inbox(
-            settings, stats, dispatcher, tap, notice, self.clock, lambda: outbox.last_setpoint_at
+            settings,
+            stats,
+            dispatcher,
+            self,
+            tap,
+            notice,
+            self.clock,
+            lambda: outbox.last_setpoint_at,
         )
         self.timesync = TimeSync(outbox, dispatcher, self._loop.time, self.clock)
         self._connection = Connection(
@@ -146,41 +151,6 @@ class Link(VehicleClient):
         return getattr(self._outbox.transport, "local", None)
 
     # --- control
-
-    @property
-    def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
-        """Called with each attitude sample, inside the read callback.
-
-        In lockstep it is called after the event loop has run the tasks of the step.
-        An exception that it raises goes to `on_error`.
-        """
-        return self._inbox.on_attitude
-
-    @on_attitude.setter
-    def on_attitude(self, callback: Callable[[AttitudeSample], None] | None) -> None:
-        self._inbox.on_attitude = callback
-
-    @property
-    def on_foreign(self) -> Callable[[Frame], None] | None:
-        """Called with each frame of another system or component than the vehicle's."""
-        return self._inbox.on_foreign
-
-    @on_foreign.setter
-    def on_foreign(self, callback: Callable[[Frame], None] | None) -> None:
-        self._inbox.on_foreign = callback
-
-    @property
-    def on_frame(self) -> Callable[[Frame], None] | None:
-        """Called with each frame of the peer, whatever its source and message; see `Inbox`.
-
-        An exception that it raises goes to `on_error`. The checksum of a message that the dialect
-        does not know is not checked.
-        """
-        return self._inbox.on_frame
-
-    @on_frame.setter
-    def on_frame(self, callback: Callable[[Frame], None] | None) -> None:
-        self._inbox.on_frame = callback
 
     def forward(self, frame: bytes) -> bool:
         """Send a whole frame of another node unchanged; return False if it could not be sent."""

@@ -5,13 +5,11 @@ from math import inf
 
 from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.messages import Message
+from companion.mavlink.messages import Message, dialect
 from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.records import CurrentMode, Heartbeat
 from companion.vehicle.registry import MULTIROTORS, autopilot_for
 
-_ARMED_FLAG = 128
-_AUTOPILOT_INVALID = 8
 _FAILSAFE_STATES = frozenset({5, 6, 8})
 """MAV_STATE of an autopilot in a failsafe: critical, emergency, flight termination."""
 
@@ -79,7 +77,7 @@ class ModeState:
         return self.failsafe or current.mode != current.intended
 
     def _on_heartbeat(self, message: Message) -> None:
-        if message.autopilot == _AUTOPILOT_INVALID:
+        if message.autopilot == dialect.MAV_AUTOPILOT_INVALID:
             return  # another component that uses the autopilot's id
         if self.autopilot is None:
             try:
@@ -89,7 +87,7 @@ class ModeState:
                 self.unsupported_error = error
         elif message.autopilot != self.autopilot.mav_autopilot or message.type not in MULTIROTORS:
             return  # an autopilot does not change its kind: this is another component
-        armed = bool(message.base_mode & _ARMED_FLAG)
+        armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
         self.armings += armed and not self.armed
         mode = str(message.custom_mode)
         if self.autopilot is not None:

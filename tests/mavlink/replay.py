@@ -11,6 +11,7 @@ import asyncio
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -24,7 +25,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.inbox import Inbox
+from companion.vehicle.inbox import Inbox, LinkCallbacks
 from companion.vehicle.state import VehicleState
 
 VEHICLE = (1, 1)
@@ -144,8 +145,11 @@ class _Player:
         stats = LinkStats()
         dispatcher = MessageDispatcher(stats)
         clock = VehicleClock()
-        self._inbox = Inbox(settings, stats, dispatcher, None, self.out.notices.append, clock)
-        self._inbox.on_attitude = self.out.samples.append
+        callbacks, notices = LinkCallbacks(), self.out.notices
+        callbacks.on_attitude = self.out.samples.append
+        self._inbox = Inbox(
+            settings, stats, dispatcher, callbacks, None, notices.append, clock, lambda: -inf
+        )
         outbox = Outbox(settings, stats, None)
         outbox.transport = self._recorder = Recorder()
         self._setpoints = SetpointEncoder(*ours, *VEHICLE, signed=False)

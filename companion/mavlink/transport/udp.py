@@ -28,16 +28,6 @@ PEER_SILENCE_S = 2.0
 a sender at another address may become the peer."""
 
 
-async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
-    """Open a UDP endpoint.
-
-    Raises:
-        EndpointError: the port is in use, the host is unknown, the address is not that of an
-            interface of this computer, or there is no permission.
-    """
-    return UdpTransport(endpoint, receiver, *await udp_address(endpoint))
-
-
 async def udp_address(
     endpoint: UdpIn | UdpOut,
 ) -> tuple[socket.AddressFamily, Any, NamedPeers]:
@@ -79,6 +69,10 @@ class UdpTransport:
 
     Attributes:
         local: (host, port) to which the socket is bound.
+
+    Raises:
+        EndpointError: the port is in use, the address is not that of an interface of this computer,
+            or there is no permission.
     """
 
     reconnects = False
