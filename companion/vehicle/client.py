@@ -31,8 +31,7 @@ class VehicleClient:
         vehicle_clock: converts the time stamps of positions.
 
     Attributes:
-        settings: the endpoint, and the ids of the vehicle and of this program.
-        stats: counters of the link.
+        settings, stats: see the arguments.
         state: the vehicle's telemetry.
     """
 

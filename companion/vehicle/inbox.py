@@ -1,25 +1,18 @@
 """Checks arriving bytes, and passes their frames to the control loop and to the dispatcher.
 
 Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
-subscribers. In lockstep, frames first wait for the beacon (a SYSTEM_TIME) that closes their step,
-and samples then wait until the event loop has run the tasks of that step.
+subscribers. `lockstep_inbox.py` says how frames wait in lockstep.
 """
 
 import asyncio
 from collections.abc import Callable
 
-from companion.mavlink.codec import (
-    ATTITUDE_QUATERNION,
-    SYSTEM_TIME,
-    decode_attitude,
-    decode_beacon,
-)
+from companion.mavlink.codec import ATTITUDE_QUATERNION, decode_attitude
 from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.frame_filter import FrameFilter, Notice
 from companion.mavlink.framing import Frame, FrameScanner
-from companion.mavlink.lockstep import LockstepEventLoop
-from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.messages import CRC_EXTRA
+from companion.mavlink.outbox import Outbox
 from companion.mavlink.peer import HEARTBEAT, PeerRule
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import FrameCounter, LinkStats
@@ -55,11 +48,7 @@ class Inbox:
         tap: called with every accepted frame, for recordings.
         notice: called once with each notice about signatures, their time stamps and the peer.
         clock: the vehicle's clock; takes the time stamp of every sample.
-        last_setpoint: returns the event-loop time of the last setpoint sent, s.
-
-    Attributes:
-        lockstep: handles beacons, with which the vehicle begins each step of lockstep
-            (SYSTEM_TIME without the time of day); None without lockstep.
+        outbox: knows when the last setpoint was sent.
     """
 
     def __init__(
@@ -71,22 +60,19 @@ class Inbox:
         tap: Tap | None,
         notice: Notice,
         clock: VehicleClock,
-        last_setpoint: Callable[[], float],
+        outbox: Outbox,
     ) -> None:
         self._stats, self._dispatcher, self._tap, self._clock = stats, dispatcher, tap, clock
-        self._callbacks = callbacks
+        self._callbacks, self._outbox = callbacks, outbox
         self._loop = asyncio.get_running_loop()
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
         self._candidate: str | None = None
-        self._held_frames: list[tuple[Frame, int]] = []
-        self._samples: list[AttitudeSample] = []
-        self.lockstep: LockstepClient | None = None
         self._peer_rule = PeerRule(
             stats,
             self._filter.notify_once,
             self._loop.time,
-            last_setpoint,
+            lambda: outbox.last_setpoint_at,
             every_frame_claims=settings.signing is not None or settings.lockstep,
         )
         self.start_connection(streaming=False)
@@ -95,13 +81,6 @@ class Inbox:
         """Prepare for a new connection; see `Receiver`."""
         self._scanner = FrameScanner(streaming=streaming, stats=self._stats, keep_unknown=True)
         self._counter.reset()
-
-    def follow_vehicle_time(
-        self, loop: LockstepEventLoop, answer: Callable[[int], None]
-    ) -> LockstepClient:
-        """Switch to lockstep: from now on frames wait until the vehicle closes its step."""
-        self.lockstep = LockstepClient(loop, self._pass_on_held, self._deliver_samples, answer)
-        return self.lockstep
 
     def receive(self, data: bytes, received_ns: int) -> bool:
         """Take bytes of the peer; return whether a frame in them was accepted.
@@ -177,14 +156,7 @@ class Inbox:
     def _accept(self, frame: Frame, received_ns: int) -> None:
         if frame.message_id == HEARTBEAT and self._peer_rule.is_peer_claim(frame):
             self._peer_rule.renew()
-        if self.lockstep is None:
-            self._pass_on(frame, received_ns)
-            return
-        beacon = decode_beacon(frame.payload) if frame.message_id == SYSTEM_TIME else None
-        if beacon is None:
-            self._held_frames.append((frame, received_ns))
-        else:  # not counted as telemetry: beacons have sequence numbers of their own
-            self.lockstep.take_beacon(beacon)
+        self._pass_on(frame, received_ns)
 
     def _pass_on(self, frame: Frame, received_ns: int) -> None:
         """Pass a frame to the tap, the control loop, the counter and the dispatcher.
@@ -215,24 +187,10 @@ class Inbox:
         time_boot_ms, q, rates = decoded
         time, age, misfit = self._clock.take(time_boot_ms, now)
         known = self._clock.age_known
-        sample = AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
-        if self.lockstep is None:
-            self._call_on_attitude(sample)
-        else:
-            self._samples.append(sample)
+        self._call_on_attitude(
+            AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
+        )
 
     def _call_on_attitude(self, sample: AttitudeSample) -> None:
         if self._callbacks.on_attitude is not None:
             self._dispatcher.guard(self._callbacks.on_attitude, sample)
-
-    def _pass_on_held(self) -> None:
-        """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""
-        held, self._held_frames = self._held_frames, []
-        for frame, received_ns in held:
-            self._pass_on(frame, received_ns)
-
-    def _deliver_samples(self) -> None:
-        """In lockstep: after a step's tasks have run, pass its samples to the control loop."""
-        samples, self._samples = self._samples, []
-        for sample in samples:
-            self._call_on_attitude(sample)

@@ -7,10 +7,8 @@ from typing import Any
 
 from companion.attitude.types import BodyRates
 from companion.mavlink.dispatcher import MessageDispatcher
-from companion.mavlink.errors import LinkError, LinkTimeout
+from companion.mavlink.errors import LinkTimeout
 from companion.mavlink.frame_filter import Notice
-from companion.mavlink.lockstep import LockstepEventLoop
-from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import AnswerQueue
 from companion.mavlink.settings import LinkSettings
@@ -23,6 +21,7 @@ from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.connection import Connection, no_beacon_message, no_heartbeat_message
 from companion.vehicle.inbox import Inbox, LinkCallbacks
+from companion.vehicle.lockstep_inbox import LockstepInbox
 from companion.vehicle.records import Heartbeat
 from companion.vehicle.timesync import TimeSync
 
@@ -67,16 +66,10 @@ class Link(VehicleClient, LinkCallbacks):
         dispatcher, outbox = MessageDispatcher(stats), Outbox(settings, stats, tap)
         self.clock = VehicleClock(lockstep=settings.lockstep)
         super().__init__(settings, outbox, dispatcher, stats, self._loop.time, self.clock)
-        self._inbox = Inbox(
-            settings,
-            stats,
-            dispatcher,
-            self,
-            tap,
-            notice,
-            self.clock,
-            lambda: outbox.last_setpoint_at,
+        self._inbox = (LockstepInbox if settings.lockstep else Inbox)(
+            settings, stats, dispatcher, self, tap, notice, self.clock, outbox
         )
+        self._lockstep = self._inbox if isinstance(self._inbox, LockstepInbox) else None
         self.timesync = TimeSync(outbox, dispatcher, self._loop.time, self.clock)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
@@ -84,11 +77,6 @@ class Link(VehicleClient, LinkCallbacks):
         self._stamp_writer: StampWriter | None = None
         if settings.signing is not None and settings.signing.file is not None:
             self._stamp_writer = StampWriter(settings.signing, settings.signing.file)
-        self._lockstep: LockstepClient | None = None
-        if settings.lockstep:
-            if not isinstance(self._loop, LockstepEventLoop):
-                raise LinkError("lockstep needs the event loop of companion.mavlink.lockstep.run")
-            self._lockstep = self._inbox.follow_vehicle_time(self._loop, outbox.close_step)
 
     # --- lifetime
 
@@ -209,7 +197,7 @@ class Link(VehicleClient, LinkCallbacks):
             self._outbox.send_heartbeat()
             await asyncio.sleep(1.0 / self.settings.heartbeat_rate_hz)
 
-    async def _first_beacon(self, lockstep: LockstepClient) -> None:
+    async def _first_beacon(self, lockstep: LockstepInbox) -> None:
         # Some vehicles wait for a first message before they send (udpout, TCP).
         self._outbox.send_heartbeat()
         try:

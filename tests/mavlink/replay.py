@@ -11,7 +11,6 @@ import asyncio
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
-from math import inf
 from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -145,12 +144,12 @@ class _Player:
         stats = LinkStats()
         dispatcher = MessageDispatcher(stats)
         clock = VehicleClock()
+        outbox = Outbox(settings, stats, None)
         callbacks, notices = LinkCallbacks(), self.out.notices
         callbacks.on_attitude = self.out.samples.append
         self._inbox = Inbox(
-            settings, stats, dispatcher, callbacks, None, notices.append, clock, lambda: -inf
+            settings, stats, dispatcher, callbacks, None, notices.append, clock, outbox
         )
-        outbox = Outbox(settings, stats, None)
         outbox.transport = self._recorder = Recorder()
         self._setpoints = SetpointEncoder(*ours, *VEHICLE, signed=False)
         self._conversation = VehicleClient(
