@@ -5,7 +5,7 @@ import sys
 from companion.bench.companion_program import answer
 from companion.mavlink import loop as link_loop
 from companion.mavlink.settings import LinkSettings
-from companion.mavsdk_link.link import MavsdkLink
+from companion.mavsdk_link import MavsdkLink
 
 
 async def fly(port: int) -> None:

@@ -15,7 +15,7 @@ from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import changed, load, parse_assignments, shipped
 from companion.extras import MissingExtraError
-from companion.files.os_errors import reason_of
+from companion.files.write_whole import reason_of
 from companion.files.yaml_file import ConfigError
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.observer import SeveralObservers

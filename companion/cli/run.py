@@ -12,7 +12,7 @@ from companion.cli.exit_codes import EXIT_FAILURE, EXIT_USAGE
 from companion.cli.text_streams import output_fault
 from companion.demo import VehicleStoppedError
 from companion.extras import MissingExtraError
-from companion.files.os_errors import reason_of
+from companion.files.write_whole import reason_of
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.realtime import RealtimeError

@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from companion.files.ascii_text import ascii_for
-from companion.files.os_errors import reason_of
+from companion.files.write_whole import reason_of
 
 _ERROR_HANDLER = "companion.transliterated"
 

@@ -1,5 +1,6 @@
 """Error messages about one value of a YAML file: what it must be, and what to write instead."""
 
+import operator
 import re
 from collections.abc import Callable, Mapping
 from math import degrees, inf, radians
@@ -29,10 +30,10 @@ _MISTAKEN_UNITS: tuple[tuple[str, str, Callable[[float], float]], ...] = (
 unit to the key's unit. The first suffix that fits is used.
 """
 _BOUNDS: dict[str, Callable[[float, float], bool]] = {
-    "ge": lambda value, bound: value >= bound,
-    "gt": lambda value, bound: value > bound,
-    "le": lambda value, bound: value <= bound,
-    "lt": lambda value, bound: value < bound,
+    "ge": operator.ge,
+    "gt": operator.gt,
+    "le": operator.le,
+    "lt": operator.lt,
 }
 _REQUIREMENTS: Mapping[str, str] = {
     "greater_than_equal": "must be at least {ge:.12g}",

@@ -15,8 +15,8 @@ from companion.flight.preflight_checks import PreflightChecks
 from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
 from companion.guidance.fence import FenceCentre
-from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE
 from companion.mavlink.errors import LinkError
+from companion.mavlink.messages import dialect
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
@@ -121,7 +121,9 @@ class FlightContext:
             nonlocal fresh_from
             with suppress(LinkError):
                 for _ in range(2):  # PX4 sends it before its answer, so the second one is fresh
-                    await self.link.command(MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT_ID, retries=0)
+                    await self.link.command(
+                        dialect.MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT_ID, retries=0
+                    )
                     fresh_from = min(fresh_from, loop.time())
 
         def on_heartbeat(_: object) -> None:

@@ -43,7 +43,7 @@ def open_link(
     """
     settings = link_settings(config)
     if config.link.backend == "mavsdk":
-        from companion.mavsdk_link.link import MavsdkLink  # noqa: PLC0415  needs the extra
+        from companion.mavsdk_link import MavsdkLink  # noqa: PLC0415  needs the extra
 
         return MavsdkLink(settings, tap, notice)
     return Link(settings, tap, opener, notice)

@@ -14,13 +14,6 @@ from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.texts import TextAssembler
 
-MAV_CMD_NAV_RETURN_TO_LAUNCH = 20
-MAV_CMD_NAV_LAND = 21
-MAV_CMD_NAV_TAKEOFF = 22
-MAV_CMD_DO_SET_MODE = 176
-MAV_CMD_COMPONENT_ARM_DISARM = 400
-MAV_CMD_REQUEST_MESSAGE = 512
-
 
 class Command(NamedTuple):
     """A MAV_CMD with its parameters, ready for `Link.command(*command)`."""
@@ -35,8 +28,7 @@ class Command(NamedTuple):
     p7: float = 0.0
 
 
-_ACCEPTED = 0
-_IN_PROGRESS = 5
+_ACCEPTED, _IN_PROGRESS = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS
 _IN_PROGRESS_TIMEOUT_S = 30.0  # from the ACK "in progress" to the final one
 _STALL_S = 0.1  # a timeout that ends this late means that our process was stalled
 _BACKLOG_S = 0.5  # after a stall the backlog of frames is read within this time
@@ -147,10 +139,9 @@ class CommandClient:
         """Wait for the final result of a command that is in progress."""
         try:
             async with asyncio.timeout(_IN_PROGRESS_TIMEOUT_S):
-                while True:
-                    result = await answers.next(_IN_PROGRESS_TIMEOUT_S)
-                    if result != _IN_PROGRESS:
-                        return result
+                while (result := await answers.next(_IN_PROGRESS_TIMEOUT_S)) == _IN_PROGRESS:
+                    pass
+                return result
         except TimeoutError:
             raise CommandUnfinished(
                 f"{command_name(command)}: the autopilot answered that the command is in progress, "

@@ -41,11 +41,7 @@ class FrameFilter:
 
     @property
     def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only because its time stamp is not proved yet.
-
-        The vehicle proves a time stamp far ahead of this program's date by answering a TIMESYNC
-        request.
-        """
+        """Whether the last frame was refused only because its time stamp is not proved yet."""
         return self._signing is not None and self._signing.awaits_answer
 
     def is_vehicle(self, frame: Frame) -> bool:

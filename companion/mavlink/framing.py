@@ -6,11 +6,11 @@ message's CRC_EXTRA, so a frame of an unknown message cannot be checked. It is s
 """
 
 import struct
-from collections.abc import Mapping
 from typing import NamedTuple
 
 from fastcrc import crc16
 
+from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.stats import LinkStats
 
 V2_MAGIC = 0xFD
@@ -50,23 +50,20 @@ class FrameScanner:
     """Finds the intact frames in the bytes that arrive.
 
     Args:
-        crc_extra: the dialect's CRC_EXTRA as one byte for each known message id.
         streaming: True if a frame may continue in the next call (TCP, serial). False for
             datagrams: an incomplete frame is dropped.
         stats: counts wrong checksums and unknown messages.
-        keep_unknown: whether frames of unknown messages (id not in `crc_extra`) are returned too;
+        keep_unknown: whether frames of unknown messages (id not in `CRC_EXTRA`) are returned too;
             their checksum cannot be checked.
     """
 
     def __init__(
         self,
-        crc_extra: Mapping[int, bytes],
         *,
         streaming: bool = False,
         stats: LinkStats | None = None,
         keep_unknown: bool = False,
     ) -> None:
-        self._crc_extra = crc_extra
         self._streaming = streaming
         self._keep_unknown = keep_unknown
         self._stats = stats or LinkStats()
@@ -145,7 +142,7 @@ class FrameScanner:
             None if they are; else `_NOT_A_FRAME`, `_INCOMPLETE`, or the length of a frame of an
             unknown message.
         """
-        extra = self._crc_extra.get(message_id)
+        extra = CRC_EXTRA.get(message_id)
         if extra is None:
             return self._unknown_frame(data, start, end)
         if end > len(data):
@@ -175,7 +172,6 @@ def _is_plausible(data: bytes, start: int) -> bool:
 def build_frame(
     message_id: int,
     payload: bytes,
-    crc_extra: bytes,
     *,
     sequence: int,
     system: int,
@@ -201,4 +197,4 @@ def build_frame(
         )
         + trimmed
     )
-    return body + crc16.mcrf4xx(body[1:] + crc_extra).to_bytes(2, "little")
+    return body + crc16.mcrf4xx(body[1:] + CRC_EXTRA[message_id]).to_bytes(2, "little")

@@ -51,7 +51,11 @@ class LockstepClock(Protocol):
 
 
 class _BeaconClock:
-    """Wall time in s until the first beacon, vehicle time in s from then on."""
+    """Wall time in s until the first beacon, vehicle time in s from then on.
+
+    If no new beacon comes for `BEACON_TIMEOUT_S` of wall time, its time advances by that amount, so
+    that timeouts expire if the vehicle is gone.
+    """
 
     def __init__(self) -> None:
         self._wall_start = time.monotonic()
@@ -85,7 +89,7 @@ class _BeaconClock:
         return max(0.0, self._waiting_since + BEACON_TIMEOUT_S - time.monotonic())
 
     def advance_alone(self) -> None:
-        """Advance time although the vehicle sent no beacon in time, so that timeouts can expire."""
+        """Advance time although the vehicle sent no beacon in time."""
         self._offset += BEACON_TIMEOUT_S
         self.start_waiting()
 
@@ -162,25 +166,16 @@ class _SteppingSelector(SettlingSelector):
 class LockstepEventLoop(LinkEventLoop):
     """An event loop in vehicle time: `advance` sets `time()`.
 
-    Before the first beacon it runs on wall time. If no new beacon comes for `BEACON_TIMEOUT_S` of
-    wall time, its time advances by that amount, so that timeouts expire if the vehicle is gone.
-
     Args:
-        clock: clock to use instead of wall time and beacons; it needs `selector` too.
-        selector: the selector that advances `clock`.
+        clock: the clock that the vehicle advances.
+        selector: the selector that waits for the vehicle.
     """
 
-    def __init__(
-        self, clock: LockstepClock | None = None, selector: SettlingSelector | None = None
-    ) -> None:
-        if clock is None or selector is None:
-            clock = beacon_clock = _BeaconClock()
-            selector = _SteppingSelector(beacon_clock)
-        self._clock: LockstepClock = clock
-        self._settling_selector = selector
+    def __init__(self, clock: LockstepClock, selector: SettlingSelector) -> None:
+        self._clock, self._settling_selector = clock, selector
         self._timer_count = 0
         self._read_clock = clock.read  # stored, because it is called a dozen times in each step
-        super().__init__(self._settling_selector)
+        super().__init__(selector)
 
     def time(self) -> float:
         """Event-loop time, s: vehicle time from the first beacon on."""
@@ -215,5 +210,7 @@ class LockstepEventLoop(LinkEventLoop):
 
 def run(main: Coroutine[Any, Any, T]) -> T:
     """Run `main` like `asyncio.run`, in vehicle time."""
-    with asyncio.Runner(loop_factory=LockstepEventLoop) as runner:
+    clock = _BeaconClock()
+    selector = _SteppingSelector(clock)
+    with asyncio.Runner(loop_factory=lambda: LockstepEventLoop(clock, selector)) as runner:
         return runner.run(main)

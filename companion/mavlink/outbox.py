@@ -6,7 +6,7 @@ from math import inf
 from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SYSTEM_TIME, SetpointEncoder, encode_system_time
 from companion.mavlink.framing import build_frame
-from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
+from companion.mavlink.messages import Message, dialect, encode
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.base import Tap, Transport
@@ -43,13 +43,8 @@ class Outbox:
     def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         """Send SET_ATTITUDE_TARGET now; return False if it could not be sent.
 
-        Args:
-            time_boot_ms: time stamp of the sample to which the setpoint responds, ms.
-            rates: body rates, rad/s (FRD).
-            thrust: collective thrust, 0..1.
-
         Raises:
-            InvalidSetpoint: a value must not reach the vehicle; nothing was sent.
+            InvalidSetpoint: a value must not reach the vehicle; see `SetpointEncoder.frame`.
         """
         was_sent = self._send_frame(
             self._setpoint_encoder.frame(self._sequence, time_boot_ms, rates, thrust)
@@ -61,7 +56,7 @@ class Outbox:
         """Keep a setpoint as the answer of this lockstep step; a later one in the step replaces it.
 
         Raises:
-            InvalidSetpoint: a value must not reach the vehicle; nothing was kept.
+            InvalidSetpoint: see `send_setpoint`; nothing was kept.
         """
         self._setpoint_encoder.frame(0, time_boot_ms, rates, thrust)
         self._latched_setpoint = (time_boot_ms, rates, thrust)
@@ -113,7 +108,6 @@ class Outbox:
         return build_frame(
             message_id,
             payload,
-            CRC_EXTRA[message_id],
             sequence=self._sequence,
             system=self._settings.source_system,
             component=self._settings.source_component,

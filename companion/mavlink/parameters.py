@@ -69,28 +69,13 @@ class ParameterClient:
         dispatcher.subscribe("PARAM_ERROR", self._on_error)
 
     async def read(self, name: str, timeout_s: float, retries: int) -> float | int:
-        """Read a parameter.
-
-        Raises:
-            UnansweredParameter: the autopilot did not answer.
-            UnknownParameter: the autopilot answered that it has no such parameter, or the name is
-                not 1 to 16 ASCII characters.
-            ParameterRefused: the autopilot answered with another error.
-            LinkLost: the connection dropped while waiting.
-        """
+        """Read a parameter; see `VehicleClient.read_parameter`."""
         self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
             return self._decoded(await self._request_value(name, timeout_s, retries))
 
     async def write(self, name: str, value: float, timeout_s: float, retries: int) -> float | int:
-        """Write a parameter in the autopilot's own type; return the value that it then has.
-
-        Raises:
-            UnansweredParameter, UnknownParameter: as for `read`.
-            ParameterRefused: the value does not fit the type, or the autopilot keeps another value
-                or answered with an error.
-            LinkLost: the connection dropped while waiting.
-        """
+        """Write a parameter; see `VehicleClient.write_parameter`."""
         self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
             param_type = (await self._request_value(name, timeout_s, retries)).param_type

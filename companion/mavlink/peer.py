@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.framing import Frame
-from companion.mavlink.settings import MAV_TYPE_GCS
+from companion.mavlink.messages import dialect
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.endpoint import PeerAddress
 
@@ -82,7 +82,6 @@ _CONTROL_DURATION_S = 2.0
 HEARTBEAT = 0
 # Offsets in a HEARTBEAT payload, and its length; a received payload may lack trailing zeros.
 _TYPE_OFFSET, _AUTOPILOT_OFFSET, _FIELD_BYTES = 4, 5, 6
-_AUTOPILOT_INVALID = 8
 
 
 class PeerRule:
@@ -123,8 +122,9 @@ class PeerRule:
         if frame.message_id != HEARTBEAT:
             return False
         fields = frame.payload.ljust(_FIELD_BYTES, b"\0")
-        return (
-            fields[_AUTOPILOT_OFFSET] != _AUTOPILOT_INVALID and fields[_TYPE_OFFSET] != MAV_TYPE_GCS
+        return not (
+            fields[_AUTOPILOT_OFFSET] == dialect.MAV_AUTOPILOT_INVALID
+            or fields[_TYPE_OFFSET] == dialect.MAV_TYPE_GCS
         )
 
     def renew(self) -> None:

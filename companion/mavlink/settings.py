@@ -6,7 +6,6 @@ from companion.mavlink.signing import Signing
 
 MAV_COMP_ID_ONBOARD_COMPUTER = 191
 MAV_TYPE_ONBOARD_CONTROLLER = 18
-MAV_TYPE_GCS = 6
 
 
 @dataclass(frozen=True)

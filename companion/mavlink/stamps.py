@@ -84,8 +84,8 @@ class StampJudge:
     def __init__(
         self,
         kept_stamps: Stamps,
-        clock: Callable[[], float] = time.time,
-        monotonic_clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float],
+        monotonic_clock: Callable[[], float],
     ) -> None:
         self.remarks: list[str] = []
         self.changed = Event()

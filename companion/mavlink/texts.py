@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.files.ascii_text import ascii_for
 from companion.mavlink.framing import build_frame
-from companion.mavlink.messages import CRC_EXTRA, Message, dialect, encode
+from companion.mavlink.messages import Message, dialect, encode
 
 _CHUNK_CHARACTERS = 50
 MAX_TEXT_ID = 0xFFFF
@@ -124,12 +124,10 @@ class TextFrames:
         return [self._frame(message) for message in messages]
 
     def _frame(self, message: Message) -> bytes:
-        message_id = message.get_msgId()
         self._sequence = (self._sequence + 1) & 0xFF
         return build_frame(
-            message_id,
+            message.get_msgId(),
             encode(message),
-            CRC_EXTRA[message_id],
             sequence=self._sequence,
             system=self._system,
             component=dialect.MAV_COMP_ID_LOG,

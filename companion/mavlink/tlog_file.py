@@ -16,7 +16,7 @@ from companion.mavlink.framing import (
     Frame,
     FrameScanner,
 )
-from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS, Message, decode
+from companion.mavlink.messages import MESSAGE_IDS, Message, decode
 
 _STAMP_BYTES = 8
 _V1_OVERHEAD, _V2_OVERHEAD = 8, 12  # bytes of header and checksum
@@ -31,7 +31,7 @@ def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
         LogError: the file cannot be read, is damaged, or is not a `.tlog`.
     """
     wanted = {MESSAGE_IDS[name] for name in names}
-    scanner = FrameScanner(CRC_EXTRA)
+    scanner = FrameScanner()
     for raw in _records(path):
         for frame in scanner.feed(raw):
             if frame.message_id in wanted:

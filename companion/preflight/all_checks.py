@@ -1,6 +1,6 @@
 """All preflight checks in order, and the rule for findings that forbid a flight."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from companion.config import Config
 from companion.preflight import (
@@ -60,9 +60,8 @@ def run_checks(config: Config, evidence: Evidence, *, repeated: bool = False) ->
     ]
 
 
-def blocking_findings(config: Config, findings: Iterable[Finding]) -> list[Finding]:
+def blocking_findings(config: Config, findings: Sequence[Finding]) -> list[Finding]:
     """The findings that forbid a flight: unsafe and not accepted, or not ready."""
-    findings = tuple(findings)
     not_ready = (finding for finding in findings if finding.result is CheckResult.NOT_READY)
     return [*unaccepted_findings(config, findings), *not_ready]
 
@@ -74,9 +73,8 @@ def unaccepted_findings(config: Config, findings: Iterable[Finding]) -> list[Fin
     ]
 
 
-def overall_result(config: Config, findings: Iterable[Finding]) -> CheckResult:
+def overall_result(config: Config, findings: Sequence[Finding]) -> CheckResult:
     """The worst result that would stop `companion fly`; SAFE if there is none."""
-    findings = tuple(findings)
     results = {finding.result for finding in findings}
     if CheckResult.NOT_CONNECTED in results:
         return CheckResult.NOT_CONNECTED

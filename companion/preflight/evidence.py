@@ -90,14 +90,15 @@ class SampleTimes(NamedTuple):
     """Effective rate, Hz, lowered by bursts (`IntervalSums`); `None` for too few samples."""
 
 
-class OtherNodes(NamedTuple):
+@dataclass(slots=True)
+class OtherNodes:
     """Other nodes on the link."""
 
-    sources: frozenset[tuple[int, int]] = frozenset()
+    sources: set[tuple[int, int]] = field(default_factory=set)
     """(system, component) of every node that was heard."""
-    companions: frozenset[tuple[int, int]] = frozenset()
+    companions: set[tuple[int, int]] = field(default_factory=set)
     """Nodes whose heartbeat has the type onboard controller."""
-    setpoint_senders: frozenset[tuple[int, int]] = frozenset()
+    setpoint_senders: set[tuple[int, int]] = field(default_factory=set)
     """Nodes that sent setpoints."""
     target_is_foreign: bool = False
     """Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed, so that another

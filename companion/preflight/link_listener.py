@@ -1,6 +1,7 @@
 """Listens to the link for a while: sample times, other nodes, estimator resets."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from math import isfinite
 from statistics import median
 
@@ -38,6 +39,7 @@ class LinkListener:
         clock: our clock, s.
 
     Attributes:
+        other_nodes: the other nodes heard so far.
         reset_count: number of estimator resets, counted by ODOMETRY's `reset_counter`.
     """
 
@@ -48,10 +50,7 @@ class LinkListener:
         self._ages: list[float] = []
         self._clock_changes = link.clock.change_count
         self._unusable_count = 0
-        self._sources: set[tuple[int, int]] = set()
-        self._companions: set[tuple[int, int]] = set()
-        self._setpoint_senders: set[tuple[int, int]] = set()
-        self._target_is_foreign = False
+        self.other_nodes = OtherNodes()
         self._resets_before: int | None = None
         self.reset_count = 0
 
@@ -72,7 +71,7 @@ class LinkListener:
     @property
     def samples(self) -> SampleTimes:
         """The attitude samples so far."""
-        pairs = list(zip(self._stamps, self._stamps[1:], strict=False))
+        pairs = list(pairwise(self._stamps))
         if not pairs:
             return SampleTimes(len(self._stamps), unusable_count=self._unusable_count)
         (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
@@ -91,26 +90,16 @@ class LinkListener:
             rate=arrivals.rate_since(IntervalSums()) if enough else None,
         )
 
-    @property
-    def other_nodes(self) -> OtherNodes:
-        """The other nodes heard so far."""
-        return OtherNodes(
-            frozenset(self._sources),
-            frozenset(self._companions),
-            frozenset(self._setpoint_senders),
-            self._target_is_foreign,
-        )
-
     def _on_foreign(self, frame: Frame) -> None:
         source = frame.system, frame.component
-        self._sources.add(source)
+        self.other_nodes.sources.add(source)
         if frame.message_id in _SETPOINT_IDS:
-            self._setpoint_senders.add(source)
+            self.other_nodes.setpoint_senders.add(source)
         if (
             frame.message_id == _HEARTBEAT_ID
             and frame.payload[_TYPE_OFFSET : _TYPE_OFFSET + 1] == _ONBOARD_CONTROLLER
         ):
-            self._companions.add(source)
+            self.other_nodes.companions.add(source)
 
     def _on_attitude(self, message: Message) -> None:
         now, clock = self._clock(), self._link.clock
@@ -125,7 +114,7 @@ class LinkListener:
     def _on_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
         moving = any(abs(value) > _MAX_IDLE_TARGET for value in (*rates, message.thrust))
-        self._target_is_foreign |= moving and self._link.state.armed is False
+        self.other_nodes.target_is_foreign |= moving and self._link.state.armed is False
 
     def _on_odometry(self, message: Message) -> None:
         before, self._resets_before = self._resets_before, message.reset_counter

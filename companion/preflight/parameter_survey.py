@@ -53,8 +53,6 @@ async def survey(
     rules: Iterable[ParameterRule],
     *,
     earlier_survey: Survey | None = None,
-    first_round: RetryPolicy = _FIRST_ROUND,
-    second_round: RetryPolicy = _SECOND_ROUND,
 ) -> Survey:
     """Read the rules' parameters, several at a time; ask again if the link loses frames.
 
@@ -67,8 +65,6 @@ async def survey(
         rules: rules of its autopilot.
         earlier_survey: survey of the same vehicle. Parameters without a value in it are not
             requested again, because each costs seconds on a link that loses frames.
-        first_round: policy of the first round of requests.
-        second_round: policy of the second round.
 
     Raises:
         LinkLost: the connection was lost.
@@ -84,10 +80,10 @@ async def survey(
             for name in rule.names
             if name != earlier_survey.present_names[rule.name]
         )
-    await requests.ask(rules, first_round)
+    await requests.ask(rules, _FIRST_ROUND)
     # An autopilot that answered nothing at all is a finding of its own.
     if requests.values and requests.lossy:
-        await requests.ask(requests.unread_rules(rules), second_round)
+        await requests.ask(requests.unread_rules(rules), _SECOND_ROUND)
     return Survey(
         requests.values,
         requests.present_names,

@@ -14,7 +14,7 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Generic, Self, TypeVar
 
-from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
+from companion.files.write_whole import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 T = TypeVar("T")
 

@@ -19,7 +19,7 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
+from companion.files.write_whole import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 _CHUNK_ROWS = 1024
 """Number of rows that are written at a time."""

@@ -8,9 +8,8 @@ import time
 from collections.abc import Callable
 
 from companion.files.ascii_text import ascii_for
-from companion.mavlink.commands import MAV_CMD_DO_SET_MODE
 from companion.mavlink.framing import Frame, build_frame
-from companion.mavlink.messages import CRC_EXTRA, Message, decode, dialect, encode
+from companion.mavlink.messages import Message, decode, dialect, encode
 from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
 from companion.mavlink.texts import MAX_TEXT_ID, status_texts
 from companion.serve.mode_requests import MISSION_ITEMS
@@ -122,12 +121,11 @@ class Component:
         return status_texts(ascii_for(text)[:_MAX_TEXT_LENGTH], severity, self._text_id)
 
     def _frame(self, message: Message, sender: Address | None = None) -> bytes:
-        number, signing = message.get_msgId(), self._settings.signing
+        signing = self._settings.signing
         system, component = sender or self._own_address
         frame = build_frame(
-            number,
+            message.get_msgId(),
             encode(message),
-            CRC_EXTRA[number],
             sequence=self._sequence,
             system=system,
             component=component,
@@ -149,7 +147,7 @@ def _acknowledgement(frame: Frame, result: int) -> Message | None:
     if frame.message_id in MISSION_ITEMS:
         return dialect.MAVLink_mission_ack_message(**sender, type=dialect.MAV_MISSION_DENIED)
     if frame.message_id == dialect.MAVLINK_MSG_ID_SET_MODE:
-        command = MAV_CMD_DO_SET_MODE
+        command = dialect.MAV_CMD_DO_SET_MODE
     elif frame.message_id in _COMMAND_IDS:
         command = decode(frame.message_id, frame.payload).command
     else:

@@ -5,11 +5,6 @@ All functions are pure.
 
 from math import isfinite
 
-from companion.mavlink.commands import (
-    MAV_CMD_DO_SET_MODE,
-    MAV_CMD_NAV_LAND,
-    MAV_CMD_NAV_RETURN_TO_LAUNCH,
-)
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import MESSAGE_IDS, decode, dialect
 from companion.vehicle.autopilot import Autopilot, ControlEntry
@@ -25,7 +20,11 @@ _GUIDED_ITEMS = 2, 3
 position, 3 to its height."""
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
 _STEERING_COMMANDS = dialect.MAV_CMD_DO_REPOSITION, dialect.MAV_CMD_DO_PAUSE_CONTINUE
-_LEAVING_COMMANDS = MAV_CMD_DO_SET_MODE, MAV_CMD_NAV_LAND, MAV_CMD_NAV_RETURN_TO_LAUNCH
+_LEAVING_COMMANDS = (
+    dialect.MAV_CMD_DO_SET_MODE,
+    dialect.MAV_CMD_NAV_LAND,
+    dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+)
 _CUSTOM_MODE_FLAG = 1
 _MAIN_MODE = 0xFF << 16
 """Mask of PX4's main mode in `custom_mode`; OFFBOARD has no sub mode, and PX4 ignores its bits."""
@@ -52,7 +51,7 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     if message.command == dialect.MAV_CMD_NAV_GUIDED_ENABLE:
         return bool(message.param1 > 0.0)
     return bool(
-        message.command == MAV_CMD_DO_SET_MODE
+        message.command == dialect.MAV_CMD_DO_SET_MODE
         and isfinite(message.param1)
         and int(message.param1) & _CUSTOM_MODE_FLAG
         and isfinite(message.param2)

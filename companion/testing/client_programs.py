@@ -8,7 +8,7 @@ from pathlib import Path
 from companion.api.connection import Configuration, as_config
 from companion.config.files import changed
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA, Message, dialect
+from companion.mavlink.messages import Message, dialect
 from companion.serve.network.client import Client
 from companion.serve.session import ServeSession
 from companion.testing.flying import config_in_memory, environment
@@ -104,7 +104,7 @@ class Program(Client):
             raise RuntimeError("the program is not connected; call connect(session) first")
         raw = message.pack(self.packer)
         self.packer.seq = (self.packer.seq + 1) & 0xFF
-        frames = FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw)
+        frames = FrameScanner(keep_unknown=True).feed(raw)
         self._session.network.receive_frames(self, frames)
 
     def of(self, name: str) -> list[Message]:

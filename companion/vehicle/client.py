@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Iterable, Mapping
 
-from companion.mavlink.commands import MAV_CMD_REQUEST_MESSAGE, CommandClient
+from companion.mavlink.commands import CommandClient
 from companion.mavlink.dispatcher import MessageDispatcher, Unsubscribe
 from companion.mavlink.errors import LinkTimeout, NotConnected
-from companion.mavlink.messages import Message, message_id
+from companion.mavlink.messages import Message, dialect, message_id
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.parameters import ParameterClient
 from companion.mavlink.pending import AnswerQueue, AnswerQueueRegistry
@@ -31,8 +31,7 @@ class VehicleClient:
         vehicle_clock: converts the time stamps of positions.
 
     Attributes:
-        settings: the endpoint, and the ids of the vehicle and of this program.
-        stats: counters of the link.
+        settings, stats: see the arguments.
         state: the vehicle's telemetry.
     """
 
@@ -108,7 +107,7 @@ class VehicleClient:
         with AnswerQueue[Message](self._registry) as answers:
             unsubscribe = self._dispatcher.subscribe(name, answers.put)
             try:
-                await self.command(MAV_CMD_REQUEST_MESSAGE, float(message_id(name)))
+                await self.command(dialect.MAV_CMD_REQUEST_MESSAGE, float(message_id(name)))
                 return await answers.next(timeout_s)
             except TimeoutError:
                 raise LinkTimeout(

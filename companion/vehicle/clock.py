@@ -88,10 +88,8 @@ class VehicleClock:
 
     def is_ahead(self, vehicle_time: float, now: float) -> bool:
         """Whether a stamp (s) is further ahead of the clock at time `now` than drift explains."""
-        if self._began == inf:
-            return False
-        spread = self.rate.spread(max(0.0, now - self._received))
-        return vehicle_time - now > self._quickest + self.delay.seconds + SMALLEST_JUMP + spread
+        offset, spread = self.offset, self.rate.spread(max(0.0, now - self._received))
+        return offset is not None and vehicle_time - now > offset + SMALLEST_JUMP + spread
 
     def take(self, time_boot_ms: int, received: float) -> SampleTiming:
         """Take the times of an attitude sample; return its vehicle time and age.

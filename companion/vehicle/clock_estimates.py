@@ -44,7 +44,7 @@ class ClockRate:
         note_due: event-loop time at which the next offset should be noted, s.
     """
 
-    def __init__(self, *, same_clock: bool = False) -> None:
+    def __init__(self, *, same_clock: bool) -> None:
         self.rate = 0.0
         self.note_due = inf if same_clock else -inf
         self._rate_error = 0.0 if same_clock else MOST_DRIFT

@@ -4,19 +4,18 @@ from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from companion.guidance.reference import GRAVITY
 from companion.mavlink.codec import IGNORE_ATTITUDE
 from companion.mavlink.errors import LogError
-from companion.mavlink.messages import Message
+from companion.mavlink.messages import Message, dialect
 from companion.mavlink.tlog_file import messages
 from companion.vehicle.autopilot import Autopilot, Role
 from companion.vehicle.registry import AUTOPILOT_NAMES, AUTOPILOTS_BY_NUMBER
 
 Row = tuple[float, ...]
 
-_ARMED_FLAG = 128
 _RELEVANT_BITS = IGNORE_ATTITUDE | 0b1100111
 """Bits of a setpoint's type mask that are compared: quaternion, rates, throttle, body thrust."""
-_STANDARD_GRAVITY = 9.80665
 _RECENT_SAMPLES = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
 _MAX_CLOCK_DIFFERENCE = 1.0
@@ -108,7 +107,7 @@ class _Reader:
         if source != self.vehicle or self._autopilot is None:
             return
         mode = self._autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
-        armed = bool(heartbeat.base_mode & _ARMED_FLAG)
+        armed = bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
         obeying = armed and Role.OFFBOARD in self._autopilot.roles(mode)
         if obeying and self._was_obeying:
             self.obeyed_setpoints.extend(self._unconfirmed_setpoints)
@@ -135,7 +134,7 @@ class _Reader:
             self._accelerometer(1e-6 * message.time_usec, -message.zacc)
         elif message_type == "SCALED_IMU":
             milli_g = -message.zacc
-            self._accelerometer(1e-3 * message.time_boot_ms, 1e-3 * _STANDARD_GRAVITY * milli_g)
+            self._accelerometer(1e-3 * message.time_boot_ms, 1e-3 * GRAVITY * milli_g)
         else:
             is_quaternion = message_type == "ATTITUDE_QUATERNION"
             rows = self.rates_with_quaternion if is_quaternion else self.rates_with_euler

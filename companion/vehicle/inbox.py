@@ -1,32 +1,40 @@
 """Checks arriving bytes, and passes their frames to the control loop and to the dispatcher.
 
 Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
-subscribers. In lockstep, frames first wait for the beacon (a SYSTEM_TIME) that closes their step,
-and samples then wait until the event loop has run the tasks of that step.
+subscribers. `lockstep_inbox.py` says how frames wait in lockstep.
 """
 
 import asyncio
 from collections.abc import Callable
-from math import inf
 
-from companion.mavlink.codec import (
-    ATTITUDE_QUATERNION,
-    SYSTEM_TIME,
-    decode_attitude,
-    decode_beacon,
-)
+from companion.mavlink.codec import ATTITUDE_QUATERNION, decode_attitude
 from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.frame_filter import FrameFilter, Notice
 from companion.mavlink.framing import Frame, FrameScanner
-from companion.mavlink.lockstep import LockstepEventLoop
-from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.messages import CRC_EXTRA
+from companion.mavlink.outbox import Outbox
 from companion.mavlink.peer import HEARTBEAT, PeerRule
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import FrameCounter, LinkStats
 from companion.mavlink.transport.base import Tap
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample
+
+
+class LinkCallbacks:
+    """What a link calls, synchronously, as frames arrive; None: nothing.
+
+    An exception that a callback raises goes to `Link.on_error`.
+    """
+
+    on_attitude: Callable[[AttitudeSample], None] | None = None
+    """Called with each attitude sample; in lockstep after the tasks of the step have run."""
+    on_foreign: Callable[[Frame], None] | None = None
+    """Called with each frame of another system or component than the vehicle's."""
+    on_frame: Callable[[Frame], None] | None = None
+    """Called with each frame of the peer, from any system and of any message, after the control
+    loop and all subscribers. Beacons, and frames of the vehicle with a refused signature, are left
+    out. The checksum of a message that the dialect does not know is not checked."""
 
 
 class Inbox:
@@ -36,19 +44,11 @@ class Inbox:
         settings: ids of the vehicle, and the signing key.
         stats: counters of the link.
         dispatcher: takes every accepted frame.
+        callbacks: take samples and frames.
         tap: called with every accepted frame, for recordings.
         notice: called once with each notice about signatures, their time stamps and the peer.
         clock: the vehicle's clock; takes the time stamp of every sample.
-        last_setpoint: returns the event-loop time of the last setpoint sent, s.
-
-    Attributes:
-        on_attitude: called with each attitude sample, synchronously.
-        on_foreign: called with each frame of another system or component than the vehicle's.
-        on_frame: called with each frame of the peer, from any system and of any message, after the
-            control loop and all subscribers. Beacons, and frames of the vehicle with a refused
-            signature, are left out.
-        lockstep: handles beacons, with which the vehicle begins each step of lockstep
-            (SYSTEM_TIME without the time of day); None without lockstep.
+        outbox: knows when the last setpoint was sent.
     """
 
     def __init__(
@@ -56,48 +56,31 @@ class Inbox:
         settings: LinkSettings,
         stats: LinkStats,
         dispatcher: MessageDispatcher,
+        callbacks: LinkCallbacks,
         tap: Tap | None,
         notice: Notice,
         clock: VehicleClock,
-        last_setpoint: Callable[[], float] = lambda: -inf,
+        outbox: Outbox,
     ) -> None:
         self._stats, self._dispatcher, self._tap, self._clock = stats, dispatcher, tap, clock
+        self._callbacks, self._outbox = callbacks, outbox
         self._loop = asyncio.get_running_loop()
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
         self._candidate: str | None = None
-        self._held_frames: list[tuple[Frame, int]] = []
-        self._samples: list[AttitudeSample] = []
-        self.on_attitude: Callable[[AttitudeSample], None] | None = None
-        self.on_foreign: Callable[[Frame], None] | None = None
-        self.on_frame: Callable[[Frame], None] | None = None
-        self.lockstep: LockstepClient | None = None
         self._peer_rule = PeerRule(
             stats,
             self._filter.notify_once,
             self._loop.time,
-            last_setpoint,
+            lambda: outbox.last_setpoint_at,
             every_frame_claims=settings.signing is not None or settings.lockstep,
         )
         self.start_connection(streaming=False)
 
     def start_connection(self, *, streaming: bool) -> None:
-        """Prepare for a new connection: forget an incomplete frame and the last sequence number.
-
-        Args:
-            streaming: whether a frame may continue in the bytes received next.
-        """
-        self._scanner = FrameScanner(
-            CRC_EXTRA, streaming=streaming, stats=self._stats, keep_unknown=True
-        )
+        """Prepare for a new connection; see `Receiver`."""
+        self._scanner = FrameScanner(streaming=streaming, stats=self._stats, keep_unknown=True)
         self._counter.reset()
-
-    def follow_vehicle_time(
-        self, loop: LockstepEventLoop, answer: Callable[[int], None]
-    ) -> LockstepClient:
-        """Switch to lockstep: from now on frames wait until the vehicle closes its step."""
-        self.lockstep = LockstepClient(loop, self._pass_on_held, self._deliver_samples, answer)
-        return self.lockstep
 
     def receive(self, data: bytes, received_ns: int) -> bool:
         """Take bytes of the peer; return whether a frame in them was accepted.
@@ -144,8 +127,7 @@ class Inbox:
     def may_prove_date(self, sender: str) -> bool:
         """Whether `sender`, refused for the date of its signature, may prove the date by TIMESYNC.
 
-        If so, the transport sends to `sender`, and the next frame that `receive` accepts makes
-        `sender` the peer.
+        See `Receiver`.
         """
         if not self._filter.awaits_answer:
             return False
@@ -167,21 +149,14 @@ class Inbox:
     def _is_admitted(self, frame: Frame) -> bool:
         if self._filter.admits_source(frame):
             return self._filter.has_good_signature(frame)
-        if self.on_foreign is not None:
-            self._dispatcher.guard(self.on_foreign, frame)
+        if self._callbacks.on_foreign is not None:
+            self._dispatcher.guard(self._callbacks.on_foreign, frame)
         return False
 
     def _accept(self, frame: Frame, received_ns: int) -> None:
         if frame.message_id == HEARTBEAT and self._peer_rule.is_peer_claim(frame):
             self._peer_rule.renew()
-        if self.lockstep is None:
-            self._pass_on(frame, received_ns)
-            return
-        beacon = decode_beacon(frame.payload) if frame.message_id == SYSTEM_TIME else None
-        if beacon is None:
-            self._held_frames.append((frame, received_ns))
-        else:  # not counted as telemetry: beacons have sequence numbers of their own
-            self.lockstep.take_beacon(beacon)
+        self._pass_on(frame, received_ns)
 
     def _pass_on(self, frame: Frame, received_ns: int) -> None:
         """Pass a frame to the tap, the control loop, the counter and the dispatcher.
@@ -201,8 +176,8 @@ class Inbox:
         self._call_on_frame(frame)
 
     def _call_on_frame(self, frame: Frame) -> None:
-        if self.on_frame is not None:
-            self._dispatcher.guard(self.on_frame, frame)
+        if self._callbacks.on_frame is not None:
+            self._dispatcher.guard(self._callbacks.on_frame, frame)
 
     def _take_sample(self, payload: bytes, now: float, received_ns: int) -> None:
         decoded = decode_attitude(payload)
@@ -212,24 +187,10 @@ class Inbox:
         time_boot_ms, q, rates = decoded
         time, age, misfit = self._clock.take(time_boot_ms, now)
         known = self._clock.age_known
-        sample = AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
-        if self.lockstep is None:
-            self._call_on_attitude(sample)
-        else:
-            self._samples.append(sample)
+        self._call_on_attitude(
+            AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
+        )
 
     def _call_on_attitude(self, sample: AttitudeSample) -> None:
-        if self.on_attitude is not None:
-            self._dispatcher.guard(self.on_attitude, sample)
-
-    def _pass_on_held(self) -> None:
-        """In lockstep: pass on the frames of a step in order, after its beacon set the clock."""
-        held, self._held_frames = self._held_frames, []
-        for frame, received_ns in held:
-            self._pass_on(frame, received_ns)
-
-    def _deliver_samples(self) -> None:
-        """In lockstep: after a step's tasks have run, pass its samples to the control loop."""
-        samples, self._samples = self._samples, []
-        for sample in samples:
-            self._call_on_attitude(sample)
+        if self._callbacks.on_attitude is not None:
+            self._dispatcher.guard(self._callbacks.on_attitude, sample)

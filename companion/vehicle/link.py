@@ -7,11 +7,8 @@ from typing import Any
 
 from companion.attitude.types import BodyRates
 from companion.mavlink.dispatcher import MessageDispatcher
-from companion.mavlink.errors import LinkError, LinkTimeout
+from companion.mavlink.errors import LinkTimeout
 from companion.mavlink.frame_filter import Notice
-from companion.mavlink.framing import Frame
-from companion.mavlink.lockstep import LockstepEventLoop
-from companion.mavlink.lockstep_client import LockstepClient
 from companion.mavlink.outbox import Outbox
 from companion.mavlink.pending import AnswerQueue
 from companion.mavlink.settings import LinkSettings
@@ -22,16 +19,16 @@ from companion.mavlink.transport.endpoint import parse_endpoint
 from companion.mavlink.transport.opening import OpenTransport, open_transport
 from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.connection import Connection
-from companion.vehicle.inbox import Inbox
-from companion.vehicle.records import AttitudeSample, Heartbeat
-from companion.vehicle.silence import no_beacon_message, no_heartbeat_message
+from companion.vehicle.connection import Connection, no_beacon_message, no_heartbeat_message
+from companion.vehicle.inbox import Inbox, LinkCallbacks
+from companion.vehicle.lockstep_inbox import LockstepInbox
+from companion.vehicle.records import Heartbeat
 from companion.vehicle.timesync import TimeSync
 
 _LOG = logging.getLogger(__name__)
 
 
-class Link(VehicleClient):
+class Link(VehicleClient, LinkCallbacks):
     """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
 
     It sends heartbeats and TIMESYNC requests, and reopens a dropped connection. It never repeats a
@@ -69,9 +66,10 @@ class Link(VehicleClient):
         dispatcher, outbox = MessageDispatcher(stats), Outbox(settings, stats, tap)
         self.clock = VehicleClock(lockstep=settings.lockstep)
         super().__init__(settings, outbox, dispatcher, stats, self._loop.time, self.clock)
-        self._inbox = Inbox(
-            settings, stats, dispatcher, tap, notice, self.clock, lambda: outbox.last_setpoint_at
+        self._inbox = (LockstepInbox if settings.lockstep else Inbox)(
+            settings, stats, dispatcher, self, tap, notice, self.clock, outbox
         )
+        self._lockstep = self._inbox if isinstance(self._inbox, LockstepInbox) else None
         self.timesync = TimeSync(outbox, dispatcher, self._loop.time, self.clock)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
@@ -79,11 +77,6 @@ class Link(VehicleClient):
         self._stamp_writer: StampWriter | None = None
         if settings.signing is not None and settings.signing.file is not None:
             self._stamp_writer = StampWriter(settings.signing, settings.signing.file)
-        self._lockstep: LockstepClient | None = None
-        if settings.lockstep:
-            if not isinstance(self._loop, LockstepEventLoop):
-                raise LinkError("lockstep needs the event loop of companion.mavlink.lockstep.run")
-            self._lockstep = self._inbox.follow_vehicle_time(self._loop, outbox.close_step)
 
     # --- lifetime
 
@@ -143,44 +136,9 @@ class Link(VehicleClient):
     @property
     def local_address(self) -> tuple[str, int] | None:
         """(host, port) to which the socket is bound, for UDP and a TCP server; else `None`."""
-        return self._connection.local_address
+        return getattr(self._outbox.transport, "local", None)
 
     # --- control
-
-    @property
-    def on_attitude(self) -> Callable[[AttitudeSample], None] | None:
-        """Called with each attitude sample, inside the read callback.
-
-        In lockstep it is called after the event loop has run the tasks of the step.
-        An exception that it raises goes to `on_error`.
-        """
-        return self._inbox.on_attitude
-
-    @on_attitude.setter
-    def on_attitude(self, callback: Callable[[AttitudeSample], None] | None) -> None:
-        self._inbox.on_attitude = callback
-
-    @property
-    def on_foreign(self) -> Callable[[Frame], None] | None:
-        """Called with each frame of another system or component than the vehicle's."""
-        return self._inbox.on_foreign
-
-    @on_foreign.setter
-    def on_foreign(self, callback: Callable[[Frame], None] | None) -> None:
-        self._inbox.on_foreign = callback
-
-    @property
-    def on_frame(self) -> Callable[[Frame], None] | None:
-        """Called with each frame of the peer, whatever its source and message; see `Inbox`.
-
-        An exception that it raises goes to `on_error`. The checksum of a message that the dialect
-        does not know is not checked.
-        """
-        return self._inbox.on_frame
-
-    @on_frame.setter
-    def on_frame(self, callback: Callable[[Frame], None] | None) -> None:
-        self._inbox.on_frame = callback
 
     def forward(self, frame: bytes) -> bool:
         """Send a whole frame of another node unchanged; return False if it could not be sent."""
@@ -239,7 +197,7 @@ class Link(VehicleClient):
             self._outbox.send_heartbeat()
             await asyncio.sleep(1.0 / self.settings.heartbeat_rate_hz)
 
-    async def _first_beacon(self, lockstep: LockstepClient) -> None:
+    async def _first_beacon(self, lockstep: LockstepInbox) -> None:
         # Some vehicles wait for a first message before they send (udpout, TCP).
         self._outbox.send_heartbeat()
         try:

@@ -5,13 +5,11 @@ from math import inf
 
 from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import UnsupportedAutopilot
-from companion.mavlink.messages import Message
+from companion.mavlink.messages import Message, dialect
 from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.records import CurrentMode, Heartbeat
 from companion.vehicle.registry import MULTIROTORS, autopilot_for
 
-_ARMED_FLAG = 128
-_AUTOPILOT_INVALID = 8
 _FAILSAFE_STATES = frozenset({5, 6, 8})
 """MAV_STATE of an autopilot in a failsafe: critical, emergency, flight termination."""
 
@@ -79,33 +77,22 @@ class ModeState:
         return self.failsafe or current.mode != current.intended
 
     def _on_heartbeat(self, message: Message) -> None:
-        if message.autopilot == _AUTOPILOT_INVALID:
+        if message.autopilot == dialect.MAV_AUTOPILOT_INVALID:
             return  # another component that uses the autopilot's id
-        autopilot_and_type = message.autopilot, message.type in MULTIROTORS
-        if self.autopilot is not None and autopilot_and_type != (
-            self.autopilot.mav_autopilot,
-            True,
-        ):
-            return  # an autopilot does not change its kind: this is another component
         if self.autopilot is None:
             try:
                 self.autopilot = autopilot_for(message.autopilot, message.type)
                 self.unsupported_error = None
             except UnsupportedAutopilot as error:
                 self.unsupported_error = error
-        armed = bool(message.base_mode & _ARMED_FLAG)
+        elif message.autopilot != self.autopilot.mav_autopilot or message.type not in MULTIROTORS:
+            return  # an autopilot does not change its kind: this is another component
+        armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
         self.armings += armed and not self.armed
         mode = str(message.custom_mode)
         if self.autopilot is not None:
             mode = self.autopilot.mode_name(message.base_mode, message.custom_mode)
-        self.heartbeat = Heartbeat(
-            self._clock(),
-            message.autopilot,
-            mode,
-            message.custom_mode,
-            armed,
-            message.system_status,
-        )
+        self.heartbeat = Heartbeat(self._clock(), mode, armed, message.system_status)
         self._base_mode = message.base_mode
         self.heartbeat_is_newest = True
 

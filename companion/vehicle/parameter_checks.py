@@ -1,6 +1,6 @@
 """Checks of parameter values that both autopilots use."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from math import degrees
 
 from companion.vehicle.parameter_rules import Check, CheckResult, CompanionSettings, Problem, Values
@@ -18,7 +18,7 @@ _MAX_LIMIT_RATIO = 1.15
 """Acceleration limits that differ by less than this factor have the same effect."""
 
 
-def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float | None = None) -> Check:
+def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float) -> Check:
     """A check that forbids the values in `bad`, which gives the consequence of each."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
@@ -32,8 +32,7 @@ def first_problem(*checks: Check) -> Check:
     """A check that reports the first problem that any of the checks finds."""
 
     def check(value: float, values: Values, settings: CompanionSettings) -> Problem | None:
-        problems = (each(value, values, settings) for each in checks)
-        return next((problem for problem in problems if problem is not None), None)
+        return next(filter(None, (each(value, values, settings) for each in checks)), None)
 
     return check
 
@@ -56,31 +55,24 @@ def safe_action(good: Iterable[float], bad: Mapping[float, str], set_to: float) 
     return check
 
 
+def _unless(is_good: Callable[[float], bool], problem: Problem) -> Check:
+    """A check that finds the same problem in each value that is not good."""
+    return lambda value, _values, _settings: None if is_good(value) else problem
+
+
 def required(result: CheckResult, good: float, because: str) -> Check:
     """A check that requires the value `good`; any other has the consequence `because`."""
-
-    def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
-        return None if value == good else Problem(result, because, good)
-
-    return check
+    return _unless(lambda value: value == good, Problem(result, because, good))
 
 
 def positive(result: CheckResult, because: str, set_to: float) -> Check:
     """A check that requires a value above zero, because zero or less turns a protection off."""
-
-    def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
-        return None if value > 0.0 else Problem(result, because, set_to)
-
-    return check
+    return _unless(lambda value: value > 0.0, Problem(result, because, set_to))
 
 
 def at_most(result: CheckResult, limit: float, because: str, set_to: float) -> Check:
     """A check that requires a value of at most `limit`."""
-
-    def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
-        return None if value <= limit else Problem(result, because, set_to)
-
-    return check
+    return _unless(lambda value: value <= limit, Problem(result, because, set_to))
 
 
 def bit_set(result: CheckResult, bit: int, because: str) -> Check:
@@ -192,18 +184,15 @@ def acceleration_limit(unit: float, axis: str) -> Check:
     key = f"vehicle.{prefix}acceleration_limit_deg_s2"
 
     def check(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-        assumed_limit = settings.acceleration_limits[axis]
-        autopilot_limit = unit * value
-        if assumed_limit is None:
-            agrees = autopilot_limit == 0.0
+        assumed, actual = settings.acceleration_limits[axis], unit * value
+        if assumed is None:
+            agrees, assumed_text = actual == 0.0, "null"
         else:
-            agrees = (
-                1.0 / _MAX_LIMIT_RATIO < autopilot_limit / degrees(assumed_limit) < _MAX_LIMIT_RATIO
-            )
+            agrees = 1.0 / _MAX_LIMIT_RATIO < actual / degrees(assumed) < _MAX_LIMIT_RATIO
+            assumed_text = f"{degrees(assumed):g}"
         if agrees:
             return None
-        assumed_text = "null" if assumed_limit is None else f"{degrees(assumed_limit):g}"
-        actual_text = "null" if autopilot_limit == 0.0 else f"{autopilot_limit:g}"
+        actual_text = "null" if actual == 0.0 else f"{actual:g}"
         return Problem(
             INEFFECTIVE, f"the planner assumes {key} {assumed_text}; set that to {actual_text}"
         )

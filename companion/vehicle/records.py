@@ -55,12 +55,8 @@ class Heartbeat(NamedTuple):
 
     received: float
     """Event-loop time of arrival, s."""
-    autopilot: int
-    """MAV_AUTOPILOT number."""
     mode: str
     """The autopilot's name for the mode."""
-    custom_mode: int
-    """The autopilot's number for the mode."""
     armed: bool
     """Whether the vehicle is armed."""
     system_status: int

@@ -1,7 +1,7 @@
 """The vehicle's newest telemetry. Values that are not finite are never kept."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import isfinite
 
 from companion.attitude import Quaternion, is_unit
@@ -104,9 +104,7 @@ class VehicleState(ModeState, _Values):
     def forget(self) -> None:
         """Forget all but heartbeat, autopilot and texts; the rest may be of another vehicle."""
         self.current_mode, self.armings = None, 0
-        fresh = _Values()
-        for field in fields(_Values):
-            setattr(self, field.name, getattr(fresh, field.name))
+        _Values.__init__(self)
 
     @property
     def landed(self) -> bool:

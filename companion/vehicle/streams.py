@@ -7,14 +7,12 @@ from typing import NamedTuple
 
 from companion.mavlink.commands import CommandClient
 from companion.mavlink.errors import CommandRefused
-from companion.mavlink.messages import message_id
+from companion.mavlink.messages import dialect, message_id
 from companion.mavlink.stats import LinkStats
 
-MAV_CMD_SET_MESSAGE_INTERVAL = 511
 _DISABLED_INTERVAL = -1.0
 _TIMEOUT_S = 1.0
 _RETRIES = 3
-_RESULT_DENIED = 2
 _MAX_HALVINGS = 3
 _ROUNDING = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not lose a whole step
 
@@ -40,22 +38,11 @@ async def set_rates(
     window_s: float,
     interval_step_us: int,
 ) -> dict[str, StreamRate]:
-    """Request an interval for each message, then count arrivals for `window_s` seconds.
+    """Request an interval for each message, then count arrivals; see `VehicleClient.set_rates`.
 
     ArduPilot denies a rate above its loop rate and keeps the old one, so a denied rate is halved
-    and requested again, up to three times.
-
-    Args:
-        commands: sends the requests.
-        stats: counts the messages that arrive.
-        rates: rate of each message, Hz; 0 stops the message.
-        window_s: time of counting, s.
-        interval_step_us: intervals are rounded down to a whole multiple of this, us.
-
-    Raises:
-        UnknownMessage: A name is not in the dialect; nothing was sent.
-        CommandTimeout: the autopilot did not answer a request.
-        LinkLost: the connection dropped while waiting.
+    and requested again, up to three times. Intervals are rounded down to a whole multiple of
+    `interval_step_us`, us.
     """
     numbers = {name: message_id(name) for name in rates}
     answers = {
@@ -81,10 +68,10 @@ async def _request(
             interval_us = float(steps * interval_step_us)
         try:
             params = (float(number), interval_us)
-            await commands.send(MAV_CMD_SET_MESSAGE_INTERVAL, params, _TIMEOUT_S, _RETRIES)
+            await commands.send(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, params, _TIMEOUT_S, _RETRIES)
         except CommandRefused as refused:
             refusal = refused.result_name
-            if refused.result != _RESULT_DENIED or rate <= 0.0:
+            if refused.result != dialect.MAV_RESULT_DENIED or rate <= 0.0:
                 break
             rate /= 2.0
         else:
@@ -95,11 +82,7 @@ async def _request(
 async def measured_rates(
     stats: LinkStats, names: Iterable[str], window_s: float
 ) -> dict[str, float]:
-    """Rates in Hz at which messages arrive, by name, counted over `window_s` seconds.
-
-    Raises:
-        UnknownMessage: A name is not in the dialect.
-    """
+    """Rates in Hz at which messages arrive, by name; see `VehicleClient.measure_rates`."""
     numbers = {name: message_id(name) for name in names}
     before = dict(stats.by_message)
     began = asyncio.get_running_loop().time()

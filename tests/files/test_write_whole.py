@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from companion.files import write_whole as module
-from companion.files.os_errors import DISK_HANGS
-from companion.files.write_whole import ReservedSpace, write_whole
+from companion.files.write_whole import DISK_HANGS, ReservedSpace, write_whole
 from companion.flight import flight_files
 from companion.flight.observer import SilentObserver
 from companion.testing import fly

@@ -10,14 +10,9 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
 from companion.flight.observer import SilentObserver
 from companion.guidance.source import ManeuverSource
-from companion.mavlink.commands import (
-    MAV_CMD_COMPONENT_ARM_DISARM,
-    MAV_CMD_DO_SET_MODE,
-    MAV_CMD_REQUEST_MESSAGE,
-    Command,
-    CommandClient,
-)
+from companion.mavlink.commands import Command, CommandClient
 from companion.mavlink.errors import CommandRefused
+from companion.mavlink.messages import dialect
 from companion.safety.actions import Exit
 from companion.vehicle.link import Link
 from companion.vehicle.px4.autopilot import Px4
@@ -258,7 +253,9 @@ def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
         assert mock.state()["mode"] == "LOITER"
     assert "the climb was stopped" in summary.result
     asked = [command for _, command, _ in commands(summary)]
-    assert [command for command in asked if command != MAV_CMD_REQUEST_MESSAGE][-1] == TAKEOFF
+    assert [command for command in asked if command != dialect.MAV_CMD_REQUEST_MESSAGE][
+        -1
+    ] == TAKEOFF
 
 
 def test_a_hold_right_after_our_take_over_is_respected(tmp_path, monkeypatch):
@@ -469,7 +466,7 @@ def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(monkeypatc
     command = Link.command
 
     async def refuse(link, number, *parameters, **options):
-        if number == MAV_CMD_REQUEST_MESSAGE:
+        if number == dialect.MAV_CMD_REQUEST_MESSAGE:
             raise CommandRefused("MAV_CMD_REQUEST_MESSAGE", 3, "UNSUPPORTED", ())
         await command(link, number, *parameters, **options)
 
@@ -482,8 +479,8 @@ def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(monkeypatc
 
 def test_a_hold_that_is_refused_becomes_a_landing(monkeypatch):
     """Interrupted, and the autopilot does not hold: it must not be left to its last rates."""
-    monkeypatch.setattr(Px4, "hold", lambda _: Command(MAV_CMD_DO_SET_MODE, 1.0, 99.0))
-    monkeypatch.setattr(Px4, "arm", lambda _: (Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0),))
+    monkeypatch.setattr(Px4, "hold", lambda _: Command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 99.0))
+    monkeypatch.setattr(Px4, "arm", lambda _: (Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0),))
     with mock_vehicle() as mock:
         observer = When("maneuvers", lambda: session.interrupt("Ctrl-C"), after=1.0)
         session = session_for(mock, None, observer)

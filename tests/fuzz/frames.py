@@ -55,7 +55,7 @@ def _cut(data: bytes, cuts: list[int]) -> list[bytes]:
 
 
 def _scan(chunks: list[bytes], pieces: list[bytes], case: Case) -> None:
-    scanner = FrameScanner(CRC_EXTRA, streaming=case["streaming"])
+    scanner = FrameScanner(streaming=case["streaming"])
     found: list[Frame] = []
     for chunk in chunks:
         found += scanner.feed(chunk)

@@ -24,7 +24,7 @@ from companion.mavlink.settings import LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.vehicle.client import VehicleClient
 from companion.vehicle.clock import VehicleClock
-from companion.vehicle.inbox import Inbox
+from companion.vehicle.inbox import Inbox, LinkCallbacks
 from companion.vehicle.state import VehicleState
 
 VEHICLE = (1, 1)
@@ -144,9 +144,12 @@ class _Player:
         stats = LinkStats()
         dispatcher = MessageDispatcher(stats)
         clock = VehicleClock()
-        self._inbox = Inbox(settings, stats, dispatcher, None, self.out.notices.append, clock)
-        self._inbox.on_attitude = self.out.samples.append
         outbox = Outbox(settings, stats, None)
+        callbacks, notices = LinkCallbacks(), self.out.notices
+        callbacks.on_attitude = self.out.samples.append
+        self._inbox = Inbox(
+            settings, stats, dispatcher, callbacks, None, notices.append, clock, outbox
+        )
         outbox.transport = self._recorder = Recorder()
         self._setpoints = SetpointEncoder(*ours, *VEHICLE, signed=False)
         self._conversation = VehicleClient(

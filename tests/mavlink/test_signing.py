@@ -9,7 +9,6 @@ from pymavlink.dialects.v20 import common as dialect
 from companion.attitude import BodyRates
 from companion.mavlink.errors import LinkTimeout, SigningError
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
 from companion.mavlink.stamps import SignatureResult
@@ -29,7 +28,7 @@ def signer(key=KEY, ticks=TICKS, link_id=3):
 
 
 def frame_of(packed):
-    [frame] = FrameScanner(CRC_EXTRA).feed(packed)
+    [frame] = FrameScanner().feed(packed)
     return frame
 
 

@@ -11,7 +11,6 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.mavlink.framing import FrameScanner, build_frame
-from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, StampWriter
 from companion.mavlink.stamp_file import StampFile
@@ -41,7 +40,7 @@ def frame(when, message=None, link_id=3):
     mav = dialect.MAVLink(None, 1, 1)
     mav.signing.secret_key, mav.signing.link_id = KEY, link_id
     mav.signing.timestamp, mav.signing.sign_outgoing = ticks(when), True
-    [found] = FrameScanner(CRC_EXTRA).feed((message or heartbeat()).pack(mav))
+    [found] = FrameScanner().feed((message or heartbeat()).pack(mav))
     return found
 
 
@@ -51,7 +50,7 @@ def signing(clock=NOW, file=None, monotonic_clock=lambda: 0.0):
 
 def stamp_of(ours):
     """When our next frame is stamped, Unix time in s."""
-    signed = ours.sign(build_frame(0, b"\1", b"\x32", sequence=0, system=1, component=1))
+    signed = ours.sign(build_frame(0, b"\1", sequence=0, system=1, component=1))
     return int.from_bytes(signed[-12:-6], "little") / 1e5 + EPOCH_UNIX_S
 
 
@@ -69,7 +68,7 @@ def run_once(clock, *frames):
 def question(ours, ts1=123_456_789_000):
     """Our signed TIMESYNC question, whose answer repeats ts1."""
     payload = bytes(8) + ts1.to_bytes(8, "little")
-    body = build_frame(TIMESYNC, payload, b"\x22", sequence=0, system=1, component=191, signed=True)
+    body = build_frame(TIMESYNC, payload, sequence=0, system=1, component=191, signed=True)
     ours.sign(body)
     return dialect.MAVLink_timesync_message(987_654_321, ts1)
 
@@ -111,9 +110,7 @@ def test_a_vehicle_that_answers_is_the_better_clock():
     assert ours.check(frame(NOW - 10 * DAY, old_answer)) is SignatureResult.AHEAD
     not_an_answer = dialect.MAVLink_timesync_message(0, asked.ts1)
     assert ours.check(frame(NOW, not_an_answer)) is SignatureResult.AHEAD
-    our_answer = build_frame(
-        TIMESYNC, bytes([9] * 16), b"\x22", sequence=0, system=1, component=191
-    )
+    our_answer = build_frame(TIMESYNC, bytes([9] * 16), sequence=0, system=1, component=191)
     ours.sign(our_answer)
     repeats_it = dialect.MAVLink_timesync_message(1, int.from_bytes(bytes([9] * 8), "little"))
     assert ours.check(frame(NOW, repeats_it)) is SignatureResult.AHEAD

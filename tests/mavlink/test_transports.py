@@ -20,8 +20,8 @@ from companion.mavlink.transport import udp as udp_module
 from companion.mavlink.transport.endpoint import SerialPort
 from companion.mavlink.transport.serial_port import SerialTransport
 from companion.vehicle import connection as connection_module
+from companion.vehicle.connection import no_heartbeat_message
 from companion.vehicle.link import Link
-from companion.vehicle.silence import no_heartbeat_message
 from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
 
 LEVEL = BodyRates(0.0, 0.0, 0.0)

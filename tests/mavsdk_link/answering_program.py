@@ -8,7 +8,7 @@ import time
 from companion.attitude import BodyRates
 from companion.mavlink import loop as link_loop
 from companion.mavlink.settings import LinkSettings
-from companion.mavsdk_link.link import MavsdkLink
+from companion.mavsdk_link import MavsdkLink
 
 TROUBLES = {
     "frozen loop": lambda: time.sleep(1.0),

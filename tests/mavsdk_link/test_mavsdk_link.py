@@ -23,8 +23,7 @@ from tests.flight.sockets import mock_vehicle
 
 pytest.importorskip("mavsdk")
 
-from companion.mavsdk_link.link import MavsdkLink
-from companion.mavsdk_link.transport import connection_url
+from companion.mavsdk_link import MavsdkLink, connection_url
 
 PROGRAM = "tests.mavsdk_link.answering_program"
 LIMIT_S = 0.3

@@ -179,13 +179,13 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
 @pytest.mark.parametrize(
     ("other_nodes", "expected"),
     [
-        (OtherNodes(sources=frozenset({(255, 190), (1, 154)})), {}),
-        (OtherNodes(sources=frozenset({(1, 191)})), {Key.OUR_IDS: UNSAFE}),
+        (OtherNodes(sources={(255, 190), (1, 154)}), {}),
+        (OtherNodes(sources={(1, 191)}), {Key.OUR_IDS: UNSAFE}),
         (
-            OtherNodes(sources=frozenset({(1, 192)}), companions=frozenset({(1, 192)})),
+            OtherNodes(sources={(1, 192)}, companions={(1, 192)}),
             {Key.SECOND_COMPANION: INEFFECTIVE},
         ),
-        (OtherNodes(setpoint_senders=frozenset({(255, 190)})), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (OtherNodes(setpoint_senders={(255, 190)}), {Key.OTHER_SETPOINTS: UNSAFE}),
         (OtherNodes(target_is_foreign=True), {Key.OTHER_SETPOINTS: UNSAFE}),
     ],
 )

@@ -2,8 +2,10 @@
 
 import asyncio
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from companion.preflight import parameter_survey
 from companion.preflight.parameter_survey import RetryPolicy, Survey, survey
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
@@ -13,7 +15,14 @@ OLD = {"SYSID_MYGCS": 255.0, "FS_OPTIONS": 16.0}
 WANTED = ("FS_OPTIONS", "MAV_GCS_SYSID", "ARMING_SKIPCHK")
 
 
-def test_an_old_version_answers_to_the_old_names():
+@pytest.fixture(autouse=True)
+def quick_rounds(monkeypatch):
+    monkeypatch.setattr(parameter_survey, "_FIRST_ROUND", RetryPolicy(0.05, 2))
+    monkeypatch.setattr(parameter_survey, "_SECOND_ROUND", RetryPolicy(0.05, 3))
+
+
+def test_an_old_version_answers_to_the_old_names(monkeypatch):
+    monkeypatch.setattr(parameter_survey, "_FIRST_ROUND", RetryPolicy(0.05, 1))
     rules = [rule for rule in ARDUPILOT_PARAMETERS if rule.name in WANTED]
     asked = []
 
@@ -27,7 +36,7 @@ def test_an_old_version_answers_to_the_old_names():
     async def scene():
         async with linked() as (link, vehicle):
             vehicle.answers["PARAM_REQUEST_READ"] = answer
-            return await survey(link, rules, first_round=RetryPolicy(0.05, 1))
+            return await survey(link, rules)
 
     values, names, untold, lossy = asyncio.run(scene())
     assert (untold, lossy) == ({"ARMING_SKIPCHK"}, False)
@@ -101,8 +110,7 @@ class Lossy:
                 vehicle.answers["PARAM_REQUEST_READ"] = lambda request: self.answer(
                     vehicle, request
                 )
-                first, second = RetryPolicy(0.05, 2), RetryPolicy(0.05, 3)
-                return await survey(link, rules, first_round=first, second_round=second)
+                return await survey(link, rules)
 
         return asyncio.run(scene())
 

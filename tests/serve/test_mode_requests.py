@@ -15,7 +15,6 @@ from companion.flight import flight_files
 from companion.flight.changes import Changes
 from companion.flight.environment import THIS_COMPUTER
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
 from companion.recording import recorder
 from companion.recording.measurements.summary import LoopCounts, Summary
 from companion.recording.trace import FlightTrace
@@ -35,7 +34,7 @@ from companion.vehicle.px4.autopilot import Px4
 
 def command(number, *parameters):
     message = dialect.MAVLink_command_long_message(1, 1, number, 0, *parameters, *[0.0] * 4)
-    return FrameScanner(CRC_EXTRA).feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
+    return FrameScanner().feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
@@ -47,7 +46,7 @@ def test_a_number_that_is_none_asks_for_nothing(number):
 
 
 def framed(message):
-    return FrameScanner(CRC_EXTRA).feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
+    return FrameScanner().feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.signing import Signing
 from companion.serve.network.client import Client
 from companion.serve.network.permission import Permission, reads_only
@@ -25,7 +24,7 @@ def packed(message, *, signed=False):
     if signed:
         mav.signing.secret_key, mav.signing.sign_outgoing = KEY, True
         mav.signing.timestamp = Signing(KEY)._judge.date()
-    return FrameScanner(CRC_EXTRA).feed(message.pack(mav))[0]
+    return FrameScanner().feed(message.pack(mav))[0]
 
 
 def command(number):

@@ -7,7 +7,6 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
 from companion.serve.network.addresses import EVERYBODY, Address, target_of
 from companion.serve.network.routing import Routing
 
@@ -27,7 +26,7 @@ class Ear:
 def frame(message, source, sequence=0):
     mav = dialect.MAVLink(None, *source)
     mav.seq = sequence
-    return FrameScanner(CRC_EXTRA, keep_unknown=True).feed(message.pack(mav))[0]
+    return FrameScanner(keep_unknown=True).feed(message.pack(mav))[0]
 
 
 def heartbeat(source, sequence=0):
@@ -215,7 +214,7 @@ def test_two_bridged_clients_do_not_make_a_storm(net):
         for origin, other in ((net.ground, net.script), (net.script, net.ground)):
             heard, other.heard = other.heard, []
             for raw in heard:
-                net.routing.forward_from_client(origin, FrameScanner(CRC_EXTRA).feed(raw)[0])
+                net.routing.forward_from_client(origin, FrameScanner().feed(raw)[0])
     assert len(net.vehicle.heard) == 1
 
 
@@ -260,7 +259,7 @@ def unknown(source, number=50_123, payload=b"\x05\x06\x07"):
 
 def test_an_unknown_message_is_forwarded_untouched(net):
     raw = unknown(AUTOPILOT)
-    (got,) = FrameScanner(CRC_EXTRA, keep_unknown=True).feed(raw)
+    (got,) = FrameScanner(keep_unknown=True).feed(raw)
     assert (got.raw, got.message_id, got.system) == (raw, 50_123, 1)
     net.routing.forward_from_vehicle(got)
     assert net.ground.heard == net.script.heard == [raw]
@@ -269,10 +268,10 @@ def test_an_unknown_message_is_forwarded_untouched(net):
 def test_unknown_messages_keep_their_place_between_known_ones():
     before, after = heartbeat(AUTOPILOT, 1).raw, heartbeat(AUTOPILOT, 3).raw
     data = before + unknown(AUTOPILOT) + after
-    scanner = FrameScanner(CRC_EXTRA, streaming=True, keep_unknown=True)
+    scanner = FrameScanner(streaming=True, keep_unknown=True)
     found = [each.raw for at in range(0, len(data), 5) for each in scanner.feed(data[at : at + 5])]
     assert found == [before, unknown(AUTOPILOT), after]
-    assert [each.raw for each in FrameScanner(CRC_EXTRA).feed(data)] == [before, after]
+    assert [each.raw for each in FrameScanner().feed(data)] == [before, after]
 
 
 def test_signed_and_version_1_frames_are_forwarded_byte_for_byte(net):
@@ -284,7 +283,7 @@ def test_signed_and_version_1_frames_are_forwarded_byte_for_byte(net):
         dialect.MAVLink(None, *AUTOPILOT), force_mavlink1=True
     )
     for raw in (signed, old):
-        (got,) = FrameScanner(CRC_EXTRA).feed(raw)
+        (got,) = FrameScanner().feed(raw)
         net.routing.forward_from_vehicle(got)
         assert net.ground.heard[-1] == raw
 

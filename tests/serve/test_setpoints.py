@@ -13,7 +13,6 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.guidance.fence import EARTH_RADIUS
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
 from companion.serve.network.addresses import Address
 from companion.serve.setpoints.request import (
     AttitudeRequest,
@@ -37,7 +36,7 @@ TARGETS = Address(1, 1), Address(1, 191)
 
 def understand(message, situation=SITUATION, *, ardupilot=False):
     raw = message.pack(dialect.MAVLink(None, 245, 190))
-    (frame,) = FrameScanner(CRC_EXTRA).feed(raw)
+    (frame,) = FrameScanner().feed(raw)
     return decode_setpoint(frame, situation, TARGETS, body_yaw_is_relative=ardupilot)
 
 

@@ -32,7 +32,6 @@ def problem(check, value):
     ("make", "told", "good", "bad", "set_to"),
     [
         (checks.forbidden, (UNSAFE, {3.0: WORSE}, 1.0), (0.0, 2.0), (3.0,), 1.0),
-        (checks.forbidden, (UNSAFE, {3.0: WORSE}), (0.0, 2.0), (3.0,), None),
         (checks.safe_action, ((1.0, 2.0), {3.0: WORSE}, 2.0), (1.0, 2.0), (3.0,), 2.0),
         (checks.required, (UNSAFE, 4.0, WORSE), (4.0,), (0.0, 5.0), 4.0),
         (checks.positive, (UNSAFE, WORSE, 7.0), (0.1, 9.0), (0.0, -1.0), 7.0),

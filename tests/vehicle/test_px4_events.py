@@ -4,7 +4,6 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from companion.mavlink.framing import FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
 from companion.mavlink.texts import TextAssembler
 from companion.vehicle.px4.events import EventReader, event_id
 
@@ -129,7 +128,7 @@ def test_recorded_frames_of_events_are_intact():
     """px4-flight-gcs.tlog at 68.018 s, and the sequence number after it."""
     event = bytes.fromhex("fd0d0000d801019a0100ac389601a0080100260000006644a1")
     sequence = bytes.fromhex("fd010000fc01019b0100264098")
-    frames = FrameScanner(CRC_EXTRA).feed(event + sequence)
+    frames = FrameScanner().feed(event + sequence)
     assert [frame.message_id for frame in frames] == [410, 411]
     scene = Scene()
     scene.reader.take(frames[0].payload)

@@ -4,8 +4,6 @@ import errno
 from collections.abc import Callable
 from typing import Protocol
 
-from companion.files.os_errors import reason_of
-
 ReceiveCallback = Callable[[bytes, int], bool]
 """Called with bytes and the `perf_counter_ns` of their arrival; returns whether a frame in them was
 accepted.
@@ -66,7 +64,7 @@ _REMEDIES = {
 
 def why_not_opened(error: OSError) -> str:
     """Why the system refused to open a UDP or TCP port, and if possible what to do."""
-    return _REMEDIES.get(error.errno or 0, reason_of(error))
+    return _REMEDIES.get(error.errno or 0) or error.strerror or str(error)
 
 
 class Transport(Protocol):

@@ -13,7 +13,7 @@ from companion.mavlink.transport.endpoint import (
 )
 from companion.mavlink.transport.serial_port import SerialTransport
 from companion.mavlink.transport.tcp import open_tcp_client, open_tcp_server
-from companion.mavlink.transport.udp import open_udp
+from companion.mavlink.transport.udp import UdpTransport, udp_address
 
 OpenTransport = Callable[[Endpoint, Receiver, LostCallback], Awaitable[Transport]]
 """A function like `open_transport`."""
@@ -33,7 +33,7 @@ async def open_transport(endpoint: Endpoint, receiver: Receiver, lost: LostCallb
     """
     match endpoint:
         case UdpIn() | UdpOut():
-            return await open_udp(endpoint, receiver)
+            return UdpTransport(endpoint, receiver, *await udp_address(endpoint))
         case TcpClient():
             return await open_tcp_client(endpoint, receiver, lost)
         case TcpServer():

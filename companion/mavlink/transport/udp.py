@@ -6,7 +6,7 @@ import logging
 import socket
 import struct
 import time
-from typing import Any, NamedTuple
+from typing import Any
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.loop import unwatch, watch
@@ -28,29 +28,13 @@ PEER_SILENCE_S = 2.0
 a sender at another address may become the peer."""
 
 
-async def open_udp(endpoint: UdpIn | UdpOut, receiver: Receiver) -> "UdpTransport":
-    """Open a UDP endpoint.
-
-    Raises:
-        EndpointError: the port is in use, the host is unknown, the address is not that of an
-            interface of this computer, or there is no permission.
-    """
-    return UdpTransport(endpoint, await udp_address(endpoint), receiver)
-
-
-class UdpAddress(NamedTuple):
-    """The socket address of an endpoint, and the peers that it names."""
-
-    family: socket.AddressFamily
-    """Address family of the socket."""
-    address: Any
-    """Socket address to bind or to send to."""
-    named_peers: NamedPeers
-    """The senders that the endpoint names."""
-
-
-async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
+async def udp_address(
+    endpoint: UdpIn | UdpOut,
+) -> tuple[socket.AddressFamily, Any, NamedPeers]:
     """Look up the host of an endpoint, and the peers that it names.
+
+    Returns:
+        The address family, the socket address to bind or to send to, and the named peers.
 
     Raises:
         EndpointError: a host name is unknown.
@@ -65,7 +49,7 @@ async def udp_address(endpoint: UdpIn | UdpOut) -> UdpAddress:
         ) from error
     family, _, _, _, address = addresses[0]
     named_peers = await resolve_peers(endpoint.peers if isinstance(endpoint, UdpIn) else (), kind)
-    return UdpAddress(family, address, named_peers)
+    return family, address, named_peers
 
 
 class UdpTransport:
@@ -85,6 +69,10 @@ class UdpTransport:
 
     Attributes:
         local: (host, port) to which the socket is bound.
+
+    Raises:
+        EndpointError: the port is in use, the address is not that of an interface of this computer,
+            or there is no permission.
     """
 
     reconnects = False
@@ -92,11 +80,13 @@ class UdpTransport:
     def __init__(
         self,
         endpoint: UdpIn | UdpOut,
-        addresses: UdpAddress,
         receiver: Receiver,
+        family: socket.AddressFamily,
+        address: Any,
+        named_peers: NamedPeers,
     ) -> None:
         self._endpoint, self._receiver = endpoint, receiver
-        self._family, self._address, self._named_peers = addresses
+        self._family, self._address, self._named_peers = family, address, named_peers
         self._loop = asyncio.get_running_loop()
         self._heard_in_period = False
         self._connected = False

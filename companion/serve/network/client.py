@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from companion.mavlink.framing import Frame, FrameScanner
-from companion.mavlink.messages import CRC_EXTRA
-from companion.mavlink.stats import LinkStats
 
 _MAX_QUEUED_BYTES = 32_768
 """Largest number of bytes queued for one client."""
@@ -61,9 +59,7 @@ class Client(ABC):
     ) -> None:
         self.name, self.host, self.device = name, host, device
         self.stats = ClientStats()
-        self._scanner = FrameScanner(
-            CRC_EXTRA, streaming=streaming, stats=LinkStats(), keep_unknown=True
-        )
+        self._scanner = FrameScanner(streaming=streaming, keep_unknown=True)
         self._queued_frames: deque[bytes] = deque()
         self._queued_bytes = 0
 

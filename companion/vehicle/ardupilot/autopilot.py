@@ -7,12 +7,7 @@ measured on ArduCopter 4.7 in simulation, 2025.
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from companion.mavlink.commands import (
-    MAV_CMD_COMPONENT_ARM_DISARM,
-    MAV_CMD_DO_SET_MODE,
-    MAV_CMD_NAV_TAKEOFF,
-    Command,
-)
+from companion.mavlink.commands import Command
 from companion.mavlink.messages import dialect
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
 from companion.vehicle.autopilot import (
@@ -23,7 +18,8 @@ from companion.vehicle.autopilot import (
     Role,
 )
 
-_ARMED_FLAG, _GUIDED_FLAG = 128, 8  # MAV_MODE_FLAG
+_ARMED_FLAG = dialect.MAV_MODE_FLAG_SAFETY_ARMED
+_GUIDED_FLAG = dialect.MAV_MODE_FLAG_GUIDED_ENABLED
 _CUSTOM_MODE_ENABLED = 1.0
 _ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x10  # attitude, both velocities, absolute position
 _NO_POSITION = 0x80  # constant position mode: the estimator has no position measurement
@@ -97,7 +93,7 @@ class ArduPilot:
 
     def set_mode(self, name: str) -> Command:
         """DO_SET_MODE with the mode's number. Raises `KeyError` for an unknown name."""
-        return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(self.modes[name]))
+        return Command(dialect.MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(self.modes[name]))
 
     def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: estimator, position, home or ArduPilot's own pre-arm checks.
@@ -119,15 +115,15 @@ class ArduPilot:
 
     def arm(self) -> tuple[Command, ...]:
         """Commands that enter GUIDED, then arm with all of GUIDED's checks."""
-        return self.set_mode("GUIDED"), Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        return self.set_mode("GUIDED"), Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
     def disarm(self) -> Command:
         """Command that disarms on the ground; ArduPilot refuses it in the air."""
-        return Command(MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        return Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
         """Command that takes off here, to a height above home (m)."""
-        return Command(MAV_CMD_NAV_TAKEOFF, p7=height_m)
+        return Command(dialect.MAV_CMD_NAV_TAKEOFF, p7=height_m)
 
     def hold(self) -> Command:
         """Command for BRAKE, which stops and holds; LOITER would follow the pilot's sticks."""

@@ -8,13 +8,8 @@ from collections.abc import Mapping
 from math import nan
 from types import MappingProxyType
 
-from companion.mavlink.commands import (
-    MAV_CMD_COMPONENT_ARM_DISARM,
-    MAV_CMD_DO_SET_MODE,
-    MAV_CMD_NAV_LAND,
-    MAV_CMD_NAV_TAKEOFF,
-    Command,
-)
+from companion.mavlink.commands import Command
+from companion.mavlink.messages import dialect
 from companion.vehicle.autopilot import (
     FLIGHT_RATES,
     ControlEntry,
@@ -115,7 +110,7 @@ class Px4:
         """DO_SET_MODE with PX4's main and sub mode. Raises `KeyError` for an unknown name."""
         number = self.modes[name]
         main, sub = number >> 16 & 0xFF, number >> 24 & 0xFF
-        return Command(MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(main), float(sub))
+        return Command(dialect.MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, float(main), float(sub))
 
     def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing: position, estimator, home or PX4's own pre-arm checks."""
@@ -133,16 +128,16 @@ class Px4:
 
     def arm(self) -> tuple[Command, ...]:
         """Commands that enter AUTO.LOITER, then arm with all checks."""
-        return (self.hold(), Command(MAV_CMD_COMPONENT_ARM_DISARM, 1.0))
+        return (self.hold(), Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0))
 
     def disarm(self) -> Command:
         """Command that disarms on the ground; PX4 refuses it in the air."""
-        return Command(MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        return Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
         """Command that takes off here, to a height above home (m), and keeps the heading (NaN)."""
         altitude = home_altitude_m + height_m
-        return Command(MAV_CMD_NAV_TAKEOFF, p4=nan, p5=nan, p6=nan, p7=altitude)
+        return Command(dialect.MAV_CMD_NAV_TAKEOFF, p4=nan, p5=nan, p6=nan, p7=altitude)
 
     def hold(self) -> Command:
         """Command that enters AUTO.LOITER."""
@@ -150,4 +145,4 @@ class Px4:
 
     def land(self) -> Command:
         """Command that lands here and keeps the heading."""
-        return Command(MAV_CMD_NAV_LAND, p4=nan, p5=nan, p6=nan)
+        return Command(dialect.MAV_CMD_NAV_LAND, p4=nan, p5=nan, p6=nan)

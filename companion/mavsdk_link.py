@@ -1,14 +1,22 @@
-"""MAVSDK as a transport: it holds the connection to the vehicle, and forwards frames unchanged.
+"""The link through MAVSDK (`link.backend: mavsdk`): it holds the connection to the vehicle.
 
-MAVSDK forwards frames between its two connections: one to the vehicle, and one of its type `raw` to
-this process. So each side gets each frame as the other sent it, with its time stamp.
+Needs the extra `mavsdk`. MAVSDK forwards frames unchanged between its two connections: one to the
+vehicle, and one of its type `raw` to this process. So each side gets each frame as the other sent
+it, with its time stamp.
 
 MAVSDK sends from a thread of its own, so a frame reaches the kernel 0.1 ms later than if this
 program sends it. MAVSDK does not report whether a frame was sent, and queues frames that a serial
 port or TCP connection cannot take.
+
+Setpoints are not sent by MAVSDK's offboard plugin. The plugin repeats the last setpoint 20 times a
+second, in its own thread, until it is told to stop, which can be too late. Measured: a process was
+stopped in flight and resumed, and the plugin sent old body rates before any other thread ran. PX4
+was landing by its failsafe; it took them as a request for offboard mode, and obeyed them. So each
+setpoint is one frame of this program, sent once, in answer to a fresh sample.
 """
 
 import asyncio
+import logging
 import os
 from collections import deque
 from time import perf_counter_ns
@@ -18,11 +26,18 @@ from mavsdk.exceptions import MavsdkError
 from mavsdk.logging import log_subscribe
 from mavsdk.mavsdk import Configuration, Mavsdk
 
-from companion.mavlink.errors import EndpointError
+from companion.mavlink.errors import EndpointError, LinkError
+from companion.mavlink.frame_filter import Notice
 from companion.mavlink.framing import V2_MAGIC
 from companion.mavlink.loop import unwatch, watch
 from companion.mavlink.settings import LinkSettings
-from companion.mavlink.transport.base import ReceiveCallback
+from companion.mavlink.transport.base import (
+    LostCallback,
+    ReceiveCallback,
+    Receiver,
+    Tap,
+    Transport,
+)
 from companion.mavlink.transport.endpoint import (
     Endpoint,
     SerialPort,
@@ -32,6 +47,9 @@ from companion.mavlink.transport.endpoint import (
     UdpOut,
     parse_endpoint,
 )
+from companion.vehicle.link import Link
+
+_LOG = logging.getLogger(__name__)
 
 _SCHEMES: dict[type[Endpoint], str] = {
     UdpIn: "udpin",
@@ -149,3 +167,32 @@ class MavsdkTransport:
 def _open_error(endpoint: str, message: str) -> str:
     reasons = (reason for name, reason in _OPEN_FAILURES.items() if name in message)
     return f"{endpoint} cannot be opened by MAVSDK: {next(reasons, message)}"
+
+
+class MavsdkLink(Link):
+    """A `Link` whose connection MAVSDK holds.
+
+    MAVSDK forwards all frames unchanged, so samples carry the vehicle's time stamps, which MAVSDK's
+    own telemetry does not give. The vehicle's answers to MAVSDK's own requests do not arrive here,
+    and count as lost in `stats`.
+
+    Args:
+        settings: the endpoint, and the ids of the vehicle and of this program.
+        tap: called with every frame accepted from and sent to the vehicle.
+        notice: called once with each notice about the peer; by default it logs a warning.
+
+    Raises:
+        EndpointError: the endpoint cannot be parsed.
+        LinkError: the settings demand lockstep or signing, which MAVSDK cannot do.
+    """
+
+    def __init__(
+        self, settings: LinkSettings, tap: Tap | None = None, notice: Notice = _LOG.warning
+    ) -> None:
+        if settings.lockstep or settings.signing is not None:
+            raise LinkError("MAVSDK can neither fly in lockstep nor sign; use link.backend: direct")
+
+        async def opener(_endpoint: Endpoint, receiver: Receiver, _lost: LostCallback) -> Transport:
+            return MavsdkTransport(settings, receiver.receive)
+
+        super().__init__(settings, tap, opener, notice)

@@ -1,1 +1,0 @@
-"""The link through MAVSDK (`link.backend: mavsdk`); needs the extra `mavsdk`."""
