@@ -10,11 +10,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from companion.least_squares import project
-
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats, project
 
 _MOST_DELAYS = 24
 _SAMPLES_PER_DELAY = 8
