@@ -192,7 +192,7 @@ def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     excited_samples = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
     response_duration = _RESPONSE_DURATION_FACTOR * (lag + data.dead_time(unknown))
     sample_period = float(np.median(np.diff(np.concatenate(data.times))))
-    analysis = analyse_residual(
+    misfit, standard_errors = analyse_residual(
         solution.residual,
         solution.jacobian,
         lambda delay: data.delayed_commands(unknown, delay),
@@ -203,9 +203,9 @@ def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     deviation = float(np.std(data.measured))
     return FitQuality(
         explained=data.r_squared(solution),
-        misfit=analysis.misfit / deviation if deviation > 0.0 else 0.0,
-        dead_time_error=data.dead_time(analysis.standard_errors),
-        lag_error=lag * float(analysis.standard_errors[0]),
+        misfit=misfit / deviation if deviation > 0.0 else 0.0,
+        dead_time_error=data.dead_time(standard_errors),
+        lag_error=lag * float(standard_errors[0]),
         span=span,
         excited_samples=excited_samples,
     )
