@@ -184,8 +184,7 @@ def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
 def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
     """The largest relative excess over any limit but the fence at each moment, (m,)."""
     without_limits = np.full_like(motion.times, -1.0)
-    over: Floats = np.max([without_limits, *excess(motion, envelope).values()], axis=0)
-    return over
+    return np.asarray(np.max([without_limits, *excess(motion, envelope).values()], axis=0))
 
 
 def _law_with_pieces(
@@ -218,8 +217,7 @@ def _law_with_pieces(
 def _largest_of_four(values: Floats, outside: float) -> Floats:
     """Largest of four `values` (n,) for each coefficient (n + 3,); `outside` beyond the ends."""
     padded = np.pad(values, 3, constant_values=outside)
-    largest: Floats = np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1)
-    return largest
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
 
 
 def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
