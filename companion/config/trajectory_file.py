@@ -28,7 +28,7 @@ from companion.guidance.trajectory import (
     from_samples,
     read_csv,
 )
-from companion.guidance.trajectory.demand import Floats
+from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.spline_curve import SplineCurve
 from companion.guidance.trajectory.timed_curve import TimedCurve
 from companion.guidance.trajectory.waypoints import largest_detour

@@ -11,8 +11,9 @@ import numpy as np
 
 from companion.guidance.fence import Breach, Fence, Place
 from companion.guidance.reference import Vector
-from companion.guidance.trajectory.demand import Floats, Motion
+from companion.guidance.trajectory.demand import Motion
 from companion.guidance.trajectory.feasibility import Violation
+from companion.guidance.trajectory.septic_spline import Floats
 
 TRACKING_MARGIN = 0.5
 """Margin between reference and fence, m. It covers the tracking error and `_POINT_DISTANCE`."""

@@ -12,7 +12,6 @@ from companion.guidance.linear import GuidanceInput, LinearCommand, LinearGuidan
 from companion.guidance.maneuvers import Corners, Maneuver, ManeuverSequence, Steps
 from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.reference import GRAVITY, Pose, Reference, VehicleMotion
-from companion.guidance.thrust import acceleration_within_thrust, specific_thrust
 
 __all__ = [
     "GRAVITY",
@@ -37,7 +36,5 @@ __all__ = [
     "ThrustSettings",
     "VehicleMotion",
     "Weights",
-    "acceleration_within_thrust",
     "horizontal_gains",
-    "specific_thrust",
 ]

@@ -1,6 +1,7 @@
 """Maneuver `identify`: doublets that measure the response to body rates and thrust."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from companion.attitude import BodyRates
@@ -66,7 +67,7 @@ class _Doublet(NamedTuple):
         return -1.0 if self.step_time <= time < 3.0 * self.step_time else 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Doublets:
     """Doublets +A, −A, +A (lasting T, 2T, T) of roll, pitch and yaw rate, and of climb.
 
@@ -93,17 +94,14 @@ class Doublets:
     climb_step_time: float
     settle: float
     name: str = "identify"
-    _doublets: tuple[_Doublet, ...] = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_doublets", self._parts())
 
     @property
     def duration(self) -> float:
         """Duration of all doublets, their rests and the times of position hold, s."""
         return self.settle + sum(part.duration + self.settle for part in self._doublets)
 
-    def _parts(self) -> tuple[_Doublet, ...]:
+    @cached_property
+    def _doublets(self) -> tuple[_Doublet, ...]:
         tilt, yaw = self.tilt_rate, self.yaw_rate
         rates = [
             _Doublet(step, BodyRates(*(size * rate for rate in axis)))

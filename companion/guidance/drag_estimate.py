@@ -74,13 +74,9 @@ class DragEstimate:
         self.prior_drag = self.drag = prior.drag
         self.top_speed = 0.0
         self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0, 0.0])
-        deviations = (
-            prior.linear_deviation,
-            prior.quadratic_deviation,
-            _WIND_DEVIATION,
-            _WIND_DEVIATION,
-        )
-        self._covariance = np.diag([*(each**2 for each in deviations), _AXIS_DRAG_DEVIATION**2])
+        drag_deviations = prior.linear_deviation, prior.quadratic_deviation
+        others = _WIND_DEVIATION, _WIND_DEVIATION, _AXIS_DRAG_DEVIATION
+        self._covariance = np.diag([each**2 for each in (*drag_deviations, *others)])
         self._innovation_sum, self._measurements = 0.0, 0
         self._forget_window()
 
@@ -131,11 +127,10 @@ class DragEstimate:
             self._covariance[wind, wind] += span * _WIND_CHANGE**2
         for axis in (0, 1):
             row = np.zeros(5)
-            row[0], row[1] = (
-                -self._displacement[axis] / span,
-                -self._speed_times_velocity[axis] / span,
-            )
-            row[2 + axis], row[4] = 1.0, -self._along_axes[axis] / span
+            row[0] = -self._displacement[axis] / span
+            row[1] = -self._speed_times_velocity[axis] / span
+            row[2 + axis] = 1.0
+            row[4] = -self._along_axes[axis] / span
             spread = self._covariance @ row
             variance = float(row @ spread) + _MEASUREMENT_DEVIATION**2
             limit = _CLAMP_DEVIATIONS * sqrt(variance)
@@ -161,9 +156,5 @@ class DragEstimate:
 
     def _forget_window(self) -> None:
         self._span = 0.0
-        self._displacement, self._speed_times_velocity, self._residual = (
-            [0.0, 0.0],
-            [0.0, 0.0],
-            [0.0, 0.0],
-        )
-        self._along_axes = [0.0, 0.0]
+        self._displacement, self._residual = [0.0, 0.0], [0.0, 0.0]
+        self._speed_times_velocity, self._along_axes = [0.0, 0.0], [0.0, 0.0]

@@ -141,17 +141,11 @@ class Fence:
         """
         (north, east, down), twice_deceleration = velocity, 2.0 * self.deceleration
         reaction = self.reaction + self.estimate_delay
-        dv_north, dv_east = (
-            reaction * acceleration[0],
-            reaction * acceleration[1],
-        )
+        dv_north, dv_east = reaction * acceleration[0], reaction * acceleration[1]
         # The square of the speed after the reaction time, minus the square of the present speed.
         increase = dv_north * (2.0 * north + dv_north) + dv_east * (2.0 * east + dv_east)
         is_faster = (increase > 0.0) * 1.0
-        dv_north, dv_east = (
-            is_faster * dv_north,
-            is_faster * dv_east,
-        )
+        dv_north, dv_east = is_faster * dv_north, is_faster * dv_east
         later_north, later_east = north + dv_north, east + dv_east
         later_speed = (later_north * later_north + later_east * later_east) ** 0.5
         half_braking_time = later_speed / twice_deceleration

@@ -47,11 +47,7 @@ class HeldHeadingManeuver:
         return self.trajectory.duration
 
     def check_times(self) -> list[float]:
-        """The times at which to check the trajectory, s.
-
-        Raises:
-            TrajectoryError: the trajectory is too long to be checked.
-        """
+        """The times at which to check the trajectory; see `Maneuver.check_times`."""
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:
@@ -101,11 +97,7 @@ class Follow:
         )
 
     def check_times(self) -> list[float]:
-        """The times at which to check the trajectory, s; the turn before it is not checked.
-
-        Raises:
-            TrajectoryError: the trajectory is too long to be checked.
-        """
+        """See `Maneuver.check_times`; the turn before the trajectory is not checked."""
         return list(self.trajectory.check_times())
 
     def at(self, time: float, start: Pose) -> Reference:

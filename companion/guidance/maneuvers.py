@@ -79,11 +79,11 @@ class Steps:
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over each doublet, s; pauses and settling are not checked."""
-        begins = [
-            index * self._doublet_period + _HOLD_PAUSE for index in range(len(self.DIRECTIONS))
-        ]
-        length = 4.0 * self.step_time
-        return [time for begin in begins for time in check_times_between(begin, begin + length)]
+        times: list[float] = []
+        for index in range(len(self.DIRECTIONS)):
+            begin = index * self._doublet_period + _HOLD_PAUSE
+            times += check_times_between(begin, begin + 4.0 * self.step_time)
+        return times
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: a pause, open-loop coefficients in the doublet, then position hold."""
@@ -126,16 +126,8 @@ class Corners:
     settle: float
     name: str = "corners"
 
-    CORNERS = (
-        (1.0, 1.0),
-        (-1.0, 1.0),
-        (-1.0, -1.0),
-        (1.0, -1.0),
-        (1.0, -1.0),
-        (-1.0, -1.0),
-        (-1.0, 1.0),
-        (1.0, 1.0),
-    )
+    _ROUND = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
+    CORNERS = (*_ROUND, *reversed(_ROUND))
 
     @property
     def duration(self) -> float:

@@ -109,6 +109,7 @@ class CommandedSource:
     Attributes:
         name: who gives the references.
         pose: the pose at which the source began, or None.
+        failure: why control must end: `fail` was called, or references stopped coming; else None.
     """
 
     def __init__(self, name: str, max_age: float, begins_within: float) -> None:
@@ -123,7 +124,7 @@ class CommandedSource:
         self._base: Reference | None = None
         self._base_at = 0.0
         self._ended = False
-        self._failure: str | None = None
+        self.failure: str | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
         """Hold `pose` until the first reference."""
@@ -170,7 +171,7 @@ class CommandedSource:
         """
         self._require_fresh(now)
         newest, given_at, jerk = self._newest, self._given_at, self._jerk
-        if newest is not None and self._failure is None:
+        if newest is not None and self.failure is None:
             return lambda time: extrapolated_reference(newest, jerk, time - given_at)
         if self._hold_reference is None or newest is None:
             self._hold_reference = self._hold(motion)
@@ -187,17 +188,12 @@ class CommandedSource:
     def _require_fresh(self, now: float) -> None:
         """Note a failure if the newest reference is too old, or the first one is overdue."""
         allowed = self._begins_within if self._newest is None else self._max_age
-        if self._failure is None and not self._ended and now - self._given_at > allowed:
-            self._failure = f"{self.name} gave no new command for {allowed:g} s"
-
-    @property
-    def failure(self) -> str | None:
-        """Why control must end: `fail` was called, or references stopped coming; else None."""
-        return self._failure
+        if self.failure is None and not self._ended and now - self._given_at > allowed:
+            self.failure = f"{self.name} gave no new command for {allowed:g} s"
 
     def fail(self, reason: str) -> None:
         """Note that no more references will come; `reason` is for the user."""
-        self._failure = reason
+        self.failure = reason
 
     def finished(self, now: float) -> bool:
         """Whether `end` was called."""

@@ -7,7 +7,7 @@ the loop is second-order.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from companion.attitude.rate_response import FIRST_ORDER_LAG_SHARE
 from companion.identification.lags import (
@@ -17,8 +17,7 @@ from companion.identification.lags import (
     value_at,
 )
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
-
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats
 
 _GRID_PERIOD = 0.004
 """Sample period of the correlation, s."""

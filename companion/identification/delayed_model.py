@@ -6,7 +6,6 @@ from math import exp, log, nan
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.identification.lags import (
     Knots,
@@ -18,9 +17,7 @@ from companion.identification.lags import (
     value_at,
 )
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch
-from companion.least_squares import Solution, minimise, project
-
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats, Solution, minimise, project
 
 
 class Model(Protocol):

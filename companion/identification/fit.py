@@ -4,11 +4,11 @@ Lag, dead time and slew limit are searched; linear regression gives gain, offset
 A second-order lag is tried too, and reported if it fits clearly better.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import product
 from math import exp, log
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.identification.delayed_model import (
     DelayedModel,
@@ -20,9 +20,7 @@ from companion.identification.delayed_model import (
 )
 from companion.identification.record import Stretch, most_excited
 from companion.identification.residual_analysis import analyse_residual
-from companion.least_squares import Solution
-
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats, Solution
 
 LAG_RANGE = exp(FirstOrder.lower_bounds[0]), exp(FirstOrder.upper_bounds[0])
 """Range in which the lag is searched, s."""
@@ -90,7 +88,7 @@ class LagFit:
     """Slew limit of the command, per second; None: no limit was found."""
     quality: FitQuality
     """Quality of the fit."""
-    second_order: SecondOrderFit | None = None
+    second_order: SecondOrderFit | None
     """Second-order fit; None if it is not clearly better."""
 
 
@@ -114,13 +112,19 @@ def fit_lag(
     best = _best_without_slew(fine, _grid_start(coarse))
     if search_slew_limit:
         best = _with_slew_if_better(best, fine, coarse)
-    fit = _lag_fit(fine, best)
-    free_gain = fine
+    free_gain, best_free_gain = fine, best
     if gain is not None:
         free_gain = DelayedModel(record, FirstOrder(), None, fine_thinning)
-        best = free_gain.search(best.unknown)
-        fit = replace(fit, gain=float(best.weights[0]))
-    return replace(fit, second_order=_second_order_fit(record, free_gain, best, coarse_thinning))
+        best_free_gain = free_gain.search(best.unknown)
+    return LagFit(
+        dead_time=fine.dead_time(best.unknown),
+        lag=exp(best.unknown[0]),
+        gain=float(best_free_gain.weights[0]),
+        offset=float(best.weights[1]),
+        slew=fine.slew(best.unknown),
+        quality=_quality(fine, best),
+        second_order=_second_order_fit(record, free_gain, best_free_gain, coarse_thinning),
+    )
 
 
 def _with_slew_if_better(best: Solution, fine: DelayedModel, coarse: DelayedModel) -> Solution:
@@ -138,18 +142,11 @@ def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
     A slew limit delays too, so smaller lags and dead times than without it are tried.
     """
     lag, dead_time = exp(best.unknown[0]), float(best.unknown[1])
+    tried = product(_TRIED_RAMP_TIMES, _LAG_SHARES, _DEAD_TIME_SHARES)
     return coarse.best_of(
         [
-            np.array(
-                [
-                    log(lag_share * lag),
-                    dead_share * dead_time,
-                    log(coarse.largest_change / ramp_time),
-                ]
-            )
-            for ramp_time in _TRIED_RAMP_TIMES
-            for lag_share in _LAG_SHARES
-            for dead_share in _DEAD_TIME_SHARES
+            np.array([log(lag_share * lag), share * dead_time, log(coarse.largest_change / ramp)])
+            for ramp, lag_share, share in tried
         ]
     )
 
@@ -187,17 +184,6 @@ def _second_order_fit(
     )
 
 
-def _lag_fit(data: DelayedModel, solution: Solution) -> LagFit:
-    return LagFit(
-        dead_time=data.dead_time(solution.unknown),
-        lag=exp(solution.unknown[0]),
-        gain=float(solution.weights[0]),
-        offset=float(solution.weights[1]),
-        slew=data.slew(solution.unknown),
-        quality=_quality(data, solution),
-    )
-
-
 def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     """The quality of a fit of either order."""
     unknown, lag = solution.unknown, exp(solution.unknown[0])
@@ -206,7 +192,7 @@ def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     excited_samples = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
     response_duration = _RESPONSE_DURATION_FACTOR * (lag + data.dead_time(unknown))
     sample_period = float(np.median(np.diff(np.concatenate(data.times))))
-    analysis = analyse_residual(
+    misfit, standard_errors = analyse_residual(
         solution.residual,
         solution.jacobian,
         lambda delay: data.delayed_commands(unknown, delay),
@@ -217,9 +203,9 @@ def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
     deviation = float(np.std(data.measured))
     return FitQuality(
         explained=data.r_squared(solution),
-        misfit=analysis.misfit / deviation if deviation > 0.0 else 0.0,
-        dead_time_error=data.dead_time(analysis.standard_errors),
-        lag_error=lag * float(analysis.standard_errors[0]),
+        misfit=misfit / deviation if deviation > 0.0 else 0.0,
+        dead_time_error=data.dead_time(standard_errors),
+        lag_error=lag * float(standard_errors[0]),
         span=span,
         excited_samples=excited_samples,
     )

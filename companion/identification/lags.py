@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats
+
 Numbers = NDArray[Any]
 """Array of real or complex numbers."""
 
@@ -149,10 +150,8 @@ def second_order_response(commands: Knots, frequency: float, damping: float, at:
         )
         return response
     slow_lag, quick_lag = first_lag.real, second_lag.real
-    slow_response, quick_response = (
-        first_order_response(commands, slow_lag, at),
-        first_order_response(commands, quick_lag, at),
-    )
+    slow_response = first_order_response(commands, slow_lag, at)
+    quick_response = first_order_response(commands, quick_lag, at)
     return (slow_lag * slow_response - quick_lag * quick_response) / (slow_lag - quick_lag)
 
 

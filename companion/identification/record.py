@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats
 
 LONGEST_DEAD_TIME = 0.5
 """Longest dead time that can be found, s."""
@@ -88,23 +88,19 @@ def _windows(stretch: Stretch) -> list[Stretch]:
     """A stretch divided into windows; those without a sample are left out."""
     windows = []
     for start in np.arange(stretch.measured_time[0], stretch.measured_time[-1], _WINDOW_DURATION):
-        first_sample, end_sample = np.searchsorted(
-            stretch.measured_time, (start, start + _WINDOW_DURATION)
-        )
-        first_command, end_command = np.searchsorted(
-            stretch.time, (start - _WINDOW_LEAD, start + _WINDOW_DURATION)
-        )
-        first_command = max(int(first_command) - 1, 0)
-        if end_sample > first_sample:
-            commands = (
-                stretch.time[first_command:end_command],
-                stretch.commanded[first_command:end_command],
+        end = start + _WINDOW_DURATION
+        samples = slice(*np.searchsorted(stretch.measured_time, (start, end)))
+        first_command, end_command = np.searchsorted(stretch.time, (start - _WINDOW_LEAD, end))
+        commands = slice(max(int(first_command) - 1, 0), end_command)
+        if stretch.measured_time[samples].size:
+            windows.append(
+                Stretch(
+                    stretch.time[commands],
+                    stretch.commanded[commands],
+                    stretch.measured_time[samples],
+                    stretch.measured[samples],
+                )
             )
-            measured = (
-                stretch.measured_time[first_sample:end_sample],
-                stretch.measured[first_sample:end_sample],
-            )
-            windows.append(Stretch(*commands, *measured))
     return windows
 
 

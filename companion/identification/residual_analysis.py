@@ -7,27 +7,14 @@ explains as much as a linear model of any order can (Ljung, System Identificatio
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from companion.least_squares import project
-
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats, project
 
 _MOST_DELAYS = 24
 _SAMPLES_PER_DELAY = 8
 """Excited samples needed for each delay of the regression; with fewer it would fit the noise."""
-
-
-class ResidualAnalysis(NamedTuple):
-    """Misfit of a fit, and standard errors of its unknowns."""
-
-    misfit: float
-    """RMS of the part that the commands explain, in the unit of the measurements."""
-    standard_errors: Floats
-    """(k,), standard errors of the unknowns, in the unit of each."""
 
 
 def analyse_residual(
@@ -37,7 +24,7 @@ def analyse_residual(
     response_duration: float,
     excited_samples: int,
     correlated_samples: int,
-) -> ResidualAnalysis:
+) -> tuple[float, Floats]:
     """Split a residual; with fewer than 8 excited samples, all of it counts as noise.
 
     Args:
@@ -48,6 +35,10 @@ def analyse_residual(
         response_duration: longest time for which the vehicle responds to a command, s.
         excited_samples: number of excited samples; see `FitQuality`.
         correlated_samples: number of samples over which the noise is correlated.
+
+    Returns:
+        The misfit, which is the RMS of the part that the commands explain, in the unit of the
+            measurements; and the standard errors of the unknowns, (k,), in the unit of each.
     """
     delays = min(_MOST_DELAYS, excited_samples // _SAMPLES_PER_DELAY)
     noise = residual
@@ -58,10 +49,8 @@ def analyse_residual(
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     # The regression takes one degree of freedom for each delay.
     correction = excited_samples / max(excited_samples - delays, 1)
-    return ResidualAnalysis(
-        _rms(residual - noise),
-        _standard_errors(slopes, noise, correlated_samples) * np.sqrt(correction),
-    )
+    standard_errors = _standard_errors(slopes, noise, correlated_samples) * np.sqrt(correction)
+    return float(np.sqrt(np.mean(np.square(residual - noise)))), standard_errors
 
 
 def _standard_errors(slopes: Floats, noise: Floats, correlated_samples: int) -> Floats:
@@ -76,7 +65,3 @@ def _standard_errors(slopes: Floats, noise: Floats, correlated_samples: int) -> 
         inverse = np.linalg.pinv(slopes.T @ slopes)
         errors: Floats = np.sqrt(np.maximum(np.diagonal(inverse @ spread @ inverse), 0.0))
     return np.where(np.isnan(errors), np.inf, errors)
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

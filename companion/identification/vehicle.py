@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from companion.identification.response import RateResponse, fit_rate_response
 from companion.identification.thrust_map import ThrustMap, fit_thrust_map
-
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats
 
 _ASSUMED_GAIN = 1.0
 """Gain of the rate loop that the planners assume."""
@@ -59,7 +58,12 @@ def identify_vehicle(
     """
     commands, measured = _rows("setpoints", setpoints, 5), _rows("rates", rates, 4)
     accelerations = _rows("specific_thrust", specific_thrust, 2)
-    roll, pitch, yaw = (_axis_response(commands, measured, axis) for axis in (1, 2, 3))
+    roll, pitch, yaw = (
+        fit_rate_response(
+            commands[:, 0], commands[:, axis], measured[:, 0], measured[:, axis], _ASSUMED_GAIN
+        )
+        for axis in (1, 2, 3)
+    )
     thrust = fit_thrust_map(
         commands[:, 0], commands[:, 4], accelerations[:, 0], accelerations[:, 1]
     )
@@ -78,8 +82,3 @@ def _rows(name: str, values: ArrayLike, columns: int) -> Floats:
     if array.ndim != 2 or array.shape[1] != columns:
         raise ValueError(f"{name} must have the shape (n, {columns}), not {array.shape}")
     return array
-
-
-def _axis_response(commands: Floats, measured: Floats, axis: int) -> RateResponse:
-    record = commands[:, 0], commands[:, axis], measured[:, 0], measured[:, axis]
-    return fit_rate_response(*record, gain=_ASSUMED_GAIN)

@@ -15,7 +15,6 @@ from companion.nmpc.model import (
     own_constant,
     translation,
 )
-from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
 _SMALLEST_COS_SQUARED = 0.01
@@ -115,7 +114,12 @@ class Symbols:
             bounded_terms=bounded_terms,
             state_of=lambda motion: motion[:size],
             constants_of=constants_of,
-            attitude_reference_of=_attitude_reference_of,
+            attitude_reference_of=lambda node: (
+                node.heading,
+                node.speed_north,
+                node.speed_east,
+                node.heading_rate,
+            ),
             control_of=lambda node: (
                 node.north + node.speed_north / settings.gain,
                 node.east + node.speed_east / settings.gain,
@@ -123,11 +127,6 @@ class Symbols:
                 node.thrust,
             ),
         )
-
-
-def _attitude_reference_of(node: Node) -> Floats:
-    """The numbers for `Model.attitude_reference` at a node."""
-    return node.heading, node.speed_north, node.speed_east, node.heading_rate
 
 
 def _tilt_rate(c: ca.SX, speed: ca.SX) -> ca.SX:

@@ -1,6 +1,5 @@
-"""Requests to the solver's process, its answers, and their form as bytes."""
+"""Requests to the solver's process and its answers; they are sent pickled."""
 
-import struct
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -11,10 +10,6 @@ from companion.nmpc.reference import Start
 
 READY_MESSAGE = b"ready"
 """First message of the solver's process, sent when it can take requests."""
-
-_REQUEST_HEAD = struct.Struct("<q25d")
-_INPUT = struct.Struct("<5d")
-_ANSWER = struct.Struct("<2q9d")
 
 
 class VehicleSnapshot(NamedTuple):
@@ -103,59 +98,3 @@ class Answer(NamedTuple):
     """Processor time of the solver alone, s."""
     iterations: float
     """Number of SQP iterations."""
-
-
-def pack_request(request: Request) -> bytes:
-    """Convert a request to bytes."""
-    vehicle, start = request.vehicle, request.start
-    head = _REQUEST_HEAD.pack(
-        request.number,
-        request.trajectory_time,
-        *start.position,
-        start.heading_offset,
-        vehicle.time,
-        *vehicle.position,
-        *vehicle.velocity,
-        *vehicle.q,
-        *vehicle.body_rates,
-        *vehicle.disturbance,
-        *vehicle.drag,
-        vehicle.axis_drag,
-    )
-    return head + b"".join(_INPUT.pack(*each) for each in request.inputs)
-
-
-def unpack_request(message: bytes) -> Request:
-    """Convert bytes to a request."""
-    number, trajectory_time, *numbers = _REQUEST_HEAD.unpack_from(message)
-    vehicle = VehicleSnapshot(
-        numbers[4],
-        (numbers[5], numbers[6], numbers[7]),
-        (numbers[8], numbers[9], numbers[10]),
-        (numbers[11], numbers[12], numbers[13], numbers[14]),
-        BodyRates(numbers[15], numbers[16], numbers[17]),
-        (numbers[18], numbers[19], numbers[20]),
-        Drag(numbers[21], numbers[22]),
-        numbers[23],
-    )
-    inputs = tuple(
-        ControlInput(*values) for values in _INPUT.iter_unpack(message[_REQUEST_HEAD.size :])
-    )
-    return Request(
-        number,
-        vehicle,
-        trajectory_time,
-        Start((numbers[0], numbers[1], numbers[2]), numbers[3]),
-        inputs,
-    )
-
-
-def pack_answer(answer: Answer) -> bytes:
-    """Convert an answer to bytes."""
-    return _ANSWER.pack(*answer)
-
-
-def unpack_answer(message: bytes) -> Answer:
-    """Convert bytes to an answer."""
-    number, status, *values = _ANSWER.unpack(message)
-    return Answer(number, Status(status), *values)

@@ -77,10 +77,8 @@ class Predictor:
         time = vehicle.time
         conditions = conditions_of(vehicle)
         constants = list(self._model.constants_of(conditions, motion))
-        in_effect = [each for each in inputs if self._effect_time(each) <= time][-1:] or [
-            *inputs[:1]
-        ]
-        current = in_effect[0] if in_effect else self._holding_input(vehicle.time, motion)
+        in_effect = [each for each in inputs if self._effect_time(each) <= time]
+        (current,) = in_effect[-1:] or inputs[:1] or [self._holding_input(time, motion)]
         for next_input in [each for each in inputs if time < self._effect_time(each) < until]:
             duration = self._effect_time(next_input) - time
             motion = self._integrate(motion, current, duration, constants)

@@ -22,14 +22,7 @@ from typing import NamedTuple
 from companion.attitude.kinematics import tilt_products
 from companion.extras import require
 from companion.guidance.trajectory.sample import Trajectory
-from companion.nmpc.messages import (
-    READY_MESSAGE,
-    Answer,
-    Request,
-    Status,
-    pack_request,
-    unpack_answer,
-)
+from companion.nmpc.messages import READY_MESSAGE, Answer, Request, Status
 from companion.nmpc.settings import Settings
 from companion.realtime import schedule_as_usual
 
@@ -128,7 +121,7 @@ class Solver:
             return
         self._drop_pending("was not answered before the next one")
         try:
-            self._socket.send(pack_request(request))
+            self._socket.send(pickle.dumps(request))
         except BlockingIOError:
             self._report(Trouble.LATE, "the solver does not read its requests")
         except (BrokenPipeError, ConnectionResetError):
@@ -152,7 +145,7 @@ class Solver:
             message = self._receive(max(0.0, deadline - monotonic()) if self._pending else 0.0)
             if not message:
                 break
-            answer = unpack_answer(message)
+            answer: Answer = pickle.loads(message)  # trusted: this program started the process
             if self._pending is not None and answer.number == self._pending.number:
                 pending, self._pending = self._pending, None
                 return self._usable_answer(pending, answer)

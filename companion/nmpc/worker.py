@@ -23,8 +23,6 @@ from companion.nmpc.messages import (
     Request,
     Status,
     VehicleSnapshot,
-    pack_answer,
-    unpack_request,
 )
 from companion.nmpc.model import Model
 from companion.nmpc.prediction import Predictor, TiltedTooFarError, conditions_of
@@ -35,6 +33,7 @@ from companion.nmpc.settings import Settings
 _WARM_UP_SOLVES = 5
 """Number of solves before the first request, which fill caches and allocate memory."""
 _LARGEST_MESSAGE = 65536  # bytes
+_NO_CONTROL = FirstControl(0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Worker:
@@ -82,14 +81,14 @@ class Worker:
         use_time = request.vehicle.time + self._settings.lead
         try:
             control = self._solve(request)
+            status = Status.SOLVED if control else Status.FAILED
         except (InvalidQuaternionError, TiltedTooFarError):
             self.forget()
-            return _failed_answer(request, Status.TILTED_TOO_FAR, use_time, perf_counter() - began)
-        if control is None:
-            return _failed_answer(request, Status.FAILED, use_time, perf_counter() - began)
+            control, status = None, Status.TILTED_TOO_FAR
+        control = control or _NO_CONTROL
         return Answer(
             request.number,
-            Status.SOLVED,
+            status,
             monotonic(),
             use_time,
             control.north,
@@ -129,12 +128,6 @@ class Worker:
         return nodes
 
 
-def _failed_answer(request: Request, status: Status, use_time: float, seconds: float) -> Answer:
-    return Answer(
-        request.number, status, monotonic(), use_time, 0.0, 0.0, 0.0, 0.0, seconds, 0.0, 0
-    )
-
-
 def main() -> None:
     """Answer the newest request, repeatedly, until the socket is closed."""
     # Ctrl-C reaches this process too, but the flight handles it and then closes the socket.
@@ -149,7 +142,7 @@ def main() -> None:
     try:
         connection.send(READY_MESSAGE)
         while message := _newest_request(connection):
-            connection.send(pack_answer(worker.answer(unpack_request(message))))
+            connection.send(pickle.dumps(worker.answer(pickle.loads(message))))
     except (BrokenPipeError, ConnectionResetError):
         pass  # the flight is over
 

@@ -105,11 +105,7 @@ def stability(config: Config, error: ModelError = EXACT) -> Margins:
 
 
 def loop_margins(loop: Loop) -> Margins:
-    """Stability margins of a loop that is computed at `frequencies`.
-
-    The loop is opened at the commanded body rate and at the commanded acceleration; of each margin
-    the smaller value is returned.
-    """
+    """Stability margins of a loop at `frequencies`; see `stability`."""
     return smaller_margins(
         margins(loop.s, loop.gain_at_rate), margins(loop.s, loop.gain_at_acceleration)
     )
@@ -133,11 +129,10 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         (by_velocity, _slow_density(omega, disturbances.velocity_error, path_time)),
         (by_acceleration, _slow_density(omega, disturbances.acceleration_error, path_time)),
     )
+    velocity_density = disturbances.velocity_density**2
+    velocity_density += 2.0 * period * disturbances.velocity_noise**2
     noise = (
-        (
-            by_velocity,
-            disturbances.velocity_density**2 + 2.0 * period * disturbances.velocity_noise**2,
-        ),
+        (by_velocity, velocity_density),
         (by_acceleration, disturbances.acceleration_density**2),
         (by_position, 2.0 * period * disturbances.position_noise**2),
     )

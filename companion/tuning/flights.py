@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from math import hypot, nan
-from typing import Any
 
 import numpy as np
 
@@ -12,8 +11,7 @@ from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.drag import NO_DRAG
 from companion.testing import MockVehicle, fly
-
-_Rows = np.ndarray[Any, np.dtype[np.float64]]
+from companion.tuning.expectation import Floats
 
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 """Wind of the trial flights in gusts: mean and standard deviation, m/s."""
@@ -135,7 +133,7 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
 
 
 def _tracking_figures(
-    tracking: _Rows, truth: _Rows, vehicle: MockVehicle, flown_config: Config
+    tracking: Floats, truth: Floats, vehicle: MockVehicle, flown_config: Config
 ) -> TrialResult:
     """The tracking figures of a flight, over the time in which its reference moved.
 
@@ -169,7 +167,7 @@ def _tracking_figures(
     )
 
 
-def _rms(offsets: _Rows) -> float:
+def _rms(offsets: Floats) -> float:
     return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
 
 

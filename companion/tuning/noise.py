@@ -4,15 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.attitude.kinematics import tilt_products
 from companion.guidance import GRAVITY
 from companion.mavlink.tlog_file import messages
-from companion.tuning.expectation import Disturbances
+from companion.tuning.expectation import Disturbances, Floats
 from companion.vehicle.registry import AUTOPILOTS
-
-Floats = NDArray[np.float64]
 
 _HOLD_BAND = 0.15, 1.5
 """Range of frequencies at which position hold responds to disturbances, Hz."""

@@ -22,10 +22,10 @@ from companion.guidance import (
     VehicleMotion,
     Weights,
     horizontal_gains,
-    specific_thrust,
 )
 from companion.guidance.feedback import HorizontalGains
 from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
+from companion.guidance.thrust import specific_thrust
 
 REST = (0.0, 0.0, 0.0)
 THRUST = 2.0, 18.0  # m/s²

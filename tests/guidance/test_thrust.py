@@ -9,8 +9,13 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates
-from companion.guidance import GRAVITY, acceleration_within_thrust, specific_thrust
-from companion.guidance.thrust import TILT_THRUST_SHARE, cos_tilt_ahead
+from companion.guidance import GRAVITY
+from companion.guidance.thrust import (
+    TILT_THRUST_SHARE,
+    acceleration_within_thrust,
+    cos_tilt_ahead,
+    specific_thrust,
+)
 
 SMALLEST, LARGEST = 2.0, 18.0
 accelerations = st.floats(-30.0, 30.0)

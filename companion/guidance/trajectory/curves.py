@@ -3,6 +3,7 @@
 Each curve begins at (0, 0, 0). Angles are radians, lengths metres, the frame is NED.
 """
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from math import cos, hypot, sin, sqrt, tau
 from typing import NamedTuple, Protocol
@@ -56,10 +57,6 @@ def require_checkable(needed: float) -> None:
         )
 
 
-def _sampling_of(figure: "Figure") -> PhaseSampling:
-    return PhaseSampling(min(tau / _CHECKS_PER_LAP, PATH_STEP / figure.path_per_phase), tau)
-
-
 class Curve(Protocol):
     """A curve over its phase."""
 
@@ -77,12 +74,16 @@ class Curve(Protocol):
 
 
 class Figure(Curve, Protocol):
-    """A curve whose largest path length per unit of phase is known; its phase is an angle."""
+    """A curve that is flown in laps, all of them alike; its phase is an angle."""
 
     @property
+    @abstractmethod
     def path_per_phase(self) -> float:
         """Largest length of the first derivative, m per rad."""
-        ...
+
+    def sampling(self) -> PhaseSampling:
+        """The phases at which to check one lap."""
+        return PhaseSampling(min(tau / _CHECKS_PER_LAP, PATH_STEP / self.path_per_phase), tau)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,7 @@ class Straight:
 
 
 @dataclass(frozen=True, slots=True)
-class Helix:
+class Helix(Figure):
     """Laps about a centre north of the start, first eastwards; the phase grows by 2π in each lap.
 
     Attributes:
@@ -123,10 +124,6 @@ class Helix:
         """Length of the first derivative, m per rad; constant."""
         return hypot(self.radius, self.rise / tau)
 
-    def sampling(self) -> PhaseSampling:
-        """The phases at which to check one lap; all laps are alike."""
-        return _sampling_of(self)
-
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
         r, up = self.radius, self.rise / tau
@@ -135,7 +132,7 @@ class Helix:
 
 
 @dataclass(frozen=True, slots=True)
-class GeronoEight:
+class GeronoEight(Figure):
     """Lemniscate of Gerono, (A sin φ, A sin φ cos φ) north and east; it begins in the middle.
 
     Attributes:
@@ -149,10 +146,6 @@ class GeronoEight:
         """Largest length of the first derivative, m per rad: in the middle."""
         return sqrt(2.0) * self.half_width
 
-    def sampling(self) -> PhaseSampling:
-        """The phases at which to check one lap; all laps are alike."""
-        return _sampling_of(self)
-
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
         a = self.half_width
@@ -164,7 +157,7 @@ class GeronoEight:
 
 
 @dataclass(frozen=True, slots=True)
-class BernoulliEight:
+class BernoulliEight(Figure):
     """Lemniscate of Bernoulli, (A sin φ, A sin φ cos φ)/(1 + cos² φ) north and east.
 
     Attributes:
@@ -178,10 +171,6 @@ class BernoulliEight:
         """Largest length of the first derivative, m per rad: at the tips."""
         return self.half_width
 
-    def sampling(self) -> PhaseSampling:
-        """The phases at which to check one lap; all laps are alike."""
-        return _sampling_of(self)
-
     def at(self, phase: float) -> CurvePoint:
         """The point at the angle `phase`."""
         a = self.half_width
@@ -193,7 +182,7 @@ class BernoulliEight:
 
 
 @dataclass(frozen=True, slots=True)
-class RotatedFigure:
+class RotatedFigure(Figure):
     """A figure rotated about the vertical through its start.
 
     Attributes:
@@ -208,10 +197,6 @@ class RotatedFigure:
     def path_per_phase(self) -> float:
         """`path_per_phase` of the figure."""
         return self.figure.path_per_phase
-
-    def sampling(self) -> PhaseSampling:
-        """`sampling` of the figure."""
-        return self.figure.sampling()
 
     def at(self, phase: float) -> CurvePoint:
         """The rotated point at `phase`."""

@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.drag import Drag
 from companion.guidance.trajectory.sample import Trajectory, TrajectoryError
+from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Progress, derivatives
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

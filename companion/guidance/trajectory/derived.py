@@ -42,11 +42,7 @@ class Slowed:
         return self.trajectory.holds_heading
 
     def check_times(self) -> list[float]:
-        """Times at which to check the slowed trajectory against limits, s.
-
-        Raises:
-            TrajectoryError: the trajectory is too long to be checked.
-        """
+        """Times at which to check it; see `Trajectory.check_times`."""
         times, _ = self.law.stretched(np.array(self.moments or self.trajectory.check_times()))
         require_duration(float(times[-1]))
         return [float(time) for time in times]
@@ -108,11 +104,7 @@ class TurnedFirst:
         return False
 
     def check_times(self) -> list[float]:
-        """Check times of the trajectory, s; the turn on the spot needs no check.
-
-        Raises:
-            TrajectoryError: the trajectory is too long to be checked.
-        """
+        """See `Trajectory.check_times`; the turn on the spot needs no check."""
         return [0.0, *(self.turn.duration + time for time in self.trajectory.check_times())]
 
     def at(self, time: float) -> Sample:

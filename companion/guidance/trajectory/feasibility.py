@@ -8,14 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from companion.drag import NO_DRAG, Drag
-from companion.guidance.trajectory.demand import (
-    Floats,
-    Motion,
-    demand,
-    require_finite,
-    sampled_motion,
-)
+from companion.guidance.trajectory.demand import Motion, demand, require_finite, sampled_motion
 from companion.guidance.trajectory.sample import Trajectory, computable
+from companion.guidance.trajectory.septic_spline import Floats
 
 _ROUNDING = 1e-9
 """Relative tolerance of limits for rounding errors. Some trajectories just meet a limit."""

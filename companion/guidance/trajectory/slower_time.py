@@ -1,7 +1,9 @@
 """A slower time law: stretches a trajectory's time by a factor that changes smoothly."""
 
+import itertools
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,17 +70,15 @@ class SlowerTime:
 
     length: float
     coefficients: tuple[float, ...]
-    _ends: tuple[float, ...] = field(init=False, repr=False, compare=False, default=())
 
-    def __post_init__(self) -> None:
-        integrals = np.array([float(np.asarray(piece.integral(1.0))) for piece in self._pieces()])
-        ends = np.concatenate(([0.0], np.cumsum(integrals * self._piece_duration)))
-        object.__setattr__(self, "_ends", tuple(ends.tolist()))
-
-    def _pieces(self) -> list[_Piece]:
+    @cached_property
+    def _ends(self) -> list[float]:
+        """Stretched times at the ends of the pieces, beginning with 0, s."""
         c = self.coefficients
-        neighbours = zip(c, c[1:], c[2:], c[3:], strict=False)
-        return [_spline_piece(*coefficients) for coefficients in neighbours]
+        pieces = itertools.starmap(_spline_piece, zip(c, c[1:], c[2:], c[3:], strict=False))
+        integrals = np.array([piece.integral(1.0) for piece in pieces])
+        ends: list[float] = np.cumsum(integrals * self._piece_duration).tolist()
+        return [0.0, *ends]
 
     @property
     def _piece_duration(self) -> float:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from companion.guidance.trajectory.demand import Floats, Motion, sampled_motion
+from companion.guidance.trajectory.demand import Motion, sampled_motion
 from companion.guidance.trajectory.derived import Slowed, evenly_slowed
 from companion.guidance.trajectory.feasibility import Envelope, Violation, broken_limits, excess
 from companion.guidance.trajectory.sample import (
@@ -25,6 +25,7 @@ from companion.guidance.trajectory.sample import (
     TrajectoryError,
     computable,
 )
+from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.slower_time import SlowerTime
 
 _LARGEST_FACTOR = 64.0
@@ -183,8 +184,7 @@ def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
 def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
     """The largest relative excess over any limit but the fence at each moment, (m,)."""
     without_limits = np.full_like(motion.times, -1.0)
-    over: Floats = np.max([without_limits, *excess(motion, envelope).values()], axis=0)
-    return over
+    return np.asarray(np.max([without_limits, *excess(motion, envelope).values()], axis=0))
 
 
 def _law_with_pieces(
@@ -216,9 +216,8 @@ def _law_with_pieces(
 
 def _largest_of_four(values: Floats, outside: float) -> Floats:
     """Largest of four `values` (n,) for each coefficient (n + 3,); `outside` beyond the ends."""
-    padded = np.concatenate(([outside] * 3, values, [outside] * 3))
-    largest: Floats = np.max([padded[k : k + values.size + 3] for k in range(4)], axis=0)
-    return largest
+    padded = np.pad(values, 3, constant_values=outside)
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
 
 
 def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:

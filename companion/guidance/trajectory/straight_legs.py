@@ -11,8 +11,8 @@ from companion.guidance.trajectory.curves import PATH_STEP, CurvePoint, PhaseSam
 from companion.guidance.trajectory.sample import Vector
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import LimitedJerk, Piece, Progress
-from companion.guidance.trajectory.timed_curve import Heading, HeldHeading, TimedCurve
-from companion.guidance.trajectory.waypoints import places_of, spline_through_headings
+from companion.guidance.trajectory.timed_curve import TimedCurve
+from companion.guidance.trajectory.waypoints import heading_through, places_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +98,7 @@ def straight_legs(
     begins = tuple(phases[:-1].tolist())
     directions = _vectors(np.diff(places, axis=0) / lengths[:, None])
     curve = Polyline(begins, _vectors(places[:-1]), tuple(map(Straight, directions)))
-    heading: Heading = HeldHeading()
-    if any(angle is not None for angle in headings):
-        heading = spline_through_headings(phases, headings)
+    heading = heading_through(phases, headings)
     return TimedCurve("straight legs", curve, Legs(legs, begins), heading)
 
 

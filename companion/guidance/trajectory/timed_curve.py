@@ -194,11 +194,7 @@ class TimedCurve:
         return isinstance(self.heading, HeldHeading)
 
     def check_times(self) -> list[float]:
-        """Times at which to check the trajectory against limits, s.
-
-        Raises:
-            TrajectoryError: the trajectory is too long to be checked.
-        """
+        """Times at which to check it; see `Trajectory.check_times`."""
         return check_times(self.curve.sampling(), self.law, self.longest)
 
     def at(self, time: float) -> Sample:

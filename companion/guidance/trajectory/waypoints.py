@@ -67,13 +67,10 @@ def waypoints(
     knots *= _stretch_factor(_spline_through(knots, places), knots, speed, acceleration)
     require_duration(float(knots[-1]))
     spline = _spline_through(knots, places)
-    heading: Heading = HeldHeading()
-    curve = SplineCurve(spline)
+    curve, heading = SplineCurve(spline), heading_through(knots, headings)
     if face_path:
         curve = SplineCurve(spline, longest_step=HEADING_CHECK_STEP)
         heading = tangent_heading(spline, (True, True))
-    elif any(angle is not None for angle in headings):
-        heading = spline_through_headings(knots, headings)
     return TimedCurve("waypoints", curve, Cruise(spline.end, 1.0), heading)
 
 
@@ -157,13 +154,15 @@ def _sampled(spline: SepticSpline, knots: Floats, count: int = _SAMPLES_PER_SEGM
     return spline.along(np.interp(fine, np.arange(knots.size), knots))
 
 
-def spline_through_headings(knots: Floats, headings: Sequence[float | None]) -> SplineHeading:
-    """A spline through the given headings, turning the short way from one to the next.
+def heading_through(knots: Floats, headings: Sequence[float | None]) -> Heading:
+    """A spline through the given headings, turning the short way; without any the heading is held.
 
     Args:
         knots: phases of the start and of the points, (k + 1,).
-        headings: heading at each point, rad, or None for any, (k,); at least one is given.
+        headings: heading at each point, rad, or None for any, (k,); empty: none is given.
     """
+    if all(angle is None for angle in headings):
+        return HeldHeading()
     given = np.array([angle is not None for angle in (None, *headings)])
     states = np.zeros((knots.size, STATE_SIZE, 1))
     states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
