@@ -9,8 +9,7 @@ from math import hypot, tau
 from pathlib import Path
 
 from companion.api.control import Control, program_control
-from companion.api.flight_loop import FlightLoop
-from companion.api.in_thread import call_in_thread
+from companion.api.flight_loop import FlightLoop, call_in_thread
 from companion.api.program import ProgramPlan
 from companion.api.state import NewestState, State
 from companion.config import trajectory_file
