@@ -10,8 +10,7 @@ from companion.flight.observer import Observer
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.kept_fence import KeptFence
-from companion.serve.ownership import Ownership
-from companion.serve.programs import Program
+from companion.serve.ownership import Ownership, Program
 from companion.serve.served_flight import ControlRequest, ServedFlight
 from companion.serve.setpoints.request import Request
 from companion.vehicle.link import Link

@@ -78,9 +78,9 @@ class ServedFlight:
         environment: Environment,
         records: FlightRecords,
         changes: Changes,
-        fence_centre: FenceCentre | None = None,
+        fence_centre: FenceCentre | None,
         *,
-        from_ground: bool = False,
+        from_ground: bool,
     ) -> None:
         self._records, self._record = records, records.new_record(changes.begin_flight())
         self._recorder = self._record.recorder(observer)

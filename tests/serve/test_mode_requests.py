@@ -28,7 +28,7 @@ from companion.serve.mode_requests import (
 )
 from companion.serve.network.addresses import Address
 from companion.serve.network.network import Network
-from companion.serve.programs import Program, Programs
+from companion.serve.ownership import Program, Programs
 from companion.vehicle.ardupilot.autopilot import ArduPilot
 from companion.vehicle.px4.autopilot import Px4
 
