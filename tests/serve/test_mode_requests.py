@@ -192,7 +192,9 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_
     flights = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
         _fence=SimpleNamespace(keep=lambda centre: None),
-        _config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test"),
+        _vehicle=SimpleNamespace(
+            config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test")
+        ),
     )
     flight = SimpleNamespace(run=run, save=save, fence_centre=None)
     asyncio.run(ServedFlights._fly(flights, flight, None))
