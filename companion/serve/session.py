@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from companion.serve.control import ServedControl
     from companion.serve.flights import ServedFlights
 
-Note = Callable[[str], None]
-
 
 class ServeSession:
     """Forwards frames between the vehicle and the clients, and flies the clients' setpoints.
@@ -60,7 +58,7 @@ class ServeSession:
     def __init__(
         self,
         config: Config,
-        note: Note,
+        note: Callable[[str], None],
         observer: Observer | None = None,
         environment: Environment = THIS_COMPUTER,
         directory: Path | None = None,
