@@ -30,15 +30,7 @@ _FLIGHT_ENDING = (
 
 
 class ServedControl:
-    """Flies the setpoints of one client at a time; no client's setpoints are forwarded.
-
-    Args:
-        config: configuration of the vehicle and of `serve`.
-        link: open link to the vehicle.
-        component: sends answers to clients and texts to pilots.
-        keeper: keeps track of the vehicle's position.
-        flights: begins the flights under a client's control.
-    """
+    """Flies the setpoints of one client at a time; no client's setpoints are forwarded."""
 
     def __init__(
         self,

@@ -15,9 +15,6 @@ _RETRY_PAUSE = 2.0
 class ServedFlights:
     """Begins the flights, and ends the owner's control with each of them.
 
-    Args:
-        vehicle: the vehicle, and what its flights share.
-
     Attributes:
         ownership: decides which client's requests are flown.
         current_flight: the flight that runs, or None.

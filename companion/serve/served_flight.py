@@ -66,7 +66,7 @@ class ServedFlight:
 
     Args:
         name: name of the owner.
-        vehicle: the vehicle, and what its flights share.
+        vehicle: see `ServedVehicle`.
         ownership: decides which client's requests are flown, and how long.
         fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
             control begins.
