@@ -41,16 +41,6 @@ class VehicleStoppedError(Exception):
     """The mock vehicle did not start, or ended before the flight did."""
 
 
-def udp_wire() -> Wire:
-    """A UDP connection on free ports.
-
-    Raises:
-        LinkError: there are no free ports.
-    """
-    port = free_port(_LOCAL_PORT_OFFSET)
-    return Wire(f"udpin://127.0.0.1:{port}", ("--port", str(port)))
-
-
 @contextmanager
 def wire_like(endpoint: str) -> Iterator[Wire]:
     """A connection of the same kind as `endpoint` while the block runs: UDP, TCP or serial.
@@ -70,7 +60,8 @@ def wire_like(endpoint: str) -> Iterator[Wire]:
                 path = Path(folder, "vehicle")
                 yield Wire(f"serial://{path}:{baud}", ("--endpoint", f"serial://{path}"))
         case _:
-            yield udp_wire()
+            port = free_port(_LOCAL_PORT_OFFSET)
+            yield Wire(f"udpin://127.0.0.1:{port}", ("--port", str(port)))
 
 
 def check_mock(config: Path) -> None:

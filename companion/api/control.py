@@ -31,14 +31,8 @@ class Control:
 
     Consecutive commands may be at most `deadman.target_stale_ms` apart. If commands stop, the
     autopilot holds the vehicle and control ends. Frames are world NED and body FRD, in SI units.
-
-    Args:
-        program: the flight's plan; its `end_error` is raised once the flight has ended.
-        context: context of the flight.
-        newest_state: publishes the state of the vehicle.
-        loop: loop of the flight.
-        source: receives the commanded references.
-        control_end: future that is done when control has ended.
+    `Vehicle.control` makes it; `source` receives the references, and `control_end` is done when
+    control has ended.
     """
 
     def __init__(
@@ -206,7 +200,7 @@ async def program_control(
     source: CommandedSource,
     control_end: asyncio.Future[None],
 ) -> AsyncGenerator[Control, None]:
-    """Let the program command the vehicle while the block runs; arguments as for `Control`.
+    """Let the program command the vehicle while the block runs; see `Control`.
 
     Raises:
         FlightEnded: the flight ended before control began, or control ended early.

@@ -175,8 +175,24 @@ def flight_loop() -> FlightLoop:
     """The loop for a flight of the running program.
 
     In lockstep and on a virtual clock it is the program's own loop, because the vehicle waits for
-    the program. A thread would only make the order of events random.
+    the program.
     """
-    if isinstance(asyncio.get_running_loop(), LockstepEventLoop):
-        return SharedLoop()
-    return OwnThreadLoop()
+    return SharedLoop() if _vehicle_waits() else OwnThreadLoop()
+
+
+async def call_in_thread(function: Callable[[*Arguments], T], *arguments: *Arguments) -> T:
+    """Call a slow function in a thread, so that samples are still answered.
+
+    In lockstep and on a virtual clock the vehicle waits for us, so the function is called directly.
+    """
+    if _vehicle_waits():
+        return function(*arguments)
+    return await asyncio.to_thread(function, *arguments)
+
+
+def _vehicle_waits() -> bool:
+    """Whether the vehicle's time waits for the running loop.
+
+    A thread would then only make the order of events random.
+    """
+    return isinstance(asyncio.get_running_loop(), LockstepEventLoop)

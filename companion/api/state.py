@@ -36,12 +36,7 @@ class State(NamedTuple):
 
 
 class NewestState:
-    """Publishes the state at each attitude sample; made in the flight's loop, read in any thread.
-
-    Args:
-        context: context of the flight.
-        loop: loop of the flight.
-    """
+    """Publishes each new state; made in the flight's loop, read in any thread."""
 
     def __init__(self, context: FlightContext, loop: FlightLoop) -> None:
         self._newest_state: State | None = None

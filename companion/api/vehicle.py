@@ -9,8 +9,7 @@ from math import hypot, tau
 from pathlib import Path
 
 from companion.api.control import Control, program_control
-from companion.api.flight_loop import FlightLoop
-from companion.api.in_thread import call_in_thread
+from companion.api.flight_loop import FlightLoop, call_in_thread
 from companion.api.program import ProgramPlan
 from companion.api.state import NewestState, State
 from companion.config import trajectory_file
@@ -46,12 +45,6 @@ class Vehicle:
     Every coroutine raises `FlightEnded` once the flight has ended early, as by a pilot or a safety
     monitor. The vehicle is then handed back or landed. A call during another one raises
     `RuntimeError`.
-
-    Args:
-        program: the flight's plan, which receives the requests.
-        context: context of the flight; it is only read here.
-        newest_state: publishes the state of the vehicle.
-        loop: loop of the flight.
     """
 
     def __init__(
@@ -61,10 +54,8 @@ class Vehicle:
         newest_state: NewestState,
         loop: FlightLoop,
     ) -> None:
-        self._program = program
-        self._context = context
-        self._newest_state = newest_state
-        self._loop = loop
+        self._program, self._context = program, context  # the context is only read here
+        self._newest_state, self._loop = newest_state, loop
 
     @property
     def state(self) -> State:

@@ -8,7 +8,7 @@ from shlex import quote
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
-from companion.config.files import changed, json_schema, load, parse_assignments, shipped
+from companion.config.files import json_schema, load, shipped, with_assignments
 from companion.config.reference import ConfigKey, as_markdown, as_yaml, changed_keys, keys
 from companion.config.suspect_values import suspect_values
 from companion.control.expected_response import expectations
@@ -103,7 +103,7 @@ def check(options: argparse.Namespace) -> int:
         ConfigError: the file cannot be used.
         SigningError: the signing key cannot be used.
     """
-    config = changed(load(options.file), parse_assignments(options.set), "--set")
+    config = with_assignments(load(options.file), options.set)
     try:
         check_link(config)
     except ConfigError as error:

@@ -3,18 +3,18 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
+from companion.api.connection import run
 from companion.attitude import PLANNER_NAMES
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
-from companion.config.files import changed, load, parse_assignments
+from companion.config.files import changed, load, with_assignments
 from companion.config.known_drag import KnownDrag, of_vehicle
 from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
@@ -23,8 +23,6 @@ from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.opening import open_link
 from companion.flight.start_checks import check_link, require_backend
 from companion.guidance import ManeuverSequence
-from companion.mavlink import lockstep
-from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkLost, LinkTimeout
 from companion.mavlink.frame_filter import Notice
 from companion.preflight.all_checks import run_checks
@@ -58,15 +56,13 @@ def doctor(options: argparse.Namespace) -> int:
             "--fix asks before each change, and standard input is no terminal; add --yes"
         )
     undo = None if options.undo is None else load_yaml(options.undo, Undo)
-    run: Callable[..., int] = lockstep.run if config.link.lockstep else link_loop.run
     doctor_run = _DoctorRun(config, Console(stderr=options.json, highlight=False, markup=False))
     try:
         if undo is None:
-            code = run(
-                doctor_run.run_checks(options.wait, fix=options.fix, without_asking=options.yes)
-            )
+            work = doctor_run.run_checks(options.wait, fix=options.fix, without_asking=options.yes)
         else:
-            code = run(doctor_run.restore(undo, options.undo))
+            work = doctor_run.restore(undo, options.undo)
+        code = run(work, in_lockstep=config.link.lockstep)
     except KeyboardInterrupt:
         code = doctor_run.report_interrupt()
     if options.json:
@@ -76,7 +72,7 @@ def doctor(options: argparse.Namespace) -> int:
 
 def _with_options(config: Config, options: argparse.Namespace) -> Config:
     """The configuration as changed by the options of the command line."""
-    config = changed(config, parse_assignments(options.set), "--set")
+    config = with_assignments(config, options.set)
     link: dict[str, Any] = {"endpoint": options.endpoint} if options.endpoint else {}
     if options.lockstep:
         link["lockstep"] = True

@@ -3,17 +3,17 @@
 import argparse
 import shutil
 import sys
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
 
 from companion import demo
+from companion.api.connection import run
 from companion.cli import interrupts
 from companion.cli.helper_process import environment, helper_process
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
-from companion.config.files import changed, load, parse_assignments, shipped
+from companion.config.files import changed, load, shipped, with_assignments
 from companion.extras import MissingExtraError
 from companion.files.write_whole import reason_of
 from companion.files.yaml_file import ConfigError
@@ -22,8 +22,6 @@ from companion.flight.observer import SeveralObservers
 from companion.flight.session import Session
 from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.live.helper import Helper
-from companion.mavlink import lockstep
-from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import EndpointError, SigningError
 from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
@@ -57,7 +55,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
         section: {key: value for key, value in values.items() if value}  # else it is not given
         for section, values in keys.items()
     }
-    flown_config = changed(config, parse_assignments(options.set), "--set")
+    flown_config = with_assignments(config, options.set)
     flown_config = changed(flown_config, changes, "the command line")
     if options.slow_down and "trajectory" not in flown_config.flight.maneuvers:
         raise ConfigError("--slow-down needs a trajectory; add --trajectory FILE")
@@ -110,14 +108,13 @@ def fly(
     if helper is not None:
         helper.changes, helper.note = session.changes, session.note
         flight = helper.run_while_serving(flight)
-    run: Callable[..., Summary] = lockstep.run if config.link.lockstep else link_loop.run
-    with ExitStack() as stack:
-        stack.callback(observer.close)
-        try:
-            summary = run(flight)
-        except (EndpointError, RealtimeError, SigningError):
-            shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
-            raise
+    try:
+        summary = run(flight, in_lockstep=config.link.lockstep)
+    except (EndpointError, RealtimeError, SigningError):
+        shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
+        raise
+    finally:
+        observer.close()
     # The vehicle is handed back and the record is complete: signals may interrupt again.
     interrupts.raise_interrupt(interrupts.signals_with_default_handler())
     with suppress(OSError):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.output_file import require_writable
-from companion.config.files import changed, load, parse_assignments
+from companion.config.files import load, with_assignments
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, read_flight
 
@@ -94,8 +94,7 @@ def replay(options: argparse.Namespace) -> int:
     record = read_flight(options.folder)
     own_config = options.config is None and not options.set
     config = load(options.config or options.folder / "config.yaml")
-    if options.set:
-        config = changed(config, parse_assignments(options.set), "--set")
+    config = with_assignments(config, options.set)
     replayed = Replay(record, config)
     samples = replayed.run()
     whole = _is_whole(record)

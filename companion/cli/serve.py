@@ -12,7 +12,7 @@ from companion.cli.helper_process import environment, helper_process
 from companion.cli.signals import SECOND_CTRL_C_AFTER, hangup_signal
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
-from companion.config.files import changed, load, parse_assignments
+from companion.config.files import changed, load, with_assignments
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SeveralObservers
@@ -104,7 +104,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
 
 def _with_options(config: Config, options: argparse.Namespace) -> Config:
     """The configuration as changed by the options of the command line."""
-    served_config = changed(config, parse_assignments(options.set), "--set")
+    served_config = with_assignments(config, options.set)
     link = {"endpoint": options.endpoint} if options.endpoint else {}
     clients = {"clients": options.client} if options.client else {}
     served_config = changed(served_config, {"link": link, "serve": clients}, "the command line")

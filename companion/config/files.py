@@ -198,11 +198,12 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     return yaml_file.validated(data, name, Config)
 
 
-def parse_assignments(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Parse texts such as `limits.max_tilt_deg=20`, with values in YAML, to changes for `changed`.
+def with_assignments(config: Config, texts: Sequence[str]) -> Config:
+    """The configuration changed by texts such as `limits.max_tilt_deg=20`, with values in YAML.
 
     Raises:
-        ConfigError: a text does not have this form, or its section is unknown or `mock`.
+        ConfigError: a text does not have this form, its section is unknown or `mock`, or the result
+            is not valid.
     """
     changes: dict[str, dict[str, Any]] = {}
     for text in texts:
@@ -223,7 +224,7 @@ def parse_assignments(texts: Sequence[str]) -> dict[str, dict[str, Any]]:
             changes.setdefault(section, {})[name] = bounded_yaml.parse(value)
         except bounded_yaml.YamlError as error:
             raise ConfigError(f"--set {text}: {error}") from error
-    return changes
+    return changed(config, changes, "--set")
 
 
 def shipped(name: str) -> Path:

@@ -32,19 +32,6 @@ FileName = Annotated[str, Field(max_length=1000)]
 MOST_INCLUDED = 32
 """Largest number of included files, including nested ones."""
 
-FORMER_KEYS = {
-    "flight.programme": "is now called `flight.maneuvers`",
-    "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
-    " no key of its own, only the extra `nmpc`",
-    **dict.fromkeys(
-        ("line", "helix", "figure_eight", "waypoints", "csv"),
-        "belongs in a trajectory file: name that file in flight.trajectory, or fly it with"
-        " --trajectory FILE",
-    ),
-}
-"""Keys that were renamed or removed, or belong in another file, with what to do instead; see
-`Section.former_keys`."""
-
 _DOUBLET_TILT_SHARE = 0.75
 """Share of max_tilt_deg that a doublet may use; wind and overshoot need the rest."""
 
@@ -52,7 +39,18 @@ _DOUBLET_TILT_SHARE = 0.75
 class Config(Section):
     """Configuration of `companion`; the top level of the YAML file."""
 
-    former_keys: ClassVar[Mapping[str, str]] = FORMER_KEYS
+    former_keys: ClassVar[Mapping[str, str]] = {
+        "flight.programme": "is now called `flight.maneuvers`",
+        "nmpc": "was removed with the acados solver: delete this section; guidance.kind: nmpc needs"
+        " no key of its own, only the extra `nmpc`",
+        **dict.fromkeys(
+            ("line", "helix", "figure_eight", "waypoints", "csv"),
+            "belongs in a trajectory file: name that file in flight.trajectory, or fly it with"
+            " --trajectory FILE",
+        ),
+    }
+    """Keys that were renamed or removed, or belong in another file, with what to do instead; see
+    `Section.former_keys`."""
 
     link: LinkConfig = LinkConfig()
     planner: PlannerConfig = PlannerConfig()

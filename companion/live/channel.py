@@ -43,19 +43,16 @@ class Channel:
         if not self.is_open:
             return False
         data = json.dumps(message, default=str).encode()
-        if len(data) > _LARGEST_MESSAGE:  # the other end would receive only the beginning
-            self.dropped += 1
-            return False
         try:
-            self._socket.send(data, socket.MSG_DONTWAIT)
+            if len(data) <= _LARGEST_MESSAGE:  # else the other end would receive only the beginning
+                self._socket.send(data, socket.MSG_DONTWAIT)
+                return True
         except BlockingIOError:
-            self.dropped += 1
-            return False
+            pass
         except OSError:  # the other end is gone
             self.is_open = False
-            self.dropped += 1
-            return False
-        return True
+        self.dropped += 1
+        return False
 
     def received_messages(self, max_count: int = sys.maxsize) -> Iterator[Message | None]:
         """Yield up to `max_count` received messages, and None if the other end is closed.

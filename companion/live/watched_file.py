@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from companion.config import Config
 from companion.config.files import files_of, load
@@ -18,7 +18,7 @@ FileStamps = tuple[tuple[int, int, int] | None, ...]
 """Inode, size and time of change (ns) of the file and each included file; None: it is missing."""
 
 
-class Edit:
+class Edit(NamedTuple):
     """What an edit of the file changes, or why it is refused.
 
     Attributes:
@@ -26,8 +26,8 @@ class Edit:
         refusal: why the edit cannot be used, one sentence; None: the edit can be used.
     """
 
-    def __init__(self, values: Values, refusal: str | None = None) -> None:
-        self.values, self.refusal = values, refusal
+    values: Values
+    refusal: str | None = None
 
 
 class WatchedFile:

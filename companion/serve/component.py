@@ -9,13 +9,14 @@ from collections.abc import Callable
 
 from companion.files.ascii_text import ascii_for
 from companion.mavlink.framing import Frame, build_frame
-from companion.mavlink.messages import Message, decode, dialect, encode
+from companion.mavlink.messages import Message, dialect, encode
 from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
 from companion.mavlink.texts import MAX_TEXT_ID, status_texts
-from companion.serve.mode_requests import MISSION_ITEMS
+from companion.serve.mode_requests import MISSION_ITEMS, command_in
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import Client
 from companion.serve.network.network import Network
+from companion.serve.network.permission import COMMAND_IDS
 
 _HEARTBEAT_PERIOD = 1.0
 _MAX_TEXT_LENGTH = 200
@@ -26,7 +27,6 @@ _MAX_ANSWERS = 10
 """Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`. Texts that contain the numbers of
 a setpoint may all differ, so that none is a repetition."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
-_COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 
 WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
 
@@ -98,7 +98,7 @@ class Component:
 
     def on_own_frame(self, client: Client, frame: Frame) -> None:
         """Refuse a command to our component, which carries out none; ignore other frames."""
-        if frame.message_id in _COMMAND_IDS:
+        if frame.message_id in COMMAND_IDS:
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
     def _note_unless_repeated(self, client: Client | None, text: str) -> bool:
@@ -148,8 +148,9 @@ def _acknowledgement(frame: Frame, result: int) -> Message | None:
         return dialect.MAVLink_mission_ack_message(**sender, type=dialect.MAV_MISSION_DENIED)
     if frame.message_id == dialect.MAVLINK_MSG_ID_SET_MODE:
         command = dialect.MAV_CMD_DO_SET_MODE
-    elif frame.message_id in _COMMAND_IDS:
-        command = decode(frame.message_id, frame.payload).command
     else:
-        return None
+        message = command_in(frame)
+        if message is None:
+            return None
+        command = message.command
     return dialect.MAVLink_command_ack_message(command, result, **sender)

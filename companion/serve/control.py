@@ -5,7 +5,6 @@ import asyncio
 from companion.config import Config
 from companion.mavlink.framing import Frame
 from companion.preflight.session import wanted_rates
-from companion.serve import refusals
 from companion.serve.component import Component
 from companion.serve.flights import ServedFlights
 from companion.serve.mode_requests import (
@@ -16,7 +15,7 @@ from companion.serve.mode_requests import (
 )
 from companion.serve.network.addresses import Address, source_of, target_of
 from companion.serve.network.client import Client
-from companion.serve.programs import Program, Programs
+from companion.serve.ownership import Program, Programs
 from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, ControlRequest
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.request import RefusedSetpoint, Request
@@ -25,17 +24,13 @@ from companion.serve.situation import SituationKeeper
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
+_FLIGHT_ENDING = (
+    "control is ending and the vehicle is held; request control again when it has ended"
+)
+
 
 class ServedControl:
-    """Flies the setpoints of one client at a time; no client's setpoints are forwarded.
-
-    Args:
-        config: configuration of the vehicle and of `serve`.
-        link: open link to the vehicle.
-        component: sends answers to clients and texts to pilots.
-        keeper: keeps track of the vehicle's position.
-        flights: begins the flights under a client's control.
-    """
+    """Flies the setpoints of one client at a time; no client's setpoints are forwarded."""
 
     def __init__(
         self,
@@ -73,7 +68,7 @@ class ServedControl:
         elif reduces_telemetry(frame, wanted_rates(self._config, self._link)):
             self._component.acknowledge(client, frame, ACCEPTED, self._autopilot)
         else:
-            if isinstance(owner, Program) and owner.client is client and leaves_control(frame):
+            if owner is not None and owner.client is client and leaves_control(frame):
                 flight.expect_release()
             return False
         return True
@@ -114,7 +109,7 @@ class ServedControl:
             flight.give(request)
         self._programs.keep(owner, request)
         if flight is not None and flight.is_ending:
-            return refusals.FLIGHT_ENDING
+            return _FLIGHT_ENDING
         if flight is None and self._give_control(owner, now):
             self._flights.begin(owner, request, None, from_ground=False)
         return None
@@ -133,7 +128,9 @@ class ServedControl:
         if state.mode is None or Role.READY not in autopilot.roles(state.mode):
             return False
         if not state.flying:
-            self._component.answer(program.client, refusals.VEHICLE_ON_GROUND)
+            self._component.answer(
+                program.client, "take off first: setpoints are flown only in the air"
+            )
             return False
         if not self._ownership.has_stream(program, now):
             return False
@@ -146,19 +143,17 @@ class ServedControl:
         """Answer a command that requests control: by a takeover or a refusal."""
         now, owner = self._clock(), self._programs.sender_of(client, frame)
         flight, on_ground = self._flights.current_flight, not self._link.state.flying
-        request, refusal = (
-            self._programs.newest_request(owner),
-            self._ownership.request_control(owner, now),
-        )
+        request = self._programs.newest_request(owner)
+        refusal = self._ownership.request_control(owner, now)
         if refusal is None and flight is not None:
-            refusal = refusals.FLIGHT_ENDING if flight.is_ending else None
-        elif refusal is None:
+            refusal = _FLIGHT_ENDING if flight.is_ending else None
+        elif refusal is None and request is None:
             refusal = (
-                self._flights.fence_refusal()
-                if request is not None
-                else refusals.SETPOINTS_FORGOTTEN
+                "too many programs send setpoints, and yours were forgotten; let the others stop"
             )
-            if refusal is None and request is not None and on_ground:
+        elif refusal is None and request is not None:
+            refusal = self._flights.fence_refusal()
+            if refusal is None and on_ground:
                 refusal = self._keeper.takeoff_refusal(request)
         result = ACCEPTED if self._flights.in_control else IN_PROGRESS
         if refusal is not None:

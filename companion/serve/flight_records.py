@@ -5,9 +5,9 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeVar
 
 from companion import realtime
+from companion.api.flight_loop import call_in_thread
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.flight.environment import Environment
@@ -15,9 +15,6 @@ from companion.flight.flight_files import FlightFiles
 from companion.mavlink.transport.base import Tap
 from companion.recording.folder import flight_folder
 from companion.recording.measurements.summary import Summary
-
-Argument = TypeVar("Argument")
-Result = TypeVar("Result")
 
 
 class FlightRecords:
@@ -82,16 +79,16 @@ class FlightRecords:
 
         The next flight may already have begun, with its own record.
         """
-        await self._in_thread(record.save, summary)
+        await call_in_thread(record.save, summary)
         if record.folder is not None:
             self._note(f"recorded in {record.folder}")
-            text = await self._in_thread(self.on_recorded, record.folder)
+            text = await call_in_thread(self.on_recorded, record.folder)
             if text is not None:
                 self._note(text)
 
     async def discard(self, record: FlightFiles) -> None:
         """Remove the record of a failed takeover, in which nothing was flown."""
-        await self._in_thread(_remove, record.folder)
+        await call_in_thread(_remove, record.folder)
 
     def _record(self, config: Config, folder: Path | None) -> FlightFiles:
         loop = asyncio.get_running_loop()
@@ -100,12 +97,6 @@ class FlightRecords:
             loop.call_soon_threadsafe(self._note, text)
 
         return FlightFiles(config, folder, self._environment, note, flies_maneuvers=False)
-
-    async def _in_thread(self, work: Callable[[Argument], Result], argument: Argument) -> Result:
-        """Call `work` in a thread, so that a slow disk blocks nothing; return its result."""
-        if not self._environment.realtime:  # on a virtual clock, all work runs in the event loop
-            return work(argument)
-        return await asyncio.to_thread(work, argument)
 
 
 def _remove(folder: Path | None) -> None:

@@ -3,18 +3,10 @@
 import asyncio
 import gc
 
-from companion.config import Config
-from companion.flight.changes import Changes
-from companion.flight.environment import Environment
-from companion.flight.observer import Observer
-from companion.serve.component import Component
-from companion.serve.flight_records import FlightRecords
 from companion.serve.kept_fence import KeptFence
-from companion.serve.ownership import Ownership
-from companion.serve.programs import Program
-from companion.serve.served_flight import ControlRequest, ServedFlight
+from companion.serve.ownership import Ownership, Program
+from companion.serve.served_flight import ControlRequest, ServedFlight, ServedVehicle
 from companion.serve.setpoints.request import Request
-from companion.vehicle.link import Link
 
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
@@ -23,36 +15,16 @@ _RETRY_PAUSE = 2.0
 class ServedFlights:
     """Begins the flights, and ends the owner's control with each of them.
 
-    Args:
-        config: configuration of the vehicle and of `serve`.
-        link: open link to the vehicle.
-        component: sends answers to clients and texts to pilots.
-        observer: receives phases and events of each flight.
-        environment: environment of the flights.
-        records: makes the records of the flights.
-        changes: applies changes of configuration values in flight.
-
     Attributes:
         ownership: decides which client's requests are flown.
         current_flight: the flight that runs, or None.
     """
 
-    def __init__(
-        self,
-        config: Config,
-        link: Link,
-        component: Component,
-        observer: Observer,
-        environment: Environment,
-        records: FlightRecords,
-        changes: Changes,
-    ) -> None:
+    def __init__(self, vehicle: ServedVehicle) -> None:
+        config = vehicle.config
         self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
         self.current_flight: ServedFlight | None = None
-        self._config, self._link, self._component = config, link, component
-        self._observer, self._environment = observer, environment
-        self._records, self._changes = records, changes
-        self._fence = KeptFence(config, link)
+        self._vehicle, self._fence = vehicle, KeptFence(config, vehicle.link)
         self._clock, self._retry_time = asyncio.get_running_loop().time, 0.0
         self._task: asyncio.Task[None] | None = None
         self._unfinished: set[asyncio.Task[None]] = set()
@@ -87,17 +59,7 @@ class ServedFlights:
             UnplannableError: no motion leads to the request.
         """
         self.current_flight = flight = ServedFlight(
-            str(owner),
-            self._config,
-            self._link,
-            self._component,
-            self.ownership,
-            self._observer,
-            self._environment,
-            self._records,
-            self._changes,
-            self._fence.centre,
-            from_ground=from_ground,
+            str(owner), self._vehicle, self.ownership, self._fence.centre, from_ground=from_ground
         )
         flight.give(request)
         self._task = task = asyncio.create_task(self._fly(flight, command))
@@ -128,5 +90,5 @@ class ServedFlights:
             if not has_begun:
                 self._retry_time = self._clock() + _RETRY_PAUSE
             await flight.save()
-            if self.current_flight is None and self._config.realtime.freeze_gc:  # between flights
-                gc.collect()
+            if self.current_flight is None and self._vehicle.config.realtime.freeze_gc:
+                gc.collect()  # between two flights

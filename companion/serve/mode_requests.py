@@ -6,11 +6,10 @@ All functions are pure.
 from math import isfinite
 
 from companion.mavlink.framing import Frame
-from companion.mavlink.messages import MESSAGE_IDS, decode, dialect
+from companion.mavlink.messages import MESSAGE_IDS, Message, decode, dialect
+from companion.serve.network.permission import COMMAND_IDS
 from companion.vehicle.autopilot import Autopilot, ControlEntry
 
-_COMMAND_LONG = dialect.MAVLINK_MSG_ID_COMMAND_LONG
-_COMMAND_INT = dialect.MAVLINK_MSG_ID_COMMAND_INT
 _SET_MODE = dialect.MAVLINK_MSG_ID_SET_MODE
 _REQUEST_DATA_STREAM = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
 MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
@@ -28,8 +27,13 @@ _LEAVING_COMMANDS = (
 _CUSTOM_MODE_FLAG = 1
 _MAIN_MODE = 0xFF << 16
 """Mask of PX4's main mode in `custom_mode`; OFFBOARD has no sub mode, and PX4 ignores its bits."""
-_MODE_MESSAGES = frozenset({_COMMAND_LONG, _COMMAND_INT, _SET_MODE})
-"""Messages that can command a mode."""
+
+
+def command_in(frame: Frame) -> Message | None:
+    """The COMMAND_LONG or COMMAND_INT in a frame; None for other messages."""
+    if frame.message_id not in COMMAND_IDS:
+        return None
+    return decode(frame.message_id, frame.payload)
 
 
 def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
@@ -38,16 +42,15 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     This applies only to a mode entered by a command (PX4's OFFBOARD). Every form that PX4 accepts
     counts: PX4 reads modes as bytes, and also accepts NAV_GUIDED_ENABLE.
     """
-    if (
-        frame.message_id not in _MODE_MESSAGES
-        or autopilot.control_entry is not ControlEntry.BY_COMMAND
-    ):
+    if autopilot.control_entry is not ControlEntry.BY_COMMAND:
         return False
     offboard = autopilot.modes[autopilot.offboard_mode] & _MAIN_MODE
     if frame.message_id == _SET_MODE:
         custom_mode = decode(frame.message_id, frame.payload).custom_mode
         return bool(custom_mode & _MAIN_MODE == offboard)
-    message = decode(frame.message_id, frame.payload)
+    message = command_in(frame)
+    if message is None:
+        return False
     if message.command == dialect.MAV_CMD_NAV_GUIDED_ENABLE:
         return bool(message.param1 > 0.0)
     return bool(
@@ -70,29 +73,24 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
         return False
     if frame.message_id in MISSION_ITEMS:
         return decode(frame.message_id, frame.payload).current in _GUIDED_ITEMS
-    if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
-        return False
-    command = decode(frame.message_id, frame.payload).command
-    return command in _STEERING_COMMANDS
+    message = command_in(frame)
+    return message is not None and message.command in _STEERING_COMMANDS
 
 
 def leaves_control(frame: Frame) -> bool:
     """Whether a frame gives up its sender's control: it commands a mode, a landing or a return."""
     if frame.message_id == _SET_MODE:
         return True
-    if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
-        return False
-    return decode(frame.message_id, frame.payload).command in _LEAVING_COMMANDS
+    message = command_in(frame)
+    return message is not None and message.command in _LEAVING_COMMANDS
 
 
 def reduces_telemetry(frame: Frame, needed: dict[str, float]) -> bool:
     """Whether a frame could reduce telemetry below the rates `needed`, Hz by message name."""
     if frame.message_id == _REQUEST_DATA_STREAM:
         return True
-    if frame.message_id not in (_COMMAND_LONG, _COMMAND_INT):
-        return False
-    message = decode(frame.message_id, frame.payload)
-    if message.command != _SET_MESSAGE_INTERVAL:
+    message = command_in(frame)
+    if message is None or message.command != _SET_MESSAGE_INTERVAL:
         return False
     rates = {MESSAGE_IDS[name]: rate for name, rate in needed.items() if name in MESSAGE_IDS}
     rate = rates.get(int(message.param1)) if isfinite(message.param1) else None

@@ -1,12 +1,29 @@
-"""Which client controls the vehicle: one at a time, until it releases control or is silent."""
+"""The clients' programs: which one controls the vehicle, and what each of them last requested."""
 
-from collections.abc import Hashable
 from dataclasses import dataclass
 from enum import Enum
 from math import inf
+from typing import NamedTuple
+
+from companion.mavlink.framing import Frame
+from companion.serve.network.addresses import Address, source_of
+from companion.serve.network.client import Client
+from companion.serve.setpoints.request import Request
 
 _MAX_CLIENTS = 64
 """Largest number of remembered clients; if more send setpoints, silent clients are forgotten."""
+_MAX_PROGRAMS = 32
+"""Number of programs whose newest request is kept."""
+
+
+class Program(NamedTuple):
+    """A program, identified by its client's connection and by its MAVLink address."""
+
+    client: Client
+    address: Address
+
+    def __str__(self) -> str:
+        return f"{self.client.name} ({self.address.system}/{self.address.component})"
 
 
 class ControlState(Enum):
@@ -41,10 +58,10 @@ class Ownership:
 
     def __init__(self, timeout: float, hold_time: float) -> None:
         self._timeout, self._hold_time = timeout, hold_time
-        self.owner: Hashable | None = None
-        self._streams: dict[Hashable, _Stream] = {}
+        self.owner: Program | None = None
+        self._streams: dict[Program, _Stream] = {}
 
-    def note_setpoint(self, client: Hashable, now: float) -> str | None:
+    def note_setpoint(self, client: Program, now: float) -> str | None:
         """Note a setpoint; return why it is not flown, or None.
 
         A setpoint of another client takes over from a silent owner.
@@ -60,7 +77,7 @@ class Ownership:
             self._forget_silent(now)
         return None
 
-    def withdraw(self, client: Hashable, owner_before: Hashable | None) -> None:
+    def withdraw(self, client: Program, owner_before: Program | None) -> None:
         """Withdraw the setpoint that was noted last, because it cannot be flown.
 
         `owner_before` was in control before the setpoint.
@@ -69,7 +86,7 @@ class Ownership:
         stream = self._streams[client]
         stream.newest_arrival = stream.previous_arrival
 
-    def request_control(self, client: Hashable, now: float) -> str | None:
+    def request_control(self, client: Program, now: float) -> str | None:
         """Give control to a client that requests it; return the reason of a refusal, or None."""
         owner = self.owner
         if owner is not None and owner != client and self._is_live(owner, now):
@@ -79,7 +96,7 @@ class Ownership:
         self.owner = client
         return None
 
-    def has_stream(self, client: Hashable, now: float) -> bool:
+    def has_stream(self, client: Program, now: float) -> bool:
         """Whether a client sends a stream: its last two setpoints came within the timeout."""
         stream = self._streams.get(client, _Stream())
         return (
@@ -89,8 +106,9 @@ class Ownership:
 
     def begin(self, now: float) -> None:
         """Note that control begins; if the owner is already silent, its hold time starts now."""
-        stream = self._streams.setdefault(self.owner, _Stream())
-        stream.newest_arrival = max(stream.newest_arrival, now - self._timeout)
+        if self.owner is not None:
+            stream = self._streams.setdefault(self.owner, _Stream())
+            stream.newest_arrival = max(stream.newest_arrival, now - self._timeout)
 
     def release(self) -> None:
         """End the ownership: the owner has released control, or the vehicle has left our mode."""
@@ -105,7 +123,7 @@ class Ownership:
             return ControlState.LIVE
         return ControlState.HOLDING if overdue <= self._hold_time else ControlState.EXPIRED
 
-    def _is_live(self, client: Hashable, now: float) -> bool:
+    def _is_live(self, client: Program, now: float) -> bool:
         return now - self._streams.get(client, _Stream()).newest_arrival <= self._timeout
 
     def _forget_silent(self, now: float) -> None:
@@ -114,3 +132,34 @@ class Ownership:
             for client, stream in self._streams.items()
             if client == self.owner or self._is_live(client, now)
         }
+
+
+class Programs:
+    """Keeps the newest request of each program, unless it was refused."""
+
+    def __init__(self) -> None:
+        self._newest: dict[Program, Request] = {}  # in the order of their newest requests
+
+    def keep(self, program: Program, request: Request) -> None:
+        """Keep a program's newest request; drop the oldest of more than `_MAX_PROGRAMS`."""
+        self._newest.pop(program, None)
+        self._newest[program] = request
+        while len(self._newest) > _MAX_PROGRAMS:
+            del self._newest[next(iter(self._newest))]
+
+    def newest_request(self, program: Program) -> Request | None:
+        """The newest request of a program; None if it has sent none, or its request was dropped."""
+        return self._newest.get(program)
+
+    def sender_of(self, client: Client, frame: Frame) -> Program:
+        """The program that sent a command.
+
+        A program may use different component ids for commands and setpoints. If no setpoint came
+        from the address of `frame`, the command counts as sent by the program with the newest
+        setpoint at the same client.
+        """
+        program = Program(client, source_of(frame))
+        if program in self._newest:
+            return program
+        others = (each for each in reversed(self._newest) if each.client is client)
+        return next(others, program)

@@ -49,19 +49,25 @@ class ControlRequest(NamedTuple):
     frame: Frame
 
 
+class ServedVehicle(NamedTuple):
+    """The vehicle of a session, and what all flights under clients' control share."""
+
+    config: Config
+    link: Link
+    component: Component
+    observer: Observer
+    environment: Environment
+    records: FlightRecords
+    changes: Changes
+
+
 class ServedFlight:
     """Takes over, flies the requests of the owner, and hands back.
 
     Args:
         name: name of the owner.
-        config: configuration of the vehicle and of `serve`.
-        link: open link to the vehicle.
-        component: sends answers to clients and texts to pilots.
+        vehicle: see `ServedVehicle`.
         ownership: decides which client's requests are flown, and how long.
-        observer: receives phases and events.
-        environment: environment of the flight.
-        records: makes the record of the flight.
-        changes: applies changes of configuration values in flight.
         fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
             control begins.
         from_ground: whether the vehicle stands armed, and takes off first.
@@ -70,18 +76,13 @@ class ServedFlight:
     def __init__(
         self,
         name: str,
-        config: Config,
-        link: Link,
-        component: Component,
+        vehicle: ServedVehicle,
         ownership: Ownership,
-        observer: Observer,
-        environment: Environment,
-        records: FlightRecords,
-        changes: Changes,
-        fence_centre: FenceCentre | None = None,
+        fence_centre: FenceCentre | None,
         *,
-        from_ground: bool = False,
+        from_ground: bool,
     ) -> None:
+        config, link, component, observer, environment, records, changes = vehicle
         self._records, self._record = records, records.new_record(changes.begin_flight())
         self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
@@ -151,8 +152,7 @@ class ServedFlight:
 
     async def run(self, command: ControlRequest | None) -> bool:
         """Fly; answer `command`, if there is one; return whether control had begun."""
-        refusing_changes = self._changes.limited_by(change_refusal)
-        with self._records.recording(self._record), refusing_changes:
+        with self._records.recording(self._record), self._changes.limited_by(change_refusal):
             result = "stopped at once"
             self._record.begin_counting(self._link.stats)
             try:

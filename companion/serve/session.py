@@ -17,7 +17,6 @@ from companion.flight.state_logger import StateLogger
 from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
-from companion.preflight.session import wanted_rates
 from companion.realtime import RealtimeSettings
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
@@ -33,8 +32,6 @@ from companion.vehicle.link import Link
 if TYPE_CHECKING:
     from companion.serve.control import ServedControl
     from companion.serve.flights import ServedFlights
-
-Note = Callable[[str], None]
 
 
 class ServeSession:
@@ -61,7 +58,7 @@ class ServeSession:
     def __init__(
         self,
         config: Config,
-        note: Note,
+        note: Callable[[str], None],
         observer: Observer | None = None,
         environment: Environment = THIS_COMPUTER,
         directory: Path | None = None,
@@ -131,7 +128,7 @@ class ServeSession:
             keeper = SituationKeeper(link, network)
             control = self._make_control(link, component, keeper)
             network.setpoint_ids = SETPOINT_IDS
-            background.append(keeper.keep_telemetry(lambda: wanted_rates(self._config, link)))
+            background.append(keeper.keep_telemetry(self._config))
         interceptor = _FrameInterceptor(
             permission, component, control, network.routing, link.settings.target_system
         )
@@ -156,8 +153,9 @@ class ServeSession:
         """Make the objects through which clients command the vehicle."""
         from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
         from companion.serve.flights import ServedFlights  # noqa: PLC0415  the same
+        from companion.serve.served_flight import ServedVehicle  # noqa: PLC0415  the same
 
-        self.flights = ServedFlights(
+        vehicle = ServedVehicle(
             self._config,
             link,
             component,
@@ -166,6 +164,7 @@ class ServeSession:
             self.records,
             self.changes,
         )
+        self.flights = ServedFlights(vehicle)
         return ServedControl(self._config, link, component, keeper, self.flights)
 
     async def _tell_silence(self, link: Link) -> None:

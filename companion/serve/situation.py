@@ -4,17 +4,18 @@ The origin is estimated from pairs of local and global positions.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping
 from contextlib import suppress
 from math import cos, degrees, hypot, radians
 
 from companion.attitude import is_unit
 from companion.attitude.rotation import euler_angles
+from companion.config import Config
 from companion.guidance.fence import EARTH_RADIUS, Place, local_offset
 from companion.guidance.reference import Vector
 from companion.mavlink.codec import decode_attitude
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import Message
+from companion.preflight.session import wanted_rates
 from companion.serve.network.network import Network
 from companion.serve.setpoints.request import Origin, Request, Situation, requests_takeoff
 from companion.vehicle.link import Link
@@ -70,11 +71,8 @@ class SituationKeeper:
             return None
         return "command a height of 1 m or more above the ground, or take off first"
 
-    async def keep_telemetry(self, wanted: Callable[[], Mapping[str, float]]) -> None:
-        """Until cancelled, request telemetry whenever no attitude comes, as ArduPilot requires.
-
-        `wanted` returns rates by message name, Hz; it is called once the autopilot is known.
-        """
+    async def keep_telemetry(self, config: Config) -> None:
+        """Until cancelled, request telemetry whenever no attitude comes, as ArduPilot requires."""
         newest_payload = self._network.attitude_payload
         while True:
             await asyncio.sleep(_CHECK_PERIOD)
@@ -82,7 +80,9 @@ class SituationKeeper:
             if newest_payload != payload_before or self._link.state.autopilot is None:
                 continue
             with suppress(LinkError):  # the autopilot may be booting; the request is repeated
-                await self._link.set_rates(wanted(), window_s=_COUNTING_TIME)
+                await self._link.set_rates(
+                    wanted_rates(config, self._link), window_s=_COUNTING_TIME
+                )
 
     def _on_global_position(self, message: Message) -> None:
         position = self._link.state.position

@@ -5,7 +5,7 @@ from collections.abc import AsyncGenerator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from companion.api.connection import Configuration, as_config
+from companion.api.connection import Configuration
 from companion.config.files import changed
 from companion.mavlink.framing import FrameScanner
 from companion.mavlink.messages import Message, dialect
@@ -42,9 +42,8 @@ async def serving(
         EndpointError, LinkError, SigningError: see `ServeSession.run`.
         RuntimeError: the session ended before its network was open.
     """
-    served_config = changed(
-        config_in_memory(as_config(config), vehicle), {"serve": {"clients": ()}}, "the test"
-    )
+    served_config = config_in_memory(config, vehicle)
+    served_config = changed(served_config, {"serve": {"clients": ()}}, "the test")
     session = ServeSession(served_config, note, None, environment, folder)
     session_task = asyncio.ensure_future(session.run())
     try:

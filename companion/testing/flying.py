@@ -92,7 +92,7 @@ def session(
     Raises:
         ConfigError: the configuration is wrong.
     """
-    flown_config = config_in_memory(as_config(config), vehicle)
+    flown_config = config_in_memory(config, vehicle)
     records = None if folder is None else Path(folder)
     if records is not None:
         records.mkdir(parents=True, exist_ok=True)
@@ -157,18 +157,19 @@ async def connect(
         raise RuntimeError(
             "connect flies on the vehicle's clock: call it inside run(vehicle, main())"
         )
-    flown_config = config_in_memory(as_config(config), vehicle)
+    flown_config = config_in_memory(config, vehicle)
     records = None if folder is None else Path(folder)
     async with connect_configured(flown_config, records, observer, environment) as connected:
         yield connected
 
 
-def config_in_memory(config: Config, vehicle: MockVehicle) -> Config:
+def config_in_memory(configuration: Configuration, vehicle: MockVehicle) -> Config:
     """The configuration for a vehicle in memory; lockstep is set to match the vehicle.
 
     Raises:
-        ConfigError: the configured link cannot reach a vehicle in memory.
+        ConfigError: the configuration is wrong, or its link cannot reach a vehicle in memory.
     """
+    config = as_config(configuration)
     if config.link.backend != "direct":
         raise ConfigError(f"link.backend {config.link.backend} cannot reach a vehicle in memory")
     if config.link.lockstep != vehicle.in_lockstep:

@@ -75,16 +75,7 @@ class _VirtualSelector(SettlingSelector):
 
 
 class VirtualEventLoop(LockstepEventLoop):
-    """An event loop on a virtual clock. File descriptors are not watched.
-
-    Args:
-        clock: clock of the loop.
-        world: moves the clock.
-
-    Attributes:
-        clock: clock of the loop.
-        world: moves the clock.
-    """
+    """An event loop on a virtual clock, which `world` moves. File descriptors are not watched."""
 
     def __init__(self, clock: VirtualClock, world: World) -> None:
         self.clock, self.world = clock, world

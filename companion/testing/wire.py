@@ -64,12 +64,7 @@ class MemoryTransport:
 
 
 class Wire:
-    """Joins a vehicle, the open transport to it, and their common clock.
-
-    Args:
-        vehicle: the vehicle.
-        clock: clock that the vehicle moves.
-    """
+    """Joins a vehicle, the transport to it, and their common clock, which the vehicle moves."""
 
     def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
         self._vehicle, self._clock = vehicle, clock

@@ -15,7 +15,6 @@ import yaml
 from companion.cli.main import main
 from companion.config import Config
 from companion.config.files import load
-from companion.config.root import FORMER_KEYS
 from companion.files import bounded_yaml
 from companion.files.bounded_yaml import MOST_BYTES, YamlError
 from companion.files.yaml_file import ConfigError, Section, parse
@@ -228,9 +227,9 @@ def test_a_former_key_is_refused_with_what_became_of_it(text, words):
     assert str(raised.value) == words
 
 
-@pytest.mark.parametrize("key", FORMER_KEYS)
+@pytest.mark.parametrize("key", Config.former_keys)
 def test_a_former_key_of_the_configuration_says_what_became_of_it(key):
     text = "".join(f"{'  ' * depth}{part}:\n" for depth, part in enumerate(key.split(".")))
     with pytest.raises(ConfigError) as raised:
         parse(text, "c.yaml", Config)
-    assert str(raised.value) == f"c.yaml, line {text.count(':')}: `{key}` {FORMER_KEYS[key]}"
+    assert str(raised.value) == f"c.yaml, line {text.count(':')}: `{key}` {Config.former_keys[key]}"

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from companion.cli.main import main
 from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
-from companion.config.files import changed, json_schema, load, parse_assignments
+from companion.config.files import json_schema, load, with_assignments
 from companion.config.flight import CircleConfig
 from companion.config.reference import changed_keys, keys
 from companion.config.vehicle import VehicleConfig
@@ -247,10 +247,8 @@ def test_a_wrong_set_is_refused_in_a_sentence(text, words, capsys):
 
 
 def test_set_changes_keys_and_the_last_one_wins():
-    changes = parse_assignments(
-        ["limits.max_tilt_deg=20", "limits.max_tilt_deg=21", "flight.arm=true"]
-    )
-    config = changed(Config(), changes, "--set")
+    assignments = ["limits.max_tilt_deg=20", "limits.max_tilt_deg=21", "flight.arm=true"]
+    config = with_assignments(Config(), assignments)
     assert (config.limits.max_tilt_deg, config.flight.arm) == (21.0, True)
 
 

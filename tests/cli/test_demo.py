@@ -64,17 +64,23 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
     port = free_port(40)
     monkeypatch.setattr(demo, "free_port", lambda *_: port)
     (folder / "log").mkdir()
-    wire = demo.udp_wire()
-    with demo.bundled_vehicle(shipped("mock-px4.yaml"), wire, folder / "log" / "a", lockstep=True):
+    mock_px4, log = shipped("mock-px4.yaml"), folder / "log" / "a"
+    with (
+        demo.wire_like("udpin://0.0.0.0:14540") as wire,
+        demo.bundled_vehicle(mock_px4, wire, log, lockstep=True),
+    ):
         assert main(["demo", "--lockstep"]) == 1
     assert f"UDP port {port + 40}" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.slow
 def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, capsys):
-    wire = demo.udp_wire()
-    (folder / "mine.yaml").write_text(f"link: {{endpoint: '{wire.endpoint}'}}")
-    with demo.bundled_vehicle(shipped("mock-px4.yaml"), wire, folder / "log", lockstep=False):
+    mock_px4, log = shipped("mock-px4.yaml"), folder / "log"
+    with (
+        demo.wire_like("udpin://0.0.0.0:14540") as wire,
+        demo.bundled_vehicle(mock_px4, wire, log, lockstep=False),
+    ):
+        (folder / "mine.yaml").write_text(f"link: {{endpoint: '{wire.endpoint}'}}")
         code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
     assert code == 1
     assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())

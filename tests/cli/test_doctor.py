@@ -350,11 +350,11 @@ def test_of_a_planner_of_another_package_no_response_is_expected():
 
 
 def test_ctrl_c_says_that_what_was_set_is_listed(capsys, tmp_path, monkeypatch):
-    def interrupted(work):
+    def interrupted(work, *, in_lockstep):
         work.close()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(doctor_command.link_loop, "run", interrupted)
+    monkeypatch.setattr(doctor_command, "run", interrupted)
     code, out, _ = doctor(capsys, "--config", far_away(tmp_path, free_port()))
     assert code == 1
     assert out == "Interrupted; every parameter that was set is listed above.\n"

@@ -185,7 +185,7 @@ def test_a_flight_whose_console_is_closed_gets_its_page(monkeypatch, tmp_path):
     )
     monkeypatch.setattr(flying, "Session", lambda *_, **__: None)
     monkeypatch.setattr(flying, "fly_interruptibly", lambda _: None)
-    monkeypatch.setattr(flying.link_loop, "run", lambda _: SimpleNamespace())
+    monkeypatch.setattr(flying, "run", lambda *_, **__: SimpleNamespace())
     monkeypatch.setattr(flying, "flight_table", lambda _: "")
     monkeypatch.setattr("companion.report.page.write_report", written.append)
     flying.fly(Config(), tmp_path, Closed())
@@ -305,7 +305,7 @@ def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside):
     monkeypatch.setattr(flying, "words_text", lambda _: "words")
     monkeypatch.setattr(flying, "closing_words", lambda *_: None)
     summary = SimpleNamespace(as_dict=dict)
-    monkeypatch.setattr(flying.link_loop, "run", lambda work: (ran.append(work), summary)[1])
+    monkeypatch.setattr(flying, "run", lambda work, **_: (ran.append(work), summary)[1])
     console = flying.FlightConsole(file=io.StringIO(), highlight=False)
     config = changed(Config(), {"recording": {"report": False}}, "a test")
     folder = tmp_path / "a [b]"

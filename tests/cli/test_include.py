@@ -7,7 +7,7 @@ import yaml
 
 from companion.cli.main import main
 from companion.config import Config
-from companion.config.files import changed, json_schema, load, parse_assignments
+from companion.config.files import changed, json_schema, load, with_assignments
 from companion.files.yaml_file import ConfigError
 
 
@@ -62,7 +62,7 @@ def test_a_tilde_is_the_home_folder(files, tmp_path, monkeypatch):
     assert config.recording.directory == tmp_path / "flights"
     assert config.flight.trajectory == tmp_path / "eight.yaml"
     assert config.link.signing_key_file == tmp_path / "key"
-    set_by_hand = changed(config, parse_assignments(["recording.directory=~/other"]), "--set")
+    set_by_hand = with_assignments(config, ["recording.directory=~/other"])
     assert set_by_hand.recording.directory == tmp_path / "other"
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from companion.campaign.campaign_file import CampaignFile, FaultScenario
 from companion.config import Config
-from companion.config.files import load, parse_assignments
+from companion.config.files import load, with_assignments
 from companion.config.reference import keys
 from companion.config.trajectory_file import TrajectoryFile
 from companion.files import bounded_yaml
@@ -174,7 +174,7 @@ def test_lines_are_those_of_keys_and_of_items():
 
 def test_a_key_on_the_command_line_without_its_section_is_told_it():
     with pytest.raises(ConfigError) as caught:
-        parse_assignments(["max_tilt_deg=20"])
+        with_assignments(Config(), ["max_tilt_deg=20"])
     assert str(caught.value) == (
         "--set max_tilt_deg=20: name the section, as in `limits.max_tilt_deg`"
     )

@@ -49,11 +49,11 @@ class Scene:
 
     @property
     def place(self):
-        return self.flights._link.state.position.position_ned
+        return self.flights._vehicle.link.state.position.position_ned
 
     @property
     def speed(self):
-        return math.hypot(*self.flights._link.state.position.velocity_ned)
+        return math.hypot(*self.flights._vehicle.link.state.position.velocity_ned)
 
     @property
     def mode(self):
@@ -330,7 +330,7 @@ async def two_at_once(scene):
     rival = MemoryClient("rival", (246, 190)).connect(scene.session)
     stranger = MemoryClient("stranger", (250, 1), host="192.0.2.7").connect(scene.session)
     away = (scene.home[0] + 20.0, *scene.home[1:])
-    forwarded = scene.flights._link.stats.forwarded
+    forwarded = scene.flights._vehicle.link.stats.forwarded
 
     def both(_):
         scene.hover()
@@ -341,7 +341,7 @@ async def two_at_once(scene):
     scene.is_said("is in control", rival)
     scene.is_said("read-only", stranger)
     await scene.is_flown()
-    assert scene.flights._link.stats.forwarded == forwarded, "no setpoint is forwarded"
+    assert scene.flights._vehicle.link.stats.forwarded == forwarded, "no setpoint is forwarded"
     scene.session.network.detach(rival)
     scene.session.network.detach(stranger)
     return REFUSED

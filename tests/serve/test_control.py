@@ -54,11 +54,11 @@ def sent_rates(tlog):
 
 
 def place(session):
-    return session.flights._link.state.position.position_ned
+    return session.flights._vehicle.link.state.position.position_ned
 
 
 def velocity(session):
-    return session.flights._link.state.position.velocity_ned
+    return session.flights._vehicle.link.state.position.velocity_ned
 
 
 def heading(vehicle):
@@ -202,7 +202,9 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4_and_the_flight_is_recorde
         assert any("commanded mode AUTO.LOITER" in event["text"] for event in summary["events"]), (
             summary["events"]
         )
-        assert summary["link"]["frames"] < session.flights._link.stats.frames, "of this flight"
+        assert summary["link"]["frames"] < session.flights._vehicle.link.stats.frames, (
+            "of this flight"
+        )
         assert summary["tracking"]["position_rms_m"] < 0.1
         assert load(folder / "config.yaml").limits.max_tilt_deg == 45.0
         sent = sent_rates(folder / "flight.tlog")

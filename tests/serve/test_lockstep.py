@@ -33,7 +33,7 @@ def flown(folder):
         async with serving(vehicle, "px4", directory=folder) as session:
             await airborne(session, vehicle, "px4", 2.5)
             script = MemoryClient().connect(session)
-            start = session.flights._link.state.position.position_ned
+            start = session.flights._vehicle.link.state.position.position_ned
             session.changes.change(BEFORE, "a test")
             await begin_control(session, script, "px4", lambda _: script.local(ALL, start))
             there = start[0] + 3.0, start[1] - 1.0, start[2]
@@ -42,7 +42,7 @@ def flown(folder):
             await stream(1.0, lambda _: script.local(POSITION, there))
             session.changes.undo("a test")
             await stream(2.0, lambda _: script.local(POSITION, there))
-            assert math.dist(session.flights._link.state.position.position_ned, there) < 0.3
+            assert math.dist(session.flights._vehicle.link.state.position.position_ned, there) < 0.3
             script.command(176, 1, 4, 3)
             await stream(0.5, lambda _: script.local(POSITION, there))
 

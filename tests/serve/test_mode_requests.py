@@ -27,7 +27,7 @@ from companion.serve.mode_requests import (
 )
 from companion.serve.network.addresses import Address
 from companion.serve.network.network import Network
-from companion.serve.programs import Program, Programs
+from companion.serve.ownership import Program, Programs
 from companion.vehicle.ardupilot.autopilot import ArduPilot
 from companion.vehicle.px4.autopilot import Px4
 
@@ -191,7 +191,9 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_
     flights = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
         _fence=SimpleNamespace(keep=lambda centre: None),
-        _config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test"),
+        _vehicle=SimpleNamespace(
+            config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test")
+        ),
     )
     flight = SimpleNamespace(run=run, save=save, fence_centre=None)
     asyncio.run(ServedFlights._fly(flights, flight, None))

@@ -59,13 +59,11 @@ class Store:
 
     def states_since(self, count: int) -> list[Message]:
         """The states that came after the first `count` states and are still kept."""
-        new_count = min(self.state_count - count, len(self.states))
-        return list(self.states)[len(self.states) - new_count :]
+        return _newest(self.states, self.state_count - count)
 
     def events_since(self, count: int) -> list[dict[str, Any]]:
         """The events that came after the first `count` events and are still kept."""
-        new_count = min(self.event_count - count, len(self.events))
-        return list(self.events)[len(self.events) - new_count :]
+        return _newest(self.events, self.event_count - count)
 
     def values(self) -> list[ConfigKey]:
         """The keys that may change in flight, with their present values."""
@@ -103,3 +101,8 @@ class Store:
     def _add_event(self, time: float, text: str) -> None:
         self.events.append({"time_s": time, "text": text})
         self.event_count += 1
+
+
+def _newest(kept: deque[dict[str, Any]], count: int) -> list[dict[str, Any]]:
+    """The newest `count` entries, or all if fewer are kept."""
+    return list(kept)[max(0, len(kept) - count) :]

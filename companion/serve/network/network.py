@@ -91,7 +91,6 @@ class Network:
         self._link, self._note_event = link, note
         self._faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
-        self._clients: list[Client] = []
         self._vehicle_frames: list[Frame] = []
         self._timer: asyncio.TimerHandle | None = None
         self._flush_handle: asyncio.Handle | None = None
@@ -120,7 +119,7 @@ class Network:
     @property
     def clients(self) -> tuple[Client, ...]:
         """The connected clients."""
-        return tuple(self._clients)
+        return self.routing.clients
 
     def now(self) -> float:
         """The event-loop time, s."""
@@ -138,13 +137,11 @@ class Network:
 
     def attach(self, client: Client) -> None:
         """Add a client that has connected."""
-        self._clients.append(client)
         self.routing.attach(client)
 
     def detach(self, client: Client) -> None:
         """Remove a client that has gone."""
-        if client in self._clients:
-            self._clients.remove(client)
+        if client in self.clients:
             self.routing.detach(client)
             self.uplink.forget(client)
             self._setpoint_limit.forget(client)
@@ -167,7 +164,7 @@ class Network:
         frames_remain = self.uplink.drain()
         for frame in vehicle_frames:
             self.routing.forward_from_vehicle(frame)
-        for client in self._clients:
+        for client in self.clients:
             client.flush()
         if frames_remain:
             self._flush_later()

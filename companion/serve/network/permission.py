@@ -36,7 +36,7 @@ _READING_COMMANDS = frozenset(
         dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES,
     }
 )
-_COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
+COMMAND_IDS = dialect.MAVLINK_MSG_ID_COMMAND_LONG, dialect.MAVLINK_MSG_ID_COMMAND_INT
 _COMMAND_OFFSET = 28
 """Offset of the command's number in COMMAND_LONG and COMMAND_INT, after seven 4-byte fields."""
 _FTP_ID = dialect.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL
@@ -49,7 +49,7 @@ ListDirectory, OpenFileRO, ReadFile, CalcFileCRC32, BurstReadFile. Source: the M
 
 def reads_only(frame: Frame) -> bool:
     """Whether a frame changes nothing on the vehicle."""
-    if frame.message_id in _COMMAND_IDS:
+    if frame.message_id in COMMAND_IDS:
         padded = frame.payload.ljust(_COMMAND_OFFSET + 2, b"\0")
         return (
             int.from_bytes(padded[_COMMAND_OFFSET : _COMMAND_OFFSET + 2], "little")

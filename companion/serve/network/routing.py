@@ -56,6 +56,7 @@ class Routing:
 
     Attributes:
         stats: counters of frames.
+        clients: the clients, in the order of `attach`.
         intercept: see `Intercept`. Until it is set, no frame of a client is forwarded.
         on_own_frame: called with each client's frame for our component; None: it is dropped.
     """
@@ -72,22 +73,22 @@ class Routing:
         self.on_own_frame: Callable[[Client, Frame], None] | None = None
         self._vehicle, self._autopilot, self._our_address = vehicle, autopilot, our_address
         self._heard: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
-        self._clients: tuple[Client, ...] = ()
+        self.clients: tuple[Client, ...] = ()
         self._repeats = _RepeatDetector(clock)
 
     def attach(self, client: Client) -> None:
         """Add a client; frames are forwarded to it from now on."""
         self._heard[client] = set()
-        self._clients = (*self._clients, client)
+        self.clients = (*self.clients, client)
 
     def detach(self, client: Client) -> None:
         """Remove a client and the addresses heard on its channel."""
         self._heard.pop(client, None)
-        self._clients = tuple(each for each in self._clients if each is not client)
+        self.clients = tuple(each for each in self.clients if each is not client)
 
     def is_at_client(self, target: Address, origin: Client) -> bool:
         """Whether a target was heard on the channel of a client other than `origin`."""
-        return any(self._reaches(each, target) for each in self._clients if each is not origin)
+        return any(self._reaches(each, target) for each in self.clients if each is not origin)
 
     def forward_from_vehicle(self, frame: Frame) -> None:
         """Forward a frame that came over the link to the vehicle."""
@@ -99,11 +100,11 @@ class Routing:
             self._learn(self._vehicle, source)
         target = target_of(frame)
         if target == EVERYBODY:
-            receivers = self._clients
+            receivers = self.clients
         elif target == self._our_address:
             return
         else:
-            receivers = tuple(each for each in self._clients if self._reaches(each, target))
+            receivers = tuple(each for each in self.clients if self._reaches(each, target))
             self.stats.no_route += not receivers
         self.stats.to_clients += len(receivers)
         for client in receivers:
@@ -136,7 +137,7 @@ class Routing:
 
     def send_to_clients(self, frame: bytes) -> None:
         """Send a frame of our own component to every client."""
-        for client in self._clients:
+        for client in self.clients:
             client.put(frame)
 
     def _learn(self, channel: Client | UplinkQueue, source: Address) -> None:
@@ -144,7 +145,7 @@ class Routing:
             self._heard[channel].add(source)
 
     def _forward(self, origin: Client, raw: bytes, target: Address) -> None:
-        others = [each for each in self._clients if each is not origin]
+        others = [each for each in self.clients if each is not origin]
         if target != EVERYBODY:
             others = [each for each in others if self._reaches(each, target)]
         if self._is_behind_vehicle(target, known_to_client=bool(others)):

@@ -36,16 +36,12 @@ async def open_tcp_server(endpoint: TcpServer, clients: ClientListener) -> "TcpP
         EndpointError: the port is in use or not permitted, the address is not that of an interface
             of this computer, or a peer's host name is unknown.
     """
-    named_peers = await resolve_peers(endpoint.peers, socket.SOCK_STREAM)
-    port = TcpPort(clients, named_peers)
+    port = TcpPort(clients, await resolve_peers(endpoint.peers, socket.SOCK_STREAM))
     try:
-        server = await asyncio.get_running_loop().create_server(
-            port.protocol, endpoint.host, endpoint.port
-        )
+        await port.listen(endpoint)
     except OSError as error:
         where = f"TCP {endpoint.host}:{endpoint.port}"
         raise EndpointError(f"{where}: {why_not_opened(error)}") from error
-    port.listen(server)
     return port
 
 
@@ -71,14 +67,12 @@ class TcpPort:
         self._closed = False
         self.local: tuple[str, int] | None = None
 
-    def protocol(self) -> "_Connection":
-        """Make the asyncio protocol of a new connection."""
-        return _Connection(self)
-
-    def listen(self, server: asyncio.Server) -> None:
-        """Accept clients from `server`."""
-        self._server = server
-        self.local = server.sockets[0].getsockname()[:2]
+    async def listen(self, endpoint: TcpServer) -> None:
+        """Accept clients at `endpoint`; raises OSError if that is not possible."""
+        self._server = await asyncio.get_running_loop().create_server(
+            lambda: _Connection(self), endpoint.host, endpoint.port
+        )
+        self.local = self._server.sockets[0].getsockname()[:2]
 
     def connect(self, endpoint: TcpOut) -> None:
         """Keep a connection to `endpoint` open."""
@@ -90,7 +84,7 @@ class TcpPort:
             try:
                 async with asyncio.timeout(_CONNECT_TIMEOUT):
                     _, connection = await loop.create_connection(
-                        self.protocol, endpoint.host, endpoint.port
+                        lambda: _Connection(self), endpoint.host, endpoint.port
                     )
                 await connection.lost.wait()
             except OSError:

@@ -11,9 +11,12 @@ from typing import NamedTuple
 
 from companion.attitude.rotation import clamp
 from companion.guidance.reference import LARGEST_JERK, change_rate
-from companion.serve.setpoints.approach import Approach, AxisLimits, AxisState, AxisValues
-from companion.serve.setpoints.commanded_state import (
+from companion.serve.setpoints.approach import (
+    Approach,
+    AxisLimits,
     AxisMotion,
+    AxisState,
+    AxisValues,
     CommandedState,
     are_far_apart,
     plus,

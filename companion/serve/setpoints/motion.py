@@ -6,9 +6,13 @@ from typing import NamedTuple
 from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import clamp
 from companion.guidance.reference import Reference, Vector, VehicleMotion
-from companion.serve.setpoints.approach import AxisLimits, AxisState, UnplannableError
+from companion.serve.setpoints.approach import (
+    AxisLimits,
+    AxisMotion,
+    AxisState,
+    UnplannableError,
+)
 from companion.serve.setpoints.axes import CommandFollower, JumpLimits
-from companion.serve.setpoints.commanded_state import AxisMotion
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _HORIZONTAL_JUMP_LIMITS = JumpLimits(0.3, 0.6)
