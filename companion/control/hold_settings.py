@@ -34,8 +34,8 @@ _QUICK_OBSERVER_DELAYS = 0.035, 0.06
 quick to normal, s."""
 _QUICK_OBSERVER_GAINS = 5.0, 7.0
 """Gains of the planner between which the observer changes from quick to normal, 1/s: the gain
-amplifies the noise. The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of 7.5
-and a quick observer."""
+amplifies the noise. The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of
+7.5 and a quick observer."""
 _BANDWIDTH_INCREASE = 0.6
 """`ObserverSettings.bandwidth_increase` of a quick observer."""
 _CALM_BANDWIDTH = 1.0

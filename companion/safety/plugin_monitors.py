@@ -115,6 +115,8 @@ class GuardedJudge:
 
     def judge_time(self, snapshot: Snapshot, raised: bool) -> str | None:
         """A breach if the latest call of the judge took too long; none after its fault."""
-        if self.fault is not None or self._judging_time <= with_hysteresis(_MAX_JUDGING_TIME, raised):
+        if self.fault is not None or self._judging_time <= with_hysteresis(
+            _MAX_JUDGING_TIME, raised
+        ):
             return None
         return f"it takes {1e3 * self._judging_time:.0f} ms to judge, and delays the setpoints"
