@@ -25,11 +25,11 @@ from companion.control.outer_loop import linear_settings, make_guidance, predict
 from companion.control.planner_runner import PlannerRunner
 from companion.control.retuning import (
     Retuning,
+    Slew,
     interpolated_config,
     loop_settings,
     reason_against_changes,
 )
-from companion.control.slew import Slew
 from companion.control.telemetry import FreshPosition
 from companion.drag import AxisDrag, Drag
 from companion.files.yaml_file import ConfigError
