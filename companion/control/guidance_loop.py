@@ -10,11 +10,10 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.hold import Hold
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.step_recorder import StepRecorder
+from companion.control.step_recorder import StepRecorder, TrackingRecord
 from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
-from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.braking import AssumedBraking
 from companion.guidance.linear import Guidance
