@@ -5,8 +5,7 @@ from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.flight.assembled import AssembledFlight
-from companion.flight.assembly import assemble
+from companion.flight.assembly import AssembledFlight, assemble
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment

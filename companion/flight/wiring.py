@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from companion.control.retuning import Retuning
-from companion.flight.assembled import AssembledFlight
+from companion.flight.assembly import AssembledFlight
 from companion.flight.state_logger import StateLogger
 from companion.mavlink.messages import Message
 from companion.vehicle.link import Link
