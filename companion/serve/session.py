@@ -13,7 +13,7 @@ from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, SilentObserver
 from companion.flight.opening import open_link, realtime_settings
-from companion.flight.state_logger import StateLogger
+from companion.flight.wiring import StateLogger
 from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
