@@ -7,6 +7,7 @@ from time import process_time
 
 from companion.flight.context import FlightContext
 from companion.guidance.fence import Corner, circle_corners, local_polygon
+from companion.guidance.reference import Vector
 from companion.recording.mcap_file.channels import RESOURCES, THRUST
 from companion.recording.mcap_file.scene import Color, Entity, Line, scene_message
 from companion.recording.mcap_file.writer import McapWriter
@@ -20,7 +21,6 @@ _DRAWING_PERIOD = 10.0
 _CIRCLE_SIDES, _UPRIGHT_EDGES = 48, 12
 """Sides of the polygon that approximates a circle, and number of its upright edges."""
 _FENCE_COLOR: Color = (0.9, 0.3, 0.3, 0.6)
-Point = tuple[float, float, float]
 
 
 class StatusRows:
@@ -35,7 +35,7 @@ class StatusRows:
     def __init__(
         self, context: FlightContext, recorder: FlightRecorder | None, clock: Callable[[], float]
     ) -> None:
-        self._context, self._recorder, self._clock = context, recorder, clock
+        self._context, self._recorder = context, recorder
         self._fence = None if recorder is None else _FenceDrawing(context, recorder)
         self._due = self._measured_at = clock()
         self._processor_s = process_time()
@@ -139,6 +139,6 @@ def _edges(
             yield corner, heights[1]
 
 
-def _write(writer: McapWriter, time_ns: int, points: list[Point]) -> None:
+def _write(writer: McapWriter, time_ns: int, points: list[Vector]) -> None:
     fence = Entity("fence", "world", lines=(Line(points, _FENCE_COLOR, separate_pairs=True),))
     writer.message("/fence", time_ns, scene_message(time_ns, (fence,)))
