@@ -196,13 +196,13 @@ class GuidanceLoop:
     ) -> StepOutput | None:
         """Make one command; return its inputs and reference, or None if none was computed."""
         if position is None:
-            self.learning.pause()
+            self.learning.hover_thrust.pause()
             return None
         # While offboard is active, a landed flag must not lead to zero thrust, which would make it
         # true; the safety monitors judge it.
         standing = standing and not self._loop.offboard_active
         if standing:
-            self.learning.on_ground()
+            self.learning.hover_thrust.on_ground()
             self._loop.resets.forget()
             if may_idle:
                 self._loop.command = GuidanceCommand(_LEVEL_TARGET, 0.0, now, idle=True)

@@ -58,7 +58,7 @@ class StatusRows:
         remaining = None if battery is None else battery.remaining
         return (
             now,
-            learning.learned_hover,
+            learning.hover_thrust.learned_hover,
             *learning.thrust_limits,
             context.loop.record.thrust,
             nan if voltage is None else voltage,

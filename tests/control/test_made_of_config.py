@@ -207,7 +207,7 @@ def test_both_loops_are_made_and_answer_a_sample():
     assert (len(trace.rates_rows()), trace.newest_latency_ns) == (1, 3_003_000)
     assert loop._deadlines == Deadlines(telemetry_stale=0.09, target_stale=0.14, deadline=0.003)
     assert loop.planner._limits == Limits(radians(30.0), radians(80.0), radians(50.0))
-    assert loop._hover_thrust is guidance_loop.learning._hover_thrust
+    assert loop._hover_thrust is guidance_loop.learning.hover_thrust
     assert guidance_loop.hold.max_tilt == pytest.approx(radians(30.0))
     assert loop.command.period == pytest.approx(0.025)
     now = 10.25
