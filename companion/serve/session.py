@@ -18,7 +18,6 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
 from companion.preflight.session import wanted_rates
-from companion.realtime import RealtimeSettings
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.network.addresses import target_of
@@ -94,9 +93,7 @@ class ServeSession:
             RealtimeError: the system refused a required `realtime` setting.
             SigningError: the key cannot be used.
         """
-        settings = (
-            realtime_settings(self._config) if self._environment.realtime else RealtimeSettings()
-        )
+        settings = realtime_settings(self._config, self._environment)
         with realtime.requested_settings(settings) as grants:
             self.records.grants = grants
             for grant in grants:

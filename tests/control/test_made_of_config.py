@@ -306,7 +306,8 @@ class Observer:
 def estimate(observer=None, **drag):
     resets = []
     correction = SimpleNamespace(reset=lambda: resets.append(1), retune=resets.append)
-    made = MotionEstimate(observer or Observer(), correction, SimpleNamespace(**drag))
+    learned = SimpleNamespace(**drag)
+    made = MotionEstimate(observer or Observer(), correction, learned, lambda: None)
     return made, resets
 
 
