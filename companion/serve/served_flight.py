@@ -239,7 +239,8 @@ class ServedFlight:
                 continue
             if self.tracking_error is not None:
                 self._component.send_value("trk_err_m", self.tracking_error)
-            self._component.send_value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
+            latency_ns = self._assembled.context.loop.record.latency_ns
+            self._component.send_value("answer_ms", 1e-6 * latency_ns)
 
     def _answer(self, command: ControlRequest | None, result: int) -> None:
         if command is not None:
