@@ -1,7 +1,7 @@
 """A campaign as read from its file: the file's content, the base configuration, and the cases."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +33,9 @@ class Campaign:
     base: Config
     """Configuration that the swept keys change; the keys of `set` are already applied. Its
     `flight.trajectory`, if any, is a key of `files`."""
-    files: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str]
     """The text of each file that a flight reads, by its path in the campaign's folder."""
-    file_path: str = "the campaign"
+    file_path: str
     """Path of the campaign file, for messages."""
 
     @property

@@ -1,7 +1,7 @@
 """Runs a campaign on a Dask cluster, and writes the result of each unit when it ends."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,13 +35,14 @@ def run(
     campaign: Campaign,
     description: Description,
     folder: Path,
-    on_unit: Callable[[Progress], None] = lambda _: None,
-) -> Progress:
+) -> Iterator[Progress]:
     """Run the units of work whose results are missing in the folder, which exists and is locked.
 
     The results of each unit are written when it ends, completely or not at all. If this function is
-    interrupted, only the units that are running are lost. `on_unit` is called before the first unit
-    and after each unit.
+    interrupted, only the units that are running are lost.
+
+    Yields:
+        the progress, before the first unit and after each unit.
 
     Raises:
         ClusterError: the connection to the scheduler is lost.
@@ -55,7 +56,7 @@ def run(
         number: unit for number, unit in enumerate(units) if number not in finished_units
     }
     progress = Progress(flown_cases=sum(len(units[number]) for number in finished_units))
-    on_unit(progress)
+    yield progress
     planned_cases = list(campaign.planned_cases()) if missing_units else []
     tasks = {
         number: (fly_planned_cases, campaign, [planned_cases[index] for index in unit], versions())
@@ -63,8 +64,7 @@ def run(
     }
     for ended_unit in run_tasks(client, tasks):
         _store_unit(ended_unit, units[ended_unit.number], campaign, folder, progress)
-        on_unit(progress)
-    return progress
+        yield progress
 
 
 def _store_unit(

@@ -7,11 +7,10 @@ begins level and without rotation, at the heading `mock.home.heading_deg`.
 """
 
 import hashlib
-from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 from math import inf, isfinite, radians
 from statistics import fmean
-from typing import NamedTuple
 
 import numpy as np
 
@@ -32,19 +31,6 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance import Corners, Steps
 from companion.guidance.reference import Pose
 from companion.recording.measurements.verdict import MAX_LINE_DISTANCE
-
-
-def run_cases(cases: Sequence[Case]) -> list[dict[str, Value]]:
-    """Simulate cases one after the other; return a row for each, in order.
-
-    `ok` is true if in every step the acceleration coefficients stayed close to the straight line
-    from start to target, within the bound that flights must keep.
-
-    Raises:
-        ConfigError: a case cannot be flown in a batch; see `check_case`.
-        MissingExtraError: numba is not installed.
-    """
-    return [_run_case(case) for case in cases]
 
 
 def check_case(case: Case) -> None:
@@ -78,7 +64,16 @@ def _why_unflyable(case: Case) -> str | None:
     return None
 
 
-def _run_case(case: Case) -> dict[str, Value]:
+def run_case(case: Case) -> dict[str, Value]:
+    """Simulate one case; return its row of results.
+
+    `ok` is true if in every step the acceleration coefficients stayed close to the straight line
+    from start to target, within the bound that flights must keep.
+
+    Raises:
+        ConfigError: the case cannot be flown in a batch; see `check_case`.
+        MissingExtraError: numba is not installed.
+    """
     check_case(case)
     config = case.config
     law_planner = planner(config)
@@ -159,27 +154,24 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
         steps = config.steps
         amplitude = steps.coefficient, steps.coefficient
         unit_maneuver = Steps(1.0, steps.duration_s, steps.settle_s)
-    pattern = _pattern(unit_maneuver, config.link.attitude_rate_hz)
-    targets = np.zeros((pattern.samples, 4))
+    parts = _parts(unit_maneuver, config.link.attitude_rate_hz)
+    targets = np.zeros((parts[-1][1], 4))
     targets[:, 2] = heading
-    for begin, end, (north, east) in pattern.parts:
+    for begin, end, (north, east) in parts:
         unlimited_target = Target(north * amplitude[0], east * amplitude[1], heading)
         targets[begin:end] = limited_target(unlimited_target, longest_target)
     return targets
 
 
-class _Pattern(NamedTuple):
-    """The open-loop steps of a maneuver and the level parts between them, by sample number."""
-
-    samples: int
-    parts: tuple[tuple[int, int, Coefficients], ...]
-    """For each step and each level part: its first sample, the sample after its last, and its
-    acceleration coefficients."""
-
-
 @lru_cache(maxsize=64)
-def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
-    """The pattern of a maneuver; at amplitude 1, so that cases of all amplitudes share it."""
+def _parts(maneuver: Corners | Steps, rate_hz: float) -> tuple[tuple[int, int, Coefficients], ...]:
+    """The open-loop steps of a maneuver and the level parts between them.
+
+    The maneuver has amplitude 1, so that cases of all amplitudes share them.
+
+    Returns:
+        for each part: its first sample, the sample after its last, its acceleration coefficients.
+    """
     pose = Pose((0.0, 0.0, 0.0), 0.0)
     times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
     commanded_coefficients = [maneuver.at(float(time), pose).coefficients for time in times]
@@ -189,5 +181,5 @@ def _pattern(maneuver: Corners | Steps, rate_hz: float) -> _Pattern:
         coefficients or level for coefficients in commanded_coefficients[steps[0] : steps[-1] + 1]
     ]
     ends = [k for k in range(1, len(targets)) if targets[k] != targets[k - 1]]
-    parts = zip((0, *ends), (*ends, len(targets)), strict=True)
-    return _Pattern(len(targets), tuple((begin, end, targets[begin]) for begin, end in parts))
+    bounds = pairwise((0, *ends, len(targets)))
+    return tuple((begin, end, targets[begin]) for begin, end in bounds)

@@ -4,6 +4,7 @@ import hashlib
 import struct
 from collections.abc import Mapping, Sequence
 from math import isfinite, nan
+from statistics import fmean
 from typing import Any
 
 import numpy as np
@@ -54,7 +55,7 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     Returns:
         value by name of the outcome; empty without a closed-loop maneuver or without `truth`.
     """
-    rows = summary.trace.tracking_rows()
+    rows = summary.trace.tracking.rows()
     parts = settled_parts(rows, summary.trace.maneuvers)
     figures: dict[str, float] = {}
     if len(truth) and parts:
@@ -93,17 +94,15 @@ def _horizontal_errors(estimated_rows: Floats, true_rows: Floats) -> dict[str, f
 
 def response(summary: Summary) -> dict[str, float]:
     """Outcomes of the response to acceleration steps; empty if there were none."""
-    response_figures = summary.response()
-    if response_figures is None:
+    steps = summary.response()
+    if steps is None:
         return {}
-    constants = [response_figures.time_constant_north_s, response_figures.time_constant_east_s]
-    finite_constants = [value for value in constants if isfinite(value)]
+    axes = steps.time_constant_north_s, steps.time_constant_east_s
+    constants = [value for value in axes if isfinite(value)]
     return {
-        "cross_axis_max": response_figures.cross_axis_max,
-        "model_deviation_max": response_figures.model_deviation_max,
-        "time_constant_s": sum(finite_constants) / len(finite_constants)
-        if finite_constants
-        else nan,
+        "cross_axis_max": steps.cross_axis_max,
+        "model_deviation_max": steps.model_deviation_max,
+        "time_constant_s": fmean(constants) if constants else nan,
     }
 
 

@@ -8,7 +8,6 @@ from companion.campaign import folder, store
 from companion.campaign.campaign import Campaign
 from companion.campaign.flight import fly_case
 from companion.campaign.loading import load
-from companion.campaign.swept import Value
 from companion.campaign.versions import difference, versions
 from companion.files.yaml_file import ConfigError
 from companion.recording.folder import flight_folder
@@ -20,8 +19,6 @@ _CASES_FOLDER = "cases"
 class Rerun(NamedTuple):
     """A case that was flown again."""
 
-    row: dict[str, Value]
-    """Results of the repeated flight, as one row."""
     folder: Path
     """Folder of the recorded flight."""
     identical: bool
@@ -57,14 +54,14 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
         )
     stored_row = _stored_row(campaign_folder, campaign, description, index)
     if stored_row is None:
-        return Rerun(row, recording, True, (*lines, "The campaign has not flown this case yet."))
+        return Rerun(recording, True, (*lines, "The campaign has not flown this case yet."))
     changed_columns = [name for name, value in stored_row.items() if row.get(name) != value]
     lines.append(
         f"It differs from the campaign's flight in {', '.join(changed_columns)}."
         if changed_columns
         else f"It is bit-identical to the campaign's flight: digest {row['digest']}."
     )
-    return Rerun(row, recording, not changed_columns, tuple(lines))
+    return Rerun(recording, not changed_columns, tuple(lines))
 
 
 def _stored_row(

@@ -153,11 +153,9 @@ class _Run:
         """Run the campaign with a progress bar; return the exit code."""
         with progress_bar(self._console, TextColumn("{task.description}")) as bar:
             task = bar.add_task(self._noun, total=description.cases)
-
-            def show(progress: engine.Progress) -> None:
+            progress = engine.Progress()
+            for progress in engine.run(client, self._campaign, description, self._folder):
                 bar.update(task, completed=progress.flown_cases)
-
-            progress = engine.run(client, self._campaign, description, self._folder, show)
         return self._report_end(progress, description)
 
     def _report_end(self, progress: engine.Progress, description: Description) -> int:

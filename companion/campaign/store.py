@@ -56,10 +56,7 @@ def schema(file: CampaignFile) -> "pa.Schema":
         name: {**swept.description(), "unit": unit_of(name)} for name, swept in file.sweep.items()
     }
     contents = {"name": file.name, "kind": file.kind, "factors": factor_metadata}
-    return pa.schema(
-        [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, kind in columns],
-        metadata={METADATA_KEY: json.dumps(contents).encode()},
-    )
+    return pa.schema(columns, metadata={METADATA_KEY: json.dumps(contents).encode()})
 
 
 def _column_type(file: CampaignFile, name: str) -> str:

@@ -59,7 +59,7 @@ def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
         return [fly_case(case) for case in cases]
     from companion.campaign import kinematics  # noqa: PLC0415  imports much
 
-    return kinematics.run_cases(cases)
+    return [kinematics.run_case(case) for case in cases]
 
 
 def _run_timed(kind: str, cases: Sequence[Case]) -> UnitResult:

@@ -87,8 +87,6 @@ class StepRows:
     """Writes the channels of guidance, and the vehicle as 3D viewers draw it (ENU)."""
 
     def __init__(self) -> None:
-        self._transform = cdr.PoseEncoder("world", "vehicle")
-        self._pose = cdr.PoseEncoder("world")
         self._scene = SceneRows()
         self._count = 0
 
@@ -112,11 +110,11 @@ class StepRows:
 
     def _draw(self, writer: McapWriter, time_ns: int, output: StepOutput) -> None:
         pose = (*_east_north_up(output.inputs.now.position_ned), *_enu_from_flu(output.q))
-        writer.message("/tf", time_ns, self._transform.message(time_ns, pose))
-        writer.message("/pose", time_ns, self._pose.message(time_ns, pose))
+        writer.message("/tf", time_ns, cdr.pose_message(time_ns, pose, "world", "vehicle"))
+        writer.message("/pose", time_ns, cdr.pose_message(time_ns, pose, "world"))
         # Drawn with the attitude of the vehicle, because a reference has none.
         reference_pose = (*_east_north_up(output.reference.position_ned), *_enu_from_flu(output.q))
-        writer.message("/reference", time_ns, self._pose.message(time_ns, reference_pose))
+        writer.message("/reference", time_ns, cdr.pose_message(time_ns, reference_pose, "world"))
 
 
 def _input_row(inputs: StepInput) -> tuple[float, ...]:

@@ -75,7 +75,7 @@ class DeadTimeWatch:
             first_row = self._row_counts[0]
             name = _AXES[self._measurements % len(_AXES)]
             self._measurements += 1
-            self._judge_axis(name, self._dead_time(name, self._trace.rates_rows(first_row)))
+            self._judge_axis(name, self._dead_time(name, self._trace.rates.rows(first_row)))
 
     def measure_whole_flight(self) -> DeadTimes:
         """Measure the dead times over the last `_MAX_ROWS` rows of the flight.
@@ -83,7 +83,7 @@ class DeadTimeWatch:
         Warn if a configured dead time is wrong, unless a warning was given already.
         """
         first_row = max(0, len(self._trace.rates) - _MAX_ROWS)
-        rows = self._trace.rates_rows(first_row)
+        rows = self._trace.rates.rows(first_row)
         ages = rows[:, _AGE_COLUMN]
         ages = ages[np.isfinite(ages)]
         measured = DeadTimes(

@@ -12,12 +12,11 @@ from collections.abc import Callable, Sequence
 from math import inf
 from pathlib import Path
 from time import monotonic, sleep
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
 from companion.files.os_errors import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 T = TypeVar("T")
-Item_contra = TypeVar("Item_contra", contravariant=True)
 
 _CHECK_PERIOD = 0.05
 """Time between two checks for new items, s."""
@@ -31,26 +30,11 @@ _SYNC_PERIOD = 0.5
 """Time between two syncs to the disk, s. A power cut loses what was written since the last one."""
 
 
-class ItemFile(Protocol[Item_contra]):
-    """The format of a `BackgroundFile`. Only the thread that writes the file calls it."""
-
-    def write(self, items: Sequence[Item_contra]) -> None:
-        """Write items. Raises OSError if the disk is full or has failed."""
-        ...
-
-    def sync(self) -> None:
-        """Wait until all items are on the disk. Raises OSError like `write`."""
-        ...
-
-    def close(self, *, complete: bool) -> None:
-        """Close the file; if `complete`, first write its end, such as an index. Raises OSError."""
-        ...
-
-
 class BackgroundFile(ABC, Generic[T]):
     """Writes items to a file in its own thread; it never delays or ends a flight.
 
-    `put` takes items also before `open`. They are written once the file is open.
+    `put` takes items also before `open`. They are written once the file is open. A subclass gives
+    the format of the file; only the thread calls its methods `_write`, `_sync` and `_end`.
 
     Attributes:
         path: path of the file.
@@ -79,8 +63,20 @@ class BackgroundFile(ABC, Generic[T]):
         self._synced_at = -inf  # the first items are on the disk at once
 
     @abstractmethod
-    def _make_file(self) -> ItemFile[T]:
+    def _create(self) -> None:
         """Create the file. Raises OSError if that is impossible."""
+
+    @abstractmethod
+    def _write(self, items: Sequence[T]) -> None:
+        """Write items. Raises OSError if the disk is full or has failed."""
+
+    @abstractmethod
+    def _sync(self) -> None:
+        """Wait until all items are on the disk. Raises OSError like `_write`."""
+
+    @abstractmethod
+    def _end(self, *, complete: bool) -> None:
+        """Close the file; if `complete`, first write its end, such as an index. Raises OSError."""
 
     def open(self) -> None:
         """Create the file, and begin to write.
@@ -88,10 +84,8 @@ class BackgroundFile(ABC, Generic[T]):
         Raises:
             OSError: the file cannot be created.
         """
-        file = self._make_file()
-        self._thread = threading.Thread(
-            target=self._run, args=(file,), name=self.path.name, daemon=True
-        )
+        self._create()
+        self._thread = threading.Thread(target=self._run, name=self.path.name, daemon=True)
         self._thread.start()
 
     @property
@@ -125,34 +119,34 @@ class BackgroundFile(ABC, Generic[T]):
                 self.dropped += len(self._waiting)
                 self._fail(DISK_HANGS)
 
-    def _run(self, file: ItemFile[T]) -> None:
+    def _run(self) -> None:
         while not self._closing.wait(_CHECK_PERIOD):
-            self._write_waiting(file)
-            self._sync_when_due(file)
-        self._write_waiting(file)
-        self._catch_failure(lambda: file.close(complete=self.failure is None))
+            self._write_waiting()
+            self._sync_when_due()
+        self._write_waiting()
+        self._catch_failure(lambda: self._end(complete=self.failure is None))
 
-    def _write_waiting(self, file: ItemFile[T]) -> None:
+    def _write_waiting(self) -> None:
         """Write the items that are waiting now; items that arrive later wait for the next call."""
         remaining = len(self._waiting)
         size = max(_SMALLEST_SLICE, -(-remaining // _MOST_SLICES))
         while remaining > 0:
             items = [self._waiting.popleft() for _ in range(min(size, remaining))]
             remaining -= len(items)
-            self._write_slice(file, items)
-            self._sync_when_due(file)
+            self._write_slice(items)
+            self._sync_when_due()
             if not self._closing.is_set():
                 sleep(_SLICE_PAUSE)
 
-    def _write_slice(self, file: ItemFile[T], items: Sequence[T]) -> None:
+    def _write_slice(self, items: Sequence[T]) -> None:
         if self.failure is None:
-            self._catch_failure(lambda: file.write(items))
+            self._catch_failure(lambda: self._write(items))
         if self.failure is not None:
             self.dropped += len(items)
 
-    def _sync_when_due(self, file: ItemFile[T]) -> None:
+    def _sync_when_due(self) -> None:
         if self.failure is None and monotonic() - self._synced_at >= _SYNC_PERIOD:
-            self._catch_failure(file.sync)
+            self._catch_failure(self._sync)
             self._synced_at = monotonic()
 
     def _catch_failure(self, work: Callable[[], None]) -> None:

@@ -127,7 +127,8 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
             "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         )
         next_step = "" if interrupted else f"; then: {remedy}"
-        armed = "is armed" if _final_silence(figures) is None else "was armed when last heard"
+        is_heard = figures["at_the_end"].get("unheard_s") is None
+        armed = "is armed" if is_heard else "was armed when last heard"
         remedy = f"the vehicle {armed}: {first_step}{next_step}"
     result = figures["result"].rstrip(".")
     return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
@@ -154,14 +155,9 @@ def _when_ended(end: dict[str, Any]) -> str:
     return words
 
 
-def _final_silence(figures: Figures) -> float | None:
-    """How long the vehicle was silent before the flight ended, s; None: it was heard."""
-    silence: float | None = figures["at_the_end"].get("unheard_s")
-    return silence
-
-
 def _vehicle_state(figures: Figures) -> str:
-    state, silence = figures["at_the_end"], _final_silence(figures)
+    state = figures["at_the_end"]
+    silence = state.get("unheard_s")  # s; None: the vehicle was heard
     heard = "now" if silence is None else f"when last heard, {silence:.1f} s before the end"
     armed = {True: "ARMED", False: "disarmed", None: "not known whether armed"}[state["armed"]]
     mode = "" if state["mode"] is None else f", in mode {state['mode']}"

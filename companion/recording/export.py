@@ -4,9 +4,9 @@ Three more tables join several channels: `tracking`, `rates` and `response` (see
 figures of the summary are computed from them.
 """
 
+import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,12 @@ from companion.recording.measurements.recorded_summary import trace_of
 _JOINED_TABLES = ("tracking", "rates", "response")
 
 
-class Table(NamedTuple):
-    """A table: its name, and its columns by name."""
-
-    name: str
-    columns: dict[str, NDArray[np.generic]]
+Columns = dict[str, NDArray[np.generic]]
+"""The columns of a table, by name."""
 
 
-def tables(record: FlightRecord) -> Iterator[Table]:
-    """All tables of a flight that have rows.
+def tables(record: FlightRecord) -> Iterator[tuple[str, Columns]]:
+    """Name and columns of each table of a flight that has rows.
 
     Raises:
         RecordError: the record is not valid.
@@ -36,12 +33,12 @@ def tables(record: FlightRecord) -> Iterator[Table]:
         rows = record.rows(channel.name)
         if len(rows):
             names = rows.dtype.names or ()
-            yield Table(channel.name, {name: rows[name] for name in names})
+            yield channel.name, {name: rows[name] for name in names}
     trace = trace_of(record)
     for name in _JOINED_TABLES:
         series = getattr(trace, name)
         if len(series):
-            yield Table(name, dict(zip(series.columns, series.rows().T, strict=True)))
+            yield name, dict(zip(series.columns, series.rows().T, strict=True))
 
 
 def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
@@ -56,10 +53,10 @@ def export_csv(record: FlightRecord, folder: Path) -> dict[Path, int]:
     row_counts = {}
     for name, columns in tables(record):
         path = folder / f"{name}.csv"
-        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
         with path.open("w", encoding="utf-8") as file:
-            file.write(",".join(columns) + "\n")
-            file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
         row_counts[path] = _row_count(columns)
     return row_counts
 
@@ -84,5 +81,5 @@ def export_parquet(record: FlightRecord, folder: Path) -> dict[Path, int]:
     return row_counts
 
 
-def _row_count(columns: dict[str, NDArray[np.generic]]) -> int:
-    return max(map(len, columns.values()), default=0)
+def _row_count(columns: Columns) -> int:
+    return len(next(iter(columns.values())))

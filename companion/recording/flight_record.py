@@ -19,13 +19,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.files import bounded_yaml
-from companion.files.bounded_file import FileRefusedError, read_text
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.mcap_file.fields import Rows
@@ -35,8 +32,6 @@ from companion.recording.trace import ManeuverMark
 
 RECORD_FILE = "flight.mcap"
 _CHANNEL_BY_NAME = {channel.name: channel for channel in CHANNELS}
-_LONGEST_CONFIGURATION = 1 << 20
-"""Largest `config.yaml` that is read, bytes."""
 
 
 class RecordError(Exception):
@@ -171,22 +166,6 @@ class FlightRecord:
                 ValuesChange(time, at_once != 0.0, json.loads(values))
                 for (time, at_once), (values,) in messages
             )
-
-    @cached_property
-    def configuration(self) -> dict[str, Any]:
-        """The complete configuration by section, as in the flight's `config.yaml`.
-
-        Raises:
-            RecordError: the configuration is missing or damaged.
-        """
-        try:
-            text = read_text(self.folder / "config.yaml", _LONGEST_CONFIGURATION)
-            configuration = bounded_yaml.parse(text)
-        except (FileRefusedError, bounded_yaml.YamlError) as error:
-            raise RecordError(f"{self.folder / 'config.yaml'}: {error}") from error
-        if not isinstance(configuration, dict):
-            raise RecordError(f"{self.folder / 'config.yaml'}: not a configuration")
-        return configuration
 
     def _decoded(
         self, topic: str, numbers: int, texts: int

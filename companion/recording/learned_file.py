@@ -1,7 +1,6 @@
 """Drag that flights have learned, stored for the next flight: one small file for each vehicle."""
 
 import json
-from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -102,6 +101,6 @@ def _parsed(path: Path) -> LearnedDrag:
 
 
 def _number(value: Any, most: float) -> float:
-    if type(value) not in (int, float) or not isfinite(value) or not 0.0 <= value <= most:
+    if type(value) not in (int, float) or not 0.0 <= value <= most:
         raise ValueError(value)
     return float(value)

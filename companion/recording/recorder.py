@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from math import nan
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
@@ -25,14 +25,8 @@ Encoder = Callable[[McapWriter, int, Any], None]
 runs in vehicle time: since the vehicle's boot); the values."""
 
 
-class Entry(NamedTuple):
-    """One entry, from which the thread makes messages."""
-
-    time: float
-    """Time on our clock, s."""
-    encoder: Encoder
-    values: Any
-    """Arguments of the encoder; they must not change any more."""
+Entry = tuple[float, Encoder, Any]
+"""Time on our clock, s; an encoder; and its values, which must not change any more."""
 
 
 class FlightRecorder(BackgroundFile[Entry]):
@@ -61,9 +55,25 @@ class FlightRecorder(BackgroundFile[Entry]):
         self._on_bad_entry, self._stream = on_bad_entry, stream
         super().__init__(path, _MOST_WAITING, on_failure)
 
-    def _make_file(self) -> "_McapEntryFile":
-        writer = McapWriter(self.path, self._stream)
-        return _McapEntryFile(writer, self._epoch, self._count_dropped)
+    def _create(self) -> None:
+        self._writer = McapWriter(self.path, self._stream)
+
+    def _write(self, items: Sequence[Entry]) -> None:
+        writer, epoch_ns = self._writer, round(self._epoch * 1e9)
+        for time, encoder, values in items:
+            try:
+                encoder(writer, epoch_ns + round(time * 1e9), values)
+            except OSError:
+                raise
+            except Exception as error:  # one bad entry must not end the record of the flight
+                self._count_dropped(error)
+        writer.stream()
+
+    def _sync(self) -> None:
+        self._writer.flush()
+
+    def _end(self, *, complete: bool) -> None:
+        self._writer.close(complete=complete)
 
     def _count_dropped(self, error: Exception) -> None:
         """Count an entry that cannot be recorded; report the first one."""
@@ -74,7 +84,7 @@ class FlightRecorder(BackgroundFile[Entry]):
 
     def add(self, time: float, encoder: Encoder, values: Any) -> None:
         """Record an entry at `time`, s on our clock."""
-        self.put(Entry(time, encoder, values))
+        self.put((time, encoder, values))
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Record metadata."""
@@ -135,31 +145,6 @@ class FlightRecorder(BackgroundFile[Entry]):
     def row(self, time: float, channel: Channel, values: Sequence[float]) -> None:
         """Record a message of a numeric channel: the float64 columns, then the uint8 columns."""
         self.add(time, _write_row, (channel, values))
-
-
-class _McapEntryFile:
-    """Writes entries to a `.mcap`; calls `drop` with the reason why an entry cannot be recorded."""
-
-    def __init__(self, writer: McapWriter, epoch: float, drop: Callable[[Exception], None]) -> None:
-        self._writer, self._count_dropped = writer, drop
-        self._epoch_ns = round(epoch * 1e9)
-
-    def write(self, items: Sequence[Entry]) -> None:
-        writer, epoch_ns = self._writer, self._epoch_ns
-        for time, encoder, values in items:
-            try:
-                encoder(writer, epoch_ns + round(time * 1e9), values)
-            except OSError:
-                raise
-            except Exception as error:  # one bad entry must not end the record of the flight
-                self._count_dropped(error)
-        writer.stream()
-
-    def sync(self) -> None:
-        self._writer.flush()
-
-    def close(self, *, complete: bool) -> None:
-        self._writer.close(complete=complete)
 
 
 def _metadata(writer: McapWriter, _: int, values: tuple[str, Mapping[str, str]]) -> None:

@@ -18,7 +18,7 @@ def flight_table(summary: Summary) -> RenderableType:
     if summary.maneuvers():
         parts.append(_tracking(summary))
     if len(summary.trace.rates):
-        parts += _dead_times(summary)
+        parts.append(_dead_times(summary))
     if summary.predictive is not None:
         parts.append(_predictive_words(summary.predictive))
     if summary.counts.setpoints:
@@ -75,12 +75,12 @@ def _response(summary: Summary) -> RenderableType:
     return table
 
 
-def _dead_times(summary: Summary) -> list[RenderableType]:
+def _dead_times(summary: Summary) -> RenderableType:
     """Measured and configured dead times."""
     dead_times = summary.dead_times
     if not dead_times.lag_known:
         words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
-        return [Text(words, style="dim")]
+        return Text(words, style="dim")
     table = _empty_table(
         "Dead time, from a sample to the effect of its setpoint", "measured", "configured"
     )
@@ -93,7 +93,7 @@ def _dead_times(summary: Summary) -> list[RenderableType]:
         table.add_row(
             "of which sample age (p50, p99)", f"{1e3 * age.p50:.1f}, {1e3 * age.p99:.1f} ms", ""
         )
-    return [table]
+    return table
 
 
 def _milliseconds(value: float | None) -> str:

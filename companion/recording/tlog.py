@@ -36,27 +36,21 @@ class TlogWriter(BackgroundFile[TimedFrame]):
         super().__init__(path, _MOST_WAITING, on_failure)
         self._epoch = epoch
 
-    def _make_file(self) -> "_TlogFile":
-        return _TlogFile(self.path, self._epoch)
-
     def __call__(self, time: float, frame: bytes) -> None:
         """Take a frame that was seen at `time`, s on the flight's clock."""
         self.put((time, frame))
 
+    def _create(self) -> None:
+        self._file = self.path.open("wb", buffering=1 << 16)
 
-class _TlogFile:
-    def __init__(self, path: Path, epoch: float) -> None:
-        self._epoch = epoch
-        self._file = path.open("wb", buffering=1 << 16)
-
-    def write(self, items: Sequence[TimedFrame]) -> None:
+    def _write(self, items: Sequence[TimedFrame]) -> None:
         epoch, write = self._epoch, self._file.write
         for time, frame in items:
             write(_STAMP.pack(round((epoch + time) * 1e6)) + frame)
         self._file.flush()
 
-    def sync(self) -> None:
+    def _sync(self) -> None:
         os.fsync(self._file.fileno())
 
-    def close(self, *, complete: bool) -> None:
+    def _end(self, *, complete: bool) -> None:
         self._file.close()

@@ -4,9 +4,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from companion.attitude import BodyRates, Quaternion, Target
 from companion.recording.mcap_file.channels import MOTION
 from companion.recording.measurements.verdict import LOST_ROWS
@@ -126,15 +123,3 @@ class FlightTrace:
             return None
         why = self._spool.failure or "the disk was too slow"
         return f"{lost} {LOST_ROWS}: {why}"
-
-    def response_rows(self) -> NDArray[np.float64]:
-        """(N, 7), rows of `response`."""
-        return self.response.rows()
-
-    def tracking_rows(self) -> NDArray[np.float64]:
-        """(N, 7), rows of `tracking`."""
-        return self.tracking.rows()
-
-    def rates_rows(self, since: int = 0) -> NDArray[np.float64]:
-        """(N, 10), rows of `rates`, from row number `since` on."""
-        return self.rates.rows(since)

@@ -41,30 +41,29 @@ def recorded_inputs(record: FlightRecord) -> Iterator[RecordedInput]:
         RecordError: a recorded input is not valid.
     """
     with record_errors(record.folder):
-        yield from _ordered_entries(_Messages(record))
-
-
-def _ordered_entries(messages: "_Messages") -> Iterator[RecordedInput]:
-    while (topic := messages.next_topic()) is not None:
-        if topic == SAMPLE.topic:
-            row = messages.take(SAMPLE)
-            answered = row["unanswered"] == 0
-            if answered and messages.next_topic() is None:
-                return  # the record was cut off between the sample and its setpoint
-            yield recorded_sample(row, messages.take(SETPOINT) if answered else None)
-        elif topic == INPUT.topic:
-            row = messages.take(INPUT)
-            target = messages.take(TARGET) if messages.next_topic() == TARGET.topic else None
-            guidance = messages.take(GUIDANCE) if messages.next_topic() == GUIDANCE.topic else None
-            yield recorded_step(row, target, guidance)
-        elif topic == ACTION.topic:
-            yield recorded_action(messages.take(ACTION))
-        elif topic == ATTITUDE_TARGET.topic:
-            yield attitude_target(messages.take(ATTITUDE_TARGET))
-        elif topic == _CHANGE_TOPIC:
-            yield messages.take_change()
-        else:  # an output; the sample or the step before it was not recorded
-            messages.skip(topic)
+        messages = _Messages(record)
+        while (topic := messages.next_topic()) is not None:
+            if topic == SAMPLE.topic:
+                row = messages.take(SAMPLE)
+                answered = row["unanswered"] == 0
+                if answered and messages.next_topic() is None:
+                    return  # the record was cut off between the sample and its setpoint
+                yield recorded_sample(row, messages.take(SETPOINT) if answered else None)
+            elif topic == INPUT.topic:
+                row = messages.take(INPUT)
+                target = messages.take(TARGET) if messages.next_topic() == TARGET.topic else None
+                guidance = (
+                    messages.take(GUIDANCE) if messages.next_topic() == GUIDANCE.topic else None
+                )
+                yield recorded_step(row, target, guidance)
+            elif topic == ACTION.topic:
+                yield recorded_action(messages.take(ACTION))
+            elif topic == ATTITUDE_TARGET.topic:
+                yield attitude_target(messages.take(ATTITUDE_TARGET))
+            elif topic == _CHANGE_TOPIC:
+                yield messages.take_change()
+            else:  # an output; the sample or the step before it was not recorded
+                messages.skip(topic)
 
 
 _CHANGE_TOPIC = "/change"

@@ -1,5 +1,6 @@
 """The result of a replay, as sentences and as a table."""
 
+import csv
 from collections import Counter
 from collections.abc import Sequence
 from math import degrees
@@ -99,14 +100,14 @@ def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
         OSError: the file cannot be written.
     """
     with path.open("w", encoding="utf-8") as file:
-        file.write(",".join(_COLUMNS) + "\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_COLUMNS)
         for each in samples:
-            row = [repr(each.received), repr(each.vehicle_time)]
-            answers = (
-                (each.recorded_setpoint, each.recorded_reason),
-                (each.replayed_setpoint, each.replayed_reason),
+            recorded, replayed = (
+                [""] * 4 if setpoint is None else [*setpoint.rates, setpoint.thrust]
+                for setpoint in (each.recorded_setpoint, each.replayed_setpoint)
             )
-            for setpoint, reason in answers:
-                sent = [""] * 4 if setpoint is None else [*setpoint.rates, setpoint.thrust]
-                row += [str(value) for value in sent] + [reason]
-            file.write(",".join(row) + "\n")
+            times = each.received, each.vehicle_time
+            writer.writerow(
+                (*times, *recorded, each.recorded_reason, *replayed, each.replayed_reason)
+            )

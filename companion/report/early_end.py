@@ -57,12 +57,14 @@ def early_end(
     end = figures["early_end"]
     if end is None:
         return None
-    monitor, reason = end["monitor"], figures["result"]
-    if config is None or monitor is None:
-        return EndMark(end["time_s"], reason)
-    if monitor in ("fence", "braking"):
-        return EndMark(end["time_s"], reason, _fence_side(config, reason, record))
-    return EndMark(end["time_s"], reason, _constant_limits(config).get(monitor))
+    reason, limit = figures["result"], None
+    if config is not None:
+        limit = (
+            _fence_side(config, reason, record)
+            if end["monitor"] in ("fence", "braking")
+            else _constant_limits(config).get(end["monitor"])
+        )
+    return EndMark(end["time_s"], reason, limit)
 
 
 def _constant_limits(config: Config) -> dict[str, CrossedLimit]:

@@ -114,7 +114,7 @@ def recorded_flight(folder: Path) -> FlightData:
         maneuvers=_maneuvers(record, phases),
         events=tuple(each for each in record.events if each.source != "phase"),
         differences=None if config is None else tuple(changed_keys(config)),
-        step_runs=step_runs(trace_of(record).response_rows()),
+        step_runs=step_runs(trace_of(record).response.rows()),
         gain=float(record.metadata["flight"].get("gain_per_s", "nan")),
         early_end=early_end(figures, record, config),
     )

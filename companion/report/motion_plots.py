@@ -50,13 +50,10 @@ def _name(flights: Sequence[FlightData], flight: FlightData, label: str) -> str:
 
 
 def _track_from_above(flights: Sequence[FlightData]) -> Plot:
-    """The track from above."""
     traces = []
+    dashes = {"position": "solid", "reference": "dash"}  # the last is on top
     for number, flight in enumerate(flights):
-        for curve_name, dash in (
-            ("position", "solid"),
-            ("reference", "dash"),
-        ):  # the last is on top
+        for curve_name, dash in dashes.items():
             if curve_name in flight.curves:
                 values = flight.curves[curve_name].values
                 positions = values[even_indices(len(values))]

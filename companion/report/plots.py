@@ -119,9 +119,32 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
 
 
 def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
-    """A line and a label at an early end, for a layout; the label is at the bottom, or `above`."""
-    label = {**_end_label(end), "y": 1.0 if above else 0.0}
-    return {"shapes": [_vertical_line(end.time)], "annotations": [label]}
+    """A line and a label at an early end, for a layout; the label is at the bottom, or `above`.
+
+    The reason is the tooltip of the label.
+    """
+    line_at_end = {
+        "type": "line",
+        "xref": "x",
+        "yref": "paper",
+        "x0": end.time,
+        "x1": end.time,
+        "y0": 0,
+        "y1": 1,
+        "line": {"color": CROSSED_COLOUR, "width": 1.5},
+    }
+    label = {
+        "x": end.time,
+        "yref": "paper",
+        "xanchor": "right",
+        "yanchor": "bottom",
+        "showarrow": False,
+        "text": f"ended {end.time:.1f} s",
+        "hovertext": end.reason,
+        "font": {"size": 11, "color": CROSSED_COLOUR},
+        "y": 1.0 if above else 0.0,
+    }
+    return {"shapes": [line_at_end], "annotations": [label]}
 
 
 def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[dict[str, Any]]:
@@ -173,31 +196,4 @@ def _name_above(span: Span) -> dict[str, Any]:
         "text": span.name,
         "name": f"{span.end - span.begin:.3f}",
         "font": {"size": 11},
-    }
-
-
-def _vertical_line(time: float) -> dict[str, Any]:
-    return {
-        "type": "line",
-        "xref": "x",
-        "yref": "paper",
-        "x0": time,
-        "x1": time,
-        "y0": 0,
-        "y1": 1,
-        "line": {"color": CROSSED_COLOUR, "width": 1.5},
-    }
-
-
-def _end_label(end: EndMark) -> dict[str, Any]:
-    """Time of an early end as a label beside the line, with the reason as a tooltip."""
-    return {
-        "x": end.time,
-        "yref": "paper",
-        "xanchor": "right",
-        "yanchor": "bottom",
-        "showarrow": False,
-        "text": f"ended {end.time:.1f} s",
-        "hovertext": end.reason,
-        "font": {"size": 11, "color": CROSSED_COLOUR},
     }

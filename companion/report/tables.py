@@ -29,8 +29,12 @@ class Table(NamedTuple):
 
 def flight_tables(flight: FlightData) -> list[Table]:
     """The tables about one flight, without empty ones."""
-    figures = flight.figures
-    tables = [] if figures is None else [_maneuver_table(figures), _figure_table(figures)]
+    if flight.figures is None:
+        return []
+    tables = (
+        _maneuver_table(flight.figures),
+        Table("Figures", ("figure", "measured"), list(_figure_rows(flight.figures))),
+    )
     return [table for table in tables if table.rows]
 
 
@@ -113,10 +117,6 @@ def _compared(key: ConfigKey) -> tuple[str, str]:
     if key.name != "endpoint":
         return value, default
     return _PORT_AT_END.sub("", value), _PORT_AT_END.sub("", default)
-
-
-def _figure_table(figures: Any) -> Table:
-    return Table("Figures", ("figure", "measured"), list(_figure_rows(figures)))
 
 
 def _figure_rows(figures: Any) -> Iterator[tuple[str, str]]:

@@ -130,7 +130,7 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
         summary = fly(flown_config, vehicle)
     if summary.result != "ok":
         return TrialResult(summary.result)
-    result = _tracking_figures(summary.trace.tracking_rows(), np.array(rows), vehicle, flown_config)
+    result = _tracking_figures(summary.trace.tracking.rows(), np.array(rows), vehicle, flown_config)
     return replace(result, wind=trial.wind.get("speed_m_s", 0.0))
 
 
@@ -140,7 +140,7 @@ def _tracking_figures(
     """The tracking figures of a flight, over the time in which its reference moved.
 
     Args:
-        tracking: rows of `FlightTrace.tracking_rows`.
+        tracking: rows of `FlightTrace.tracking`.
         truth: rows of `_recorded_truth`.
         vehicle: vehicle after the flight.
         flown_config: configuration of the flight.

@@ -89,8 +89,10 @@ def searched(place, folder, fleet, trials=14):
     with pytest.MonkeyPatch.context() as patch:
         proposal = Proposal({"planner": {"gain_per_s": 5.5}, "limits": {"max_tilt_deg": 30.0}})
         patch.setattr(candidates, "propose", lambda _: proposal)
-        search = Search(made, tune_section(made), folder, fleet, learning_flight=lambda _: None)
-    return search.run(trials), search
+        patch.setattr("companion.campaign.tune.search.learned_config", lambda _: None)
+        search = Search(made, tune_section(made), folder, fleet)
+    *_, found = search.run(trials)
+    return found, search
 
 
 @pytest.fixture(scope="module")

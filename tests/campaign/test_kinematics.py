@@ -23,7 +23,7 @@ from companion.batch.rate_loop import fly_steps
 from companion.batch.step_figures import step_figures
 from companion.campaign import engine, loading, store, unit
 from companion.campaign.case import Fault
-from companion.campaign.kinematics import check_case, run_cases
+from companion.campaign.kinematics import check_case
 from companion.campaign.versions import versions
 from companion.files.yaml_file import ConfigError
 from companion.recording.measurements.response import measure_response
@@ -133,10 +133,10 @@ def campaign(folder, **changes):
 def test_each_case_of_a_batch_is_flown_with_its_own_vehicle_and_target(tmp_path):
     told = campaign(tmp_path)
     cases = list(told.cases())
-    rows = run_cases(cases)
+    rows = unit.run_cases("batch", cases)
     assert [row["case"] for row in rows] == list(range(6))
     assert len({row["digest"] for row in rows}) == 6
-    assert rows == run_cases(cases)
+    assert rows == unit.run_cases("batch", cases)
     for quick, slow in zip(rows[::2], rows[1::2], strict=True):
         assert quick["corners.north_coefficient"] == slow["corners.north_coefficient"]
         assert quick["time_constant_s"] < slow["time_constant_s"] - 0.02
@@ -164,7 +164,7 @@ def test_what_a_batch_cannot_fly_is_refused(tmp_path, told, message):
 def test_a_batch_is_flown_at_once_and_has_one_time(tmp_path):
     cases = list(campaign(tmp_path).cases())
     flown = unit.fly_cases("batch", cases, versions())
-    assert flown.rows == run_cases(cases)
+    assert flown.rows == unit.run_cases("batch", cases)
     assert len(flown.wall_s) == 1
     assert flown.worker == "this process"
     unit.check_cases("batch", cases)
@@ -178,7 +178,7 @@ def test_a_batch_is_flown_at_once_and_has_one_time(tmp_path):
 def test_steps_are_flown_to_both_sides_in_both_axes(tmp_path):
     told = {"flight.maneuvers": ["steps"], "steps.duration_s": 0.4}
     made = campaign(tmp_path, set=told, sweep={"steps.coefficient": [0.02, 0.04]}, samples=1)
-    small, large = run_cases(list(made.cases()))
+    small, large = unit.run_cases("batch", list(made.cases()))
     assert small["ok"]
     assert small["time_constant_s"] == pytest.approx(large["time_constant_s"], rel=0.05)
     assert large["rate_max_rad_s"] == pytest.approx(2.0 * small["rate_max_rad_s"], rel=0.1)

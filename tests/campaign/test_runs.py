@@ -273,13 +273,10 @@ def test_progress_counts_what_earlier_runs_flew(tmp_path, dask, on_dask, capsys)
     campaign, out = load(tmp_path, sweep=TILT), tmp_path / "out"
     description = folder.describe(campaign, 2, None)
     folder.make(out, campaign, description)
-    shown = []
-    engine.run(
-        dask, campaign, description, out, lambda progress: shown.append(progress.flown_cases)
-    )
+    shown = [each.flown_cases for each in engine.run(dask, campaign, description, out)]
     assert shown[0] == 0
     assert sorted(shown[1:])[-1] == 3
-    assert engine.run(dask, campaign, description, out) == Progress(flown_cases=3)
+    assert list(engine.run(dask, campaign, description, out)) == [Progress(flown_cases=3)]
 
 
 def test_a_termination_waits_until_the_cluster_is_made():

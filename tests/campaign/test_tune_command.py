@@ -3,7 +3,6 @@
 import errno
 import os
 from dataclasses import replace
-from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -23,8 +22,8 @@ from companion.campaign.tune.candidates import (
     tune_section,
 )
 from companion.campaign.tune.certainty import compare
-from companion.campaign.tune.scores import score_of
-from companion.campaign.tune.search import Candidate, Search, SearchResults
+from companion.campaign.tune.scores import Candidate, SearchResults, score_of
+from companion.campaign.tune.search import Search
 from companion.campaign.tune.writing import CheckedResult, result_text, summary_lines
 from companion.campaign.versions import VersionError
 from companion.cli.main import main
@@ -44,7 +43,7 @@ def quick(connected, monkeypatch):
     """Candidates are flown by `row_of` on a worker in this process."""
 
     monkeypatch.setattr(command, "cluster_client", connected)
-    monkeypatch.setattr(command, "Search", partial(Search, learning_flight=lambda _: None))
+    monkeypatch.setattr("companion.campaign.tune.search.learned_config", lambda _: None)
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     monkeypatch.setattr(unit, "fly_case", row_of)
 
@@ -234,13 +233,14 @@ def test_a_candidate_whose_keys_do_not_fit_together_is_not_flown(tmp_path, monke
     made = campaign(tmp_path)
     monkeypatch.setattr(candidates, "propose", lambda _: Proposal({}))
     fly = pytest.fail
-    search = Search(made, tune_section(made), tmp_path, fly, learning_flight=lambda _: None)
+    monkeypatch.setattr("companion.campaign.tune.search.learned_config", lambda _: None)
+    search = Search(made, tune_section(made), tmp_path, fly)
 
     def refuse(*_):
         raise ConfigError("a minimum above a maximum")
 
     monkeypatch.setattr("companion.campaign.tune.search.cases", refuse)
-    found = search.run(2)
+    *_, found = search.run(2)
     assert (found.tried_count, found.stopped_early_count, found.best) == (2, 2, None)
 
 

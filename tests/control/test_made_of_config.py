@@ -204,7 +204,7 @@ def test_both_loops_are_made_and_answer_a_sample():
     assert (stamp, tuple(rates)) == (3000, pytest.approx((0.0, 0.0, 0.0), abs=1e-9))
     assert thrust == hover_thrust(CONFIG).normalised_thrust(0.0, SAMPLE.q, SAMPLE.body_rates)
     assert (loop.record.latency_ns, loop.record.missed_deadlines) == (3_003_000, 1)
-    assert len(trace.rates_rows()) == 1
+    assert len(trace.rates.rows()) == 1
     assert loop._deadlines == Deadlines(telemetry_stale=0.09, target_stale=0.14, deadline=0.003)
     assert loop.planner._limits == Limits(radians(30.0), radians(80.0), radians(50.0))
     assert loop._hover_thrust is guidance_loop.learning.hover_thrust

@@ -161,13 +161,12 @@ def test_each_second_step_draws_the_vehicle_and_its_reference_east_north_up():
     half = sqrt(0.5)
     turned = half * (x + y), half * (x - y), half * (w - z), half * (w + z)
     here, there = (2.5, 1.5, 3.5, *turned), (5.0, 4.0, 6.0, *turned)
-    world = cdr.PoseEncoder("world")
-    transform = cdr.PoseEncoder("world", "vehicle").message(88, here)
+    transform = cdr.pose_message(88, here, "world", "vehicle")
     assert kept.messages["/tf"] == 2 * [(88, transform)]
-    assert kept.messages["/pose"] == 2 * [(88, world.message(88, here))]
-    assert kept.messages["/reference"] == 2 * [(88, world.message(88, there))]
+    assert kept.messages["/pose"] == 2 * [(88, cdr.pose_message(88, here, "world"))]
+    assert kept.messages["/reference"] == 2 * [(88, cdr.pose_message(88, there, "world"))]
     level = MADE._replace(q=(1.0, 0.0, 0.0, 0.0))  # towards north: turned left by 90° from east
     rows.step(kept, 88, StepEntry(READ, level, None))
     rows.step(kept, 88, StepEntry(READ, level, None))
-    north = world.message(88, (2.5, 1.5, 3.5, 0.0, 0.0, half, half))
+    north = cdr.pose_message(88, (2.5, 1.5, 3.5, 0.0, 0.0, half, half), "world")
     assert kept.messages["/pose"][-1] == (88, north)

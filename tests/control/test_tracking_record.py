@@ -59,7 +59,7 @@ def test_a_maneuver_is_told_once_and_its_end_is_marked():
         record.add(now, now - 6.0, Reference((1.0, 2.0, -3.0)), HERE)
     assert told == ["maneuver: program"]
     assert trace.maneuvers == [ManeuverMark(10.0, 4.0, "program"), ManeuverMark(21.0, 15.0, None)]
-    rows = trace.tracking_rows()
+    rows = trace.tracking.rows()
     assert rows[0].tolist() == pytest.approx([3.0, 1.0, 2.0, -3.0, 1.5, 2.5, -3.5])
 
 
@@ -74,7 +74,7 @@ def test_a_maneuver_is_told_once_and_its_end_is_marked():
 def test_what_is_no_reference_is_nan(reference, known):
     trace = FlightTrace()
     TrackingRecord(trace, FlownSource()).add(9.0, 3.0, reference, HERE)
-    assert [not isnan(value) for value in trace.tracking_rows()[0, 1:4]] == known
+    assert [not isnan(value) for value in trace.tracking.rows()[0, 1:4]] == known
 
 
 def test_open_loop_before_a_vehicle_has_returned_gives_it_no_more_time_to_return():

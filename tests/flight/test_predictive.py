@@ -56,7 +56,7 @@ def test_from_standing_into_the_circle_it_neither_swings_nor_leaves(tmp_path):
     assert tracking["position_max_m"] <= 0.2
     assert told["flown"] > 600
     assert told["troubles"] == {}
-    rates = summary.trace.rates_rows()
+    rates = summary.trace.rates.rows()
     steady = rates[len(rates) // 3 : len(rates) // 2, 2:5]
     assert steady.std(axis=0).max() <= 0.6  # a limit cycle swings from limit to limit, 4.4 rad/s
 

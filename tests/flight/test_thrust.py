@@ -107,7 +107,7 @@ def test_a_hover_thrust_that_is_far_off_is_told_after_control(learned):
 def height_errors(summary):
     """Vehicle time since control began, s, and the height error, m."""
     assert summary.result == "ok"
-    rows = summary.trace.tracking_rows()
+    rows = summary.trace.tracking.rows()
     return rows[:, 0] - rows[0, 0], np.abs(rows[:, 6] - rows[:, 3])
 
 

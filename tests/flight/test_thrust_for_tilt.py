@@ -88,7 +88,7 @@ def test_a_vehicle_heavier_than_configured_keeps_its_height(
     with mock_vehicle(autopilot=autopilot, **heavy) as mock:
         summary = fly(mock, thrust={"hover_thrust": expected}, **flight)
     assert summary.result == "ok", summary.events
-    rows = summary.trace.tracking_rows()
+    rows = summary.trace.tracking.rows()
     assert np.abs(rows[:, 6] - rows[:, 3]).max() < 0.15, np.abs(rows[:, 6] - rows[:, 3]).max()
     (told,) = [text for _, text in summary.events if "of tilt: the tilt is limited to that" in text]
     assert any(f"the vehicle hovers at a thrust of {hover}" in told for hover in hovers), told

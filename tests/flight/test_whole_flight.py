@@ -53,7 +53,7 @@ def test_one_seed_gives_one_log_to_the_bit(twice):
     assert first.stat().st_size > 1_000_000
     assert first.read_bytes() == second.read_bytes()
     assert twice[0].events == twice[1].events
-    rows, again = (summary.trace.tracking_rows() for summary in twice)
+    rows, again = (summary.trace.tracking.rows() for summary in twice)
     assert rows == pytest.approx(again, nan_ok=True)
 
 

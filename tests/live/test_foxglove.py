@@ -17,6 +17,7 @@ from websockets.sync.client import connect
 
 from companion.cli.main import main
 from companion.config import Config
+from companion.config.files import load
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.session import Session
@@ -125,10 +126,10 @@ def test_the_vehicle_its_paths_and_the_fence_are_drawn(flown):
 
     (fence,) = decoded(record, "/fence")[0][1].entities
     corners = np.array([(each.x, each.y, each.z) for each in fence.lines[0].points])
-    limits = record.configuration["limits"]
+    limits = load(record.folder / "config.yaml").limits
     radii = np.hypot(*corners[:, :2].T)
-    assert radii == pytest.approx(np.full(len(radii), limits["fence_radius_m"]), abs=0.3)
-    heights = limits["fence_floor_m"], limits["fence_ceiling_m"] + 2.0
+    assert radii == pytest.approx(np.full(len(radii), limits.fence_radius_m), abs=0.3)
+    heights = limits.fence_floor_m, limits.fence_ceiling_m + 2.0
     assert (corners[:, 2].min(), corners[:, 2].max()) == pytest.approx(heights, abs=0.4)
 
 

@@ -43,56 +43,51 @@ def test_numpy_rates_are_recorded_and_a_bad_entry_costs_itself_alone(tmp_path):
     assert setpoint["commanded_yaw_rad_s"] == 0.5
 
 
-class Slices:
+class Slices(BackgroundFile):
     """A file that keeps how many items came at a time; `answers` is set while the disk does."""
 
-    def __init__(self):
+    def __init__(self, path, told=None):
+        super().__init__(path, 10_000, told)
         self.sizes, self.answers = [], threading.Event()
 
-    def write(self, items):
+    def _create(self):
+        pass
+
+    def _write(self, items):
         self.answers.wait(10.0)
         self.sizes.append(len(items))
 
-    def sync(self):
+    def _sync(self):
         pass
 
-    def close(self, *, complete):
+    def _end(self, *, complete):
         pass
-
-
-class ToSlices(BackgroundFile):
-    def __init__(self, path, told=None):
-        super().__init__(path, 10_000, told)
-        self.file = Slices()
-
-    def _make_file(self):
-        return self.file
 
 
 @pytest.mark.parametrize(("count", "size"), [(110, 20), (5000, 100)])
 def test_what_waits_is_written_in_slices(tmp_path, count, size):
-    writer = ToSlices(tmp_path / "file")
-    writer.file.answers.set()
+    writer = Slices(tmp_path / "file")
+    writer.answers.set()
     for number in range(count):
         writer.put(number)
     with writer:
         pass
-    assert sum(writer.file.sizes) == count
-    assert max(writer.file.sizes) == size
+    assert sum(writer.sizes) == count
+    assert max(writer.sizes) == size
     assert writer.dropped == 0
 
 
 def test_a_disk_that_does_not_answer_does_not_keep_the_flight_from_ending(tmp_path, monkeypatch):
     monkeypatch.setattr(background_file, "DISK_TIMEOUT", 0.1)
     told = []
-    writer = ToSlices(tmp_path / "file", told.append)
+    writer = Slices(tmp_path / "file", told.append)
     for number in range(50):
         writer.put(number)
     writer.open()
     writer.close()
     (text,) = told
     assert "did not answer" in text
-    writer.file.answers.set()
+    writer.answers.set()
 
 
 def test_figures_do_not_wait_for_such_a_disk_either(tmp_path, monkeypatch):
@@ -112,31 +107,28 @@ def test_figures_do_not_wait_for_such_a_disk_either(tmp_path, monkeypatch):
 class Refusing(Slices):
     """A file that cannot be written."""
 
-    def __init__(self):
-        super().__init__()
-        self.complete = None
+    complete = None
 
-    def write(self, items):
+    def _write(self, items):
         raise ValueError("no such item")
 
-    def close(self, *, complete):
+    def _end(self, *, complete):
         self.complete = complete
 
 
 def test_an_item_that_cannot_be_written_ends_the_recording_and_not_the_flight(tmp_path):
-    writer = ToSlices(tmp_path / "file")  # nobody is told
-    writer.file = Refusing()
+    writer = Refusing(tmp_path / "file")  # nobody is told
     for number in range(30):
         writer.put(number)
     with writer:
         pass
     assert writer.failure.endswith("internal error: ValueError('no such item'); the flight goes on")
     assert writer.dropped == 30
-    assert writer.file.complete is False
+    assert writer.complete is False
 
 
 def test_a_file_that_was_never_opened_can_be_closed(tmp_path):
-    writer = ToSlices(tmp_path / "file")
+    writer = Slices(tmp_path / "file")
     writer.close()
     assert writer.failure is None
     assert list(tmp_path.iterdir()) == []

@@ -47,6 +47,7 @@ def test_the_newest_is_the_vehicle_that_flew_last(tmp_path):
             for key in GOOD
             for value in (-0.1, 1e9, float("nan"), float("inf"), None, "0.3", True, [0.3])
         ),
+        json.dumps({**GOOD, "drag_per_s": 10**400}),  # more than a float holds
         json.dumps({key: value for key, value in GOOD.items() if key != "drag_per_s"}),
     ],
     ids=lambda text: text[:70],

@@ -43,7 +43,7 @@ def trace_of(tau, bend=0.0, directions=(NORTH, EAST), wind=(0.0, 0.0), size=0.2,
     "tau", [0.2, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.1, 0.34))]
 )
 def test_time_constants_are_recovered(tau):
-    response = measure_response(trace_of(tau).response_rows(), gain=1 / tau)
+    response = measure_response(trace_of(tau).response.rows(), gain=1 / tau)
     assert response.time_constant_north_s == pytest.approx(tau, rel=1e-3)
     assert response.time_constant_east_s == pytest.approx(tau, rel=1e-3)
     assert response.cross_axis_max == pytest.approx(0.0, abs=1e-9)
@@ -51,14 +51,14 @@ def test_time_constants_are_recovered(tau):
 
 
 def test_deviation_and_cross_axis_are_seen():
-    response = measure_response(trace_of(0.3, bend=0.02).response_rows(), gain=5.0)
+    response = measure_response(trace_of(0.3, bend=0.02).response.rows(), gain=5.0)
     assert response.cross_axis_max == pytest.approx(0.02, rel=0.05)
     assert 0.03 < response.model_deviation_max < 0.1
 
 
 @pytest.mark.parametrize("wind", [(0.0, 0.0), (-0.4, 0.02), (0.3, 0.3)])
 def test_wind_changes_neither_the_size_of_the_steps_nor_the_axes_that_were_flown(wind):
-    response = measure_response(trace_of(0.3, directions=[NORTH], wind=wind).response_rows(), 5.0)
+    response = measure_response(trace_of(0.3, directions=[NORTH], wind=wind).response.rows(), 5.0)
     assert response.step_size == pytest.approx(0.2)
     assert response.time_constant_north_s == pytest.approx(0.3, rel=1e-3)
     assert math.isnan(response.time_constant_east_s)
@@ -75,7 +75,7 @@ def test_wind_changes_neither_the_size_of_the_steps_nor_the_axes_that_were_flown
 def test_a_doublet_is_named_by_the_nearest_point_of_the_compass(degrees, words):
     angle = math.radians(degrees)
     way, wind = (math.cos(angle), math.sin(angle)), (0.1, -0.3)
-    (run,) = step_runs(trace_of(0.3, directions=[way], wind=wind).response_rows())
+    (run,) = step_runs(trace_of(0.3, directions=[way], wind=wind).response.rows())
     assert run.compass_point == words
     assert run.direction == pytest.approx(way)
 
@@ -86,10 +86,10 @@ def trace_in_wind():
 
 
 def test_the_tilt_that_balances_the_wind_is_no_part_of_a_step():
-    response = measure_response(trace_in_wind().response_rows(), gain=5.0)
+    response = measure_response(trace_in_wind().response.rows(), gain=5.0)
     assert response.step_size == pytest.approx(0.25, abs=0.03)
     assert response.target_tilt == pytest.approx(math.asin(math.hypot(0.55, 0.3)))
-    calm = measure_response(trace_of(0.3).response_rows(), gain=5.0)
+    calm = measure_response(trace_of(0.3).response.rows(), gain=5.0)
     assert (calm.step_size, calm.target_tilt) == pytest.approx((0.2, math.asin(0.2)))
 
 
@@ -119,7 +119,7 @@ def test_speed_and_tilt_of_the_maneuvers_are_not_those_of_the_take_off():
 
 
 def test_without_steps_there_is_no_response():
-    assert measure_response(FlightTrace().response_rows(), 5.0) is None
+    assert measure_response(FlightTrace().response.rows(), 5.0) is None
 
 
 def summary(trace, dead_times=DeadTimes()):  # noqa: B008

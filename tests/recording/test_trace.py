@@ -21,9 +21,9 @@ def noted(rows=ROWS):
 
 
 def test_rows_can_be_had_from_one_on():
-    assert noted().rates_rows().tolist() == [list(map(float, row)) for row in ROWS]
-    assert noted().rates_rows(1).tolist() == [list(map(float, ROWS[1]))]
-    assert noted().rates_rows(2).shape == (0, 10)
+    assert noted().rates.rows().tolist() == [list(map(float, row)) for row in ROWS]
+    assert noted().rates.rows(1).tolist() == [list(map(float, ROWS[1]))]
+    assert noted().rates.rows(2).shape == (0, 10)
 
 
 @pytest.mark.parametrize("name", ["response", "tracking", "rates", "latencies_ns", "motion"])

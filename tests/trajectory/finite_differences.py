@@ -63,8 +63,11 @@ def assert_rests_at_both_ends(trajectory):
         assert abs(sample.heading_rate) < 1e-7
 
 
-def largest(trajectory, derivative, count=20_001):
-    """Largest length of a derivative."""
-    times = np.linspace(0.0, trajectory.duration, count)
-    vectors = [getattr(trajectory.at(t), derivative) for t in times.tolist()]
-    return np.linalg.norm(vectors, axis=1).max()
+def largest(trajectory, *derivatives, count=20_001):
+    """Largest length of each derivative, one number if there is one."""
+    samples = [trajectory.at(t) for t in np.linspace(0.0, trajectory.duration, count).tolist()]
+    lengths = [
+        np.linalg.norm([getattr(sample, each) for sample in samples], axis=1).max()
+        for each in derivatives
+    ]
+    return lengths if len(lengths) > 1 else lengths[0]

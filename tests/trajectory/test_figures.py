@@ -53,7 +53,7 @@ def test_the_jerk_of_figures_is_continuous(figure, share):
     for t in (share * figure.duration, 0.0, figure.duration, *joints):
         before, after = (figure.at(t + d).jerk for d in (-1e-7, 1e-7))
         # A short ramp may lie between two of the 200 places: its own jerk counts, too.
-        scale = 1.0 + max(largest(figure, "jerk", 200), float(np.linalg.norm(before)))
+        scale = 1.0 + max(largest(figure, "jerk", count=200), float(np.linalg.norm(before)))
         np.testing.assert_allclose(before, after, atol=1e-4 * scale)
 
 
@@ -62,7 +62,7 @@ def test_the_jerk_of_figures_is_continuous(figure, share):
 def test_the_peak_speed_is_the_one_asked_for(data, speed, acceleration, laps):
     kind = data.draw(st.sampled_from([gerono_eight, bernoulli_eight, circle]))
     figure = kind(data.draw(_sizes), Laps(speed, laps, acceleration))
-    assert largest(figure, "velocity", 4001) == pytest.approx(speed, rel=1e-5)
+    assert largest(figure, "velocity", count=4001) == pytest.approx(speed, rel=1e-5)
 
 
 def test_the_peak_speed_of_a_helix_counts_its_rise():
@@ -145,9 +145,10 @@ def test_a_line_keeps_its_limits_and_arrives(to, speed, acceleration, jerk, alon
     assert_derivatives_agree(straight, inner_times(straight), jumps=jerk)
     assert_rests_at_both_ends(straight)
     assert straight.at(straight.duration).position == pytest.approx(to)
-    assert largest(straight, "velocity", 500) <= speed * (1 + 1e-9)
-    assert largest(straight, "acceleration", 500) <= acceleration * (1 + 1e-9)
-    assert largest(straight, "jerk", 500) == pytest.approx(jerk)
+    fastest, strongest, jerkiest = largest(straight, "velocity", "acceleration", "jerk", count=500)
+    assert fastest <= speed * (1 + 1e-9)
+    assert strongest <= acceleration * (1 + 1e-9)
+    assert jerkiest == pytest.approx(jerk)
     if along:
         assert straight.at(1.0).heading == pytest.approx(atan2(to[1], to[0]))
 

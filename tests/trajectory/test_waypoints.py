@@ -42,7 +42,7 @@ def test_derivatives_agree_and_the_limits_are_met(points, speed, acceleration, a
     assert_derivatives_agree(path, inner_times(path))
     assert_rests_at_both_ends(path)
     assert path.at(path.duration).position == pytest.approx(points[-1], abs=1e-9)
-    fastest, strongest = (largest(path, name, 2001) for name in ("velocity", "acceleration"))
+    fastest, strongest = largest(path, "velocity", "acceleration", count=2001)
     assert max(fastest / speed, strongest / acceleration) == pytest.approx(1.0, rel=1e-3)
 
 

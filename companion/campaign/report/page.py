@@ -106,7 +106,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         f"Campaign {results.name}",
         shown_plots,
         headline=headline(results),
-        good=not results.count_true("crashed") and bool(_successes(results).all()),
+        good=not results.crashed_count and bool(_successes(results).all()),
         lines=[*missing_cases_note(results), *what_to_look_at(results, by_outcome)],
         tables=[table for table in first_tables if table is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
@@ -145,7 +145,7 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     `by_outcome` holds the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
-    if crashed_count := results.count_true("crashed"):
+    if crashed_count := results.crashed_count:
         yield (
             f"{crashed_count} {results.noun} crashed; they stand first in the table of worst cases."
         )

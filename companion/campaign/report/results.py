@@ -126,6 +126,7 @@ class Results:
         column = self.columns.get(name)
         return column is not None and column.dtype == float and bool(np.isfinite(column).any())
 
-    def count_true(self, name: str) -> int:
-        """Number of cases in which a boolean column is true; null counts as false."""
-        return sum(value is True for value in self.columns.get(name, ()))
+    @property
+    def crashed_count(self) -> int:
+        """Number of cases that crashed."""
+        return sum(value is True for value in self.columns.get("crashed", ()))

@@ -57,20 +57,16 @@ def compare(before: Score, after: Score, samples: int) -> Comparison | None:
     Returns:
         None if fewer than two samples were flown to their end with both configurations.
     """
-    scores = before, after
-    errors = [np.array(score.true_errors).reshape(samples, -1) for score in scores]
+    errors = [np.array(score.true_errors).reshape(samples, -1) for score in (before, after)]
     is_complete = np.isfinite(np.hstack(errors)).all(axis=1)
     count = int(is_complete.sum())
     if count < 2:
         return None
-    before_errors, after_errors = (sample_errors[is_complete] for sample_errors in errors)
+    mean_squares = [np.mean(np.square(each[is_complete]), axis=1) for each in errors]
 
     def pooled_complete(values: tuple[float, ...]) -> float:
         return pooled_rms(np.array(values).reshape(samples, -1)[is_complete])
 
-    mean_squares = [
-        np.mean(np.square(sample_errors), axis=1) for sample_errors in (before_errors, after_errors)
-    ]
     return Comparison(
         _interval(_rms, mean_squares[0]),
         _interval(_rms, mean_squares[1]),

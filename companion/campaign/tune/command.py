@@ -29,9 +29,8 @@ from companion.campaign.tune.candidates import (
     unseen_campaign,
 )
 from companion.campaign.tune.certainty import compare
-from companion.campaign.tune.scores import Row, score_of
-from companion.campaign.tune.search import Fly, Search, SearchResults
-from companion.campaign.tune.storage import StorageError
+from companion.campaign.tune.scores import Row, SearchResults, score_of
+from companion.campaign.tune.search import Fly, Search, StorageError
 from companion.campaign.tune.writing import (
     CheckedResult,
     best_so_far_text,
@@ -112,24 +111,19 @@ def _run_search(search: Search, trials: int, console: Console) -> SearchResults:
 
     `trials` includes the candidates of earlier runs.
     """
-    newest_results = SearchResults()
+    results = SearchResults()
     best_so_far = TextColumn("{task.description}")
     try:
         with progress_bar(console, TextColumn("candidates"), best_so_far) as bar:
             task = bar.add_task("", total=trials)
-
-            def show(results: SearchResults) -> None:
-                nonlocal newest_results
-                newest_results = results
+            for results in search.run(trials):
                 best = "" if results.best is None else f"best {results.best.score.rms:.3f} m"
                 bar.update(task, completed=results.tried_count, description=best)
-
-            show(search.run(trials, show))
     except (StorageError, OSError):
-        if newest_results.best is not None:
-            console.print(best_so_far_text(newest_results.best), end="")
+        if results.best is not None:
+            console.print(best_so_far_text(results.best), end="")
         raise
-    return newest_results
+    return results
 
 
 def _check_and_write(

@@ -1,6 +1,7 @@
-"""The score of a candidate: its errors, and which cases stayed inside the envelope."""
+"""Scores of candidates: their errors, which cases stayed inside the envelope, and the best ones."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import Any, NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.campaign.swept import Value
+from companion.campaign.tune.candidates import Values
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, Value]
@@ -64,6 +66,33 @@ class Score(NamedTuple):
             for name in _ERROR_NAMES
         )
         return cls(true_errors, estimated_errors, estimator_errors, tuple(attributes["inside"]))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A candidate that has flown all its cases."""
+
+    number: int
+    """Number of the trial."""
+    values: Values
+    score: Score
+    """Score on the cases of the search."""
+
+
+@dataclass
+class SearchResults:
+    """The results of a search so far."""
+
+    tried_count: int = 0
+    """Number of all candidates, including those of `stopped_early_count`."""
+    stopped_early_count: int = 0
+    """Number of candidates that were abandoned, or whose keys were refused."""
+    best: Candidate | None = None
+    """Candidate with the smallest error of those that met the constraint, `inside_share`; None:
+    none met it."""
+    near_best: list[Candidate] = field(default_factory=list)
+    """The best tenth, or at least the best three, of the candidates that met the constraint
+    `inside_share`; the best first."""
 
 
 def score_of(rows: Sequence[Row], envelope: float | None) -> Score:

@@ -1,7 +1,7 @@
 """The search with Optuna; it can be interrupted at any time and continued."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,6 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import Tune
 from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
-    Values,
     candidates_near,
     cases,
     clamped_to_search,
@@ -19,9 +18,14 @@ from companion.campaign.tune.candidates import (
     suggested_values,
 )
 from companion.campaign.tune.first_flight import learned_config
-from companion.campaign.tune.scores import Row, Score, pooled_rms, score_of
-from companion.campaign.tune.storage import storage_errors
-from companion.config import Config
+from companion.campaign.tune.scores import (
+    Candidate,
+    Row,
+    Score,
+    SearchResults,
+    pooled_rms,
+    score_of,
+)
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -54,43 +58,35 @@ _VIOLATION_KEY, _COMPLETE_KEY = "violation", "complete"
 """Attributes of a trial: violation of the constraint, and whether all cases were flown."""
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A candidate that has flown all its cases."""
-
-    number: int
-    """Number of the trial."""
-    values: Values
-    score: Score
-    """Score on the cases of the search."""
+class StorageError(Exception):
+    """The storage is damaged or cannot be written; the message gives the reason."""
 
 
-@dataclass
-class SearchResults:
-    """The results of a search so far."""
+@contextmanager
+def _storage_errors(path: Path) -> Iterator[None]:
+    """In the context, turn the errors of the storage at `path` into a `StorageError`.
 
-    tried_count: int = 0
-    """Number of all candidates, including those of `stopped_early_count`."""
-    stopped_early_count: int = 0
-    """Number of candidates that were abandoned, or whose keys were refused."""
-    best: Candidate | None = None
-    """Candidate with the smallest error of those that met the constraint, `inside_share`; None:
-    none met it."""
-    near_best: list[Candidate] = field(default_factory=list)
-    """The best tenth, or at least the best three, of the candidates that met the constraint
-    `inside_share`; the best first."""
+    Optuna wraps SQLAlchemy's errors in its own, and their text only guesses at the cause.
+    """
+    from optuna.exceptions import StorageInternalError  # noqa: PLC0415  an extra
+    from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna
+
+    try:
+        yield
+    except (DBAPIError, StorageInternalError) as error:
+        cause = error.__cause__ if isinstance(error, StorageInternalError) else error
+        reason = cause.orig if isinstance(cause, DBAPIError) else cause
+        raise StorageError(f"{path}: cannot be used: {reason}") from error
 
 
 class Search:
-    """A search that keeps its state in a folder.
+    """A search that keeps its state in a folder; a new one first flies `learned_config`.
 
     Args:
         campaign: the campaign; gives the cases.
         tune: section `tune` of the campaign.
         folder: folder for the storage.
         fly: flies cases.
-        learning_flight: flies the vehicle before a new search; returns the configuration with the
-            measured values, or None if there are none.
 
     Raises:
         ConfigError: the first case cannot be flown.
@@ -106,7 +102,6 @@ class Search:
         tune: Tune,
         folder: Path,
         fly: Fly,
-        learning_flight: Callable[[Campaign], Config | None] = learned_config,
     ) -> None:
         import optuna  # noqa: PLC0415  an extra
 
@@ -114,30 +109,32 @@ class Search:
         self._optuna = optuna
         self._campaign, self._tune, self._fly = campaign, tune, fly
         self.path = folder / STORAGE
-        with storage_errors(self.path):
+        with _storage_errors(self.path):
             self._study: Study = optuna.create_study(
                 storage=f"sqlite:///{self.path}",
                 study_name=_STUDY_NAME,
                 sampler=self._sampler(0),
                 load_if_exists=True,
             )
-            self._enqueue_starts(learning_flight)
+            if not self._study.trials:
+                self._enqueue_starts()
 
-    def run(
-        self, trials: int, on_trial: Callable[[SearchResults], None] = lambda _: None
-    ) -> SearchResults:
+    def run(self, trials: int) -> Iterator[SearchResults]:
         """Try candidates until there are `trials` of them, including those of earlier runs.
+
+        Yields:
+            the results so far, before each candidate and at the end.
 
         Raises:
             StorageError: the storage cannot be used any more, perhaps because the disk is full.
         """
-        with storage_errors(self.path):
-            while len(self._ended_trials()) < trials:
-                on_trial(self.results())
+        with _storage_errors(self.path):
+            yield (results := self.results())
+            while results.tried_count < trials:
                 # Each trial has its own seed, so an interruption does not change the candidates.
-                self._study.sampler = self._sampler(len(self._ended_trials()))
+                self._study.sampler = self._sampler(results.tried_count)
                 self._try_candidate(self._interrupted_trial() or self._study.ask())
-            return self.results()
+                yield (results := self.results())
 
     def results(self) -> SearchResults:
         """The results of all trials so far, including those of earlier runs."""
@@ -172,14 +169,13 @@ class Search:
             n_startup_trials=_MOST_STARTS + self._neighbour_count,
         )
 
-    def _enqueue_starts(self, learning_flight: Callable[[Campaign], Config | None]) -> None:
+    def _enqueue_starts(self) -> None:
         """Enqueue the start candidates of a new search, and candidates near the last of them."""
-        if not self._study.trials:
-            config, search = learning_flight(self._campaign), self._tune.search
-            initial = list(start_candidates(self._campaign, self._tune, config))
-            count, seed = self._neighbour_count, self._campaign.file.seed
-            for start in (*initial, *candidates_near(initial[-1], search, count, seed)):
-                self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
+        config, search = learned_config(self._campaign), self._tune.search
+        initial = list(start_candidates(self._campaign, self._tune, config))
+        count, seed = self._neighbour_count, self._campaign.file.seed
+        for start in (*initial, *candidates_near(initial[-1], search, count, seed)):
+            self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted_trial(self) -> "Trial | None":
         """The trial whose flights were interrupted, to be tried again; None: there is none."""

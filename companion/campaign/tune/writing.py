@@ -8,8 +8,7 @@ from companion.campaign.campaign import Campaign
 from companion.campaign.swept import SweptValues
 from companion.campaign.tune.candidates import Values
 from companion.campaign.tune.certainty import Comparison
-from companion.campaign.tune.scores import Score
-from companion.campaign.tune.search import Candidate, SearchResults
+from companion.campaign.tune.scores import Candidate, Score, SearchResults
 from companion.files import bounded_yaml
 
 _EDGE_SHARE = 0.02

@@ -1,5 +1,6 @@
 """Time laws: the phase of a curve (progress along it) as a function of time."""
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import cos, pi, sin, sqrt
@@ -218,7 +219,7 @@ class LimitedJerk:
             return Progress(0.0)
         if time >= self.duration:
             return Progress(self._length)
-        index = sum(time >= end for end in self._ends)
+        index = bisect_right(self._ends, time)
         start, state, jerk = self._pieces[index]
         return _after_constant_jerk(state, jerk, time - start)
 

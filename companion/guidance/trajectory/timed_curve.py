@@ -9,7 +9,7 @@ missed by less than 0.3 %; `tests/trajectory/test_check_times.py` compares them 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import atan2, remainder, tau
+from math import atan2, ceil, remainder, tau
 from typing import Protocol
 
 import numpy as np
@@ -19,11 +19,15 @@ from companion.guidance.trajectory.sample import LONGEST_DURATION, Sample, Traje
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import Piece, TimeLaw, derivatives
 
-_CHECKS_PER_PIECE = 256
-"""Fewest check times in each piece of a time law whose rate changes."""
+_FEWEST_CHECKS = (16, 256)
+"""Fewest check times in a short and in a long piece of a time law whose rate changes."""
+_CHECK_PERIOD = 0.005
+"""Time between two checks of a short piece, s: shorter than a vehicle's response by far."""
 
-_TABLE_ROWS = 2048
-"""Rows of the table from which the time at a phase is interpolated; this time need not be exact."""
+_TABLE_ROWS = (64, 2048)
+"""Least and most rows of the table from which the time at a phase is interpolated; this time need
+not be exact."""
+_ROWS_PER_PHASE = 8
 
 
 def check_times(
@@ -43,10 +47,9 @@ def check_times(
         for part in _checked_parts(piece, sampling, law)
     ]
     phases = [(law.at(part.begin).phase, law.at(part.end).phase) for part in parts]
-    require_checkable(sum(_check_count(sampling, *span) for span in phases))
-    grids = [
-        _check_times_in(part, sampling, law, span) for part, span in zip(parts, phases, strict=True)
-    ]
+    spans = list(zip(parts, phases, strict=True))
+    require_checkable(sum(_check_count(part, sampling, *span) for part, span in spans))
+    grids = [_check_times_in(part, sampling, law, span) for part, span in spans]
     times: list[float] = np.unique(np.concatenate(([0.0, law.duration], *grids))).tolist()
     return times
 
@@ -74,10 +77,16 @@ def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Itera
     yield piece
 
 
-def _check_count(sampling: PhaseSampling, begin: float, end: float) -> float:
+def _check_count(piece: Piece, sampling: PhaseSampling, begin: float, end: float) -> float:
     if sampling.phase_step is None:
         return bisect_right(sampling.phases, end) - bisect_left(sampling.phases, begin)
-    return (end - begin) / sampling.phase_step + _CHECKS_PER_PIECE
+    return (end - begin) / sampling.phase_step + _fewest_checks(piece)
+
+
+def _fewest_checks(piece: Piece) -> int:
+    if piece.steady:
+        return 1
+    return int(np.clip(ceil((piece.end - piece.begin) / _CHECK_PERIOD), *_FEWEST_CHECKS))
 
 
 def _check_times_in(
@@ -94,9 +103,10 @@ def _check_times_in(
         rate = law.at(piece.begin).first
         ends = np.array([piece.begin, piece.end])
         return np.concatenate((ends, piece.begin + (phases - begin) / rate))
-    table_times = np.linspace(piece.begin, piece.end, _TABLE_ROWS)
+    rows = int(np.clip(_ROWS_PER_PHASE * len(phases), *_TABLE_ROWS))
+    table_times = np.linspace(piece.begin, piece.end, rows)
     table_phases = np.array([law.at(time).phase for time in table_times.tolist()])
-    even_times = np.linspace(piece.begin, piece.end, _CHECKS_PER_PIECE + 1)
+    even_times = np.linspace(piece.begin, piece.end, _fewest_checks(piece) + 1)
     # The jerk may jump at the end, and belongs to the next part there.
     before_end = np.nextafter(piece.end, piece.begin)
     phase_times = np.interp(phases, table_phases, table_times)

@@ -7,7 +7,6 @@ its length (uint32), and its bytes.
 
 import struct
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
 
 from companion.recording.mcap_file.channels import TOPICS
 
@@ -18,17 +17,6 @@ _FULL_BATCH = 32_000
 
 SendBatch = Callable[[bytes], None]
 """Sends a datagram; it never blocks, and never raises."""
-
-
-class StreamedMessage(NamedTuple):
-    """A message of the live stream."""
-
-    channel_index: int
-    """Index in `TOPICS` of the message's channel."""
-    time_ns: int
-    """Time since 1970, ns; if the flight runs in vehicle time, since the vehicle's boot."""
-    data: bytes
-    """Payload of the message, as in `flight.mcap`."""
 
 
 class Batch:
@@ -52,10 +40,10 @@ class Batch:
             self._collected.clear()
 
 
-def messages_of(datagram: bytes) -> Iterator[StreamedMessage]:
-    """The messages of a datagram, in order."""
+def messages_of(datagram: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Index of the channel, time and bytes of each message of a datagram, in order."""
     at = 0
     while at < len(datagram):
         number, time_ns, length = _HEADER.unpack_from(datagram, at)
         at += _HEADER.size + length
-        yield StreamedMessage(number, time_ns, datagram[at - length : at])
+        yield number, time_ns, datagram[at - length : at]

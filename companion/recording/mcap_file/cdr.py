@@ -7,7 +7,6 @@ import struct
 
 from companion.recording.mcap_file.fields import CDR_HEADER, PACKAGE, MessageType
 
-_POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<iI")
 _UINT32 = struct.Struct("<I")
 _NANOSECONDS = 1_000_000_000
@@ -117,7 +116,7 @@ class CdrMessage:
     def add_time(self, time_ns: int) -> None:
         """Add a time in ns since 1970, as `builtin_interfaces/Time`."""
         self.align(4)
-        self._bytes += _stamp(time_ns)
+        self._bytes += _STAMP.pack(*divmod(time_ns, _NANOSECONDS))
 
     def add_doubles(self, *values: float) -> None:
         """Add float64 values."""
@@ -182,27 +181,14 @@ def log_of(message: bytes) -> tuple[int, str, str]:
         raise ValueError(f"a log message is too short: {error}") from error
 
 
-class PoseEncoder:
-    """Encodes messages of type FRAME_TRANSFORM (two frames) or POSE_IN_FRAME (one frame).
-
-    All messages have the same names of frames.
-    """
-
-    def __init__(self, *frames: str) -> None:
-        message = CdrMessage()
-        message.add_time(0)
-        for frame in frames:
-            message.add_text(frame)
-        message.align(8)
-        self._names = message.bytes()[len(CDR_HEADER) + _STAMP.size :]
-
-    def message(self, time_ns: int, pose: Pose) -> bytes:
-        """The message for `pose` at a time in ns since 1970."""
-        return CDR_HEADER + _stamp(time_ns) + self._names + _POSE.pack(*pose)
-
-
-def _stamp(time_ns: int) -> bytes:
-    return _STAMP.pack(*divmod(time_ns, _NANOSECONDS))
+def pose_message(time_ns: int, pose: Pose, *frames: str) -> bytes:
+    """Encode a message of type FRAME_TRANSFORM (two frames) or POSE_IN_FRAME (one frame)."""
+    message = CdrMessage()
+    message.add_time(time_ns)
+    for frame in frames:
+        message.add_text(frame)
+    message.add_doubles(*pose)
+    return message.bytes()
 
 
 def _string(message: bytes, offset: int) -> tuple[str, int]:

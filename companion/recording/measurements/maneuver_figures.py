@@ -1,7 +1,7 @@
 """Tracking figures of each maneuver; errors of different maneuvers cannot be compared."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import degrees, inf, isnan, nan
 from typing import Any
 
@@ -54,7 +54,7 @@ class ManeuverFigures:
     """Largest horizontal distance from where the maneuver began, m."""
     speed: float
     """Largest speed of the reference (95th percentile), m/s; NaN without a reference."""
-    swing: Swing = NOT_MEASURED
+    swing: Swing
     """Oscillation of roll and pitch; not measured in open loop."""
 
     def as_dict(self) -> dict[str, Any]:
@@ -93,11 +93,10 @@ def measure_maneuvers(
         marks: marks of `FlightTrace.maneuvers`.
         began: beginning of the flight, s on our clock.
     """
-    measured = []
-    for mark, part in _flown_maneuvers(rows, marks):
-        figures = _figures_of(mark.name or "", mark.time - began, part)
-        measured.append(replace(figures, swing=_swing(figures, rates, part[0, 0], part[-1, 0])))
-    return tuple(measured)
+    return tuple(
+        _figures_of(mark.name or "", mark.time - began, part, rates)
+        for mark, part in _flown_maneuvers(rows, marks)
+    )
 
 
 def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
@@ -139,17 +138,16 @@ def _settling_time(rows: Floats) -> float:
     return min(SETTLING_TIME, _LARGEST_SHARE * float(rows[-1, 0] - rows[0, 0]))
 
 
-def _swing(figures: ManeuverFigures, rates: Floats, begin: float, end: float) -> Swing:
-    """Oscillation of roll and pitch in a maneuver, from `begin` to `end`, s; none in open loop."""
-    if figures.open_loop:
-        return NOT_MEASURED
-    if figures.duration - figures.settling_time >= SHORTEST_PART:
-        begin += figures.settling_time
+def _swing(rates: Floats, time: Floats, settling_time: float, speed: float) -> Swing:
+    """Oscillation of roll and pitch in a maneuver with these times; `speed` as in the figures."""
+    begin, end = time[0], time[-1]
+    if float(end - begin) - settling_time >= SHORTEST_PART:
+        begin += settling_time
     part = rates[(rates[:, 0] >= begin) & (rates[:, 0] <= end)]
-    return measure_swing(part[:, 0], part[:, 1:], at_rest=figures.speed <= _MAX_SPEED_AT_REST)
+    return measure_swing(part[:, 0], part[:, 1:], at_rest=speed <= _MAX_SPEED_AT_REST)
 
 
-def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
+def _figures_of(name: str, begin: float, rows: Floats, rates: Floats) -> ManeuverFigures:
     time, reference, position = rows[:, 0], rows[:, 1:4], rows[:, 4:7]
     duration = float(time[-1] - time[0])
     open_loop, settling_time = _is_open_loop(rows), _settling_time(rows)
@@ -159,6 +157,7 @@ def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
     height_known = ~np.isnan(height)  # another program may command the thrust
     settled_height = height[~is_settling & height_known]
     offset = position[:, :2] - position[0, :2]
+    speed = _largest_speed(time, reference)
     return ManeuverFigures(
         name,
         begin,
@@ -172,7 +171,8 @@ def _figures_of(name: str, begin: float, rows: Floats) -> ManeuverFigures:
         height_mean=float(settled_height.mean()) if len(settled_height) else nan,
         settling_max=largest(np.hypot(level, height)[is_settling & height_known]),
         drift=float(np.hypot(offset[:, 0], offset[:, 1]).max()),
-        speed=_largest_speed(time, reference),
+        speed=speed,
+        swing=NOT_MEASURED if open_loop else _swing(rates, time, settling_time, speed),
     )
 
 

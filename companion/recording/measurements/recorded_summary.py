@@ -103,31 +103,27 @@ def trace_of(record: FlightRecord) -> FlightTrace:
         RecordError: the record is not valid.
     """
     with record_errors(record.folder):
-        return _flight_trace(record)
-
-
-def _flight_trace(record: FlightRecord) -> FlightTrace:
-    trace = FlightTrace()
-    sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
-    sample = sample[sample["unanswered"] == 0]
-    # Matched by the vehicle's stamps, because two samples may arrive at the same time.
-    numbers = _sample_indices(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
-    measured = np.column_stack([sample[f"measured_{axis}_rad_s"] for axis in _AXES])
-    ages = np.where(sample["age_known"] == 1, sample["age_s"], np.nan)
-    for row, number in zip(setpoint, numbers.tolist(), strict=True):
-        trace.add_latency(round(1e3 * float(row["latency_us"])))
-        time = float(row["vehicle_time_s"])
-        if row["offboard_active"] and number >= 0:  # else its sample was not recorded
-            sent = row[_SETPOINT_COLUMNS].tolist()
-            trace.rates.add([time, *sent, *measured[number].tolist(), float(ages[number])])
-        if row["is_step"]:
-            trace.response.add([time, *row[_STEP_COLUMNS].tolist()])
-    for row in tracking_rows(guidance):
-        trace.tracking.add(row.tolist())
-    for row in record.rows("motion").tolist():
-        trace.motion.add(list(row))
-    trace.maneuvers += record.maneuvers
-    return trace
+        trace = FlightTrace()
+        sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
+        sample = sample[sample["unanswered"] == 0]
+        # Matched by the vehicle's stamps, because two samples may arrive at the same time.
+        numbers = _sample_indices(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
+        measured = np.column_stack([sample[f"measured_{axis}_rad_s"] for axis in _AXES])
+        ages = np.where(sample["age_known"] == 1, sample["age_s"], np.nan)
+        for row, number in zip(setpoint, numbers.tolist(), strict=True):
+            trace.add_latency(round(1e3 * float(row["latency_us"])))
+            time = float(row["vehicle_time_s"])
+            if row["offboard_active"] and number >= 0:  # else its sample was not recorded
+                sent = row[_SETPOINT_COLUMNS].tolist()
+                trace.rates.add([time, *sent, *measured[number].tolist(), float(ages[number])])
+            if row["is_step"]:
+                trace.response.add([time, *row[_STEP_COLUMNS].tolist()])
+        for row in tracking_rows(guidance):
+            trace.tracking.add(row.tolist())
+        for row in record.rows("motion").tolist():
+            trace.motion.add(list(row))
+        trace.maneuvers += record.maneuvers
+        return trace
 
 
 def tracking_rows(guidance: NDArray[np.void]) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from companion.attitude.kinematics import tilt_angle
 from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.flight_facts import FlightFacts
 from companion.recording.measurements.maneuver_figures import (
+    Floats,
     ManeuverFigures,
     in_maneuvers,
     largest,
@@ -107,7 +108,7 @@ class Summary:
 
     @cached_property
     def _response(self) -> StepResponse | None:
-        return measure_response(self.trace.response_rows(), self.gain)
+        return measure_response(self.trace.response.rows(), self.gain)
 
     def latency_us(self) -> dict[str, float]:
         """Latency from sample to setpoint in this process: p50, p99 and maximum, µs."""
@@ -119,7 +120,7 @@ class Summary:
 
     def tracking(self) -> dict[str, float]:
         """Errors of position and height under control, m: see `tracking_errors`."""
-        return tracking_errors(self.trace.tracking_rows())
+        return tracking_errors(self.trace.tracking.rows())
 
     def maneuvers(self) -> tuple[ManeuverFigures, ...]:
         """The figures of each maneuver that was flown, in order."""
@@ -128,8 +129,8 @@ class Summary:
     @cached_property
     def _maneuvers(self) -> tuple[ManeuverFigures, ...]:
         trace = self.trace
-        rates = trace.rates_rows()[:, _ROLL_AND_PITCH]
-        return measure_maneuvers(trace.tracking_rows(), rates, trace.maneuvers, self.facts.began)
+        rates = trace.rates.rows()[:, _ROLL_AND_PITCH]
+        return measure_maneuvers(trace.tracking.rows(), rates, trace.maneuvers, self.facts.began)
 
     def extent(self) -> dict[str, float]:
         """The largest height (m), speed (m/s) and tilt (°), and the time under control (s).
@@ -137,9 +138,9 @@ class Summary:
         Speed and tilt are given for the whole flight and for its maneuvers. They come from rows ten
         times a second; during steps, the tilt comes from every sample.
         """
-        rows, tracked = self.trace.motion.rows(), self.trace.tracking_rows()
+        rows, tracked = self.trace.motion.rows(), self.trace.tracking.rows()
         maneuvers = rows[in_maneuvers(rows[:, 1], self.trace.maneuvers)]
-        tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response_rows()])
+        tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response.rows()])
         return {
             "height_max_m": _largest_known(rows[:, _HEIGHT]),
             "speed_max_m_s": _largest_known(rows[:, _SPEED]),
@@ -178,7 +179,7 @@ class Summary:
         return json.dumps(self.as_dict(), allow_nan=False)
 
 
-def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, float]:
+def tracking_errors(rows: Floats) -> dict[str, float]:
     """RMS and largest position error, and RMS height error, m.
 
     `rows` are the (N, 7) rows of `FlightTrace.tracking`; those without a reference position or
@@ -188,7 +189,7 @@ def tracking_errors(rows: "np.ndarray[Any, np.dtype[np.float64]]") -> dict[str, 
     distance = np.linalg.norm(error[~np.isnan(error).any(axis=1)], axis=1)
     return {
         "position_rms_m": rms(distance),
-        "position_max_m": float(distance.max()) if len(distance) else math.nan,
+        "position_max_m": largest(distance),
         "height_rms_m": rms(error[~np.isnan(error[:, 2]), 2]),
     }
 
@@ -201,7 +202,7 @@ def _dead_times_as_dict(dead_times: DeadTimes) -> dict[str, float | None]:
     }
 
 
-def _largest_known(*columns: "np.ndarray[Any, np.dtype[np.float64]]") -> float:
+def _largest_known(*columns: Floats) -> float:
     """The largest number of all columns (n,); NaN: they contain none."""
     values = np.concatenate(columns)
     return largest(values[~np.isnan(values)])

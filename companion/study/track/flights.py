@@ -126,7 +126,7 @@ def fly(task: Task) -> TrackedFlight:
     if summary.result != "ok":
         infinite_error = PositionError(inf, inf)
         return TrackedFlight(summary.result, infinite_error, infinite_error, np.empty((0, 4)))
-    return _measure(summary.trace.tracking_rows(), truth_recorder.rows())
+    return _measure(summary.trace.tracking.rows(), truth_recorder.rows())
 
 
 def _task_config(base: Config, task: Task, trajectory_file: Path) -> Config:
@@ -185,7 +185,7 @@ def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:
     """Measure the errors on the trajectory: from the end of the hover to the last true position.
 
     Args:
-        tracking: rows of `FlightTrace.tracking_rows`.
+        tracking: rows of `FlightTrace.tracking`.
         truth: rows of `TruthRecorder.rows`.
     """
     time = truth[:, 0]
