@@ -1,6 +1,7 @@
 """What guidance flies now: nothing, a held pose, or a source of references."""
 
 from math import dist, inf
+from typing import NamedTuple
 
 from companion.control.predictive import FollowedTrajectory
 from companion.guidance import Pose, Reference, VehicleMotion
@@ -13,6 +14,19 @@ _REJOINED_DISTANCE = 1.0
 """Distance from the reference below which the vehicle counts as returned after open loop, m."""
 _RETURN_TIME = 10.0
 """Time allowed to return to the reference after open loop, s; a return over 10 m takes 4 s."""
+
+
+class FlownPart(NamedTuple):
+    """The maneuver that is flown now, or the source that another program commands."""
+
+    name: str
+    """Name to show to the user."""
+    elapsed: float
+    """Time since the maneuver or source began, s."""
+    duration: float | None
+    """Duration of the maneuver, s; None: a source, which decides itself when it ends."""
+    part: object
+    """The maneuver or the source itself."""
 
 
 class FlownSource:
@@ -74,6 +88,16 @@ class FlownSource:
             else Reference(pose.position_ned, heading=pose.heading)
         )
         return lambda _: held_reference
+
+    def part(self, now: float) -> FlownPart | None:
+        """The maneuver or source that is flown at `now`, s of event-loop time; None: neither is."""
+        source, begun_at = self.source, self.begun_at
+        if source is None or begun_at is None or source.finished(now):
+            return None
+        if not isinstance(source, ManeuverSource):
+            return FlownPart(source.name, now - begun_at, None, source)
+        maneuver, elapsed = source.maneuvers.part_at(now - begun_at)
+        return FlownPart(maneuver.name, elapsed, maneuver.duration, maneuver)
 
     def followed_trajectory(self, now: float) -> FollowedTrajectory | None:
         """The trajectory that is followed at `now`, s of event-loop time; None if none is."""

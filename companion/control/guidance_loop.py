@@ -10,11 +10,10 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.hold import Hold
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.step_recorder import StepRecorder
+from companion.control.step_recorder import StepRecorder, TrackingRecord
 from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
 from companion.control.ticker import Ticker
-from companion.control.tracking_record import TrackingRecord
 from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.braking import AssumedBraking
 from companion.guidance.linear import Guidance
@@ -197,13 +196,13 @@ class GuidanceLoop:
     ) -> StepOutput | None:
         """Make one command; return its inputs and reference, or None if none was computed."""
         if position is None:
-            self.learning.pause()
+            self.learning.hover_thrust.pause()
             return None
         # While offboard is active, a landed flag must not lead to zero thrust, which would make it
         # true; the safety monitors judge it.
         standing = standing and not self._loop.offboard_active
         if standing:
-            self.learning.on_ground()
+            self.learning.hover_thrust.on_ground()
             self._loop.resets.forget()
             if may_idle:
                 self._loop.command = GuidanceCommand(_LEVEL_TARGET, 0.0, now, idle=True)

@@ -33,7 +33,9 @@ _QUICK_OBSERVER_DELAYS = 0.035, 0.06
 """Delays of the rate loop (dead time plus half the lag) between which the observer changes from
 quick to normal, s."""
 _QUICK_OBSERVER_GAINS = 5.0, 7.0
-"""Gains of the planner between which the observer changes from quick to normal, 1/s."""
+"""Gains of the planner between which the observer changes from quick to normal, 1/s: the gain
+amplifies the noise. The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of
+7.5 and a quick observer."""
 _BANDWIDTH_INCREASE = 0.6
 """`ObserverSettings.bandwidth_increase` of a quick observer."""
 _CALM_BANDWIDTH = 1.0
@@ -118,24 +120,14 @@ def observer_quickness(config: Config) -> float:
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
-    return _falling_ramp(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS) * _gain_quickness(config)
-
-
-def _gain_quickness(config: Config) -> float:
-    """How quick an observer the planner's gain allows, 0..1; the gain amplifies the noise.
-
-    The ArduPilot mock, limited to 90 °/s, oscillated without end with a gain of 7.5 and a quick
-    observer.
-    """
-    return _falling_ramp(config.planner.gain_per_s, _QUICK_OBSERVER_GAINS)
+    by_rate_loop = _falling_ramp(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS)
+    return by_rate_loop * _falling_ramp(config.planner.gain_per_s, _QUICK_OBSERVER_GAINS)
 
 
 def observer_settings(config: Config) -> ObserverSettings:
     """The settings of the motion observer."""
-    (slow, quick), quickness = (
-        _POSITION_PULL,
-        _falling_ramp(_rate_loop_delay(config), _STIFF_HOLD_DELAYS),
-    )
+    slow, quick = _POSITION_PULL
+    quickness = _falling_ramp(_rate_loop_delay(config), _STIFF_HOLD_DELAYS)
     return ObserverSettings(
         _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
         _POSITION_TIME_CONSTANT,

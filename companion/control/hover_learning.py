@@ -24,46 +24,31 @@ class HoverLearning:
     Before offboard control ATTITUDE_TARGET reports the autopilot's own thrust. So an error of the
     configured hover thrust is corrected before the takeover. After offboard control nothing is
     learned.
+
+    Attributes:
+        hover_thrust: the estimate.
     """
 
     def __init__(self, hover_thrust: HoverThrust, state: Telemetry) -> None:
-        self._hover_thrust = hover_thrust
+        self.hover_thrust = hover_thrust
         self._state = state
         self._had_control = False
 
     @property
     def thrust_limits(self) -> tuple[float, float]:
         """Smallest and largest available specific thrust, from the learned hover thrust, m/s²."""
-        hover_thrust = self._hover_thrust
+        hover_thrust = self.hover_thrust
         return hover_thrust.smallest_specific_thrust, hover_thrust.largest_specific_thrust
-
-    @property
-    def learned_hover(self) -> float:
-        """Learned normalised thrust at hover, at the battery voltage just after take-off, 0..1."""
-        return self._hover_thrust.learned_hover
-
-    @property
-    def present_hover(self) -> float:
-        """Learned normalised thrust at hover, at the present battery voltage, 0..1."""
-        return self._hover_thrust.present_hover
 
     def largest_tilt(self, acceleration_down: float = 0.0) -> float:
         """Largest tilt, rad, at which 95 % of the largest thrust give `acceleration_down`, m/s²."""
-        return largest_tilt(GRAVITY - acceleration_down, self._hover_thrust.largest_tilted_thrust)
+        return largest_tilt(GRAVITY - acceleration_down, self.hover_thrust.largest_tilted_thrust)
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""
         largest = sin(self.largest_tilt(acceleration_down))
         north, east = clamp_length(target.north, target.east, largest)
         return target._replace(north=north, east=east)
-
-    def on_ground(self) -> None:
-        """Note that the vehicle is on the ground: pause learning, forget the take-off voltage."""
-        self._hover_thrust.on_ground()
-
-    def pause(self) -> None:
-        """Stop learning until the next `step`."""
-        self._hover_thrust.pause()
 
     def step(self, now: float, q: Quaternion, *, offboard_active: bool, steady: bool) -> None:
         """Learn from the newest telemetry.
@@ -76,7 +61,7 @@ class HoverLearning:
         """
         battery, position = self._state.battery, self._state.position
         if battery is not None:
-            self._hover_thrust.note_voltage(battery.received, battery.voltage_v)
+            self.hover_thrust.note_voltage(battery.received, battery.voltage_v)
         self._had_control = self._had_control or offboard_active
         can_learn = (
             steady
@@ -84,13 +69,13 @@ class HoverLearning:
             else not self._had_control and self._note_autopilot_thrust(now, q)
         )
         if can_learn and position is not None:
-            self._hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
+            self.hover_thrust.observe(position.vehicle_time, position.velocity_ned[2])
         else:
-            self._hover_thrust.pause()
+            self.hover_thrust.pause()
 
     def mismatch_warning(self) -> str | None:
         """Advice to set thrust.hover_thrust, if the learned one differs by over 15 %; else None."""
-        hover_thrust = self._hover_thrust
+        hover_thrust = self.hover_thrust
         configured, learned = hover_thrust.configured_hover, hover_thrust.learned_hover
         if not self._had_control or abs(learned - configured) <= _MISMATCH_SHARE * configured:
             return None
@@ -106,5 +91,5 @@ class HoverLearning:
             return False
         if not self._state.armed or height is None or height < _CLEAR_HEIGHT:
             return False
-        self._hover_thrust.note_thrust(target.thrust, q)
+        self.hover_thrust.note_thrust(target.thrust, q)
         return True

@@ -48,7 +48,7 @@ class MotionEstimate:
         observer: MotionObserver,
         correction: PositionCorrection,
         drag: DragEstimate,
-        offset: Callable[[], float | None] = lambda: None,
+        offset: Callable[[], float | None],
     ) -> None:
         self.vertical_thrust = GRAVITY
         self._observer = observer

@@ -124,9 +124,7 @@ def linear_settings(config: Config) -> LinearSettings:
     )
 
 
-def motion_estimate(
-    config: Config, offset: Callable[[], float | None] = lambda: None
-) -> MotionEstimate:
+def motion_estimate(config: Config, offset: Callable[[], float | None]) -> MotionEstimate:
     """The motion estimate with its observer, position correction and drag estimate.
 
     Args:

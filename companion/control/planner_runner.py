@@ -17,8 +17,7 @@ from companion.attitude.model_following import SHORTEST_PERIOD, ModelFollowingPl
 from companion.attitude.rotation import limit_rates
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.heading_frame import HeadingFrame
-from companion.control.step_frame import StepFrame
+from companion.control.heading_frame import HeadingFrame, StepFrame
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 _LONGEST_PERIOD = 0.1

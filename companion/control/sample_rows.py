@@ -12,7 +12,6 @@ from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
-from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.loop_channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
@@ -92,8 +91,7 @@ class SampleRows:
         """Write a sample, and the setpoint that answers it."""
         sample, reason, flags, checked_at, answer = entry
         code = _REASON_CODES[reason] if flags.on else CONTROL_OFF
-        data = SAMPLE.packing.pack(
-            CDR_HEADER,
+        row = (
             sample.received,
             sample.vehicle_time,
             sample.time_boot_ms,
@@ -106,15 +104,13 @@ class SampleRows:
             sample.age_known,
             *flags,
         )
-        writer.message("/sample", time_ns, data)
+        writer.row(SAMPLE, time_ns, row)
         if answer is not None:
-            data = SETPOINT.packing.pack(CDR_HEADER, *self._setpoint(sample, flags, answer))
-            writer.message("/setpoint", time_ns, data)
+            writer.row(SETPOINT, time_ns, self._setpoint(sample, flags, answer))
 
     def attitude_target(self, writer: McapWriter, time_ns: int, target: AttitudeTarget) -> None:
         """Write a new ATTITUDE_TARGET."""
-        data = ATTITUDE_TARGET.packing.pack(CDR_HEADER, target.time_boot_ms, *target.q)
-        writer.message("/attitude_target", time_ns, data)
+        writer.row(ATTITUDE_TARGET, time_ns, (target.time_boot_ms, *target.q))
 
     def _setpoint(
         self, sample: AttitudeSample, flags: LoopFlags, answer: Answer

@@ -1,9 +1,15 @@
-"""Records the steps of guidance."""
+"""Records the steps of guidance, and how the vehicle tracks the reference."""
 
+from collections.abc import Callable
+from math import nan
+
+from companion.control.flown_source import FlownSource
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepRows
 from companion.control.telemetry import Clock, Telemetry
+from companion.guidance.reference import Reference, VehicleMotion
 from companion.recording.recorder import FlightRecorder
+from companion.recording.trace import FlightTrace
 
 
 class StepRecorder:
@@ -55,3 +61,47 @@ class StepRecorder:
         """Record a call at `now` by which a phase of the flight controls guidance; see `step`."""
         if self._recorder is not None:
             self._recorder.action(now, name, self._vehicle_clock.offset)
+
+
+class TrackingRecord:
+    """Writes reference, position, and the beginning of each maneuver to the trace.
+
+    Args:
+        trace: the trace of the flight.
+        flown_source: the source that guidance flies.
+
+    Attributes:
+        note: called with a message for each maneuver that begins.
+    """
+
+    def __init__(self, trace: FlightTrace, flown_source: FlownSource) -> None:
+        self.note: Callable[[str], None] = lambda _: None
+        self._trace = trace
+        self._flown_source = flown_source
+        self._recorded_part: object = None
+
+    def add(
+        self, now: float, vehicle_time: float, reference: Reference, motion: VehicleMotion
+    ) -> None:
+        """Record one step of guidance.
+
+        Args:
+            now: event-loop time, s.
+            vehicle_time: the same time on the vehicle's clock, s.
+            reference: reference at this time.
+            motion: motion of the vehicle at this time.
+        """
+        flown = self._flown_source.part(now)
+        part = None if flown is None else flown.part
+        if part is not self._recorded_part:
+            self._recorded_part = part
+            name = None if flown is None else flown.name
+            self._trace.begin_maneuver(now, vehicle_time, name)
+            if name is not None:
+                self.note(f"maneuver: {name}")
+        north, east, down = reference.position_ned
+        if not reference.holds_position:
+            north = east = nan  # only the height is a reference
+        if not reference.holds_height:
+            down = nan
+        self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)

@@ -12,7 +12,6 @@ from companion.control.scene_rows import SceneRows
 from companion.guidance import GuidanceInput, Reference
 from companion.guidance.reference import Vector
 from companion.recording.mcap_file import cdr
-from companion.recording.mcap_file.fields import CDR_HEADER
 from companion.recording.mcap_file.loop_channels import GUIDANCE, INPUT, TARGET
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
@@ -94,18 +93,13 @@ class StepRows:
     def step(self, writer: McapWriter, time_ns: int, entry: StepEntry) -> None:
         """Write the inputs, the result and the command of a step."""
         inputs, output, command = entry
-        writer.message(
-            "/guidance_input", time_ns, INPUT.packing.pack(CDR_HEADER, *_input_row(inputs))
-        )
+        writer.row(INPUT, time_ns, _input_row(inputs))
         if command is not None:
-            data = TARGET.packing.pack(CDR_HEADER, *_target_row(command))
-            writer.message("/target", time_ns, data)
+            writer.row(TARGET, time_ns, _target_row(command))
             self._scene.note_command(command)
         if output is not None:
-            data = GUIDANCE.packing.pack(
-                CDR_HEADER, inputs.time, *_guidance_row(output), inputs.flags.offboard_active
-            )
-            writer.message("/guidance", time_ns, data)
+            active = inputs.flags.offboard_active
+            writer.row(GUIDANCE, time_ns, (inputs.time, *_guidance_row(output), active))
             self._count += 1
             if self._count % _POSE_EVERY == 0:
                 self._draw(writer, time_ns, output)
@@ -174,8 +168,7 @@ def _guidance_row(output: StepOutput) -> tuple[float, ...]:
         *inputs.now.velocity_ned,
         _nan_if_none(output.error),
         *inputs.disturbance,
-        inputs.drag.linear,
-        inputs.drag.quadratic,
+        *inputs.drag,
         reference.holds_position,
         reference.holds_height,
         reference.thrust_is_steady,

@@ -2,19 +2,18 @@
 
 import asyncio
 from collections.abc import Callable
-from functools import partial
+from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 
 from companion.config import Config
-from companion.config.known_drag import KnownDrag
 from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
 from companion.control.outer_loop import make_predictive_control
-from companion.flight.assembled import AssembledFlight
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch
-from companion.flight.environment import THIS_COMPUTER, Environment
+from companion.flight.environment import Environment
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.flown_config import description, flattened
 from companion.flight.maneuvers import fresh_copy
@@ -26,18 +25,30 @@ from companion.flight.status import StatusReporter
 from companion.flight.vehicle_identity import DragMemory, ReplacementDetector
 from companion.flight.watch import RateRequester, Watch
 from companion.guidance.follow import Follow
-from companion.recording.recorder import FlightRecorder
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
 
 
-def _record_drag(record: FlightRecorder, clock: Callable[[], float], known: KnownDrag) -> None:
-    if known.drag is None:
-        record.action(clock(), "drag_prior")
-    else:
-        record.action(clock(), "drag_prior", drag=(known.drag.linear, known.drag.quadratic))
+@dataclass(frozen=True, slots=True)
+class AssembledFlight:
+    """The parts of a flight that is ready to run; `assemble` makes and joins them."""
+
+    flight: Flight
+    context: FlightContext
+    trace: FlightTrace
+    dead_time_watch: DeadTimeWatch
+    drag_memory: DragMemory
+    ladder: SafetyLadder
+    reporter: StatusReporter
+    changes: Changes
+
+    def close(self) -> None:
+        """End the process of predictive control, if there is one."""
+        predictive = self.context.guidance_loop.maker.predictive_control
+        if predictive is not None:
+            predictive.close()
 
 
 def assemble(
@@ -47,8 +58,8 @@ def assemble(
     ask_landing: AskLanding,
     folder: Path | None,
     plan: Plan,
-    environment: Environment = THIS_COMPUTER,
-    changes: Changes | None = None,
+    environment: Environment,
+    changes: Changes,
 ) -> AssembledFlight:
     """Assemble a flight with the phases of `plan` over an open link.
 
@@ -66,7 +77,6 @@ def assemble(
     flight = Flight(context, plan, watch, recorder, ask_landing)
     ladder.note = context.note = context.preflight.note = flight.note
     context.guidance_loop.record.note = rate_requester.note = flight.note
-    changes = changes or Changes(config)
     memory = _drag_memory(context, folder, flight.note, changes)
     _prepare_trajectories(context, flight.note, real_time=real_time)
     if record is not None:
@@ -77,7 +87,9 @@ def assemble(
             flight.began, description(changes.config_at_flight_start, plan, real_time=real_time)
         )
         ladder.on_change = record.alarm
-        memory.on_begin = partial(_record_drag, record, clock)
+        memory.on_begin = lambda known: record.action(
+            clock(), "drag_prior", drag=known.drag or (nan, nan)
+        )
     dead_time_watch = DeadTimeWatch(trace, config.vehicle.axes, flight.note)
     reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
     return AssembledFlight(

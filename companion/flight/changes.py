@@ -13,8 +13,12 @@ from companion.config.in_flight import (
     differences,
 )
 from companion.config.known_drag import KnownDrag
-from companion.control.retuning import Retuning, loop_settings, reason_against_changes
-from companion.control.slew import Slew
+from companion.control.retuning import (
+    Retuning,
+    Slew,
+    loop_settings,
+    reason_against_changes,
+)
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate_change
 from companion.recording.recorder import FlightRecorder

@@ -114,7 +114,7 @@ class _TiltMargin:
         tilts.append((now, degrees(learning.largest_tilt())))
         while now - tilts[0][0] > _MARGIN_WINDOW:
             tilts.popleft()
-        tilt, hover = max(each for _, each in tilts), learning.present_hover
+        tilt, hover = max(each for _, each in tilts), learning.hover_thrust.present_hover
         if tilt < _MIN_HOLDING_TILT:
             raise FlightEnded(
                 f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "

@@ -1,14 +1,38 @@
-"""What happened in a finished flight, for its report: phases, early end, advice on keys."""
+"""What happened in a finished flight, for its report: counters, phases, early end, advice."""
 
 import asyncio
 from collections.abc import Sequence
 
 from companion.control.expected_response import gain_warning
-from companion.flight.assembled import AssembledFlight
+from companion.flight.assembly import AssembledFlight
 from companion.flight.context import FlightContext
 from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.flight_facts import EarlyEnd, FlightFacts
-from companion.recording.trace import ManeuverMark
+from companion.recording.measurements.summary import LoopCounts, PredictiveFigures
+
+
+def loop_counts(context: FlightContext) -> LoopCounts:
+    """The counters of the control loop."""
+    record = context.loop.record
+    return LoopCounts(
+        samples=record.samples,
+        setpoints=record.setpoints,
+        missed_deadlines=record.missed_deadlines,
+        stale=record.stale_count,
+        refused=record.refused_count,
+        unanswered={reason.value: count for reason, count in record.unanswered.items()},
+        rate_hz=context.setpoint_rate_hz,
+    )
+
+
+def predictive_figures(context: FlightContext) -> PredictiveFigures | None:
+    """The figures of predictive control; None if the flight did not use it."""
+    predictive = context.guidance_loop.maker.predictive_control
+    if predictive is None:
+        return None
+    record = predictive.record
+    troubles = {trouble.value: count for trouble, count in record.troubles.items()}
+    return PredictiveFigures(record.flown_answers, troubles, tuple(record.computing_seconds))
 
 
 def advice(assembled: AssembledFlight, dead_times: DeadTimes) -> tuple[str, ...]:
@@ -28,7 +52,7 @@ def _learned_settings(context: FlightContext) -> dict[str, str]:
     learning, estimate = context.guidance_loop.learning, context.guidance_loop.estimate
     settings: dict[str, str] = {}
     if learning.mismatch_warning() is not None:
-        settings["thrust.hover_thrust"] = f"{learning.learned_hover:.2f}"
+        settings["thrust.hover_thrust"] = f"{learning.hover_thrust.learned_hover:.2f}"
     if estimate.mismatch_warning() is not None:
         drag = estimate.drag.drag
         settings["guidance.drag_per_s"] = f"{drag.linear:.2f}"
@@ -55,18 +79,11 @@ def facts_of(
     now = asyncio.get_running_loop().time()
     end = None if state.battery is None else state.battery.remaining
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
-    early_end = None
-    if flight.failed_in is not None and result != "ok":
-        # There is no such event if the user left the flight.
-        time = next((at for at, text in flight.events if text == result), now - began)
-        marks, breaches = assembled.trace.maneuvers, assembled.ladder.breaches
-        failed = flight.failed_in.name
-        early_end = _early_end(time, began, takeoff, failed, marks, breaches, result)
     return FlightFacts(
         began=began,
         phases=tuple((at - began, name) for at, name in phases),
         takeoff=takeoff,
-        early_end=early_end,
+        early_end=_early_end(assembled, takeoff, result, now),
         vehicle_uid=context.replacement_detector.uid,
         armed=state.armed,
         mode=state.mode,
@@ -96,25 +113,25 @@ def _silence_duration(context: FlightContext, now: float) -> float | None:
 
 
 def _early_end(
-    time: float,
-    began: float,
-    takeoff: float | None,
-    phase: str,
-    marks: list[ManeuverMark],
-    breaches: dict[str, str],
-    result: str,
-) -> EarlyEnd:
-    """The end of a flight that ended early.
+    assembled: AssembledFlight, takeoff: float | None, result: str, now: float
+) -> EarlyEnd | None:
+    """The end of a flight that ended early; None: it did not.
 
-    `time` (of the end) and `takeoff` are in s since the flight began, `began` in s on our clock.
+    `takeoff` is in s since the flight began, `now` in s on our clock.
     """
-    name, maneuver_elapsed = None, None
+    flight, began = assembled.flight, assembled.flight.began
+    if flight.failed_in is None or result == "ok":
+        return None
+    # There is no such event if the user left the flight.
+    time = next((at for at, text in flight.events if text == result), now - began)
+    phase, name, maneuver_elapsed = flight.failed_in.name, None, None
     if phase == "maneuvers":
-        for mark in marks:  # a hold may have ended the maneuver before the flight ended
+        for mark in assembled.trace.maneuvers:  # a hold may have ended it before the flight ended
             if mark.name is not None:
                 name, maneuver_begin = mark.name, mark.time
                 maneuver_elapsed = time + began - maneuver_begin
             elif name is not None and mark.time <= time + began:
                 maneuver_elapsed = mark.time - maneuver_begin
     airborne = None if takeoff is None or takeoff > time else time - takeoff
-    return EarlyEnd(time, airborne, phase, name, maneuver_elapsed, breaches.get(result))
+    breach = assembled.ladder.breaches.get(result)
+    return EarlyEnd(time, airborne, phase, name, maneuver_elapsed, breach)

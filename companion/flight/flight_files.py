@@ -11,9 +11,9 @@ from companion import realtime
 from companion.config import Config
 from companion.files.write_whole import ReservedSpace, write_with_timeout
 from companion.flight import flown_config
-from companion.flight.assembled import AssembledFlight
+from companion.flight.assembly import AssembledFlight
 from companion.flight.environment import Environment
-from companion.flight.flight_facts import advice, facts_of
+from companion.flight.flight_facts import advice, facts_of, loop_counts, predictive_figures
 from companion.flight.observer import EventRecorder, Observer
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextFrames
@@ -164,7 +164,7 @@ class FlightFiles:
             phase=(flight.failed_in or flight.phase).name,
             planner=self._config.planner_name,
             gain=self._config.planner.gain_per_s,
-            counts=assembled.counts(),
+            counts=loop_counts(assembled.context),
             link={
                 name: value - self._counted_before.get(name, 0)
                 for name, value in _counters(stats).items()
@@ -173,7 +173,7 @@ class FlightFiles:
             events=list(flight.events),
             log=self.folder,
             dead_times=dead_times,
-            predictive=assembled.predictive_figures(),
+            predictive=predictive_figures(assembled.context),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
             facts=facts_of(assembled, recorder.phases, result, advice_texts),
         )

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from companion.config import Config
+from companion.flight.environment import Environment
 from companion.mavlink.frame_filter import Notice
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.signing import Signing, key_from_passphrase_file
@@ -49,8 +50,10 @@ def open_link(
     return Link(settings, tap, opener, notice)
 
 
-def realtime_settings(config: Config) -> RealtimeSettings:
-    """The real-time settings to request from the operating system."""
+def realtime_settings(config: Config, environment: Environment) -> RealtimeSettings:
+    """The real-time settings to request from the operating system; on a virtual clock none."""
+    if not environment.realtime:
+        return RealtimeSettings()
     section = config.realtime
     return RealtimeSettings(
         fifo_priority=section.priority if section.scheduler == "fifo" else None,

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from companion import realtime
 from companion.config import Config
-from companion.flight.assembled import AssembledFlight
-from companion.flight.assembly import assemble
+from companion.flight.assembly import AssembledFlight, assemble
 from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
@@ -16,7 +15,6 @@ from companion.flight.observer import Observer
 from companion.flight.opening import open_link, realtime_settings
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
-from companion.realtime import RealtimeSettings
 from companion.recording.closing_words import LEFT_BY_USER
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import fault_message
@@ -98,7 +96,7 @@ class Session:
         record = FlightFiles(
             config, self._folder, environment, self.note, flies_maneuvers=self._plan is None
         )
-        settings = realtime_settings(self._config) if environment.realtime else RealtimeSettings()
+        settings = realtime_settings(self._config, environment)
         with realtime.requested_settings(settings) as grants, record:
             recorder, opener = record.recorder(self._observer), environment.open_transport
             async with open_link(self._config, record.tap, self.note, opener) as link:

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
-from companion.control.tracking_record import flown_part
 from companion.flight.context import FlightContext
 from companion.flight.phases import Phase
 from companion.flight.status_rows import StatusRows
@@ -153,7 +152,7 @@ class StatusReporter:
         """The present state."""
         now, context = self._clock(), self._context
         (phase, phase_began), record = self._phase(), context.loop.record
-        maneuver = flown_part(context.guidance_loop.flown_source, now)
+        maneuver = context.guidance_loop.flown_source.part(now)
         return FlightStatus(
             time=now - self._began,
             airborne_time=None if self.takeoff is None else now - self.takeoff,

@@ -31,13 +31,16 @@ class ReplacementDetector:
     Args:
         link: link to the vehicle.
         clock: our clock, s.
+
+    Attributes:
+        uid: hardware id of the checked vehicle; None: unknown.
     """
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
         self._begun = self._committed = False
         self._peers = self._restarts = 0
-        self._uid: str | None = None
+        self.uid: str | None = None
         self._other_uid: str | None = None
         self._frames = 0
         self._updated_at = clock()
@@ -46,7 +49,7 @@ class ReplacementDetector:
     def begin(self) -> None:
         """Begin to watch: from now on, every frame must come from one vehicle."""
         self._begun, self._committed = True, False
-        self._uid = self._other_uid = None
+        self.uid = self._other_uid = None
         self._peers, self._restarts = self._link.stats.peers, self._link.clock.restart_count
         self._frames, self._updated_at = self._link.stats.frames, self._clock()
         self._silence = self._long_silence = 0.0
@@ -71,15 +74,10 @@ class ReplacementDetector:
 
     def note_identity(self, identity: Identity) -> None:
         """Take the identity from AUTOPILOT_VERSION; an unknown hardware id is ignored."""
-        if self._uid is None:
-            self._uid = identity.uid
-        elif identity.uid not in (None, self._uid):
+        if self.uid is None:
+            self.uid = identity.uid
+        elif identity.uid not in (None, self.uid):
             self._other_uid = identity.uid
-
-    @property
-    def uid(self) -> str | None:
-        """Hardware id of the checked vehicle; None: unknown."""
-        return self._uid
 
     @property
     def is_same_vehicle(self) -> bool:
@@ -115,7 +113,7 @@ class ReplacementDetector:
         if self._restarts != self._link.clock.restart_count:
             return f"the autopilot may have restarted: {self._link.clock.last_change}"
         if self._other_uid is not None:
-            return f"another vehicle answers: hardware id {self._other_uid}, not {self._uid}"
+            return f"another vehicle answers: hardware id {self._other_uid}, not {self.uid}"
         if self._long_silence:
             return f"the vehicle was not heard for {self._long_silence:.1f} s"
         return None

@@ -27,7 +27,7 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
         wind_north_m_s2=wind[0],
         wind_east_m_s2=wind[1],
         height_m=state.height,
-        hover_thrust=guidance_loop.learning.learned_hover,
+        hover_thrust=guidance_loop.learning.hover_thrust.learned_hover,
         frames=stats.frames,
         frames_lost=stats.lost,
         round_trip_ms=None if round_trip is None else 1e3 * round_trip,

@@ -1,15 +1,17 @@
-"""Connects the link's callbacks and changes in flight to a flight."""
+"""Connects the link's callbacks and changes in flight to a flight; notes the vehicle's changes."""
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import takewhile
 
 from companion.control.retuning import Retuning
-from companion.flight.assembled import AssembledFlight
-from companion.flight.state_logger import StateLogger
+from companion.flight.assembly import AssembledFlight
 from companion.mavlink.messages import Message
+from companion.mavlink.texts import StatusText
 from companion.vehicle.link import Link
 from companion.vehicle.records import AttitudeSample
+from companion.vehicle.state import VehicleState
 
 
 @contextmanager
@@ -61,3 +63,40 @@ def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
         for unsubscribe in unsubscribers:
             unsubscribe()
         state_logger.log_changes()
+
+
+class StateLogger:
+    """Notes each change of mode and arming state, and each text of the autopilot, as an event.
+
+    The first call notes the present mode and arming state, but no text from before.
+
+    Args:
+        state: telemetry of the vehicle.
+        note: called with each change as a sentence.
+    """
+
+    def __init__(self, state: VehicleState, note: Callable[[str], None]) -> None:
+        self._state = state
+        self._note = note
+        self._mode: str | None = None
+        self._armed: bool | None = None
+        self._last_text: StatusText | None = state.texts[-1] if state.texts else None
+
+    def log_changes(self) -> None:
+        """Note every change since the last call."""
+        state = self._state
+        for text in self._new_texts():
+            self._note(f"autopilot: {text.text}")
+        if state.mode != self._mode:
+            self._mode = state.mode
+            self._note(f"mode {state.mode}")
+        if state.armed != self._armed:
+            self._armed = state.armed
+            self._note("armed" if state.armed else "disarmed")
+
+    def _new_texts(self) -> list[StatusText]:
+        last, texts = self._last_text, self._state.texts
+        new = [*takewhile(lambda text: text is not last, reversed(texts))][::-1]
+        if new:
+            self._last_text = new[-1]
+        return new

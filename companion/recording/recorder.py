@@ -12,7 +12,7 @@ from typing import Any
 from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.batch import SendBatch
-from companion.recording.mcap_file.fields import CDR_HEADER, Channel
+from companion.recording.mcap_file.fields import Channel
 from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
 from companion.recording.mcap_file.writer import McapWriter
 
@@ -166,4 +166,4 @@ def _write_log(writer: McapWriter, time_ns: int, values: tuple[str, str]) -> Non
 
 def _write_row(writer: McapWriter, time_ns: int, values: tuple[Channel, Sequence[float]]) -> None:
     channel, numbers = values
-    writer.message(channel.topic, time_ns, channel.packing.pack(CDR_HEADER, *numbers))
+    writer.row(channel, time_ns, numbers)

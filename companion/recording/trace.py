@@ -58,7 +58,6 @@ class FlightTrace:
             0..1, measured roll, pitch, yaw rad/s, age of the sample s or NaN), while the
             vehicle's heartbeats show offboard control.
         latencies_ns: latencies from sample to setpoint inside this process, ns.
-        newest_latency_ns: the newest latency, ns; 0 before the first.
         motion: (time since the flight began s, vehicle time s, height over home m, speed m/s, tilt
             °, distance from the reference m), ten times a second in all phases; NaN: unknown.
         maneuvers: beginning of each maneuver, and end of the last one.
@@ -70,7 +69,6 @@ class FlightTrace:
         self.response = Series(_RESPONSE, self._spool)
         self.tracking = Series(_TRACKING, self._spool)
         self.rates = Series(_RATES, self._spool, rows_in_memory=_KEPT_RATES)
-        self.newest_latency_ns = 0
         self.latencies_ns = Series(("latency_ns",), self._spool)
         self.motion = Series(_MOTION, self._spool)
         self.maneuvers: list[ManeuverMark] = []
@@ -102,7 +100,6 @@ class FlightTrace:
 
     def add_latency(self, nanoseconds: int) -> None:
         """Record the latency of a setpoint."""
-        self.newest_latency_ns = nanoseconds
         self.latencies_ns.add([nanoseconds])
 
     def add_motion(self, time: float, row: Iterable[float]) -> None:

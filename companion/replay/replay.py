@@ -14,8 +14,12 @@ from companion.config import Config
 from companion.config.files import changed
 from companion.config.known_drag import KnownDrag, prior_of
 from companion.control.loops import make_loops
-from companion.control.retuning import Retuning, loop_settings, reason_against_changes
-from companion.control.slew import Slew
+from companion.control.retuning import (
+    Retuning,
+    Slew,
+    loop_settings,
+    reason_against_changes,
+)
 from companion.drag import Drag
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose, Reference, VehicleMotion

@@ -6,7 +6,6 @@ is handed back, because the flight must not go on without a monitor that the use
 judge delays the answers to samples, and a warning names it.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
 
@@ -26,9 +25,6 @@ _MAX_JUDGING_TIME = 0.003
 _SLOW_DURATION = 0.5
 """Time for which every call of a judge must be too slow before the warning, s; a busy computer
 makes only some calls slow."""
-
-MonitorFactory = Callable[[Config], Monitor]
-"""Makes a monitor for a configuration; entry points in `companion.monitors` name such functions."""
 
 
 def plugin_monitors(config: Config) -> tuple[Monitor, ...]:

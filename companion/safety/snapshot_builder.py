@@ -141,12 +141,11 @@ class SnapshotBuilder:
         )
 
     def _motion(self) -> Motion:
-        guidance_loop, loop, start = self._guidance_loop, self._loop, self.fence_centre_ned
+        guidance_loop, loop, centre = self._guidance_loop, self._loop, self.fence_centre_ned
         offset, velocity = None, (0.0, 0.0, 0.0)
         if guidance_loop.motion is not None:
-            (north, east, down), velocity = guidance_loop.motion
-            if start is not None:
-                offset = north - start[0], east - start[1], down - start[2]
+            position, velocity = guidance_loop.motion
+            offset = None if centre is None else minus(position, centre)
         sample, idle = loop.resets.newest_attitude, loop.command is None or loop.command.idle
         return Motion(
             None if sample is None else sample.q,

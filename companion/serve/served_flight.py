@@ -235,11 +235,11 @@ class ServedFlight:
         """Send the tracking error and the latency of setpoints to clients."""
         while True:
             await asyncio.sleep(_VALUES_PERIOD)
-            if not self.in_control:
-                continue
-            if self.tracking_error is not None:
-                self._component.send_value("trk_err_m", self.tracking_error)
-            self._component.send_value("answer_ms", 1e-6 * self._assembled.trace.newest_latency_ns)
+            loop, error = self._assembled.context.loop, self.tracking_error
+            if loop.offboard_active and error is not None:
+                self._component.send_value("trk_err_m", error)
+            if loop.offboard_active:
+                self._component.send_value("answer_ms", 1e-6 * loop.record.latency_ns)
 
     def _answer(self, command: ControlRequest | None, result: int) -> None:
         if command is not None:

@@ -13,11 +13,10 @@ from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, SilentObserver
 from companion.flight.opening import open_link, realtime_settings
-from companion.flight.state_logger import StateLogger
+from companion.flight.wiring import StateLogger
 from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
 from companion.mavlink.peer import HEARTBEAT
-from companion.realtime import RealtimeSettings
 from companion.serve.component import Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.network.addresses import target_of
@@ -91,9 +90,7 @@ class ServeSession:
             RealtimeError: the system refused a required `realtime` setting.
             SigningError: the key cannot be used.
         """
-        settings = (
-            realtime_settings(self._config) if self._environment.realtime else RealtimeSettings()
-        )
+        settings = realtime_settings(self._config, self._environment)
         with realtime.requested_settings(settings) as grants:
             self.records.grants = grants
             for grant in grants:

@@ -4,6 +4,7 @@ from collections import defaultdict
 from math import nan
 
 from companion.recording.mcap_file.channels import CHANNELS
+from companion.recording.mcap_file.writer import McapWriter
 
 _CHANNELS = {channel.topic: channel for channel in CHANNELS}
 
@@ -25,6 +26,8 @@ class KeptMessages:
 
     def message(self, topic, time_ns, data):
         self.messages[topic].append((time_ns, data))
+
+    row = McapWriter.row
 
     def action(self, time, name, clock_offset=None, drag=(nan, nan)):
         self.actions.append((time, name, clock_offset))

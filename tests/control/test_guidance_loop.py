@@ -61,7 +61,7 @@ class Bench:
         self.guidance_loop = GuidanceLoop(
             self.loop,
             make_guidance(Config()),
-            motion_estimate(Config()),
+            motion_estimate(Config(), lambda: None),
             self.hover,
             self.state,
             self.ground,

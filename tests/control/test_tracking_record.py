@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from companion.attitude import BodyRates, Coefficients
-from companion.control.flown_source import FlownSource
-from companion.control.tracking_record import FlownPart, TrackingRecord, flown_part
+from companion.control.flown_source import FlownPart, FlownSource
+from companion.control.step_recorder import TrackingRecord
 from companion.guidance import Doublets, ManeuverSequence, Pose, Reference, VehicleMotion
 from companion.guidance.follow import Follow
 from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
@@ -27,16 +27,16 @@ def program(ends=20.0):
 
 def test_what_is_flown_has_its_name_and_its_time():
     flown, source = FlownSource(), program()
-    assert flown_part(flown, 12.0) is None
+    assert flown.part(12.0) is None
     assert flown.finished(99.0) is False
     flown.begin(source, POSE, 10.0)
-    assert flown_part(flown, 12.0) == FlownPart("program", 2.0, None, source)
+    assert flown.part(12.0) == FlownPart("program", 2.0, None, source)
     assert (flown.finished(20.0), flown.finished(20.5)) == (False, True)
-    assert flown_part(flown, 20.5) is None
+    assert flown.part(20.5) is None
     flown.begin(ManeuverSource(ManeuverSequence([DOUBLETS])), POSE, 30.0)
-    assert flown_part(flown, 31.5) == FlownPart("identify", 1.5, DOUBLETS.duration, DOUBLETS)
+    assert flown.part(31.5) == FlownPart("identify", 1.5, DOUBLETS.duration, DOUBLETS)
     flown.begun_at = None
-    assert flown_part(flown, 31.5) is None
+    assert flown.part(31.5) is None
 
 
 def test_only_a_trajectory_is_followed():

@@ -12,8 +12,7 @@ from companion.attitude.model_following import ModelFollowingPlanner
 from companion.config import Config
 from companion.config.files import changed, load
 from companion.config.in_flight import changeable_keys, differences
-from companion.control.retuning import interpolated_config
-from companion.control.slew import SLEW_TIME
+from companion.control.retuning import SLEW_TIME, interpolated_config
 from companion.flight.changes import ChangeRefusedError, Changes
 from companion.recording.flight_record import read_flight
 from companion.replay.replay import Replay

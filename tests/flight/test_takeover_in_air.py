@@ -8,6 +8,7 @@ import pytest
 from companion.config import Config
 from companion.config.files import changed
 from companion.flight.assembly import assemble
+from companion.flight.changes import Changes
 from companion.flight.observer import EventRecorder, SilentObserver
 from companion.flight.opening import link_settings
 from companion.flight.plan import TakeoverPlan
@@ -53,7 +54,14 @@ def taken_over(mock, source, program=None):
                 SilentObserver(), asyncio.get_running_loop().time, lambda _: None
             )
             assembled = assemble(
-                config, link, recorder, None, None, TakeoverPlan(source), environment
+                config,
+                link,
+                recorder,
+                None,
+                None,
+                TakeoverPlan(source),
+                environment,
+                Changes(config),
             )
             with connected(link, assembled):
                 flight = asyncio.ensure_future(assembled.flight.run())

@@ -88,7 +88,7 @@ def test_the_batterys_voltage_reaches_the_thrust():
             bench.state.battery = Battery(bench.now, volts, 0.5)
             bench.hover(0.2, told=None, offboard_active=True, steady=False)
     assert bench.hover_thrust.largest_specific_thrust == pytest.approx(0.81 * full, rel=1e-3)
-    bench.learning.on_ground()
+    bench.learning.hover_thrust.on_ground()
     assert bench.hover_thrust.largest_specific_thrust == full
 
 

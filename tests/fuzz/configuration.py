@@ -19,6 +19,8 @@ from companion.control.inner_loop import planner, rate_limits
 from companion.control.outer_loop import predictive_settings
 from companion.files.yaml_file import ConfigError
 from companion.flight.assembly import assemble
+from companion.flight.changes import Changes
+from companion.flight.environment import THIS_COMPUTER
 from companion.flight.observer import EventRecorder, SilentObserver
 from companion.flight.opening import link_settings
 from companion.flight.plan import ConfiguredPlan
@@ -84,7 +86,8 @@ async def _assembled(config: Config, folder: Path) -> None:
 
     link = Link(link_settings(config), None)
     recorder = EventRecorder(SilentObserver(), asyncio.get_running_loop().time, lambda _: None)
-    assembled = assemble(config, link, recorder, ask, folder, ConfiguredPlan(config))
+    plan, changes = ConfiguredPlan(config), Changes(config)
+    assembled = assemble(config, link, recorder, ask, folder, plan, THIS_COMPUTER, changes)
     assert 0.0 < assembled.context.maneuvers.duration < inf
     assembled.close()
 

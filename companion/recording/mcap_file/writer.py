@@ -1,13 +1,14 @@
 """Writes `flight.mcap` with the library `mcap`."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
 from companion.recording.mcap_file.batch import Batch, SendBatch
 from companion.recording.mcap_file.channels import ENCODING, SCHEMA_ENCODING, TOPICS
+from companion.recording.mcap_file.fields import CDR_HEADER, Channel
 
 _CHUNK_LENGTH = 1 << 20
 """Length at which a chunk is ended, bytes."""
@@ -48,6 +49,10 @@ class McapWriter:
         if self._batch is not None:
             self._batch.add(topic, time_ns, data)
         self._writer.add_message(self._ids[topic], time_ns, data, time_ns)
+
+    def row(self, channel: Channel, time_ns: int, numbers: Sequence[float]) -> None:
+        """Add a message of a numeric channel: the float64 columns, then the uint8 columns."""
+        self.message(channel.topic, time_ns, channel.packing.pack(CDR_HEADER, *numbers))
 
     def stream(self) -> None:
         """Send the messages added since the last call to the live stream, if there is one."""
