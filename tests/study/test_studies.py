@@ -279,7 +279,7 @@ def test_what_is_interrupted_leaves_no_broken_page(tmp_path, capsys, monkeypatch
     assert main(["study", "kmax", "--out", str(tmp_path)]) == 1
     assert "Interrupted" in capsys.readouterr().out
     assert (tmp_path / "kmax.html").read_bytes() == page
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob(".*"))
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path, capsys, monkeypatch):
