@@ -10,6 +10,8 @@ from matplotlib.figure import Figure
 from companion.study.methods import REFERENCE_STYLE, LineStyle, Method
 from companion.study.step import Floats, Step
 
+AxisLimits = tuple[float, float]
+
 _THINNED_POINTS = 400
 """Smallest number of points of a thinned line; without thinning a page would have megabytes."""
 
@@ -95,16 +97,16 @@ def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], step: S
 
 
 def note_magnification(
-    axes: Axes, axis: str, span: float, other_axis: str, other_span: float
+    axes: Axes, axis: str, limits: AxisLimits, other_axis: str, other_limits: AxisLimits
 ) -> None:
     """Write below the title of a panel how many times one axis is magnified compared with another.
 
     Args:
         axes: the panel.
         axis: name of the axis.
-        span: range of values that the axis shows.
+        limits: smallest and largest value that the axis shows.
         other_axis: name of the axis that it is compared with.
-        other_span: range of values that the other axis shows.
+        other_limits: smallest and largest value that the other axis shows.
     """
-    factor = other_span / span
+    factor = (other_limits[1] - other_limits[0]) / (limits[1] - limits[0])
     axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{factor:.0f} of {other_axis}")

@@ -162,16 +162,12 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         ylim=(1e-5, 0.1),
     )
     draw_plane(plane, curves, FIGURE_2)
-    north_span, east_span = _span(north.get_ylim()), _span(east.get_ylim())
-    note_magnification(east, "this axis", east_span, "that of north", north_span)
-    east_span, north_span = _span(plane.get_xlim()), _span(plane.get_ylim())
-    note_magnification(plane, "the $a_E$ axis", east_span, "the $a_N$ axis", north_span)
+    note_magnification(east, "this axis", east.get_ylim(), "that of north", north.get_ylim())
+    note_magnification(
+        plane, "the $a_E$ axis", plane.get_xlim(), "the $a_N$ axis", plane.get_ylim()
+    )
     north.legend(loc="lower right")
     return figure
-
-
-def _span(limits: tuple[float, float]) -> float:
-    return limits[1] - limits[0]
 
 
 def _findings(
