@@ -9,10 +9,6 @@ from companion.attitude.types import AttitudeError, BodyRates, Quaternion, Targe
 from companion.user_code import naming_user_code
 
 
-class InvalidRatesError(AttitudeError):
-    """A planner from another package returned body rates that are not finite."""
-
-
 class PluginPlanner:
     """Checks the planner of another package and limits its body rates.
 
@@ -32,15 +28,15 @@ class PluginPlanner:
         """The planner's body rates within the limits, rad/s.
 
         Raises:
-            InvalidRatesError: the planner's rates are not finite.
-            AttitudeError: the planner cannot use this attitude or target.
+            AttitudeError: the planner cannot use this attitude or target, or its rates are not
+                finite.
             UserCodeError: the planner raised another error, or did not return three numbers.
         """
         with naming_user_code("planner", self._code, AttitudeError):
             roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
             finite = isfinite(roll) and isfinite(pitch) and isfinite(yaw)
         if not finite:
-            raise InvalidRatesError(f"the planner returned {(roll, pitch, yaw)}, not finite rates")
+            raise AttitudeError(f"the planner returned {(roll, pitch, yaw)}, not finite rates")
         return BodyRates(*limit_rates(roll, pitch, yaw, self._tilt_rate, self._yaw_rate))
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:

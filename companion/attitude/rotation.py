@@ -8,8 +8,6 @@ from math import asin, atan2, cos, pi, sin, sqrt
 
 from companion.attitude.types import Quaternion
 
-TWO_PI = 2.0 * pi
-
 _SMALL_ANGLE = 1e-12
 """Half angle h, rad, below which sin(h)/h is 1 to double precision."""
 
@@ -132,7 +130,7 @@ def limit_rates(
 def wrap_difference(angle: float) -> float:
     """Wrap an angle between −2π and 2π, such as a difference of two headings, to (−π, π]."""
     if angle > pi:
-        return angle - TWO_PI
+        return angle - 2.0 * pi
     if angle <= -pi:
-        return angle + TWO_PI
+        return angle + 2.0 * pi
     return angle

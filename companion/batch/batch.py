@@ -77,8 +77,7 @@ def rates(
             a plain function.
         ValueError: the shapes of `q` and `targets` are wrong or differ.
     """
-    planner = _require_law_planner(planner)
-    q, targets, loops = _checked_arguments(planner, q, targets, dt, 1, compiled)
+    planner, q, targets, loops = _checked_arguments(planner, q, targets, dt, 1, compiled)
     body_rates = np.empty((3, q.shape[1]))
     loops.apply(q, targets, body_rates, dt, planner.constants)
     return body_rates
@@ -97,8 +96,7 @@ def advance(
     Arguments and errors are those of `rates`. Also, a negative `steps` raises ValueError, and a
     `steps` that is not an integer raises TypeError.
     """
-    planner = _require_law_planner(planner)
-    q, targets, loops = _checked_arguments(planner, q, targets, dt, steps, compiled)
+    planner, q, targets, loops = _checked_arguments(planner, q, targets, dt, steps, compiled)
     final_q = _final_attitudes(loops, planner, q, targets, dt, steps)
     if _turned_too_far(loops, final_q):
         loops = compiled_loops(planner.law, any_angle=True)
@@ -115,8 +113,7 @@ def simulate(
     compiled: bool | None = None,
 ) -> History:
     """As `advance`, but returns the attitudes and body rates of all samples."""
-    planner = _require_law_planner(planner)
-    q, targets, loops = _checked_arguments(planner, q, targets, dt, steps, compiled)
+    planner, q, targets, loops = _checked_arguments(planner, q, targets, dt, steps, compiled)
     history = History(np.empty((steps + 1, *q.shape)), np.empty((steps, 3, q.shape[1])))
     history.q[0] = q
     loops.record(history.q, targets, history.rates, dt, planner.constants)
@@ -147,30 +144,21 @@ def coefficients(q: ArrayLike) -> Array:
     return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=-2)
 
 
-def _require_law_planner(planner: Planner) -> LawPlanner:
-    """The planner, which must be one without memory.
-
-    Raises:
-        TypeError: the planner keeps state between samples.
-    """
-    if isinstance(planner, LawPlanner):
-        return planner
-    raise TypeError(
-        f"a batch maps planners without memory ({', '.join(LAW_NAMES)}, or a law of your own, each "
-        f"made by make_planner), not {type(planner).__name__}; make one planner for each vehicle, "
-        "and call its rates() for each sample"
-    )
-
-
 def _checked_arguments(
-    planner: LawPlanner,
+    planner: Planner,
     q: ArrayLike,
     targets: ArrayLike,
     dt: float,
     steps: int,
     compiled: bool | None,
-) -> tuple[Array, Array, Loops]:
-    """Check the arguments; return normalised attitudes, limited targets and loops."""
+) -> tuple[LawPlanner, Array, Array, Loops]:
+    """Check the arguments; return planner, normalised attitudes, limited targets and loops."""
+    if not isinstance(planner, LawPlanner):
+        raise TypeError(
+            f"a batch maps planners without memory ({', '.join(LAW_NAMES)}, or a law of your own, "
+            f"each made by make_planner), not {type(planner).__name__}; make one planner for each "
+            "vehicle, and call its rates() for each sample"
+        )
     q, targets = as_rows(q, "q"), as_rows(targets, "targets")
     if q.shape != targets.shape:
         raise ValueError(f"{q.shape[1]} attitudes, but {targets.shape[1]} targets")
@@ -186,10 +174,10 @@ def _checked_arguments(
         _require_plain_function(planner.law)
         loops = compiled_loops(planner.law)
         if compiled_check()(q, targets, longest_target):
-            return q, targets, loops
+            return planner, q, targets, loops
     else:
         loops = plain_loops(planner.law)
-    return unit_quaternions(q), limited_targets(targets, longest_target), loops
+    return planner, unit_quaternions(q), limited_targets(targets, longest_target), loops
 
 
 def _is_plain_function(law: Law) -> bool:

@@ -66,12 +66,7 @@ def fly_steps(
 
     Raises:
         MissingExtraError: numba is not installed.
-        TypeError: the planner keeps state between samples.
     """
-    if not isinstance(planner, LawPlanner):
-        raise TypeError(
-            f"{type(planner).__name__} keeps state; a batch needs a planner without state"
-        )
     require("numba", "study", "a compiled batch")
     coefficients, commanded_rates = np.empty((len(targets), 2)), np.empty((len(targets), 3))
     loops, delays = _rate_loop_arrays(axes)

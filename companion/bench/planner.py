@@ -11,13 +11,13 @@ from timeit import Timer
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
 from companion import batch
 from companion.attitude import LAW_NAMES, Limits, Target, make_planner
 from companion.attitude.planner import LawPlanner
+from companion.batch.loops import Array
 from companion.extras import pip_command
 
 BATCH_SIZES = (1, 1_000, 10_000)
@@ -42,13 +42,6 @@ class _Case(NamedTuple):
     """Runs the case."""
     steps: int
     """Number of planner steps in one run."""
-
-
-class _Fleet(NamedTuple):
-    """Unit quaternions `q` (4, n) and `targets` (4, n) of n vehicles, as in `companion.batch`."""
-
-    q: NDArray[np.float64]
-    targets: NDArray[np.float64]
 
 
 def run(seconds: float, as_json: bool) -> dict[str, Any]:
@@ -97,9 +90,9 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 
 def _flight_cases() -> list[_Case]:
     """Cases of a step with an unchanged target, which is usual in flight, and with a new target."""
-    vehicle = _fleet(2)
-    same, other = (Target(*column) for column in vehicle.targets.T.tolist())
-    values: dict[str, Any] = {"q": tuple(vehicle.q[:, 0].tolist()), "same": same, "other": other}
+    q, targets = _fleet(2)
+    same, other = (Target(*column) for column in targets.T.tolist())
+    values: dict[str, Any] = {"q": tuple(q[:, 0].tolist()), "same": same, "other": other}
     functions: dict[str, Callable[..., Any]] = {"baseline": _first_argument}
     functions |= {name: _planner(name).rates for name in LAW_NAMES}
     return [
@@ -119,8 +112,8 @@ def _first_argument(q: Any, target: Any, dt: float) -> Any:
 def _batch_cases(compiled: bool) -> list[_Case]:
     cases = []
     for count in BATCH_SIZES:
-        fleet = _fleet(count)
-        values: dict[str, Any] = {"q": fleet.q, "targets": fleet.targets, "compiled": compiled}
+        q, targets = _fleet(count)
+        values: dict[str, Any] = {"q": q, "targets": targets, "compiled": compiled}
         copy = Timer("q.copy(), targets.copy()", globals=values)
         cases.append(_Case(str(count), "baseline", copy, count))
         for name in LAW_NAMES:
@@ -144,13 +137,16 @@ def _planner(name: str) -> LawPlanner:
     return planner
 
 
-def _fleet(count: int) -> _Fleet:
-    """`count` vehicles at many headings, some with a large tilt, and targets within the limits."""
+def _fleet(count: int) -> tuple[Array, Array]:
+    """Attitudes (4, n) at many headings, some with a large tilt, and targets (4, n) in the limits.
+
+    `count` is n, the number of vehicles.
+    """
     random = np.random.default_rng(1)
     q = random.normal(size=(4, count))
     q[0] = 1.5 + np.abs(q[0])
     q /= np.linalg.norm(q, axis=0)
-    return _Fleet(q, random.uniform(-0.39, 0.39, size=(4, count)))
+    return q, random.uniform(-0.39, 0.39, size=(4, count))
 
 
 def _shortest_ns(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
@@ -211,9 +207,5 @@ def _show(figures: dict[str, Any]) -> None:
 
 
 def _cell(ns: float, ratio: float | None) -> str:
-    shown = _short_number(ns)
+    shown = f"{ns:,.0f}" if ns >= 100.0 else f"{ns:.3g}"
     return shown if ratio is None else f"{shown} {ratio:.0f}×"
-
-
-def _short_number(number: float) -> str:
-    return f"{number:,.0f}" if number >= 100.0 else f"{number:.3g}"

@@ -28,8 +28,7 @@ _ATTITUDE = (0.99, 0.05, 0.05, 0.1197)
 
 def stamp_by_time(setpoint: bytes) -> int:
     """The time stamp (ms) of the sample, in `time_boot_ms` of a SET_ATTITUDE_TARGET frame."""
-    stamp: int = struct.unpack_from("<I", setpoint, _TIME_OFFSET)[0]
-    return stamp
+    return int.from_bytes(setpoint[_TIME_OFFSET : _TIME_OFFSET + 4], "little")
 
 
 def stamp_by_yaw_rate(setpoint: bytes) -> int:

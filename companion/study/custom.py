@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude.reference import FirstOrderReference
@@ -29,7 +28,7 @@ from companion.study.measures import (
     settling_time,
     signed_distance_from_line,
 )
-from companion.study.methods import LIMIT_STYLE, METHOD_BY_PLANNER, Method, planner_of
+from companion.study.methods import LAW_METHODS, LIMIT_STYLE, Method, planner_of
 from companion.study.outcome import Cell, Job, Outcome, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
 
@@ -51,9 +50,10 @@ def _run(case: Case, tick: Tick) -> Outcome:
     """Fly the case with each of its methods at each of its rates."""
     responses: Responses = {}
     for hz in case.rates_hz:
-        for method in (m for name, m in METHOD_BY_PLANNER.items() if name in case.methods):
-            tick(f"{method.label} at {hz:g} Hz")
-            responses[method, hz] = _fly(case, method, hz)
+        for method in LAW_METHODS:
+            if method.planner in case.methods:
+                tick(f"{method.label} at {hz:g} Hz")
+                responses[method, hz] = _fly(case, method, hz)
     return Outcome(
         name="custom",
         title="Custom case",
@@ -70,10 +70,11 @@ def _run(case: Case, tick: Tick) -> Outcome:
 
 def _results(case: Case, responses: Responses) -> Table:
     """The table of the largest errors and rates of each method at each sample rate."""
+    count = len(case.headings_deg)
     return Table(
         "custom",
         "The custom case; largest values over"
-        f" {_count_text(case.headings_deg, 'heading')}, rates as commanded.",
+        f" {count} heading{'s' if count > 1 else ''}, rates as commanded.",
         (
             "method",
             "rate, Hz",
@@ -122,10 +123,6 @@ def _samples(
                 heading,
                 *(float(v) for v in (instant, *coefficients, *body_rates)),
             )
-
-
-def _count_text(things: tuple[float, ...], word: str) -> str:
-    return f"{len(things)} {word}" + ("s" if len(things) > 1 else "")
 
 
 def _fly(case: Case, method: Method, rate_hz: float) -> Response:
@@ -183,7 +180,7 @@ def _figure(case: Case, responses: Responses) -> Figure:
     )
     draw_response(north, east, step.time, curves)
     draw_reference(north, east, step.time, reference, _reference_text(case))
-    draw_plane(plane, curves, np.array([step.start, step.target]))
+    draw_plane(plane, curves, step)
     for m, response in shown_responses.items():
         draw_line(
             from_straight_line,

@@ -8,7 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from companion.study.methods import REFERENCE_STYLE, LineStyle, Method
-from companion.study.step import Floats
+from companion.study.step import Floats, Step
+
+AxisLimits = tuple[float, float]
 
 _THINNED_POINTS = 400
 """Smallest number of points of a thinned line; without thinning a page would have megabytes."""
@@ -77,33 +79,34 @@ def draw_reference(
     draw_line(east, time, reference[:, 1], REFERENCE_STYLE, label)
 
 
-def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], ends: Floats) -> None:
-    """Draw paths in the plane of the coefficients.
+def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], step: Step) -> None:
+    """Draw paths in the plane of the coefficients, and the straight line of the step.
 
     Args:
         axes: the panel.
         curves: for each curve its method, label and (n, 2) coefficients.
-        ends: (2, 2), start and target.
+        step: the step that was flown.
     """
     for method, label, c in curves:
         draw_line(axes, c[:, 1], c[:, 0], method.line_style, label)
-    axes.plot(ends[:, 1], ends[:, 0], **REFERENCE_STYLE)
-    axes.plot(*ends[0, ::-1], "o", color="black", markersize=4)
-    axes.plot(*ends[1, ::-1], "*", color="black", markersize=8)
+    start, target = step.start, step.target
+    axes.plot([start.east, target.east], [start.north, target.north], **REFERENCE_STYLE)
+    axes.plot(start.east, start.north, "o", color="black", markersize=4)
+    axes.plot(target.east, target.north, "*", color="black", markersize=8)
     axes.set(title="Path (● start, ★ target)", xlabel="$a_E$", ylabel="$a_N$")
 
 
 def note_magnification(
-    axes: Axes, axis: str, span: float, other_axis: str, other_span: float
+    axes: Axes, axis: str, limits: AxisLimits, other_axis: str, other_limits: AxisLimits
 ) -> None:
     """Write below the title of a panel how many times one axis is magnified compared with another.
 
     Args:
         axes: the panel.
         axis: name of the axis.
-        span: range of values that the axis shows.
+        limits: smallest and largest value that the axis shows.
         other_axis: name of the axis that it is compared with.
-        other_span: range of values that the other axis shows.
+        other_limits: smallest and largest value that the other axis shows.
     """
-    factor = other_span / span
+    factor = (other_limits[1] - other_limits[0]) / (limits[1] - limits[0])
     axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{factor:.0f} of {other_axis}")

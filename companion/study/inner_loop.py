@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 from math import exp
 
 import numpy as np
-from numpy.typing import NDArray
 
-from companion.attitude import BodyRates, Planner, Quaternion, Target
+from companion.attitude import BodyRates, Planner, Quaternion, Target, make_planner
 from companion.attitude.kinematics import cos_tilt
+from companion.attitude.limits import Constants
 from companion.attitude.representation import normalised
 from companion.guidance.thrust import specific_thrust
+from companion.study.step import Floats
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
@@ -31,20 +32,14 @@ ROLL_STEP_S = 0.25
 class InnerLoopFlight:
     """Result of a flight of n planner samples. Rates are body rates (FRD), rad/s."""
 
-    time: NDArray[np.float64]
+    time: Floats
     """(n+1,), s from the start."""
-    q: NDArray[np.float64]
+    q: Floats
     """(n+1, 4), attitude (w, x, y, z), body → world (NED)."""
-    body_rates: NDArray[np.float64]
+    body_rates: Floats
     """(n+1, 3), true rates of the vehicle."""
-    commanded_rates: NDArray[np.float64]
+    commanded_rates: Floats
     """(n, 3), rates commanded at each sample, before any delay."""
-    tilt_saturated: NDArray[np.bool_]
-    """(n,), whether the rotors could not produce the commanded roll and pitch torque in at least
-    one physics step of the sample."""
-    yaw_saturated: NDArray[np.bool_]
-    """(n,), whether the rotors could not produce the commanded yaw torque in at least one physics
-    step of the sample."""
 
 
 @dataclass(frozen=True)
@@ -83,27 +78,22 @@ class InnerLoop:
         q = normalised(start)
         multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust_to_hold_height(q))
         setpoints = self._setpoint_queue(multirotor.throttle(_thrust_to_hold_height(q)))
-        attitudes, body_rates, commanded_rates, saturated = [q], [multirotor.body_rates], [], []
+        attitudes, body_rates, commanded_rates = [q], [multirotor.body_rates], []
         for _ in range(samples):
             rates = planner.rates(q, target, 1.0 / rate_hz, BodyRates(*multirotor.body_rates))
             setpoint = rates, multirotor.throttle(_thrust_to_hold_height(q))
-            tilt_saturated = yaw_saturated = False
             for _ in range(physics_steps):
                 setpoints.append(setpoint)
                 multirotor.move(multirotor.drive(*setpoints[0]))
-                tilt_saturated |= multirotor.mix.tilt_saturated
-                yaw_saturated |= multirotor.mix.yaw_saturated
             q = multirotor.q
             attitudes.append(q)
             body_rates.append(multirotor.body_rates)
             commanded_rates.append(rates)
-            saturated.append((tilt_saturated, yaw_saturated))
         return InnerLoopFlight(
             np.arange(samples + 1) / rate_hz,
             np.array(attitudes),
             np.array(body_rates),
             np.array(commanded_rates),
-            *np.array(saturated).T,
         )
 
     def rate_time_63(self) -> float:
@@ -114,7 +104,7 @@ class InnerLoop:
         """
         target_rate = ROLL_STEP.roll * (1.0 - exp(-1.0))
         flight = self.fly(
-            _ConstantRates(ROLL_STEP),
+            make_planner(_roll_step),
             LEVEL,
             Target(0.0, 0.0, 0.0),
             seconds=ROLL_STEP_S,
@@ -160,23 +150,9 @@ def faster_inner_loop(factor: int) -> InnerLoop:
     )
 
 
-class _ConstantRates:
-    """A planner that always commands the same rates."""
-
-    def __init__(self, rates: BodyRates) -> None:
-        self._rates = rates
-
-    def rates(
-        self, q: Quaternion, target: Target, dt: float, body_rates: BodyRates | None = None
-    ) -> BodyRates:
-        """The constant rates."""
-        return self._rates
-
-    def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Do nothing."""
-
-    def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
-        """Do nothing."""
+def _roll_step(q: Quaternion, target: Target, dt: float, constants: Constants) -> BodyRates:
+    """A law that always commands `ROLL_STEP`."""
+    return ROLL_STEP
 
 
 def _thrust_to_hold_height(q: Quaternion) -> float:

@@ -6,12 +6,10 @@ from math import exp
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.attitude import BodyRates, Planner, Quaternion, Target
 from companion.attitude.rotation import after_constant_rates
-
-Floats = NDArray[np.float64]
+from companion.study.step import Floats
 
 STEP_HZ = 1000
 """Simulation steps per second; dead times and sample periods are whole numbers of steps."""
@@ -44,14 +42,13 @@ class LagBody:
         self.rates = BodyRates(0.0, 0.0, 0.0)
         self._decay = exp(-1e3 / (STEP_HZ * lag_ms))
         self._mean_decay = 1e-3 * lag_ms * (1.0 - self._decay) * STEP_HZ  # mean over a step
-        self._delayed = deque([self.rates] * (dead_time_ms + 1))
+        self._delayed = deque([self.rates] * (dead_time_ms + 1), maxlen=dead_time_ms + 1)
 
     def simulate(self, commanded_rates: BodyRates, steps: int) -> None:
         """Simulate `steps` steps of 1/STEP_HZ s with constant commanded rates, rad/s."""
         decay, mean_decay, (roll, pitch, yaw) = self._decay, self._mean_decay, self.rates
         for _ in range(steps):
             self._delayed.append(commanded_rates)
-            self._delayed.popleft()
             roll_goal, pitch_goal, yaw_goal = self._delayed[0]
             # The difference of each rate from its delayed command decays.
             roll, pitch, yaw = roll - roll_goal, pitch - pitch_goal, yaw - yaw_goal

@@ -49,14 +49,14 @@ def cross_track(response: Response) -> Floats:
     return np.asarray(np.abs(signed_distance_from_line(response)).max(axis=0))
 
 
-def settling_time(response: Response, share: float = 0.05) -> Floats:
-    """(headings,) time from which the distance to the target stays within `share` of the step, s.
+def settling_time(response: Response) -> Floats:
+    """(headings,) time from which the distance to the target stays within 5 % of the step, s.
 
     The time is inf if the response ends outside this distance.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     offset = response.coefficients - target[:, None]
-    is_outside = np.hypot(offset[:, 0], offset[:, 1]) > share * np.hypot(*(target - start))
+    is_outside = np.hypot(offset[:, 0], offset[:, 1]) > 0.05 * np.hypot(*(target - start))
     after_last_outside = is_outside.shape[0] - np.argmax(is_outside[::-1], axis=0)
     first = np.where(is_outside.any(axis=0), after_last_outside, 0)  # first sample to stay inside
     time = response.step.time

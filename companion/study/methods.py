@@ -49,8 +49,8 @@ EXACT = Method("exact", "exact", "#CC79A7", (2, 1))
 
 PAPER_METHODS = (QUATERNION, SO3, EULER, PROPOSED)
 """The methods of the paper's comparison, in drawing order: wide lines first."""
-METHOD_BY_PLANNER = {method.planner: method for method in (*PAPER_METHODS, EXACT)}
-"""The method of every planner that keeps no state, by name of the planner, in drawing order."""
+LAW_METHODS = (*PAPER_METHODS, EXACT)
+"""The methods of all planners that keep no state, in drawing order."""
 
 
 def planner_of(

@@ -9,6 +9,7 @@ from pathlib import Path
 import jinja2
 from matplotlib.figure import Figure
 
+from companion.files.write_whole import write_whole
 from companion.study.outcome import Outcome
 
 _DPI = 130
@@ -22,11 +23,11 @@ def write_outcome(outcome: Outcome, folder: Path) -> None:
     """
     _lay_out(outcome.figure)
     for extension in ("svg", "png"):
-        _write(folder / f"{outcome.name}.{extension}", _image(outcome.figure, extension))
+        write_whole(folder / f"{outcome.name}.{extension}", _image(outcome.figure, extension))
     for table in (*outcome.tables, *outcome.series):
-        _write(folder / f"{table.name}.csv", table.as_csv().encode())
+        write_whole(folder / f"{table.name}.csv", table.as_csv())
     for table in outcome.tables:
-        _write(folder / f"{table.name}.md", table.as_markdown().encode())
+        write_whole(folder / f"{table.name}.md", table.as_markdown())
 
 
 def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
@@ -52,7 +53,7 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
         },
         version=version("mavlink-companion"),
     )
-    _write(path, page.encode())
+    write_whole(path, page)
 
 
 def _lay_out(figure: Figure) -> None:
@@ -70,13 +71,3 @@ def _image(figure: Figure, extension: str) -> bytes:
     metadata = {"Date": None} if extension == "svg" else {"Software": None}
     figure.savefig(buffer, format=extension, dpi=_DPI, metadata=metadata)
     return buffer.getvalue()
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Replace a file in one step, so that an interruption leaves the old one or the new one."""
-    temporary_path = path.with_name(f"{path.name}.part")
-    try:
-        temporary_path.write_bytes(content)
-        temporary_path.replace(path)
-    finally:
-        temporary_path.unlink(missing_ok=True)

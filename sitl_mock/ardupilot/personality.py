@@ -1,7 +1,6 @@
 """ArduCopter's personality: its numbers and its behaviour (recorded from 4.7.0-dev)."""
 
 from collections.abc import Collection, Iterable
-from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
@@ -49,6 +48,7 @@ class ArduPilot:
     system_id_parameter = "MAV_SYSID"
     unsigned_links: Collection[str] = ("companion",)
     parameters = ARDUPILOT_PARAMETERS
+    with_defaults = staticmethod(with_ardupilot_defaults)
     identity = Identity(
         capabilities=64495,
         flight_sw_version=0x04070000,
@@ -56,10 +56,6 @@ class ArduPilot:
         os_sw_version=0,
         flight_custom_version=tuple(b"12f6aa4e"),
     )
-
-    def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:
-        """Return the ``mock:`` section, completed by the defaults of ArduCopter's simulator."""
-        return with_ardupilot_defaults(section)
 
     def slot_us(self, settings: VehicleSettings) -> int:
         """Return the period of the main loop, us."""

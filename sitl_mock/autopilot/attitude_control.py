@@ -61,8 +61,7 @@ def attitude_rates(
     ew, ex, ey, ez = multiply(conjugate(q), weighted_target)
     error_scale = copysign(2.0, ew)
     yaw_gain = gains.yaw / yaw_weight if yaw_weight > 0.0 else gains.yaw
-    w, x, y, z = q
-    down = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+    down = body_z(conjugate(q))  # the world's down axis in body axes
     max_rates = gains.max_rates
     return (
         _clamp(error_scale * ex * gains.roll + down[0] * yaw_rate, max_rates[0]),

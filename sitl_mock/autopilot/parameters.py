@@ -116,7 +116,6 @@ class ParameterTable:
     def __init__(self, defaults: Iterable[Parameter], overrides: dict[str, float]) -> None:
         self._values = dict(sorted(defaults))
         self._names = list(self._values)
-        self._index_by_name = {name: index for index, name in enumerate(self._names)}
         for name, value in overrides.items():
             is_integer = isinstance(self._values[name], int) and float(value).is_integer()
             self.set(name, int(value) if is_integer else float(value))
@@ -125,7 +124,7 @@ class ParameterTable:
         return len(self._names)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._index_by_name
+        return name in self._values
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
@@ -145,7 +144,7 @@ class ParameterTable:
 
     def index_of(self, name: str) -> int:
         """Return a parameter's index."""
-        return self._index_by_name[name]
+        return self._names.index(name)
 
     def set(self, name: str, value: int | float) -> None:
         """Change a value.

@@ -50,21 +50,14 @@ class UdpEndpoint:
         ConfigError: as of `bound_socket`.
     """
 
+    connected = True  # UDP cannot know
+
     def __init__(self, local_port: int, remote_port: int, option: str) -> None:
         self.socket = bound_socket(local_port, option)
         self.address = f"UDP {HOST}:{local_port}"
+        self.descriptors = [self.socket.fileno()]
         self.has_received = False
         self._partner = (HOST, remote_port)
-
-    @property
-    def connected(self) -> bool:
-        """Always True: UDP cannot know."""
-        return True
-
-    @property
-    def descriptors(self) -> list[int]:
-        """File descriptor of the socket."""
-        return [self.socket.fileno()]
 
     def receive(self) -> tuple[bytes, bool] | None:
         """Return the next datagram and whether the partner sent it; None if there is none."""

@@ -15,7 +15,6 @@ from sitl_mock.physics.multirotor_step import (
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.physics.rigid_body import Load
-from sitl_mock.physics.rotors import Mix
 
 _STILL_AIR = Conditions(1.0, ZERO, ZERO)
 
@@ -34,7 +33,7 @@ class Multirotor:
     Attributes:
         law: constants.
         body: motion after the latest step. To stop the vehicle, assign `at_rest(q)`.
-        actuation: state of controller and rotors after the latest step.
+        actuation: state of controller and rotors after the latest step, its `Mix` first.
     """
 
     def __init__(
@@ -64,11 +63,6 @@ class Multirotor:
     def body_rates(self) -> Vector:
         """Body rates after the latest step, rad/s, FRD."""
         return self.body[0][7:]
-
-    @property
-    def mix(self) -> Mix:
-        """Throttles of the latest step, and which torques saturated."""
-        return self.actuation[0]
 
     def throttle(self, specific_thrust: float) -> float:
         """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""

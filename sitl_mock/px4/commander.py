@@ -12,7 +12,7 @@ from sitl_mock.link.link import Link
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.px4.arming import UNARMABLE_MODES, ArmingChecks, AutoDisarm
 from sitl_mock.px4.failsafe import Failsafe
-from sitl_mock.px4.failsafe_actions import AnnounceEvent
+from sitl_mock.px4.failsafe_actions import AnnounceEvent, FailsafeActions
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import PILOTED_MODES, POSITION_MODES, custom_mode
 from sitl_mock.px4.setpoints import decode_setpoint
@@ -45,9 +45,10 @@ class Px4Commander:
     ) -> None:
         self.refusal: str | None = None
         self.pilot_simulated = False
-        self.failsafe = Failsafe(
-            state, parameters, stream, announce, self._enter_mode, self._stop_motors
+        self._actions = FailsafeActions(
+            state, parameters, announce, self._enter_mode, self._stop_motors
         )
+        self.failsafe = Failsafe(state, parameters, announce, self._actions)
         self._sticks = Sticks(parameters)
         self._checks = checks
         self._auto_disarm = AutoDisarm(state, parameters)
@@ -162,7 +163,9 @@ class Px4Commander:
         self._update_prearm_problem()
         self._checks.report(gcs_alive=self.failsafe.gcs_alive, pilot_present=self._pilot_present)
         self._detect_stick_override()
-        self.failsafe.step(pilot_present=self._pilot_present)
+        self.failsafe.step(
+            offboard_alive=self._checks.offboard_alive, pilot_present=self._pilot_present
+        )
         if state.armed:
             if state.mode is Mode.TAKEOFF and state.took_off and self._control.takeoff_reached:
                 if state.intended_mode is Mode.TAKEOFF:
@@ -189,7 +192,7 @@ class Px4Commander:
         """Switch to POSCTL if a pilot moves the sticks in the air in an automatic mode."""
         state = self._state
         in_automatic_flight = state.armed and not state.landed and state.mode not in PILOTED_MODES
-        if not in_automatic_flight or self.failsafe.holds_before_acting:
+        if not in_automatic_flight or self._actions.holds_before_acting:
             return
         if self._sticks.are_overriding(state.time_us):
             self._announce(EventKind.PILOT_TOOK_OVER, "")

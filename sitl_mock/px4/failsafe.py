@@ -1,12 +1,9 @@
 """PX4's failsafes: loss of a link, of offboard setpoints, of position; low battery."""
 
-from collections.abc import Callable
-
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.px4.failsafe_actions import (
     LAND,
@@ -43,27 +40,21 @@ class Failsafe:
     Args:
         state: the autopilot's state.
         parameters: the autopilot's parameters.
-        stream: the offboard setpoints.
         announce: sends texts and events.
-        enter: enters a mode and leaves the intended mode as it is.
-        stop: stops the motors and announces the event.
+        actions: executes the action of a failsafe.
     """
 
     def __init__(
         self,
         state: State,
         parameters: ParameterTable,
-        stream: OffboardStream,
         announce: AnnounceEvent,
-        enter: Callable[[Mode], None],
-        stop: Callable[[EventKind], None],
+        actions: FailsafeActions,
     ) -> None:
         self._state = state
         self._parameters = parameters
-        self._stream = stream
         self._announce = announce
-        self._enter = enter
-        self._actions = FailsafeActions(state, parameters, announce, enter, stop)
+        self._actions = actions
         self._pilot_present = False
         self._pilot_optional = True
         self._pilot_lost_us: int | None = None
@@ -98,21 +89,21 @@ class Failsafe:
         timeout_us = self._parameters["COM_DL_LOSS_T"] * 1e6 + _GCS_MARGIN_US
         return self._state.time_us - self._gcs_heartbeat_us <= timeout_us
 
-    def step(self, *, pilot_present: bool) -> None:
-        """Check every failsafe once; ``pilot_present``: a pilot holds the sticks."""
+    def step(self, *, offboard_alive: bool, pilot_present: bool) -> None:
+        """Check every failsafe once.
+
+        Args:
+            offboard_alive: whether offboard setpoints arrive.
+            pilot_present: whether a pilot holds the sticks.
+        """
         self._watch_companion()
         self._watch_battery()
         self._watch_gcs()
         self._watch_pilot(pilot_present=pilot_present)
         if self._state.armed:
             self._watch_position()
-            self._watch_offboard()
-        self._warn_disarmed()
-
-    @property
-    def holds_before_acting(self) -> bool:
-        """Whether a failsafe waits in Hold for COM_FAIL_ACT_T; moved sticks do not end the wait."""
-        return self._actions.holds_before_acting
+            self._watch_offboard(alive=offboard_alive)
+        self._warn_disarmed(offboard_alive=offboard_alive)
 
     def _is_exempt(self, parameter: str) -> bool:
         """Whether a parameter exempts the intended mode from a failsafe."""
@@ -147,11 +138,10 @@ class Failsafe:
         if self._pilot_lost_us != _ACTED_ALREADY or state.mode in PILOTED_MODES:
             self._actions.act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
 
-    def _watch_offboard(self) -> None:
+    def _watch_offboard(self, *, alive: bool) -> None:
         state = self._state
         if state.intended_mode is not Mode.OFFBOARD:
             return
-        alive = self._stream.alive(state.time_us, self._parameters["COM_OF_LOSS_T"])
         if state.mode is Mode.OFFBOARD and not alive:
             action = OFFBOARD_ACTIONS.get(int(self._parameters["COM_OBL_RC_ACT"]), POSITION)
             if action.mode in PILOTED_MODES and not self._pilot_present:
@@ -159,13 +149,12 @@ class Failsafe:
             self._actions.act(Cause.OFFBOARD_LOST, action)
         elif alive and self._actions.cause is Cause.OFFBOARD_LOST:
             self.clear()
-            self._enter(Mode.OFFBOARD)
+            self._actions.enter(Mode.OFFBOARD)
 
-    def _warn_disarmed(self) -> None:
+    def _warn_disarmed(self, *, offboard_alive: bool) -> None:
         """Warn, and do no more, if disarmed in OFFBOARD without setpoints (recorded)."""
         state = self._state
-        alive = self._stream.alive(state.time_us, self._parameters["COM_OF_LOSS_T"])
-        lost = not state.armed and state.mode is Mode.OFFBOARD and not alive
+        lost = not state.armed and state.mode is Mode.OFFBOARD and not offboard_alive
         if lost and not self._disarmed_warning_sent:
             mode = custom_mode(state.mode).to_bytes(4, "little")
             self._announce(EventKind.FAILSAFE_WARNING, "", mode)

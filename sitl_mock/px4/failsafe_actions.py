@@ -97,7 +97,7 @@ class FailsafeActions:
         self._state = state
         self._parameters = parameters
         self._announce = announce
-        self._enter = enter
+        self.enter = enter
         self._stop = stop
         self._announced_action: tuple[Cause, Action] | None = None
         self.cause: Cause | None = None
@@ -141,7 +141,7 @@ class FailsafeActions:
         if state.landed:
             mode = Mode.LOITER  # it stays on the ground, and disarms
         if state.mode is not mode:
-            self._enter(mode)
+            self.enter(mode)
 
     def _announce_action(self, cause: Cause, action: Action, next_action: Action | None) -> None:
         intended_mode = custom_mode(self._state.intended_mode)

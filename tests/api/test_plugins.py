@@ -7,8 +7,8 @@ from math import hypot, isfinite, nan
 
 import pytest
 
-from companion.attitude import BodyRates, InvalidTargetError, Limits, Target
-from companion.attitude.plugin_planner import InvalidRatesError, PluginPlanner
+from companion.attitude import AttitudeError, BodyRates, InvalidTargetError, Limits, Target
+from companion.attitude.plugin_planner import PluginPlanner
 from companion.cli.main import main
 from companion.config import Config
 from companion.control.inner_loop import planner
@@ -197,7 +197,7 @@ def test_rates_that_are_not_finite_are_refused():
         def rates(self, *_):
             return nan, 0.0, 0.0
 
-    with pytest.raises(InvalidRatesError):
+    with pytest.raises(AttitudeError, match="not finite rates"):
         PluginPlanner(Nothing(), Limits()).rates((1.0, 0.0, 0.0, 0.0), Target(0.4, 0.3, 0.0), 0.004)
     with pytest.raises(InvalidTargetError):
         planner(config("planner: {name: mine}")).rates(

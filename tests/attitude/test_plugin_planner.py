@@ -4,8 +4,8 @@ from math import hypot, inf, nan
 
 import pytest
 
-from companion.attitude import BodyRates, Limits, Target
-from companion.attitude.plugin_planner import InvalidRatesError, PluginPlanner
+from companion.attitude import AttitudeError, BodyRates, Limits, Target
+from companion.attitude.plugin_planner import PluginPlanner
 
 Q, TARGET = (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.0, 0.0)
 
@@ -42,7 +42,7 @@ def test_without_limits_the_rates_are_the_planners():
 
 @pytest.mark.parametrize("rates", [(nan, 0.0, 0.0), (0.0, inf, 0.0), (0.0, 0.0, -inf)])
 def test_rates_that_are_not_finite_are_refused(rates):
-    with pytest.raises(InvalidRatesError, match="the planner returned"):
+    with pytest.raises(AttitudeError, match="the planner returned"):
         PluginPlanner(Another(rates), Limits()).rates(Q, TARGET, 0.004)
 
 

@@ -188,9 +188,3 @@ def test_a_fault_is_no_part_of_a_batch(tmp_path):
     case = replace(next(campaign(tmp_path).cases()), fault=Fault("x", (), "land", 0.0, ("ok",)))
     with pytest.raises(ConfigError, match=r"kind: batch has no faults"):
         check_case(case)
-
-
-def test_a_planner_that_keeps_state_flies_no_batch():
-    stateful = make_planner("model-following", lag=0.05, dead_time=0.04)
-    with pytest.raises(TypeError, match="keeps state; a batch needs a planner without"):
-        fly_steps(stateful, [TILT] * 3, (1.0, 0.0, 0.0, 0.0), np.zeros((3, 4)), EVERY)

@@ -5,8 +5,6 @@ from typing import Any
 from mock_rig import ACCEPTED, Rig
 from pymavlink.dialects.v20 import ardupilotmega
 
-from sitl_mock.link.framing import decode
-
 STABILIZE, ALT_HOLD, GUIDED, LOITER, RTL, LAND, BRAKE = 0, 2, 4, 5, 6, 9, 17
 FAILED = 4
 HOVER = 0.364
@@ -32,12 +30,6 @@ class ArduRig(Rig):
 
     def _decoded(self, frame: bytes) -> list[Any]:
         return [_parser.decode(bytearray(frame))]
-
-    def say_frame(self, frame: bytes) -> None:
-        """Deliver a frame as it is."""
-        for each in decode(frame):
-            self.simulation.handle(each, self.simulation.companion)
-        self._take()
 
     def texts(self) -> list[str]:
         """Every text said so far, its chunks put together."""

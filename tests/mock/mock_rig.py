@@ -62,7 +62,11 @@ class Rig:
 
     def say(self, message: Any) -> None:
         """Deliver a message through the wire format, as the socket would."""
-        for each in decode(self.framer.frame(message)):
+        self.say_frame(self.framer.frame(message))
+
+    def say_frame(self, frame: bytes) -> None:
+        """Deliver a frame as it is."""
+        for each in decode(frame):
             self.simulation.handle(each, self.simulation.companion)
         self._take()
 

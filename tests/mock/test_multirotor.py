@@ -22,7 +22,7 @@ def test_it_begins_with_its_rotors_turning_steadily():
     hovering = multirotor(AIRFRAME.gravity_m_s2)
     assert sum(hovering.actuation[1]) == pytest.approx(AIRFRAME.mass_kg * AIRFRAME.gravity_m_s2)
     throttle = hovering.throttle(AIRFRAME.gravity_m_s2)
-    assert hovering.mix.throttles == (throttle,) * 4
+    assert hovering.actuation[0].throttles == (throttle,) * 4
     for _ in range(1000):
         hovering.move(hovering.drive(REST, throttle))
     assert hovering.body[0] == pytest.approx((*REST, *LEVEL, *REST), abs=1e-12)
@@ -50,8 +50,8 @@ def test_it_sinks_below_its_weight_and_lifts_above(factor):
 def test_a_throttle_that_is_none_stops_the_rotors(throttle):
     hovering = multirotor(AIRFRAME.gravity_m_s2)
     hovering.drive((3.0, 0.0, 0.0), throttle)
-    assert hovering.mix.throttles == (0.0,) * 4
-    assert hovering.mix.tilt_saturated
+    assert hovering.actuation[0].throttles == (0.0,) * 4
+    assert hovering.actuation[0].tilt_saturated
 
 
 def test_uncontrolled_the_rotors_give_no_torque():

@@ -281,9 +281,9 @@ def test_the_shaping_acts_only_after_its_delay():
     multirotor = hovering()
     delay = RateLoopConfig.ardupilot().roll.shaping.delay_ms * 1e-3
     fly(multirotor, vector(ROLL, 1.0), delay)
-    assert len(set(multirotor.mix.throttles)) == 1
+    assert len(set(multirotor.actuation[0].throttles)) == 1
     fly(multirotor, vector(ROLL, 1.0), DT)
-    assert len(set(multirotor.mix.throttles)) > 1
+    assert len(set(multirotor.actuation[0].throttles)) > 1
 
 
 @pytest.mark.parametrize("armed", [True, False])

@@ -59,8 +59,6 @@ def test_at_its_target_the_vehicle_stays_whatever_the_tilt():
     flight = fly(start=attitude(c, psi), target=Target(*c, psi))
     assert np.abs(flight.body_rates).max() < 1e-9
     assert path_of(flight) == pytest.approx(np.tile(c, (201, 1)), abs=1e-9)
-    assert not flight.tilt_saturated.any()
-    assert not flight.yaw_saturated.any()
 
 
 def distance_from_ideal(lag_ms, name):
@@ -127,7 +125,6 @@ def test_rolling_while_yawing_pitches_as_euler_says():
     )
     asked = (1.5, 0.0, 2.0)
     flight = fly(Asking(*asked), InnerLoop(airframe, rate_loop), 0.5, 100)
-    assert not (flight.tilt_saturated | flight.yaw_saturated).any()  # so the laws are linear
 
     begin = np.concatenate((LEVEL, np.zeros(9)))
     with_gyro, without = (
@@ -153,19 +150,18 @@ def test_rolling_while_yawing_pitches_as_euler_says():
 def test_an_absurd_command_saturates_the_rotors_and_their_torque_bounds_the_turn():
     airframe = AirframeConfig()
     flight = fly(Asking(500.0, 0.0, 500.0), seconds=0.1)
-    assert flight.tilt_saturated[20:].all()
-    assert flight.yaw_saturated[20:].all()
     # All thrust on one side at full allocation, half the throttle range each way.
     most = 0.5 * airframe.rotor_arm_m * airframe.mass_kg * airframe.thrust_slope_m_s2
     assert 0.0 < np.diff(flight.body_rates[:, 0]).max() * 1000 < most / airframe.inertia_kg_m2[0]
-    assert not fly(Asking(0.2, 0.0, 0.0), seconds=0.1).tilt_saturated.any()
 
 
 def test_a_tilted_vehicle_saturates_at_another_command_than_a_level_one():
     """The thrust that holds height leaves less room above: at 60° there is none for yaw."""
     steep = attitude(Coefficients(0.0, 0.85), 0.0)
-    assert not fly(Asking(0.0, 0.0, 0.5)).yaw_saturated.any()
-    assert fly(Asking(0.0, 0.0, 0.5), start=steep).yaw_saturated.any()
+    level, tilted = (
+        fly(Asking(0.0, 0.0, 0.5), start=start).body_rates[-1, 2] for start in (LEVEL, steep)
+    )
+    assert 0.0 < tilted < 0.9 * level
 
 
 @pytest.mark.parametrize(("delay", "steps"), [(0.020, 20), (0.0034, 3), (0.0036, 4)])

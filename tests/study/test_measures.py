@@ -15,7 +15,7 @@ from companion.study.measures import (
     second_order_path,
     settling_time,
 )
-from companion.study.methods import EXACT, METHOD_BY_PLANNER, planner_of
+from companion.study.methods import EXACT, LAW_METHODS, planner_of
 from companion.study.step import Response, Step, fly
 
 STEP = Step(Coefficients(0.0, 0.0), Coefficients(0.3, 0.4), rate_hz=100.0, headings=(0.0, 1.0))
@@ -74,7 +74,7 @@ def test_a_second_order_response_is_found_again():
 
 
 def test_a_flown_response_begins_at_the_start_and_ends_at_the_target():
-    for method in METHOD_BY_PLANNER.values():
+    for method in LAW_METHODS:
         flown = fly(planner_of(method, STEP.gain), STEP)
         assert flown.coefficients.shape == (201, 2, 2)
         assert flown.at_heading(1)[0] == pytest.approx(STEP.start, abs=1e-12)

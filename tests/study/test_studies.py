@@ -3,6 +3,7 @@
 import csv
 import importlib.util
 import math
+import os
 import re
 from collections import Counter
 from dataclasses import replace
@@ -279,7 +280,7 @@ def test_what_is_interrupted_leaves_no_broken_page(tmp_path, capsys, monkeypatch
     assert main(["study", "kmax", "--out", str(tmp_path)]) == 1
     assert "Interrupted" in capsys.readouterr().out
     assert (tmp_path / "kmax.html").read_bytes() == page
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob(".*"))
 
 
 def test_without_the_extra_one_sentence_says_what_to_install(tmp_path, capsys, monkeypatch):
@@ -300,7 +301,7 @@ def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, capsys
 
 
 def test_a_full_disk_is_one_sentence(tmp_path, capsys):
-    (tmp_path / "kmax.png.part").symlink_to("/dev/full")
+    (tmp_path / f".kmax.png.{os.getpid()}").symlink_to("/dev/full")
     assert main(["study", "kmax", "--out", str(tmp_path)]) == 1
     said = capsys.readouterr().err
     assert "No space left" in said

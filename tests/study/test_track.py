@@ -56,7 +56,7 @@ def vehicle(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_a_trajectory_is_followed_closely_only_if_led(flown):
     with_lead, without_lead, windy = (flown[0][task] for task in TASKS)
-    assert with_lead.ok
+    assert with_lead.result == "ok"
     assert with_lead.telemetry_error.rms < 0.04
     assert with_lead.telemetry_error.rms < with_lead.telemetry_error.largest < 0.1
     assert without_lead.telemetry_error.rms > 3.0 * with_lead.telemetry_error.rms
@@ -106,8 +106,7 @@ def test_a_flight_is_the_same_to_the_bit_in_company_and_alone(flown):
 def test_a_flight_that_fails_has_no_error_to_show(vehicle):
     vehicle(faults=[{"kind": "gps_loss", "after_offboard_s": 2.5}])
     tracked = flights.fly(TASKS[0])
-    assert not tracked.ok
-    assert tracked.result
+    assert tracked.result not in ("ok", "")
     assert (tracked.telemetry_error, tracked.true_error) == (
         PositionError(inf, inf),
         PositionError(inf, inf),

@@ -1,5 +1,6 @@
 """The figure of the study `lag`: example, grid, wrong lag and dead time, complete inner loop."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from companion.study.lag.flights import (
     NO_ERROR,
     RATES_HZ,
     SHOWN_RATE_HZ,
+    Comparison,
     CompleteLoopFlights,
     DelayError,
     Example,
@@ -37,7 +39,6 @@ CAPTION = (
     " sample rate."
 )
 
-_ENDS = np.array([FIGURE_2.start, FIGURE_2.target])  # of the step, coefficients
 _CROSS_TRACK_LABEL = "largest distance from the line"
 _WORSE_COLOUR = "#A33C00"
 """Colour of cells where another method has less cross-track error than model-following, and of the
@@ -97,7 +98,7 @@ def _grid_values(grid: Grid) -> tuple[list[int], list[int]]:
 
 
 def _draw_paths(axes: Axes, responses: dict[Method, Response]) -> None:
-    draw_plane(axes, [(m, m.label, r.at_heading(0)) for m, r in responses.items()], _ENDS)
+    draw_plane(axes, [(m, m.label, r.at_heading(0)) for m, r in responses.items()], FIGURE_2)
 
 
 def _draw_distance(axes: Axes, responses: dict[Method, Response]) -> None:
@@ -120,25 +121,28 @@ def _draw_cut(
         values_ms: lag or dead time of each cell, ms.
         quantity: "lag" or "dead time".
     """
+    _draw_cross_tracks(axes, values_ms, [grid[cell] for cell in cells])
+    axes.set(
+        title=f"Cross-track by {quantity}, {_CUT_HZ:.0f} Hz", xlabel=f"{quantity}, ms", yscale="log"
+    )
+    axes.legend(loc="center right")
+
+
+def _draw_cross_tracks(
+    axes: Axes, values: Sequence[float], comparisons: Sequence[Comparison]
+) -> None:
+    """Draw the cross-track error of every method over the condition that the comparisons vary."""
     for method in METHODS:
-        cross_tracks = [grid[cell].by_method[method].cross_track for cell in cells]
-        axes.plot(values_ms, cross_tracks, marker=".", **method.line_style)
-    with_true_delays = [grid[cell].model_following_scores[NO_ERROR].cross_track for cell in cells]
-    with_worst_delays = [grid[cell].worst_cross_track for cell in cells]
+        cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
+        axes.plot(values, cross_tracks, marker=".", **method.line_style)
     axes.fill_between(
-        values_ms,
-        with_true_delays,
-        with_worst_delays,
+        values,
+        [comparison.model_following_scores[NO_ERROR].cross_track for comparison in comparisons],
+        [comparison.worst_cross_track for comparison in comparisons],
         **_SHADE,
         label="model-following, wrong lag and dead time",
     )
-    axes.set(
-        title=f"Cross-track by {quantity}, {_CUT_HZ:.0f} Hz",
-        xlabel=f"{quantity}, ms",
-        ylabel=_CROSS_TRACK_LABEL,
-        yscale="log",
-    )
-    axes.legend(loc="center right")
+    axes.set_ylabel(_CROSS_TRACK_LABEL)
 
 
 def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
@@ -196,25 +200,11 @@ def _draw_inner_loop_errors(axes: Axes, complete: CompleteLoopFlights) -> None:
 
 
 def _draw_rates(axes: Axes, complete: CompleteLoopFlights) -> None:
-    rates, comparisons = list(complete.by_rate), complete.by_rate.values()
-    for method in METHODS:
-        cross_tracks = [comparison.by_method[method].cross_track for comparison in comparisons]
-        axes.plot(rates, cross_tracks, marker=".", **method.line_style)
-    with_true_delays = [
-        comparison.model_following_scores[NO_ERROR].cross_track for comparison in comparisons
-    ]
-    with_worst_delays = [comparison.worst_cross_track for comparison in comparisons]
-    axes.fill_between(
-        rates,
-        with_true_delays,
-        with_worst_delays,
-        **_SHADE,
-        label="model-following, wrong lag and dead time",
-    )
+    rates = list(complete.by_rate)
+    _draw_cross_tracks(axes, rates, list(complete.by_rate.values()))
     axes.set(
         title="Cross-track by sample rate, complete inner loop",
         xlabel="sample rate, Hz",
-        ylabel=_CROSS_TRACK_LABEL,
         xscale="log",
         xticks=rates,
         xticklabels=[f"{rate:.0f}" for rate in rates],

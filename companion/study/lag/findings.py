@@ -3,7 +3,6 @@
 from companion.study.lag.flights import (
     MAX_TILT_RATE,
     NO_ERROR,
-    OTHER_METHODS,
     SHOWN_RATE_HZ,
     CompleteLoopFlights,
     DelayError,
@@ -13,7 +12,13 @@ from companion.study.lag.flights import (
     score,
 )
 from companion.study.measures import largest_tilt_rate
-from companion.study.methods import MODEL_FOLLOWING_METHOD, PROPOSED, QUATERNION, Method
+from companion.study.methods import (
+    LAW_METHODS,
+    MODEL_FOLLOWING_METHOD,
+    PROPOSED,
+    QUATERNION,
+    Method,
+)
 from companion.study.outcome import Finding
 
 _ROUNDING = 1e-9
@@ -41,7 +46,7 @@ def find(
 
 def _example_findings(example: Example) -> tuple[Finding, Finding, Finding]:
     cross_tracks = {m: score(r).cross_track for m, r in example.unlimited_responses[100.0].items()}
-    best = min(OTHER_METHODS, key=lambda method: cross_tracks[method])
+    best = min(LAW_METHODS, key=lambda method: cross_tracks[method])
     worst = max(wrong_score.cross_track for wrong_score in example.model_following_scores.values())
     rate = max(largest_tilt_rate(response) for response in example.rate_limited_responses.values())
     limited_cross_track = max(
@@ -148,7 +153,7 @@ def _complete_loop_findings(
     cross_tracks = {
         m: method_score.cross_track for m, method_score in by_rate[SHOWN_RATE_HZ].by_method.items()
     }
-    nearest = min(OTHER_METHODS, key=lambda method: fit_deviations[method])
+    nearest = min(LAW_METHODS, key=lambda method: fit_deviations[method])
     worst_rate = max(by_rate, key=lambda rate: by_rate[rate].ratio)
     comparison = by_rate[worst_rate]
     return (

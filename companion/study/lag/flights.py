@@ -9,13 +9,12 @@ from companion.attitude import Limits, Planner, make_planner
 from companion.study.inner_loop import InnerLoop
 from companion.study.lag_loop import LagLoop
 from companion.study.measures import cross_track, settling_time
-from companion.study.methods import EXACT, MODEL_FOLLOWING_METHOD, PAPER_METHODS, Method
+from companion.study.methods import LAW_METHODS, MODEL_FOLLOWING_METHOD, Method
 from companion.study.outcome import Tick
 from companion.study.step import FIGURE_2, Loop, Response, fly_loop
 
-OTHER_METHODS = (*PAPER_METHODS, EXACT)
-"""The methods that do not use lag and dead time of the rate loop."""
-METHODS = (*OTHER_METHODS, MODEL_FOLLOWING_METHOD)
+METHODS = (*LAW_METHODS, MODEL_FOLLOWING_METHOD)
+"""All methods; only model-following uses lag and dead time of the rate loop."""
 RATES_HZ = (50.0, 100.0, 250.0)
 DEAD_TIMES_MS = (0, 20, 40, 60, 80)
 LAGS_MS = (10, 25, 40, 60)
@@ -89,7 +88,7 @@ class Comparison(NamedTuple):
     """Scores with one rate loop at one sample rate."""
 
     other_scores: dict[Method, Score]
-    """Score of each method of `OTHER_METHODS`."""
+    """Score of each method of `LAW_METHODS`."""
     model_following_scores: dict[DelayError, Score]
     """Score of model-following for each error of its assumed lag and dead time, `NO_ERROR`
     included."""
@@ -101,7 +100,7 @@ class Comparison(NamedTuple):
 
     @property
     def best_other(self) -> Method:
-        """The method of `OTHER_METHODS` with the smallest cross-track error."""
+        """The method of `LAW_METHODS` with the smallest cross-track error."""
         return min(self.other_scores, key=lambda method: self.other_scores[method].cross_track)
 
     @property
@@ -181,7 +180,7 @@ def fly_grid(tick: Tick) -> Grid:
         errors = [error for error in _error_pairs(GRID_ERRORS) if dead_time or not error.dead_time]
         for rate in RATES_HZ:
             grid[GridCell(rate, dead_time, lag)] = Comparison(
-                {m: score(_fly(m, delays, loop, rate)) for m in OTHER_METHODS},
+                {m: score(_fly(m, delays, loop, rate)) for m in LAW_METHODS},
                 _scores_with_errors(errors, delays, loop, rate),
             )
     return grid
@@ -205,7 +204,7 @@ def fly_complete(tick: Tick) -> CompleteLoopFlights:
         tick(f"complete inner loop at {rate:.0f} Hz")
         responses[rate] = {m: _fly(m, COMPLETE_DELAYS, COMPLETE_LOOP, rate) for m in METHODS}
         by_rate[rate] = Comparison(
-            {method: score(responses[rate][method]) for method in OTHER_METHODS},
+            {method: score(responses[rate][method]) for method in LAW_METHODS},
             _scores_with_errors(_error_pairs(FINE_ERRORS), COMPLETE_DELAYS, COMPLETE_LOOP, rate),
         )
     return CompleteLoopFlights(by_rate, responses[SHOWN_RATE_HZ])

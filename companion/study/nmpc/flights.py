@@ -100,7 +100,6 @@ class Flight:
         path: position after each period, m, NED.
         solve_s: processor time of each solve, s.
         iterations: number of iterations of each solve.
-        failures: number of solves without a usable answer.
     """
 
     def __init__(self, task: Task, variant: Variant) -> None:
@@ -108,7 +107,6 @@ class Flight:
         self.path: list[tuple[float, float, float]] = []
         self.solve_s: list[float] = []
         self.iterations: list[float] = []
-        self.failures = 0
         self._task = task
         self._solver = variant.solver(task.trajectory)
         self._solver.warm_up()
@@ -138,8 +136,6 @@ class Flight:
         if answer.status is Status.SOLVED:
             target = answer.north, answer.east, answer.heading
             self._inputs.append(ControlInput(answer.time, *target, answer.thrust))
-        else:
-            self.failures += 1
         vehicle.fly(
             Target(flown_input.north, flown_input.east, flown_input.heading),
             flown_input.thrust,

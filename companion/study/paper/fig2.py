@@ -2,7 +2,6 @@
 
 from math import degrees
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude import Quaternion, Target, comparison_laws
@@ -26,7 +25,7 @@ from companion.study.measures import (
 )
 from companion.study.methods import (
     EULER,
-    EXACT,
+    LAW_METHODS,
     PAPER_METHODS,
     PROPOSED,
     QUATERNION,
@@ -39,8 +38,7 @@ from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _EQUALITY_TOLERANCE = 1e-9
 """Difference below which the coefficients at two headings count as the same."""
-_METHODS = (*PAPER_METHODS, EXACT)
-PARTS = len(_METHODS) + 1
+PARTS = len(LAW_METHODS) + 1
 
 
 def _printed_quaternion_law(
@@ -65,7 +63,7 @@ def run(tick: Tick) -> Outcome:
     """Fly the step of figure 2 with every method at every heading."""
     reference = FIGURE_2.reference()
     responses = {}
-    for method in _METHODS:
+    for method in LAW_METHODS:
         tick(method.label)
         responses[method] = fly(planner_of(method, FIGURE_2.gain), FIGURE_2)
     tick("the error as the paper prints it")
@@ -163,17 +161,13 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         yscale="log",
         ylim=(1e-5, 0.1),
     )
-    draw_plane(plane, curves, np.array([FIGURE_2.start, FIGURE_2.target]))
-    north_span, east_span = _span(north.get_ylim()), _span(east.get_ylim())
-    note_magnification(east, "this axis", east_span, "that of north", north_span)
-    east_span, north_span = _span(plane.get_xlim()), _span(plane.get_ylim())
-    note_magnification(plane, "the $a_E$ axis", east_span, "the $a_N$ axis", north_span)
+    draw_plane(plane, curves, FIGURE_2)
+    note_magnification(east, "this axis", east.get_ylim(), "that of north", north.get_ylim())
+    note_magnification(
+        plane, "the $a_E$ axis", plane.get_xlim(), "the $a_N$ axis", plane.get_ylim()
+    )
     north.legend(loc="lower right")
     return figure
-
-
-def _span(limits: tuple[float, float]) -> float:
-    return limits[1] - limits[0]
 
 
 def _findings(

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from math import pi, radians
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from companion.attitude import Limits
@@ -12,7 +11,7 @@ from companion.study.drawing import (
     draw_line,
     draw_plane,
     draw_reference,
-    label_response,
+    draw_response,
     label_tilt_rate,
     new_figure,
 )
@@ -103,21 +102,15 @@ def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
         for method in _METHODS
     ]
     figure, ((north, east), (rate, plane)) = new_figure(2, 2)
-    for method, label, c in curves:
-        draw_line(north, time, c[:, 0], method.line_style, label)
-        draw_line(east, time, c[:, 1], method.line_style)
-        draw_line(
-            rate,
-            time[:-1],
-            responses[method].tilt_rate[:, shown_heading[method]],
-            method.line_style,
-        )
+    draw_response(north, east, time, curves)
+    for method, response in responses.items():
+        tilt_rate = response.tilt_rate[:, shown_heading[method]]
+        draw_line(rate, time[:-1], tilt_rate, method.line_style)
     draw_reference(north, east, time, reference, "reference, equation 33")
     rate.axhline(MAX_TILT_RATE, **LIMIT_STYLE)
-    label_response(north, east)
     label_tilt_rate(rate, "Tilt rate and its limit")
     rate.set(xlim=(0.0, 1.2), ylim=(0.0, 1.8))
-    draw_plane(plane, curves, np.array([FIGURE_4.start, FIGURE_4.target]))
+    draw_plane(plane, curves, FIGURE_4)
     north.legend(loc="lower right")
     return figure
 

@@ -16,6 +16,7 @@ from companion.study.measures import (
 )
 from companion.study.methods import (
     EULER,
+    LAW_METHODS,
     PAPER_METHODS,
     PROPOSED,
     QUATERNION,
@@ -25,7 +26,6 @@ from companion.study.methods import (
 from companion.study.outcome import Claimant, Finding, Outcome, Table, Tick
 from companion.study.paper.fig5_flights import (
     MEASURED_FACTOR,
-    METHODS,
     PARTS,
     QUICK_FACTOR,
     LoopFlights,
@@ -98,7 +98,7 @@ def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
                 heading_effect(loop.responses[method]),
             )
             for loop in (quick, measured)
-            for method in METHODS
+            for method in LAW_METHODS
         ),
     )
 
@@ -158,7 +158,7 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
     draw_line(
         north, step.time, second_order_path[:, 0], _SECOND_ORDER_LINE, "second-order reference"
     )
-    draw_plane(plane, curves, np.array([step.start, step.target]))
+    draw_plane(plane, curves, step)
     for panel in (north, east):
         panel.set(xlim=(0.0, 1.5))
     for panel in panels:

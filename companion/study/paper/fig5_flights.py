@@ -12,16 +12,15 @@ from companion.study.measures import (
     largest_deviation,
     second_order_path,
 )
-from companion.study.methods import EXACT, PAPER_METHODS, Method, planner_of
+from companion.study.methods import LAW_METHODS, PAPER_METHODS, Method, planner_of
 from companion.study.outcome import Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly_loop
 
 STEP = replace(FIGURE_2, headings=tuple(k * pi / 4.0 for k in range(-3, 5)))
-METHODS = (*PAPER_METHODS, EXACT)
 QUICK_FACTOR, MEASURED_FACTOR = 5, 1
 """Speeds of the two inner loops relative to the mock vehicle, which responds as a PX4 does."""
 _SWEPT_FACTORS = (10, 5, 3, 2, 1)
-PARTS = 2 * len(METHODS) + len(_SWEPT_FACTORS)
+PARTS = 2 * len(LAW_METHODS) + len(_SWEPT_FACTORS)
 
 Sweep = dict[float, dict[Method, float]]
 """Cross-track error at heading 0, by `LoopFlights.time_63` of the inner loop (s) and by method."""
@@ -63,7 +62,7 @@ def fly_methods(factor: int, tick: Tick) -> LoopFlights:
     """Fly every method with an inner loop `factor` times as fast as measured on a PX4."""
     inner_loop = faster_inner_loop(factor)
     flights = LoopFlights(inner_loop.rate_time_63(), {}, {})
-    for method in METHODS:
+    for method in LAW_METHODS:
         tick(f"{method.label}, {1e3 * flights.time_63:.0f} ms")
         response = fly_loop(planner_of(method, STEP.gain), STEP, inner_loop)
         flights.responses[method] = response

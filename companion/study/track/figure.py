@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from companion.attitude.planner import MODEL_FOLLOWING
 from companion.study.drawing import draw_line, new_figure
 from companion.study.methods import (
-    EXACT,
+    LAW_METHODS,
     MODEL_FOLLOWING_METHOD,
-    PAPER_METHODS,
     PROPOSED,
     REFERENCE_STYLE,
     LineStyle,
@@ -36,7 +35,7 @@ CAPTION = (
     " (not led), in still air (solid) and in wind (dotted)."
 )
 
-_METHODS = (*PAPER_METHODS, EXACT, MODEL_FOLLOWING_METHOD)
+_METHODS = (*LAW_METHODS, MODEL_FOLLOWING_METHOD)
 _COLOUR_WITHOUT_LEAD = "#D55E00"
 _STILL_AIR: LineStyle = {"linestyle": "-", "marker": "o", "markersize": 4.0, "linewidth": 1.6}
 _IN_WIND: LineStyle = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}

@@ -67,11 +67,6 @@ class TrackedFlight(NamedTuple):
     path: Floats
     """(n, 4), reference north and east, true north and east, m."""
 
-    @property
-    def ok(self) -> bool:
-        """Whether the trajectory was flown to its end."""
-        return self.result == "ok"
-
 
 TrackedFlights = dict[Task, TrackedFlight]
 
