@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.phases import Phase
 from companion.config import Config
+from companion.flight.phases import Phase
 from companion.flight.watch import Watch
 from companion.vehicle.autopilot import Role
 from tests.flight.fly import fly, mock_vehicle
