@@ -33,6 +33,13 @@ _LAST_SETPOINT_TIMEOUT = 0.1
 _BACKLOG_DRAIN_TIME = 0.5
 """Time after a stall of this program within which the queued telemetry is read, s."""
 
+_SHORTEST_STALL = 0.2
+"""A heartbeat during whose wait this program did not run for longer is not called fresh, s."""
+
+_MAX_STALLED_WAITS = 3
+"""After so many waits with a stall, a heartbeat counts as fresh: a computer that always stalls must
+still be able to hand back."""
+
 _HEARTBEAT_ID = 0.0
 """Message id of HEARTBEAT, as a float for the command that requests a message."""
 
@@ -111,8 +118,15 @@ class FlightContext:
 
         After a stall of this program, queued frames look new, so a heartbeat is requested. The
         heartbeat after the answer is fresh; without an answer, a heartbeat after
-        `_BACKLOG_DRAIN_TIME` is fresh.
+        `_BACKLOG_DRAIN_TIME` is fresh. If this program stalls meanwhile, the answer may be queued
+        as well, and a pilot may have taken over since: then this function waits again.
         """
+        for _ in range(_MAX_STALLED_WAITS):
+            if await self._wait_for_heartbeat() < _SHORTEST_STALL:
+                return
+
+    async def _wait_for_heartbeat(self) -> float:
+        """Wait as `fresh_heartbeat` says; return the longest stall meanwhile, s."""
         loop = asyncio.get_running_loop()
         fresh_from = loop.time() + _BACKLOG_DRAIN_TIME
         fresh = loop.create_future()
@@ -133,11 +147,16 @@ class FlightContext:
 
         unsubscribe = self.link.subscribe("HEARTBEAT", on_heartbeat)
         request_task = asyncio.create_task(ask())
+        longest_stall = 0.0
         try:
-            await fresh
+            while not fresh.done():
+                began = loop.time()
+                await asyncio.wait({fresh}, timeout=_POLL_PERIOD)
+                longest_stall = max(longest_stall, loop.time() - began - _POLL_PERIOD)
         finally:
             request_task.cancel()
             unsubscribe()
+        return longest_stall
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it is stale."""

@@ -17,7 +17,7 @@ from companion.flight.context import FlightContext
 from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
 from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
-from companion.mavlink.errors import CommandTimeout, LinkLost
+from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
@@ -139,6 +139,7 @@ async def hand_back(context: FlightContext) -> None:
 async def hold_when_heard(context: FlightContext) -> None:
     """Send nothing until the vehicle is heard; if it still obeys us, command it to hold.
 
+    A vehicle that refuses to hold is landed, as in a hand back.
     ArduPilot stays in GUIDED when setpoints end, and does not hold its position.
     """
     frames = context.link.stats.frames
@@ -154,6 +155,10 @@ async def hold_when_heard(context: FlightContext) -> None:
     while True:
         try:
             await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
+        except CommandRefused as error:  # without setpoints it would drift, so it must land
+            await context.fresh_heartbeat()
+            require_role(context.link, {Role.OFFBOARD})  # a pilot may have taken over meanwhile
+            raise FlightEnded(str(error), Exit.LAND) from error
         except (CommandTimeout, LinkLost) as error:
             context.detail = str(error)
         else:

@@ -95,7 +95,7 @@ async def _hand_over(
     release_task = asyncio.create_task(_release_when_offboard_ends(context))
     try:
         while True:
-            _stop_moving(context)
+            stop_moving(context)
             try:
                 await change_mode(context, command, require_ours, done)
                 break
@@ -132,7 +132,8 @@ async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
     context.release()
 
 
-def _stop_moving(context: FlightContext) -> None:
+def stop_moving(context: FlightContext) -> None:
+    """If the autopilot obeys us, brake and hold; an error in guidance ends the setpoints."""
     if not context.loop.offboard_active:
         return
     try:

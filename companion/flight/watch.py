@@ -7,6 +7,7 @@ from math import inf
 from companion.config.computer import LinkConfig
 from companion.flight.commands import require_role, roles_of
 from companion.flight.context import FlightContext
+from companion.flight.hand_over import stop_moving
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
 from companion.safety import SafetyLadder
@@ -109,7 +110,7 @@ class Watch:
         if phase.monitored and self._context.loop.offboard_active:
             self._judge_snapshot(now)
         if phase.allowed_roles:
-            self._judge_heartbeat(now)
+            self._judge_heartbeat(now, monitored=phase.monitored)
 
     def on_current_mode(self, phase: Phase) -> None:
         """Check a CURRENT_MODE, which comes twice a second and at once after a status change.
@@ -151,6 +152,10 @@ class Watch:
         # must not resume, because it would end the failsafe.
         may_enter = loop.taking_over and Role.READY in roles and not state.failsafe
         if loop.awaiting_mode and (Role.OFFBOARD in roles or may_enter):
+            # Only in a phase that is not monitored: the vehicle has moved away from its hold.
+            if self._clock() - loop.record.gap_from > self._context.config.deadman.silence_limit:
+                stop_moving(self._context)
+                self._context.guidance_loop.step()  # the newest command leads to the old place
             loop.resume()
 
     def _judge_snapshot(self, now: float) -> None:
@@ -174,11 +179,12 @@ class Watch:
         self._stopped_in_control |= verdict.stream is not StreamEffect.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
-    def _judge_heartbeat(self, now: float) -> None:
+    def _judge_heartbeat(self, now: float, *, monitored: bool) -> None:
         """Judge the age of the mode and of the heartbeat at `now`, the time of this judgement.
 
-        While the autopilot does not obey us, stalls of this program do not count as age: heartbeats
-        that came during a stall are read after it, and a stall must not end a take-off.
+        Stalls of this program count as age only in a monitored phase while the autopilot obeys us:
+        heartbeats that came during a stall are read after it, and a stall must end neither a
+        take-off nor a landing. After a gap no setpoint is sent before the mode is confirmed.
         """
         state, loop = self._context.link.state, self._context.loop
         # While taking over, it may obey the first setpoint although no heartbeat has told so.
@@ -187,7 +193,7 @@ class Watch:
 
         def age(received: float) -> float:
             stalled = self._context.snapshot_builder.counters.stall_time(since=received)
-            return now - received - (0.0 if in_control else stalled)
+            return now - received - (0.0 if in_control and monitored else stalled)
 
         if age(state.mode_received) > self._context.heartbeat_limit:
             raise FlightEnded(

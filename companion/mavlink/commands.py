@@ -128,6 +128,10 @@ class CommandClient:
                 return result
             except TimeoutError:  # the ACK is lost, or after a stall it may be in the backlog
                 deadline = time() + _BACKLOG_S if time() - deadline > _STALL_S else -inf
+            except asyncio.CancelledError:
+                if time() > deadline:  # only a stall has kept it from timing out
+                    deadline = time() + _BACKLOG_S
+                raise
             finally:
                 this_try.deadline = deadline
         raise CommandTimeout(

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from companion.config import Config
 from companion.flight.phases import Phase
 from companion.flight.watch import Watch
 from companion.vehicle.autopilot import Role
@@ -121,6 +122,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
         awaiting_mode=True,
         offboard_active=False,
         taking_over=taking_over,
+        record=SimpleNamespace(gap_from=0.0),
         resume=lambda: resumed.append(1),
     )
     state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False)
@@ -129,6 +131,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
         snapshot_builder=SimpleNamespace(listen=lambda _: None),
         ground=SimpleNamespace(update=lambda: None),
         replacement_detector=SimpleNamespace(update=lambda: None, require=lambda: None),
+        config=Config(),
         loop=loop,
         link=SimpleNamespace(state=state, autopilot=autopilot),
         fresh_heartbeat=answer.wait,

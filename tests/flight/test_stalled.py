@@ -5,6 +5,7 @@ timers run, and a heartbeat need not be among these.
 """
 
 import asyncio
+from math import hypot
 
 import pytest
 
@@ -35,7 +36,8 @@ def test_px4_that_its_failsafe_has_taken_and_landed_in_a_stall_is_not_taken_back
     summary, truth = stalled("px4", 5.0)
     assert summary.result.startswith("this program did not run for"), summary.events
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
-    assert summary.events[-1][1].endswith("disarmed in OFFBOARD: nothing is commanded")
+    assert truth["mode"] == "OFFBOARD", "nothing was commanded since"
+    assert summary.events[-1][1] == "the autopilot's failsafe took over: mode AUTO.RTL"
 
 
 def test_a_stall_during_the_take_off_does_not_leave_the_vehicle_in_the_air():
@@ -63,3 +65,58 @@ def test_ardupilot_that_obeyed_the_first_setpoint_before_a_stall_is_asked_to_hol
         truth = mock.state()
     assert summary.result != "ok"
     assert (truth["mode"], truth["armed"]) == ("BRAKE", True), summary.events
+
+
+def stalled_at(mock, phase, seconds, after, *, then=lambda: None, **changes):
+    """A hover that stalls `after` s into a phase; `then` is called as the stall begins."""
+
+    def stall():
+        then()
+        asyncio.get_running_loop().clock.now += seconds
+
+    def stall_soon():
+        if after == 0.0:
+            stall()  # before the phase has asked for anything
+        else:
+            asyncio.get_running_loop().call_later(after, stall)
+
+    return fly(mock, None, When(phase, stall_soon), **changes)
+
+
+@pytest.mark.parametrize("after", [0.02, 0.05])
+@pytest.mark.parametrize(("autopilot", "piloted"), [("px4", "POSCTL"), ("ardupilot", "LOITER")])
+def test_a_pilot_who_takes_over_in_a_stall_of_the_hand_back_is_not_overruled(
+    autopilot, piloted, after
+):
+    """The heartbeat that the program waited for is queued, and older than the takeover."""
+    with mock_vehicle(autopilot=autopilot, delay_s=0.015) as mock:
+
+        def take_over_soon():
+            takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "at_s": mock.time + 0.8}
+            mock.inject(takeover)
+
+        summary = stalled_at(mock, "hand back", 1.5, after, then=take_over_soon)
+        mock.run(1.0)  # a command may be on its way
+        truth = mock.state()
+    assert truth["mode"] == piloted, summary.events
+    assert summary.result == f"the pilot or another station took over: mode {piloted}"
+
+
+def test_an_empty_battery_is_landed_though_the_program_stalls_as_it_asks_for_the_landing():
+    """The heartbeats of the stall are read after it, so nothing was silent but the program."""
+    with mock_vehicle(autopilot="ardupilot", delay_s=0.015) as mock:
+        mock.inject({"kind": "low_battery", "remaining": 0.1, "after_offboard_s": 2.0})
+        summary = stalled_at(mock, "land", 1.5, 0.0)
+        truth = mock.state()
+    assert summary.result.startswith("battery at 10 %"), summary.events
+    assert (truth["mode"], truth["armed"], truth["landed"]) == ("LAND", False, True)
+
+
+def test_a_vehicle_that_drifted_in_a_stall_of_the_hand_back_is_not_flown_back():
+    """It drifts half a metre, and is held where it is then."""
+    with mock_vehicle(autopilot="ardupilot", delay_s=0.015) as mock:
+        summary = stalled_at(mock, "hand back", 5.0, 0.0, then=mock.setpoints.clear)
+    assert summary.result == "ok", summary.events
+    resumed = [each for each in mock.setpoints if each.time > mock.setpoints[0].time + 1.0]
+    assert len(resumed) > 3
+    assert max(hypot(*each.rates) for each in resumed) < 1.1, "as if it had to fly back"

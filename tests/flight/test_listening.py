@@ -1,0 +1,73 @@
+"""A vehicle that was silent is heard again while it still obeys us, and refuses to hold."""
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
+
+SET_MODE, FAILED = 176, 4
+RATE_HOLD = {"px4": "COM_OF_LOSS_T", "ardupilot": "GUID_TIMEOUT"}
+HOLD_MODE = {"px4": 4.0, "ardupilot": 17.0}
+"""Second parameter of the command that asks for the hold."""
+
+
+class Refusal:
+    """Refuses to hold, instead of the mock vehicle."""
+
+    def __init__(self, mock, then=lambda: None):
+        self._mode, self._then = HOLD_MODE[mock.autopilot], then
+        self._parser, self._packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
+        self._acks = []
+        mock.from_companion, mock.to_companion = self._to_vehicle, self._to_companion
+
+    def _to_vehicle(self, data):
+        for message in self._parser.parse_buffer(data) or ():
+            is_mode = message.get_type() == "COMMAND_LONG" and message.command == SET_MODE
+            if is_mode and message.param2 == self._mode:
+                self._acks.append(dialect.MAVLink_command_ack_message(SET_MODE, FAILED))
+                self._then()
+                return []
+        return [data]
+
+    def _to_companion(self, data):
+        acks, self._acks = self._acks, []
+        return [data, *(bytes(ack.pack(self._packer)) for ack in acks)]
+
+
+def flown(mock, then=lambda: None):
+    """A hover; the link is silent for a second, and a hold is refused from then on."""
+
+    def begin():
+        mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 1.0})
+        Refusal(mock, then)
+
+    accepted = {"accept": [RATE_HOLD[mock.autopilot]]}
+    observer = When("maneuvers", begin, after=1.0)
+    return fly(mock, None, observer, flight=accepted, hover={"duration_s": 9.0})
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_vehicle_that_refuses_to_hold_once_heard_again_is_landed(autopilot):
+    """ArduPilot would drift at its height without end."""
+    with mock_vehicle(autopilot=autopilot, parameters={RATE_HOLD[autopilot]: 5.0}) as mock:
+        summary = flown(mock)
+        truth = mock.state()
+    assert summary.result.startswith("no attitude from the vehicle"), summary.events
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
+    texts = [text for _, text in summary.events]
+    assert "handing back: asking the autopilot to land" in texts
+
+
+def test_a_pilot_who_holds_it_meanwhile_is_not_overruled_by_the_landing():
+    with mock_vehicle(parameters={"COM_OF_LOSS_T": 5.0}) as mock:
+
+        def hold():
+            mock.from_companion = None  # the ground station's command is not refused
+            mock.command(SET_MODE, 1, 4, 3)
+
+        summary = flown(mock, then=hold)
+        mock.run(1.0)
+        truth = mock.state()
+    assert (truth["mode"], truth["armed"]) == ("LOITER", True), summary.events
+    assert summary.events[-1][1] == "the pilot or another station took over: mode AUTO.LOITER"
