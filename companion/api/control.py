@@ -190,8 +190,9 @@ class Control:
         return self._start_state.heading if heading is None else heading
 
     def _require_control(self) -> None:
-        if self._program.end_error is not None:
-            raise self._program.end_error
+        error = self._program.end_error
+        if error is not None:
+            raise error
         if self._control_end.done():
             self._control_end.result()
             raise FlightEnded("the program has ended its control")
