@@ -59,6 +59,7 @@ def test_while_a_monitor_lands_the_vehicle_calls_say_what_it_said(autopilot):
         landing = asyncio.Event()
         mock.when(lambda: mock.state()["mode"] == "LAND", landing.set)
         await asyncio.wait_for(landing.wait(), 10.0)
+        await asyncio.sleep(0.5)  # until the flight has heard of the mode
         assert mock.state()["armed"]
         said.extend(await reasons(vehicle))
 
