@@ -220,7 +220,9 @@ async def program_control(
         yield Control(program, context, newest_state, loop, source, control_end)
     except BaseException as error:
         if not isinstance(error, FlightEnded):
-            loop.post(source.fail, f"{source.name} raised {error!r}")
+            cancelled = isinstance(error, asyncio.CancelledError)
+            reason = "was cancelled" if cancelled else f"raised {error!r}"
+            loop.post(source.fail, f"{source.name} {reason}")
         raise
     finally:
         loop.post(source.end)

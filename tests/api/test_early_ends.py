@@ -7,6 +7,7 @@ from functools import partial
 import pytest
 
 import companion
+from companion.files.yaml_file import ConfigError
 from tests.api.test_flying import BOTH, flown
 from tests.flight.fly import QuickVehicle
 
@@ -67,6 +68,42 @@ def test_while_a_monitor_lands_the_vehicle_calls_say_what_it_said(autopilot):
     flown(program, mock)
     assert len(said) == 4
     assert all("limits.min_battery_percent" in text for text in said), said
+
+
+def test_a_time_out_around_a_control_block_is_no_error_of_the_program():
+    """The result was "the program raised CancelledError()"."""
+
+    async def drift(vehicle):
+        async with vehicle.control() as control:
+            async for _ in control.states():
+                control.accelerate((0.0, 0.0, 0.0))
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(drift(vehicle), 1.0)
+
+    summary, _ = flown(program, QuickVehicle())
+    assert summary.result == "the program was cancelled"
+
+
+@pytest.mark.parametrize("slow_down", [False, True])
+def test_a_refused_go_to_says_what_helps_in_a_program(slow_down):
+    """It advised `--slow-down` and `flight.slow_down`, which change nothing of a program's."""
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        north, east, down = vehicle.state.position_ned
+        below = north, east, down + 4.0
+        with pytest.raises(ConfigError, match=r"max_descent.*lower speed") as refused:
+            await vehicle.go_to(below)  # its default speed is above limits.max_descent_m_s
+        assert "--slow-down" not in str(refused.value)
+        await vehicle.go_to(below, speed=0.9)
+        await vehicle.land()
+
+    flight = {"takeoff_height_m": 6.0, "slow_down": slow_down}
+    summary, events = flown(program, QuickVehicle(), flight=flight)
+    assert summary.result == "ok", events
 
 
 @pytest.mark.parametrize("in_the_air", [False, True])
