@@ -130,9 +130,10 @@ async def _connected_vehicle(
     try:
         yield Vehicle(program, context, newest_state, loop)
     except BaseException as error:
-        loop.post(session.note, f"the program raised {error!r}")
+        cancelled = isinstance(error, asyncio.CancelledError)
+        reason = "the program was cancelled" if cancelled else f"the program raised {error!r}"
         with suppress(FlightEnded):
-            await asyncio.shield(loop.start(_end_flight(program)))
+            await asyncio.shield(loop.start(_end_failed(session, program, reason)))
         raise
     await asyncio.shield(loop.start(_end_flight(program)))
 
@@ -159,6 +160,7 @@ async def _make_session(
     observer = observer or SilentObserver()
     session = Session(config, folder, observer, decline_landing, program, environment)
     program.interrupt = session.interrupt
+    program.end_reason = lambda: session.end_reason
     return session, program
 
 
@@ -184,6 +186,14 @@ async def _wait_connected(
 
 async def _interrupt(session: Session, reason: str) -> bool:
     return session.interrupt(reason)
+
+
+async def _end_failed(session: Session, program: ProgramPlan, reason: str) -> None:
+    """End the flight after the program failed, which becomes the result of the flight."""
+    if program.is_over or program.end_error is not None:
+        session.note(reason)
+    else:
+        program.interrupt(reason)
 
 
 async def _end_flight(program: ProgramPlan) -> None:

@@ -184,8 +184,9 @@ class Control:
         return self._start_state.heading if heading is None else heading
 
     def _require_control(self) -> None:
-        if self._program.end_error is not None:
-            raise self._program.end_error
+        error = self._program.end_error
+        if error is not None:
+            raise error
         if self._control_end.done():
             self._control_end.result()
             raise FlightEnded("the program has ended its control")
@@ -213,7 +214,9 @@ async def program_control(
         yield Control(program, context, newest_state, loop, source, control_end)
     except BaseException as error:
         if not isinstance(error, FlightEnded):
-            loop.post(source.fail, f"{source.name} raised {error!r}")
+            cancelled = isinstance(error, asyncio.CancelledError)
+            reason = "was cancelled" if cancelled else f"raised {error!r}"
+            loop.post(source.fail, f"{source.name} {reason}")
         raise
     finally:
         loop.post(source.end)

@@ -13,6 +13,7 @@ from companion.recording.measurements.summary import Summary
 from companion.safety.actions import FlightEnded
 
 _NEXT_CALL = "the program's next call"
+_CANCELLED = "the program cancelled its request"
 
 
 @dataclass(slots=True, eq=False)
@@ -44,10 +45,11 @@ class ProgramPlan:
         summary: summary of the flight, available after it has ended.
         is_over: whether the flight has no further phases, because the last request is done or the
             flight has ended.
-        end_error: exception that every later call raises; None before the end of the flight.
         finished: set when the flight has ended and its files are written.
         interrupt: function that ends the flight; its argument is the reason in words
             (`Session.interrupt`).
+        end_reason: function that returns why the flight ends early, or None
+            (`Session.end_reason`).
     """
 
     def __init__(self) -> None:
@@ -56,10 +58,12 @@ class ProgramPlan:
         self.summary: Summary | None = None
         self.is_over = False
         self.interrupt: Callable[[str], object] = lambda _: None
+        self.end_reason: Callable[[], str | None] = lambda: None
         self._waiting_requests: deque[PhaseRequest] = deque()
         self._running_request: PhaseRequest | None = None
         self._new_request = asyncio.Event()
-        self.end_error: Exception | None = None
+        self._end_error: Exception | None = None
+        self._cancelled = False
         self.finished = asyncio.Event()
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
@@ -98,6 +102,7 @@ class ProgramPlan:
             RuntimeError: an earlier request has not ended yet.
         """
         if self.end_error is not None:
+            await self.finished.wait()
             raise self.end_error
         if self.busy:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
@@ -109,8 +114,17 @@ class ProgramPlan:
         except asyncio.CancelledError:
             if request in self._waiting_requests:
                 self._waiting_requests.remove(request)
-            self.interrupt("the program cancelled its request")
+            self._cancelled = True
+            self.interrupt(_CANCELLED)
             raise
+
+    @property
+    def end_error(self) -> Exception | None:
+        """The exception that every later call raises; None: the flight does not end."""
+        if self._end_error is not None:
+            return self._end_error
+        reason = self.end_reason() or (_CANCELLED if self._cancelled else None)
+        return None if reason is None else FlightEnded(reason)
 
     @property
     def busy(self) -> bool:
@@ -119,7 +133,7 @@ class ProgramPlan:
 
     def end(self, error: Exception) -> None:
         """Note that the flight has ended; calls that wait, and all later ones, raise `error`."""
-        self.end_error, self.is_over = error, True
+        self._end_error, self.is_over = error, True
         if not self.connected.done():
             self.connected.set_exception(error)
         for request in (self._running_request, *self._waiting_requests):

@@ -80,6 +80,7 @@ class Vehicle:
             FlightEnded: the flight has ended early, or the vehicle is already in the air; a
                 vehicle in the air flies on.
         """
+        self._require_flight()
         if self._context.loop.offboard_active or self._context.link.state.flying:
             raise FlightEnded("the vehicle flies already", Exit.LEAVE)
         await self._request(
@@ -211,14 +212,18 @@ class Vehicle:
         north, east, down = minus(position, centre)
         require_followable(context.config, maneuver, (north, east, down), context.known_drag)
 
+    def _require_flight(self) -> None:
+        error = self._program.end_error
+        if error is not None:
+            raise error
+
     def _held_pose(self) -> Pose:
         """The pose that guidance holds, or at which its present maneuver began.
 
         Raises:
             FlightEnded: the flight has ended, or the vehicle is not under the program's control.
         """
-        if self._program.end_error is not None:
-            raise self._program.end_error
+        self._require_flight()
         pose = self._context.guidance_loop.flown_source.pose
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)

@@ -27,8 +27,8 @@ class Flight:
 
     Attributes:
         began: time when the flight began, s on our clock.
-        phase: the running phase.
-        failed_in: the phase that failed, or None.
+        phase, failed_in: the running phase; the phase that failed, or None.
+        end_reason: why the flight ends or ended early, or None.
         events: (time since the flight began, s; text) of each event.
 
     Args:
@@ -49,13 +49,13 @@ class Flight:
     ) -> None:
         self.phase = ground_phases(context.config.flight)[0]
         self.failed_in: Phase | None = None
+        self.end_reason: str | None = None
         self.events: list[tuple[float, str]] = []
         self._context, self._plan, self._watch = context, plan, watch
-        self._observer, self._ask_landing = observer, ask_landing
+        self._observer, self._ask_landing, self._asking_landing = observer, ask_landing, False
         self._clock = asyncio.get_running_loop().time
         self.began = self._phase_began = self._clock()
         self._interruption: FlightEnded | None = None
-        self._asking_landing = False
         self._end_future = self._new_end_future()
 
     async def run(self) -> str:
@@ -67,7 +67,7 @@ class Flight:
         try:
             await self._fly_all()
         except FlightEnded as ended:
-            self.failed_in = self.phase
+            self.failed_in, self.end_reason = self.phase, ended.reason
             self.note(ended.reason)
             await self._leave(ended.exit or self._usual_exit())
             return ended.result

@@ -31,6 +31,10 @@ from companion.guidance.trajectory import (
 from companion.safety.table import fence_of
 
 _SLOWER_REMEDY = "make it slower or smaller, or change the limit"
+_SLOWER_IN_PROGRAM = (
+    "fly it more slowly (go_to: a lower speed, acceleration or jerk; flight.slow_down does not "
+    "change what a program flies), or change the limit"
+)
 
 
 def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
@@ -72,7 +76,7 @@ def require_inside(
 
 
 def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: KnownDrag) -> None:
-    """Check a trajectory that begins in flight against all limits and the fence.
+    """Check a trajectory that a program flies from the present place against limits and fence.
 
     Args:
         config: configuration of the flight.
@@ -95,7 +99,8 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
         with naming_trajectory_errors(maneuver.name):
             found = violations(maneuver.trajectory, replace(envelope, fence=fence))
         if found:
-            raise ConfigError(f"{maneuver.name}: {found[0]}; {found[0].remedy}")
+            remedy = _SLOWER_IN_PROGRAM if found[0].slowing_helps else found[0].remedy
+            raise ConfigError(f"{maneuver.name}: {found[0]}; {remedy}")
 
 
 def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: KnownDrag) -> None:

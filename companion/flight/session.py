@@ -71,6 +71,11 @@ class Session:
         if self._flight_task is not None and not self._flight_task.cancelling():
             self._flight_task.cancel()
 
+    @property
+    def end_reason(self) -> str | None:
+        """Why the flight ends or ended early; None: it goes on, or ended as it should."""
+        return None if self._assembled is None else self._assembled.flight.end_reason
+
     def note(self, text: str) -> None:
         """Record an event and show it; before the flight begins, keep it until then."""
         if self._assembled is None:

@@ -1,0 +1,136 @@
+"""A flight that ends early says why: in its summary, and to each later call of the program."""
+
+import asyncio
+import json
+from functools import partial
+
+import pytest
+
+import companion
+from companion.files.yaml_file import ConfigError
+from tests.api.test_flying import BOTH, flown
+from tests.flight.fly import QuickVehicle
+
+CANCELLED = "the program cancelled its request"
+
+
+async def reasons(vehicle):
+    """What each kind of call says; `land` last, because it waits for the end of the flight."""
+
+    async def take_control():
+        async with vehicle.control():
+            pass
+
+    said = []
+    for call in (partial(vehicle.go_to, (1.0, 0.0, -2.0)), vehicle.take_off, take_control):
+        with pytest.raises(companion.FlightEnded) as ended:
+            await call()
+        said.append(str(ended.value))
+    with pytest.raises(companion.FlightEnded) as ended:
+        await vehicle.land()
+    return [*said, str(ended.value)]
+
+
+@BOTH
+def test_after_a_cancelled_call_the_next_ones_say_that_it_was_cancelled(autopilot):
+    """They said that another call had not ended yet, or that the vehicle must take off first."""
+    said = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(vehicle.go_to((6.0, 0.0, -2.0)), 1.0)
+        said.extend(await reasons(vehicle))
+
+    mock = QuickVehicle(autopilot)
+    summary, _ = flown(program, mock)
+    assert said == [CANCELLED] * 4
+    assert summary.result == CANCELLED
+    assert mock.state()["mode"] in ("LOITER", "BRAKE")
+
+
+@BOTH
+def test_while_a_monitor_lands_the_vehicle_calls_say_what_it_said(autopilot):
+    """`go_to` said "take off first", and `take_off` "the vehicle flies already"."""
+    said = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        mock.inject({"kind": "low_battery"})
+        landing = asyncio.Event()
+        mock.when(lambda: mock.state()["mode"] == "LAND", landing.set)
+        await asyncio.wait_for(landing.wait(), 10.0)
+        await asyncio.sleep(0.5)  # until the flight has heard of the mode
+        assert mock.state()["armed"]
+        said.extend(await reasons(vehicle))
+
+    mock = QuickVehicle(autopilot)
+    flown(program, mock)
+    assert len(said) == 4
+    assert all("limits.min_battery_percent" in text for text in said), said
+
+
+def test_a_time_out_around_a_control_block_is_no_error_of_the_program():
+    """The result was "the program raised CancelledError()"."""
+
+    async def drift(vehicle):
+        async with vehicle.control() as control:
+            async for _ in control.states():
+                control.accelerate((0.0, 0.0, 0.0))
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(drift(vehicle), 1.0)
+
+    summary, _ = flown(program, QuickVehicle())
+    assert summary.result == "the program was cancelled"
+
+
+@pytest.mark.parametrize("slow_down", [False, True])
+def test_a_refused_go_to_says_what_helps_in_a_program(slow_down):
+    """It advised `--slow-down` and `flight.slow_down`, which change nothing of a program's."""
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        north, east, down = vehicle.state.position_ned
+        below = north, east, down + 4.0
+        with pytest.raises(ConfigError, match=r"max_descent.*lower speed") as refused:
+            await vehicle.go_to(below)  # its default speed is above limits.max_descent_m_s
+        assert "--slow-down" not in str(refused.value)
+        await vehicle.go_to(below, speed=0.9)
+        await vehicle.land()
+
+    flight = {"takeoff_height_m": 6.0, "slow_down": slow_down}
+    summary, events = flown(program, QuickVehicle(), flight=flight)
+    assert summary.result == "ok", events
+
+
+@pytest.mark.parametrize("in_the_air", [False, True])
+def test_a_program_that_raises_between_two_calls_is_the_result_of_the_flight(tmp_path, in_the_air):
+    """It was "ok", as if the program had ended as it should."""
+
+    async def program(vehicle):
+        if in_the_air:
+            await vehicle.take_off()
+        raise ZeroDivisionError("mine")
+
+    mock = QuickVehicle()
+    with pytest.raises(ZeroDivisionError):
+        flown(program, mock, tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
+    assert summary["result"] == "the program raised ZeroDivisionError('mine')"
+    assert (mock.state()["mode"], mock.state()["armed"]) == ("LOITER", in_the_air)
+
+
+def test_a_program_that_raises_after_its_landing_has_flown_well(tmp_path):
+    async def program(vehicle):
+        await vehicle.take_off()
+        await vehicle.land()
+        raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError):
+        flown(program, QuickVehicle(), tmp_path)
+    summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
+    assert summary["result"] == "ok"
+    assert "the program raised ZeroDivisionError('mine')" in str(summary["events"])
