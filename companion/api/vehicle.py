@@ -12,7 +12,7 @@ from companion.api.control import Control, program_control
 from companion.api.flight_loop import FlightLoop, call_in_thread
 from companion.api.program import ProgramPlan
 from companion.api.state import NewestState, State
-from companion.config import trajectory_file
+from companion.config import Config, trajectory_file
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded, fly_maneuvers
 from companion.flight.maneuver_checks import naming_trajectory_errors, require_followable
@@ -37,6 +37,8 @@ from companion.safety.actions import Exit, FlightEnded
 
 _START_TIMEOUT = 1.0
 """Longest time from the beginning of control to the first command, s."""
+_USUAL_SPEED = 2.0
+"""Speed of `go_to` if the program gives none, m/s."""
 
 
 class Vehicle:
@@ -103,7 +105,7 @@ class Vehicle:
         position_ned: Vector,
         *,
         heading: float | None = None,
-        speed: float = 2.0,
+        speed: float | None = None,
         acceleration: float = 2.0,
         jerk: float = 4.0,
     ) -> None:
@@ -114,7 +116,8 @@ class Vehicle:
         Args:
             position_ned: m, in the frame of `State.position_ned`.
             heading: rad; the vehicle turns to it before it leaves; None: the present heading.
-            speed: largest speed, m/s.
+            speed: largest speed, m/s; None: 2 m/s, or what the limits of climb, descent and speed
+                allow in this direction if that is less.
             acceleration: largest acceleration, m/s².
             jerk: largest jerk, m/s³.
 
@@ -125,6 +128,8 @@ class Vehicle:
             ValueError: an argument is not finite, or the heading exceeds two turns.
         """
         to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
+        if speed is None:
+            speed = _usual_speed(to, self._context.config)
         names = "speed", "acceleration", "jerk"
         speed, acceleration, jerk = map(finite_number, names, (speed, acceleration, jerk))
         new_heading = None if heading is None else finite_number("heading", heading)
@@ -228,3 +233,12 @@ class Vehicle:
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
         return pose
+
+
+def _usual_speed(to: Vector, config: Config) -> float:
+    """Speed of a line to `to` (m NED from its start), m/s: at most `_USUAL_SPEED`."""
+    fastest = min(_USUAL_SPEED, config.safety.max_speed_m_s)
+    fastest_vertical = config.limits.max_climb_m_s if to[2] < 0.0 else config.limits.max_descent_m_s
+    if fastest * abs(to[2]) <= fastest_vertical * hypot(*to):
+        return fastest
+    return fastest_vertical * hypot(*to) / abs(to[2])

@@ -96,7 +96,7 @@ def test_a_refused_go_to_says_what_helps_in_a_program(slow_down):
         north, east, down = vehicle.state.position_ned
         below = north, east, down + 4.0
         with pytest.raises(ConfigError, match=r"max_descent.*lower speed") as refused:
-            await vehicle.go_to(below)  # its default speed is above limits.max_descent_m_s
+            await vehicle.go_to(below, speed=2.0)  # above limits.max_descent_m_s
         assert "--slow-down" not in str(refused.value)
         await vehicle.go_to(below, speed=0.9)
         await vehicle.land()

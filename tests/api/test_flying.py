@@ -58,6 +58,32 @@ def flown(program, mock, folder=None, **changes):
 
 
 @BOTH
+def test_without_a_speed_it_goes_as_fast_as_the_limits_of_climb_and_descent_allow(autopilot):
+    """`go_to` flies at 2 m/s, which the default limits do not allow straight down."""
+    seconds = []
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        for way in ((0.0, 4.0, 0.0), (0.0, 0.0, -4.0), (0.0, 0.0, 4.0), (-1.0, 0.5, 1.5)):
+            began = vehicle.state
+            place = tuple(map(sum, zip(began.position_ned, way, strict=True)))
+            await vehicle.go_to(place)
+            seconds.append(vehicle.state.time - began.time)
+            assert dist(vehicle.state.position_ned, place) < 0.3
+        await vehicle.land()
+
+    limits = {"max_climb_m_s": 1.5, "max_descent_m_s": 0.8}
+    flight = {"takeoff_height_m": 4.0}
+    summary, events = flown(program, QuickVehicle(autopilot), limits=limits, flight=flight)
+    assert summary.result == "ok", events
+    expected = [
+        line(way, v, 2.0, 4.0).duration
+        for way, v in (((4.0, 0.0, 0.0), 2.0), ((0.0, 0.0, -4.0), 1.5), ((0.0, 0.0, 4.0), 0.8))
+    ]
+    assert seconds[:3] == pytest.approx(expected, abs=0.3)
+
+
+@BOTH
 def test_it_takes_off_flies_to_places_and_lands(autopilot):
     at = []
 
