@@ -50,6 +50,8 @@ class _Climb:
         self._context, self._height = context, height
         self._has_begun = False
         self._held_at: float | None = None
+        motion = context.guidance_loop.motion
+        self._start_down = None if motion is None else motion.position_ned[2]
 
     def is_over(self) -> bool:
         """Whether the height is reached; raise `FlightEnded` if somebody stopped the climb."""
@@ -67,7 +69,7 @@ class _Climb:
             )
         is_near_height = height > self._height - _MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
-            raise FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE)
+            raise self._early_end(height)
         return is_near_height and abs(position.velocity_ned[2]) < 0.3 and not state.taking_off
 
     def _was_stopped(self) -> bool:
@@ -78,6 +80,19 @@ class _Climb:
         elif self._has_begun and self._held_at is None:
             self._held_at = now
         return self._held_at is not None and now - self._held_at > _ARRIVAL_TIME
+
+    def _early_end(self, height: float) -> FlightEnded:
+        """Why the climb ended at a `height` above home (m) that is not the commanded one."""
+        motion = self._context.guidance_loop.motion
+        if motion is not None and self._start_down is not None:
+            climbed = self._start_down - motion.position_ned[2]  # without jumps of home or estimate
+            if climbed > self._height - _MAX_UNDERSHOOT:
+                return FlightEnded(
+                    f"after a climb of {climbed:.1f} m the height above home is {height:.1f} m: "
+                    "home or the height estimate has jumped",
+                    Exit.LAND,
+                )
+        return FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE)
 
 
 def _require_ground(context: FlightContext) -> None:

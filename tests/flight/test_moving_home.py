@@ -54,6 +54,31 @@ def test_home_that_is_set_elsewhere_in_flight_leads_to_the_ground(phase, higher,
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
 
 
+@pytest.mark.parametrize("jumping", ["HOME_POSITION", "LOCAL_POSITION_NED"])
+def test_a_height_that_jumps_in_the_take_off_is_named_and_the_vehicle_lands(jumping):
+    """It was taken for a pilot who stopped the climb: the vehicle was left armed in the air."""
+    jump = 0.0
+
+    def change(message):
+        if message.get_type() == jumping:
+            message.z += jump
+
+    def begin_jump():
+        nonlocal jump
+        jump = -3.0 if jumping == "HOME_POSITION" else 3.0
+
+    with mock_vehicle() as mock:
+        Changed(mock, change)
+        at = When("takeoff", lambda: mock.at(mock.time + 0.8, begin_jump))
+        summary = fly(mock, None, at, flight={"takeoff_height_m": 4.0})
+        truth = mock.state()
+    assert summary.result == (
+        "after a climb of 4.0 m the height above home is 1.0 m: home or the height estimate has "
+        "jumped"
+    )
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
+
+
 def test_a_take_off_from_a_boat_that_moves_is_flown():
     """As seen from the water, which is where the program sees it from."""
     with mock_vehicle() as mock:
