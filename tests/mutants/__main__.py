@@ -141,7 +141,10 @@ def _mutants(folder: Path) -> list[Mutant]:
 
 
 def _find_changes(folder: Path, mutants: list[Mutant]) -> None:
-    from mutmut.mutation.diff_apply import get_diff_for_mutant  # noqa: PLC0415  an extra
+    from mutmut.configuration import reset_config  # noqa: PLC0415  an extra
+    from mutmut.mutation.diff_apply import get_diff_for_mutant  # noqa: PLC0415
+
+    reset_config()  # it keeps the configuration of the first room
 
     with contextlib.chdir(folder):
         for mutant in mutants:
