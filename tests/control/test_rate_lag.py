@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates
 from companion.control.estimator_resets import EstimatorResets
+from companion.control.rate_lag import RateLag
 from companion.vehicle.records import AttitudeSample
 
 
@@ -50,3 +51,13 @@ def test_corrections_of_the_heading_are_still_found_and_are_no_lag():
     resets, history = tumbled(0.005, correction_deg_s=2.0)
     assert resets.rate_lag.seconds == pytest.approx(0.005, abs=0.001)
     assert history[-1] - history[len(history) // 4] == pytest.approx(6.0, abs=0.2)
+
+
+@pytest.mark.parametrize("change", [(5.0, 0.0), (0.0, -5.0), (3.0, 4.0), (-4.0, 3.0)])
+def test_a_change_of_the_rates_counts_by_its_size_about_whichever_axis(change):
+    lag, learned = 0.004, RateLag()
+    for _ in range(3):  # corrected by what is known already
+        p, q = ((lag - learned.seconds) * rate for rate in change)
+        x, y, z, w = Rotation.from_rotvec((p, q, 0.1)).as_quat()
+        learned.learn((0.0, 0.0, 0.0), (*change, 9.0), (1.0, 0.0, 0.0, 0.0), (w, x, y, z))
+    assert learned.seconds == pytest.approx(lag, rel=0.01)
