@@ -47,6 +47,8 @@ def test_only_a_trajectory_is_followed():
     flown.begin(ManeuverSource(ManeuverSequence([DOUBLETS, follow])), POSE, 10.0)
     assert flown.followed_trajectory(12.0) is None
     assert flown.followed_trajectory(12.5 + DOUBLETS.duration) == (follow, 2.5, POSE)
+    flown.pose = None
+    assert flown.followed_trajectory(12.5 + DOUBLETS.duration) is None
 
 
 def test_a_maneuver_is_told_once_and_its_end_is_marked():
