@@ -12,6 +12,7 @@ from scipy.linalg import expm
 from companion.attitude import Coefficients
 from companion.attitude.reference import (
     FirstOrderReference,
+    Lag,
     SecondOrderReference,
     remaining_distance,
 )
@@ -111,3 +112,25 @@ def test_a_model_at_its_target_stays_there():
 @pytest.mark.parametrize("max_speed", [np.inf, 1.0])
 def test_no_time_leaves_the_whole_distance(max_speed):
     assert remaining_distance(0.6, 5.0, max_speed, 0.0) == 0.6
+
+
+@pytest.mark.parametrize("sigma", [0.0, 0.0004, 0.003])
+@pytest.mark.parametrize("dt", [0.004, 0.05])
+def test_a_lag_is_its_differential_equation(sigma, dt):
+    """σ·r̈ + lag·ṙ = command − r: the integral, r and ṙ, and the transition of (r − command, ṙ)."""
+    lag, rate, slope, command = 0.06, 0.5, -2.0, 1.5
+
+    def derivatives(_, state):
+        _, r, r_dot = state
+        if sigma == 0.0:
+            return r, (command - r) / lag, 0.0
+        return r, r_dot, (command - r - lag * r_dot) / sigma
+
+    start = 0.0, rate, slope
+    end = solve_ivp(derivatives, (0.0, dt), start, rtol=1e-11, atol=1e-12).y[:, -1]
+    if sigma == 0.0:
+        end[2] = (command - end[1]) / lag
+    assert Lag(lag, sigma).after(rate, slope, command, dt) == pytest.approx(end, rel=1e-8)
+    rows = np.reshape(Lag(lag, sigma).transition(dt), (2, 2))
+    expected = (end[1] - command, end[2] if sigma > 0.0 else 0.0)
+    assert rows @ (rate - command, slope) == pytest.approx(expected, rel=1e-8)

@@ -12,6 +12,7 @@ from companion.attitude.rotation import (
     attitude_of,
     body_error,
     cos_and_sinc,
+    down_in_body,
     euler_angles,
     turned_about_vertical,
     wrap_difference,
@@ -64,6 +65,11 @@ def test_angle_per_sine_makes_a_rotation_vector(angle):
     x, y, z, w = Rotation.from_rotvec([0.6 * angle, 0.0, 0.8 * angle]).as_quat()
     factor = angle_per_sine(abs(float(w)), math.hypot(x, y, z))
     assert (factor * x, factor * z) == pytest.approx((0.6 * angle, 0.8 * angle), rel=1e-14)
+
+
+def test_down_in_the_body_is_scipys():
+    found = [down_in_body(q) for q in scalars(ROTATIONS)]
+    assert np.allclose(found, ROTATIONS.inv().apply((0.0, 0.0, 1.0)), atol=1e-14)
 
 
 def test_euler_angles_are_scipys():
