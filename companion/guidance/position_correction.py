@@ -5,6 +5,9 @@ from math import exp, hypot, sqrt
 
 from companion.guidance.reference import NorthEast, VehicleMotion, clamp_length
 
+_SHORTEST_GAP = 0.0005
+"""Two positions nearer in time are not compared, s: their stamps are in ms, and nothing is divided
+by a time of almost zero."""
 _LONGEST_GAP = 0.5
 """Longest time between two positions from which a correction is computed, s."""
 _LONGEST_FILTER_TIME = 0.1
@@ -100,7 +103,7 @@ class PositionCorrection:
         self._moving = min(
             hypot(measured.velocity_ned[0], measured.velocity_ned[1]) / _MOVING_SPEED, 1.0
         )
-        if before is None or not 0.0 < dt < _LONGEST_GAP:
+        if before is None or not _SHORTEST_GAP < dt < _LONGEST_GAP:
             self._raw = self._filtered = self._correction = (0.0, 0.0)
         else:
             self._filter_unexplained_velocity(before, measured, dt)

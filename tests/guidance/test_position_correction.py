@@ -5,7 +5,7 @@ from random import Random
 from statistics import mean
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from companion.guidance.position_correction import CorrectionSettings, PositionCorrection
@@ -132,6 +132,7 @@ def test_at_rest_the_positions_are_trusted_less_and_filtered_more():
     assert added[0.0] <= 0.6 * added[3.0]
 
 
+@example([(0.0, (0.0, 1.0), (0.0, 0.0)), (1e-265, (0.0, 0.0), (0.0, 0.0))])
 @given(st.lists(st.tuples(st.floats(-1.0, 1.0), pairs, pairs), min_size=1, max_size=30))
 def test_it_is_bounded_whatever_comes(rows):
     correction, time = PositionCorrection(SETTINGS), 0.0
