@@ -184,9 +184,7 @@ class Control:
         return self._start_state.heading if heading is None else heading
 
     def _require_control(self) -> None:
-        error = self._program.end_error
-        if error is not None:
-            raise error
+        self._program.require_flight()
         if self._control_end.done():
             self._control_end.result()
             raise FlightEnded("the program has ended its control")

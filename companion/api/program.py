@@ -103,7 +103,7 @@ class ProgramPlan:
         """
         if self.end_error is not None:
             await self.finished.wait()
-            raise self.end_error
+            self.require_flight()
         if self.busy:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
         request = PhaseRequest(phases, ends_flight)
@@ -125,6 +125,12 @@ class ProgramPlan:
             return self._end_error
         reason = self.end_reason() or (_CANCELLED if self._cancelled else None)
         return None if reason is None else FlightEnded(reason)
+
+    def require_flight(self) -> None:
+        """Raise `end_error` if the flight ends or has ended."""
+        error = self.end_error
+        if error is not None:
+            raise error
 
     @property
     def busy(self) -> bool:

@@ -82,7 +82,7 @@ class Vehicle:
             FlightEnded: the flight has ended early, or the vehicle is already in the air; a
                 vehicle in the air flies on.
         """
-        self._require_flight()
+        self._program.require_flight()
         if self._context.loop.offboard_active or self._context.link.state.flying:
             raise FlightEnded("the vehicle flies already", Exit.LEAVE)
         await self._request(
@@ -217,18 +217,13 @@ class Vehicle:
         north, east, down = minus(position, centre)
         require_followable(context.config, maneuver, (north, east, down), context.known_drag)
 
-    def _require_flight(self) -> None:
-        error = self._program.end_error
-        if error is not None:
-            raise error
-
     def _held_pose(self) -> Pose:
         """The pose that guidance holds, or at which its present maneuver began.
 
         Raises:
             FlightEnded: the flight has ended, or the vehicle is not under the program's control.
         """
-        self._require_flight()
+        self._program.require_flight()
         pose = self._context.guidance_loop.flown_source.pose
         if pose is None or not self._context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
@@ -237,8 +232,8 @@ class Vehicle:
 
 def _usual_speed(to: Vector, config: Config) -> float:
     """Speed of a line to `to` (m NED from its start), m/s: at most `_USUAL_SPEED`."""
-    fastest = min(_USUAL_SPEED, config.safety.max_speed_m_s)
-    fastest_vertical = config.limits.max_climb_m_s if to[2] < 0.0 else config.limits.max_descent_m_s
-    if fastest * abs(to[2]) <= fastest_vertical * hypot(*to):
-        return fastest
-    return fastest_vertical * hypot(*to) / abs(to[2])
+    speed = min(_USUAL_SPEED, config.safety.max_speed_m_s)
+    if to[2] == 0.0:
+        return speed
+    vertical = config.limits.max_climb_m_s if to[2] < 0.0 else config.limits.max_descent_m_s
+    return min(speed, vertical * hypot(*to) / abs(to[2]))

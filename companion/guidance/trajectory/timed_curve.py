@@ -46,8 +46,7 @@ def check_times(
         if piece.end > piece.begin
         for part in _checked_parts(piece, sampling, law)
     ]
-    phases = [(law.at(part.begin).phase, law.at(part.end).phase) for part in parts]
-    spans = list(zip(parts, phases, strict=True))
+    spans = [(part, (law.at(part.begin).phase, law.at(part.end).phase)) for part in parts]
     require_checkable(sum(_check_count(part, sampling, *span) for part, span in spans))
     grids = [_check_times_in(part, sampling, law, span) for part, span in spans]
     times: list[float] = np.unique(np.concatenate(([0.0, law.duration], *grids))).tolist()
