@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import FlightLoop, flight_loop
-from companion.api.program import ProgramPlan, flight_ended
+from companion.api.program import ProgramPlan, failure_words, flight_ended
 from companion.api.state import NewestState
 from companion.api.vehicle import Vehicle
 from companion.config import Config
@@ -130,8 +130,7 @@ async def _connected_vehicle(
     try:
         yield Vehicle(program, context, newest_state, loop)
     except BaseException as error:
-        cancelled = isinstance(error, asyncio.CancelledError)
-        reason = "the program was cancelled" if cancelled else f"the program raised {error!r}"
+        reason = failure_words("the program", error)
         with suppress(FlightEnded):
             await asyncio.shield(loop.start(_end_failed(session, program, reason)))
         raise

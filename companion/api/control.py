@@ -7,7 +7,7 @@ from math import inf, isnan
 
 from companion.api.commanded import checked_copy
 from companion.api.flight_loop import FlightLoop
-from companion.api.program import ProgramPlan
+from companion.api.program import ProgramPlan, failure_words
 from companion.api.state import NewestState, State
 from companion.attitude import BodyRates, Coefficients
 from companion.flight.context import FlightContext
@@ -212,9 +212,7 @@ async def program_control(
         yield Control(program, context, newest_state, loop, source, control_end)
     except BaseException as error:
         if not isinstance(error, FlightEnded):
-            cancelled = isinstance(error, asyncio.CancelledError)
-            reason = "was cancelled" if cancelled else f"raised {error!r}"
-            loop.post(source.fail, f"{source.name} {reason}")
+            loop.post(source.fail, failure_words(source.name, error))
         raise
     finally:
         loop.post(source.end)

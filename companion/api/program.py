@@ -162,3 +162,10 @@ class ProgramPlan:
 def flight_ended(result: str) -> FlightEnded:
     """The exception for calls after the end of a flight whose summary has this `result`."""
     return FlightEnded("the flight is over" if result == "ok" else result)
+
+
+def failure_words(name: str, error: BaseException) -> str:
+    """Says that what is called `name` was cancelled, or which error it raised."""
+    if isinstance(error, asyncio.CancelledError):
+        return f"{name} was cancelled"
+    return f"{name} raised {error!r}"
