@@ -74,6 +74,40 @@ def test_the_hold_pauses_before_a_run_of_steps_and_nowhere_else(maneuvers):
     assert paused == pytest.approx(runs * 1.0)
 
 
+@pytest.mark.parametrize("maneuvers", [Steps(0.25, 0.7, 3.0), Corners(0.3, 0.4, 0.7, 2.0)])
+def test_steps_are_added_to_the_tilt_that_holds_against_the_wind(maneuvers):
+    times = np.arange(0.005, maneuvers.duration, 0.01)
+    steps = [r for t in times if (r := maneuvers.at(float(t), START)).coefficients]
+    assert steps
+    assert all(step.horizontal.trimmed is True for step in steps)
+
+
+def test_each_corner_is_held_for_its_time():
+    """Two rounds, the second one mirrored, as by hand."""
+    corners = Corners(0.3, 0.4, 0.7, 2.0)
+    signs = [(1, 1), (-1, 1), (-1, -1), (1, -1), (1, -1), (-1, -1), (-1, 1), (1, 1)]
+    for index, (north, east) in enumerate(signs):
+        for share in (0.01, 0.99):
+            asked = corners.at(1.0 + 0.7 * (index + share), START).coefficients
+            assert asked == pytest.approx((0.3 * north, 0.4 * east))
+    assert corners.at(1.0 + 0.7 * 8.01, START).coefficients is None
+    times = np.array(corners.check_times())
+    assert times[0] == pytest.approx(1.0)
+    assert times[-2] == pytest.approx(1.0 + 0.7 * 8)
+    assert np.diff(times[:-1]).max() < 0.0101
+
+
+def test_the_times_to_check_of_steps_cover_each_doublet_and_nothing_else():
+    steps = Steps(0.25, 0.7, 3.0)
+    times = np.array(steps.check_times())
+    begins = np.array([1.0, 7.8, 14.6])  # a pause of 1 s, doublets of 2.8 s, settling of 3 s
+    inside = [(begin - 1e-9 <= times) & (times <= begin + 2.8 + 1e-9) for begin in begins]
+    assert np.any(inside, axis=0).all()
+    for one in inside:
+        assert times[one][[0, -1]] == pytest.approx(times[one][0] + np.array([0.0, 2.8]))
+        assert np.diff(times[one]).max() < 0.0101
+
+
 def test_the_circle_gathers_speed_as_a_raised_cosine_and_no_lap_is_too_long_to_check():
     """Half the speed in the middle of a ramp of speed/(1 m/s²), three quarters after two thirds."""
     flown = circle(3.0, 2.0, 1.0)

@@ -1,6 +1,6 @@
 """How far the last rates carry a vehicle: by hand where that can be, and its limits."""
 
-from math import cos, hypot, pi
+from math import cos, hypot, pi, sin
 
 import pytest
 
@@ -49,6 +49,27 @@ def test_without_feedback_height_and_drift_are_what_one_reckons_by_hand():
     drifting = reach(flown(velocity=(-5.0, 0.0, 0.0)), steady._replace(brakes=False))
     assert drifting.place == pytest.approx((-5.0 * 1.1 - 5.0 * 0.1 - 5.0 / 0.2, 0.0))
     assert drifting.spread == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_tilted_vehicle_falls_by_the_thrust_it_lacks_until_it_is_level():
+    """By hand, for a tilt of 1 rad: held for 0.1 s, levelled from 0.1 s later on at 3 rad/s."""
+    tilted = flown(thrust=(GRAVITY * sin(1.0), 0.0, -GRAVITY * cos(1.0)))
+    there = reach(tilted, PX4._replace(hold_time=0.0, max_tilt_rate=0.0))
+    lacking, until_level = GRAVITY * (1.0 - cos(1.0)), 0.1 + 1.0 / 3.0
+    levelling = GRAVITY * (1.0 - sin(1.0))  # the mean of cos from 1 rad to 0 is sin(1)/1
+    speed = lacking * 0.1
+    fall = 0.5 * lacking * 0.1**2 + speed * until_level + 0.5 * levelling * until_level**2
+    braking = (speed + levelling * until_level) ** 2 / 8.0
+    assert there.down == pytest.approx(fall + braking, rel=0.01)
+    assert there.up == 0.0
+
+
+def test_the_spread_is_that_of_a_thrust_axis_that_feedback_turns_all_the_time():
+    """By hand: at 0.15 rad/s the acceleration is g·0.15·t, the speed half of that by t."""
+    there = reach(flown(), PX4)
+    time = 1.1
+    moved, speed = GRAVITY * 0.15 * time**3 / 6.0, GRAVITY * 0.15 * time**2 / 2.0
+    assert there.up == pytest.approx(moved + speed * 0.1 + speed**2 / 8.0, rel=0.06)
 
 
 def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it():
