@@ -421,6 +421,7 @@ def test_timesync_tells_how_old_a_sample_was_when_it_arrived(run):
             assert delay.seconds == pytest.approx(0.5, abs=0.05 + error)
             age = link.clock.age(clock() + ahead - 1.0, clock())
             assert age == pytest.approx(1.0, abs=0.05 + error)
+            assert link.clock.age(clock() + ahead + 1.0, clock()) == 0.0  # never negative
 
     run(scene())
 

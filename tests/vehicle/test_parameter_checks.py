@@ -55,6 +55,15 @@ def test_an_action_that_nobody_knows_is_unsafe():
     assert found == Problem(UNSAFE, "companion does not know this action", 1.0)
 
 
+def test_of_several_checks_the_first_that_finds_something_speaks():
+    both = checks.first_problem(
+        checks.positive(UNSAFE, "it is off", 7.0), checks.at_most(BAD, 5.0, WORSE, 1.5)
+    )
+    assert problem(both, 3.0) is None
+    assert problem(both, 0.0) == Problem(UNSAFE, "it is off", 7.0)
+    assert problem(both, 6.0) == Problem(BAD, WORSE, 1.5)
+
+
 @pytest.mark.parametrize(
     ("value", "words", "set_to"),
     [

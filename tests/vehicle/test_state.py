@@ -171,6 +171,7 @@ def test_positions_that_are_not_finite_are_counted_never_stored(bench, bad):
         bench.take(dialect.MAVLink_local_position_ned_message(8, *values))
     assert bench.state.position.vehicle_time == 0.004
     assert bench.stats.non_finite == 6
+    assert bench.stats.non_finite_at == {"LOCAL_POSITION_NED": 10.0}
 
 
 def position(bench, seconds, north=0.0):
@@ -305,6 +306,7 @@ def test_height_is_counted_from_home(bench):
     for bad in (math.nan, math.inf):
         bench.take(home_at(bad))
     assert (bench.state.height, bench.stats.non_finite) == (-0.5, 2)
+    assert bench.stats.non_finite_at == {"HOME_POSITION": 10.0}
 
 
 def test_gps_that_was_good_is_missed(bench):
@@ -357,6 +359,7 @@ def test_a_thrust_that_is_none_is_passed_over(bench):
         assert bench.take(target(good)).attitude_target_thrust == (10.0, good)
     for bad in (-0.1, 1.1, math.nan, math.nan):
         assert bench.take(target(bad)).attitude_target_thrust == (10.0, 1.0)
+    assert bench.stats.non_finite_at == {"ATTITUDE_TARGET": 10.0}
     assert bench.stats.non_finite == 2
 
 
