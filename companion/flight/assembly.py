@@ -42,6 +42,7 @@ class AssembledFlight:
     drag_memory: DragMemory
     ladder: SafetyLadder
     reporter: StatusReporter
+    recorder: EventRecorder
     changes: Changes
 
     def close(self) -> None:
@@ -93,7 +94,7 @@ def assemble(
     dead_time_watch = DeadTimeWatch(trace, config.vehicle.axes, flight.note)
     reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
     return AssembledFlight(
-        flight, context, trace, dead_time_watch, memory, ladder, reporter, changes
+        flight, context, trace, dead_time_watch, memory, ladder, reporter, recorder, changes
     )
 
 

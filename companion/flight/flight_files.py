@@ -136,7 +136,6 @@ class FlightFiles:
         self,
         stats: LinkStats,
         assembled: AssembledFlight,
-        recorder: EventRecorder,
         result: str,
         grants: tuple[realtime.SettingResult, ...],
     ) -> Summary:
@@ -145,7 +144,6 @@ class FlightFiles:
         Args:
             stats: counters of the flight's link.
             assembled: the flight.
-            recorder: has recorded the phases.
             result: "ok", or the reason why it ended early.
             grants: which requested real-time settings were granted.
         """
@@ -156,7 +154,7 @@ class FlightFiles:
             if text == dead_times.warning():
                 continue  # already reported in flight
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
-            recorder.write(text)
+            assembled.recorder.write(text)
         assembled.drag_memory.save()
         self._ended_at = asyncio.get_running_loop().time() - flight.began
         return Summary(
@@ -175,7 +173,7 @@ class FlightFiles:
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            facts=facts_of(assembled, recorder.phases, result, advice_texts),
+            facts=facts_of(assembled, result, advice_texts),
         )
 
     def save(self, summary: Summary) -> Summary:
