@@ -10,6 +10,7 @@ from companion.config import Config
 from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
 from companion.control.outer_loop import make_predictive_control
+from companion.control.telemetry import GuidedVehicle
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch
@@ -107,9 +108,7 @@ def _context(
     loop, guidance_loop = make_loops(
         config,
         link.send_setpoint,
-        link.state,
-        ground,
-        link.clock,
+        GuidedVehicle(link.state, ground, link.clock),
         trace,
         clock,
         environment.clock_ns,
