@@ -134,7 +134,6 @@ class FlightFiles:
 
     def summary(
         self,
-        stats: LinkStats,
         assembled: AssembledFlight,
         result: str,
         grants: tuple[realtime.SettingResult, ...],
@@ -142,7 +141,6 @@ class FlightFiles:
         """The summary of a finished flight, before its log is closed. Also saves the learned drag.
 
         Args:
-            stats: counters of the flight's link.
             assembled: the flight.
             result: "ok", or the reason why it ended early.
             grants: which requested real-time settings were granted.
@@ -165,7 +163,7 @@ class FlightFiles:
             counts=loop_counts(assembled.context),
             link={
                 name: value - self._counted_before.get(name, 0)
-                for name, value in _counters(stats).items()
+                for name, value in _counters(assembled.context.link.stats).items()
             },
             trace=trace,
             events=list(flight.events),

@@ -114,9 +114,9 @@ class Session:
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)
-                async with connected(link, self._assembled):
+                async with connected(self._assembled):
                     result = await self._run(self._assembled.flight)
-            summary = record.summary(link.stats, self._assembled, result, grants)
+            summary = record.summary(self._assembled, result, grants)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         return record.save(summary)
 

@@ -12,21 +12,19 @@ from companion.flight.context import cancel
 from companion.mavlink.messages import Message
 from companion.mavlink.texts import StatusText
 from companion.safety.actions import fault_message
-from companion.vehicle.link import Link
 from companion.vehicle.records import AttitudeSample
 from companion.vehicle.state import VehicleState
 
 
 @asynccontextmanager
 async def connected(
-    link: Link, assembled: AssembledFlight, *beside: Coroutine[Any, Any, None]
+    assembled: AssembledFlight, *beside: Coroutine[Any, Any, None]
 ) -> AsyncIterator[None]:
-    """Connect the flight to the link, and report its state, while the block runs it; then end both.
+    """Connect the flight to its link, and report its state, while the block runs it; then end both.
 
     Only one flight at a time may be connected to a link.
 
     Args:
-        link: open link to the vehicle.
         assembled: the flight.
         beside: more to run meanwhile; an exception in it, or in the reporter, is noted as an event
             and does not end the flight.
@@ -39,7 +37,7 @@ async def connected(
             assembled.flight.note(fault_message(error))
 
     try:
-        with _callbacks(link, assembled):
+        with _callbacks(assembled):
             works = assembled.reporter.run(), *beside
             tasks = [asyncio.create_task(run_guarded(work)) for work in works]
             try:
@@ -52,9 +50,9 @@ async def connected(
 
 
 @contextmanager
-def _callbacks(link: Link, assembled: AssembledFlight) -> Iterator[None]:
+def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
     """Connect the link's callbacks, and changes of values, to the flight while the block runs."""
-    flight, context = assembled.flight, assembled.context
+    flight, context, link = assembled.flight, assembled.context, assembled.context.link
     loop, guidance_loop = context.loop, context.guidance_loop
     time = asyncio.get_running_loop().time
     dead_time_watch = assembled.dead_time_watch

@@ -82,7 +82,7 @@ class ServedFlight:
         config, link, component, observer, environment, records, changes = vehicle
         self._records, self._record = records, records.new_record(changes.begin_flight())
         self._summary: Summary | None = None
-        self._link, self._component, self._ownership = link, component, ownership
+        self._component, self._ownership = component, ownership
         self._changes, self._clock = changes, asyncio.get_running_loop().time
         self._autopilot = Address(link.settings.target_system, link.settings.target_component)
         self._owner_name, self._release_commanded_at = name, -inf
@@ -150,16 +150,14 @@ class ServedFlight:
         """Fly; answer `command`, if there is one; return whether control had begun."""
         with self._records.recording(self._record), self._changes.limited_by(change_refusal):
             result = "stopped at once"
-            self._record.begin_counting(self._link.stats)
+            self._record.begin_counting(self._assembled.context.link.stats)
             try:
                 beside = self._answer_and_tell(command), self._send_values()
-                async with connected(self._link, self._assembled, *beside):
+                async with connected(self._assembled, *beside):
                     result = await self._assembled.flight.run()
             finally:
                 self._tell_end(command, result)
-                self._summary = self._record.summary(
-                    self._link.stats, self._assembled, result, self._records.grants
-                )
+                self._summary = self._record.summary(self._assembled, result, self._records.grants)
         return self._source.start_pose is not None
 
     async def save(self) -> None:
