@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import FlightLoop, flight_loop
 from companion.api.program import ProgramPlan, failure_words, flight_ended
-from companion.api.state import NewestState
+from companion.api.state import ConnectedFlight, NewestState
 from companion.api.vehicle import Vehicle
 from companion.config import Config
 from companion.config.files import changed, load
@@ -122,13 +122,13 @@ async def _connected_vehicle(
 ) -> AsyncGenerator[Vehicle, None]:
     """The vehicle after the preflight checks; at the end of the block the flight ends."""
     try:
-        context, newest_state = await loop.start(_wait_connected(loop, program))
+        connected = await loop.start(_wait_connected(loop, program))
     except asyncio.CancelledError:
         if not await loop.start(_interrupt(session, "the program was cancelled")):
             flight.cancel()
         raise
     try:
-        yield Vehicle(program, context, newest_state, loop)
+        yield Vehicle(connected)
     except BaseException as error:
         reason = failure_words("the program", error)
         with suppress(FlightEnded):
@@ -176,11 +176,9 @@ async def _fly(session: Session, program: ProgramPlan) -> None:
     program.end(flight_ended(summary.result))
 
 
-async def _wait_connected(
-    loop: FlightLoop, program: ProgramPlan
-) -> tuple[FlightContext, NewestState]:
+async def _wait_connected(loop: FlightLoop, program: ProgramPlan) -> ConnectedFlight:
     context = await asyncio.shield(program.connected)
-    return context, NewestState(context, loop)
+    return ConnectedFlight(program, context, NewestState(context, loop), loop)
 
 
 async def _interrupt(session: Session, reason: str) -> bool:

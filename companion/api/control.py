@@ -6,11 +6,9 @@ from contextlib import asynccontextmanager
 from math import inf, isnan
 
 from companion.api.commanded import checked_copy
-from companion.api.flight_loop import FlightLoop
-from companion.api.program import ProgramPlan, failure_words
-from companion.api.state import NewestState, State
+from companion.api.program import failure_words
+from companion.api.state import ConnectedFlight, State
 from companion.attitude import BodyRates, Coefficients
-from companion.flight.context import FlightContext
 from companion.guidance.finite import finite_vector
 from companion.guidance.reference import (
     HorizontalCommand,
@@ -36,16 +34,9 @@ class Control:
     """
 
     def __init__(
-        self,
-        program: ProgramPlan,
-        context: FlightContext,
-        newest_state: NewestState,
-        loop: FlightLoop,
-        source: CommandedSource,
-        control_end: asyncio.Future[None],
+        self, flight: ConnectedFlight, source: CommandedSource, control_end: asyncio.Future[None]
     ) -> None:
-        self._program, self._context, self._newest_state = program, context, newest_state
-        self._loop, self._source, self._control_end = loop, source, control_end
+        self._flight, self._source, self._control_end = flight, source, control_end
         self._command: tuple[Reference, float, Vector | None] | None = None
         self._posted = False
         self._start_state = self.state
@@ -53,7 +44,7 @@ class Control:
     @property
     def state(self) -> State:
         """The newest state of the vehicle."""
-        return self._newest_state.state()
+        return self._flight.newest_state.state()
 
     async def states(self, seconds: float = inf) -> AsyncIterator[State]:
         """Yield the state at each new attitude sample; skip samples while the caller works.
@@ -72,11 +63,11 @@ class Control:
         def wake(_: object) -> None:
             new_state.set()
 
-        unsubscribe = self._newest_state.subscribe(new_state.set)
+        unsubscribe = self._flight.newest_state.subscribe(new_state.set)
         self._control_end.add_done_callback(wake)
-        end_time = self._loop.time() + seconds
+        end_time = self._flight.loop.time() + seconds
         try:
-            while self._loop.time() < end_time:
+            while self._flight.loop.time() < end_time:
                 self._require_control()
                 yield self.state
                 new_state.clear()
@@ -131,17 +122,17 @@ class Control:
         reference = checked_copy(reference)
         jerk_ned = None if jerk_ned is None else finite_vector("jerk_ned", jerk_ned)
         self._require_control()
-        self._command = reference, self._loop.time(), jerk_ned
+        self._command = reference, self._flight.loop.time(), jerk_ned
         if not self._posted:  # else the callback posted before will take this command
             self._posted = True
-            self._loop.post(self._post_command)
+            self._flight.loop.post(self._post_command)
 
     def _post_command(self) -> None:
         """Give the newest command to guidance; called in the flight's loop."""
         self._posted = False
         if self._command is not None:
             self._source.give(*self._command)
-            self._context.guidance_loop.step_soon()
+            self._flight.context.guidance_loop.step_soon()
 
     def tilt(self, north: float, east: float, heading: float | None = None) -> None:
         """Command acceleration coefficients, and hold the height at which control began.
@@ -184,7 +175,7 @@ class Control:
         return self._start_state.heading if heading is None else heading
 
     def _require_control(self) -> None:
-        self._program.require_flight()
+        self._flight.program.require_flight()
         if self._control_end.done():
             self._control_end.result()
             raise FlightEnded("the program has ended its control")
@@ -192,12 +183,7 @@ class Control:
 
 @asynccontextmanager
 async def program_control(
-    program: ProgramPlan,
-    context: FlightContext,
-    newest_state: NewestState,
-    loop: FlightLoop,
-    source: CommandedSource,
-    control_end: asyncio.Future[None],
+    flight: ConnectedFlight, source: CommandedSource, control_end: asyncio.Future[None]
 ) -> AsyncGenerator[Control, None]:
     """Let the program command the vehicle while the block runs; see `Control`.
 
@@ -209,13 +195,13 @@ async def program_control(
             done, _ = await asyncio.wait({control_end}, timeout=0.01)
             if done:
                 control_end.result()
-        yield Control(program, context, newest_state, loop, source, control_end)
+        yield Control(flight, source, control_end)
     except BaseException as error:
         if not isinstance(error, FlightEnded):
-            loop.post(source.fail, failure_words(source.name, error))
+            flight.loop.post(source.fail, failure_words(source.name, error))
         raise
     finally:
-        loop.post(source.end)
+        flight.loop.post(source.end)
         await asyncio.wait({control_end})
         if not control_end.cancelled():
             control_end.exception()

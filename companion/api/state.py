@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from companion.api.flight_loop import FlightLoop
+from companion.api.program import ProgramPlan
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.representation import heading
 from companion.flight.context import FlightContext
@@ -88,6 +89,19 @@ class NewestState:
         )
         for wake in self._pending_calls:
             wake()
+
+
+class ConnectedFlight(NamedTuple):
+    """A flight after its preflight checks, as `Vehicle` and `Control` use it."""
+
+    program: ProgramPlan
+    """Takes the program's requests."""
+    context: FlightContext
+    """Context of the flight; the program only reads it."""
+    newest_state: NewestState
+    """The newest state of the vehicle."""
+    loop: FlightLoop
+    """Event loop of the flight."""
 
 
 class _PendingCall:

@@ -9,9 +9,8 @@ from math import hypot, tau
 from pathlib import Path
 
 from companion.api.control import Control, program_control
-from companion.api.flight_loop import FlightLoop, call_in_thread
-from companion.api.program import ProgramPlan
-from companion.api.state import NewestState, State
+from companion.api.flight_loop import call_in_thread
+from companion.api.state import ConnectedFlight, State
 from companion.config import Config, trajectory_file
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded, fly_maneuvers
@@ -49,15 +48,8 @@ class Vehicle:
     `RuntimeError`.
     """
 
-    def __init__(
-        self,
-        program: ProgramPlan,
-        context: FlightContext,
-        newest_state: NewestState,
-        loop: FlightLoop,
-    ) -> None:
-        self._program, self._context = program, context  # the context is only read here
-        self._newest_state, self._loop = newest_state, loop
+    def __init__(self, flight: ConnectedFlight) -> None:
+        self._flight = flight
 
     @property
     def state(self) -> State:
@@ -66,12 +58,12 @@ class Vehicle:
         Raises:
             RuntimeError: no position or no attitude has come yet.
         """
-        return self._newest_state.state()
+        return self._flight.newest_state.state()
 
     @property
     def summary(self) -> Summary | None:
         """What was flown and measured, after the block of `connect`; None before."""
-        return self._program.summary
+        return self._flight.program.summary
 
     async def take_off(self) -> None:
         """Arm where `flight.arm` allows it (else wait for the pilot), climb, and take over.
@@ -82,8 +74,8 @@ class Vehicle:
             FlightEnded: the flight has ended early, or the vehicle is already in the air; a
                 vehicle in the air flies on.
         """
-        self._program.require_flight()
-        if self._context.loop.offboard_active or self._context.link.state.flying:
+        self._flight.program.require_flight()
+        if self._flight.context.loop.offboard_active or self._flight.context.link.state.flying:
             raise FlightEnded("the vehicle flies already", Exit.LEAVE)
         await self._request(
             lambda context: takeoff_phases(context.config.flight, context.link.autopilot)
@@ -129,7 +121,7 @@ class Vehicle:
         """
         to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
         if speed is None:
-            speed = _usual_speed(to, self._context.config)
+            speed = _usual_speed(to, self._flight.context.config)
         names = "speed", "acceleration", "jerk"
         speed, acceleration, jerk = map(finite_number, names, (speed, acceleration, jerk))
         new_heading = None if heading is None else finite_number("heading", heading)
@@ -163,7 +155,7 @@ class Vehicle:
         else:
             with naming_trajectory_errors(str(getattr(trajectory, "name", ""))):
                 trajectory = await call_in_thread(checked_trajectory, trajectory)
-        await self._fly(Follow(trajectory, self._context.config.limits.max_yaw_rate))
+        await self._fly(Follow(trajectory, self._flight.context.config.limits.max_yaw_rate))
 
     @asynccontextmanager
     async def control(self, name: str = "the program") -> AsyncGenerator[Control, None]:
@@ -179,13 +171,13 @@ class Vehicle:
             FlightEnded: the vehicle is not under the program's control when the block begins.
         """
         self._held_pose()  # raises if the vehicle is not under our control
-        source = CommandedSource(name, self._context.config.deadman.target_stale, _START_TIMEOUT)
+        source = CommandedSource(
+            name, self._flight.context.config.deadman.target_stale, _START_TIMEOUT
+        )
         work = partial(fly_commanded, commands=source)
         phase = program_phase("control", f"{name} to end its control", work)
         control_end = self._request(lambda _: (phase,))
-        async with program_control(
-            self._program, self._context, self._newest_state, self._loop, source, control_end
-        ) as control:
+        async with program_control(self._flight, source, control_end) as control:
             yield control
 
     async def land(self) -> None:
@@ -200,7 +192,9 @@ class Vehicle:
         self, phases: Callable[[FlightContext], Sequence[Phase]], *, ends_flight: bool = False
     ) -> asyncio.Future[None]:
         """Request phases; the future is done when they have ended."""
-        return self._loop.start(self._program.request(phases, ends_flight=ends_flight))
+        return self._flight.loop.start(
+            self._flight.program.request(phases, ends_flight=ends_flight)
+        )
 
     async def _fly(self, maneuver: Maneuver) -> None:
         self._held_pose()  # raises if the vehicle is not under our control
@@ -212,7 +206,7 @@ class Vehicle:
         )
 
     def _require_followable(self, maneuver: Maneuver) -> None:
-        context, position = self._context, self._held_pose().position_ned
+        context, position = self._flight.context, self._held_pose().position_ned
         centre = context.snapshot_builder.fence_centre_ned or (0.0, 0.0, 0.0)
         north, east, down = minus(position, centre)
         require_followable(context.config, maneuver, (north, east, down), context.known_drag)
@@ -223,9 +217,9 @@ class Vehicle:
         Raises:
             FlightEnded: the flight has ended, or the vehicle is not under the program's control.
         """
-        self._program.require_flight()
-        pose = self._context.guidance_loop.flown_source.pose
-        if pose is None or not self._context.loop.offboard_active:
+        self._flight.program.require_flight()
+        pose = self._flight.context.guidance_loop.flown_source.pose
+        if pose is None or not self._flight.context.loop.offboard_active:
             raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
         return pose
 

@@ -10,7 +10,7 @@ from companion.attitude.kinematics import (
     tilt_products,
 )
 from companion.attitude.limits import Constants
-from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.rate_response import AxisResponse, RateLoopResponse
 from companion.attitude.reference_model import ReferenceModel, model_lag
 from companion.attitude.rotation import clamp
 from companion.attitude.types import BodyRates, Coefficients, Quaternion, Target
@@ -103,7 +103,9 @@ class FeedForward:
         dead_time: the larger dead time of roll and pitch, s.
     """
 
-    def __init__(self, constants: Constants, response: RateResponse, longest_period: float) -> None:
+    def __init__(
+        self, constants: Constants, response: RateLoopResponse, longest_period: float
+    ) -> None:
         axes = response.roll, response.pitch, response.yaw
         roll, pitch, yaw = (axis.with_least_lag() for axis in axes)
         self.tilt = tilt = roll, pitch

@@ -12,7 +12,7 @@ from companion.attitude.kinematics import (
     tilt_products,
 )
 from companion.attitude.limits import Constants
-from companion.attitude.rate_response import RateResponse, feedback_gain
+from companion.attitude.rate_response import RateLoopResponse, feedback_gain
 from companion.attitude.representation import (
     is_unit,
     limited_target,
@@ -50,7 +50,7 @@ class ModelFollowingPlanner:
             beyond the recovery angle.
     """
 
-    def __init__(self, constants: Constants, response: RateResponse) -> None:
+    def __init__(self, constants: Constants, response: RateLoopResponse) -> None:
         self._feed_forward = FeedForward(constants, response, LONGEST_PERIOD)
         self._sample_hold = SampleHold()
         self._started = False

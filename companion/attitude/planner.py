@@ -144,7 +144,7 @@ def make_planner(
             `limits.max_tilt` it is also the largest tilt of a target. `model-following` also needs
             the response of the rate loop (`AxisResponse`): `lag` and `dead_time`, s (0.0 for an
             immediate one). It also takes `damping` (default None: first order), `acceleration`,
-            rad/s² (default None: no limit), and `RateResponse.frame_lead`, s. With the prefix
+            rad/s² (default None: no limit), and `RateLoopResponse.frame_lead`, s. With the prefix
             `pitch_` or `yaw_` the four values of a response can be given for that axis (default
             None: the value of roll). There is no `yaw_damping`. If `pitch_lag` is given without
             `pitch_damping`, pitch is of first order.

@@ -6,7 +6,7 @@ from typing import Any
 
 from companion.attitude.limits import Constants, Limits, make_constants
 from companion.attitude.model_following import ModelFollowingPlanner
-from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.rate_response import AxisResponse, RateLoopResponse
 
 
 def constants_of(
@@ -61,7 +61,7 @@ def make_model_following(
     )
     if pitch_damping is None:
         pitch_damping = roll.damping if pitch_lag is None else inf
-    response = RateResponse(
+    response = RateLoopResponse(
         roll,
         _filled_from_roll(roll, pitch_lag, pitch_dead_time, pitch_acceleration, pitch_damping),
         _filled_from_roll(roll, yaw_lag, yaw_dead_time, yaw_acceleration, inf),

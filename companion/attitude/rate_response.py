@@ -43,7 +43,7 @@ class AxisResponse:
 
 
 @dataclass(frozen=True, slots=True)
-class RateResponse:
+class RateLoopResponse:
     """Response of the rate loop on all axes.
 
     Attributes:

@@ -4,7 +4,7 @@ from math import inf, radians
 
 from companion.attitude.history import PlanHistory, locate_time
 from companion.attitude.limits import Constants
-from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.rate_response import AxisResponse, RateLoopResponse
 from companion.attitude.reference import first_order_step
 from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import clamp
@@ -123,7 +123,7 @@ class TargetFrame:
         "_turns",
     )
 
-    def __init__(self, response: RateResponse) -> None:
+    def __init__(self, response: RateLoopResponse) -> None:
         self._acceleration = response.yaw.acceleration
         self._lead_time = response.lead_time
         self._delay = max(0.0, response.tilt.dead_time - _TARGET_TO_BODY_DELAY)
@@ -170,7 +170,7 @@ class TargetFrame:
 
         It is computed from the newest attitude target. If that is missing, older than
         `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD` from the body, the lead is computed
-        from `RateResponse.lead_time`.
+        from `RateLoopResponse.lead_time`.
 
         Args:
             start_heading: see `FeedForward.advance`.

@@ -12,7 +12,7 @@ from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
 from companion.control.step_recorder import StepRecorder, TrackingRecord
 from companion.control.step_rows import StepFlags, StepOutput
-from companion.control.telemetry import Clock, FreshPosition, Ground, Telemetry
+from companion.control.telemetry import GuidedVehicle
 from companion.control.ticker import Ticker
 from companion.guidance import GuidanceInput, HoverThrust, Pose, Reference, VehicleMotion
 from companion.guidance.braking import AssumedBraking
@@ -54,8 +54,7 @@ class GuidanceLoop:
         guidance: Guidance,
         estimate: MotionEstimate,
         hover_thrust: HoverThrust,
-        state: Telemetry,
-        ground: Ground,
+        vehicle: GuidedVehicle,
         trace: FlightTrace,
         *,
         max_tilt: float,
@@ -63,7 +62,6 @@ class GuidanceLoop:
         period: float,
         max_position_age: float,
         clock: Callable[[], float],
-        vehicle_clock: Clock,
     ) -> None:
         self.flown_source = FlownSource()
         self.bound_to_hold = False
@@ -71,18 +69,17 @@ class GuidanceLoop:
         self.acceleration: NorthEast = (0.0, 0.0)
         self.tracking_error: float | None = None
         self.estimate = estimate
-        self.learning = HoverLearning(hover_thrust, state)
+        self.learning = HoverLearning(hover_thrust, vehicle.state)
         self.maker = CommandMaker(guidance, self.flown_source, estimate, self.learning, period)
-        self._loop = loop
-        self._ground = ground
+        self._loop, self._vehicle = loop, vehicle
         self.record = TrackingRecord(trace, self.flown_source)
         self.hold = Hold(self.flown_source, self.maker, self.learning, max_tilt, assumed_braking)
-        self._fresh_position = FreshPosition(state, vehicle_clock, max_position_age)
+        self._max_position_age = max_position_age
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._ticker = Ticker(period, clock)
-        self._recorder = StepRecorder(trace.recorder, state, vehicle_clock)
+        self._recorder = StepRecorder(trace.recorder, vehicle)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Use an attitude from now on, if it is a unit quaternion and fits the vehicle's clock."""
@@ -92,7 +89,7 @@ class GuidanceLoop:
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it arrived, or was measured, too long ago."""
-        return self._fresh_position.at(self._clock())
+        return self._vehicle.fresh_position(self._clock(), self._max_position_age)
 
     def stand_by(self) -> None:
         """Hold no pose: idle on the ground, damp the motion in the air."""
@@ -178,9 +175,9 @@ class GuidanceLoop:
         """Make one command, unless the position is stale or the command would not be finite."""
         now = self._clock()
         self.before_step(now)
-        position = self._fresh_position.at(now)
-        standing = self._ground.standing
-        may_idle = standing and self._ground.may_idle
+        position = self._vehicle.fresh_position(now, self._max_position_age)
+        standing = self._vehicle.ground.standing
+        may_idle = standing and self._vehicle.ground.may_idle
         before, active = self._loop.command, self._loop.offboard_active
         output = self._step(now, position, standing=standing, may_idle=may_idle)
         command = self._loop.command

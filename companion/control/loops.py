@@ -8,7 +8,7 @@ from companion.control.guidance_loop import GuidanceLoop
 from companion.control.inner_loop import hover_thrust, planner, rate_limits
 from companion.control.loop_record import Deadlines
 from companion.control.outer_loop import make_guidance, motion_estimate
-from companion.control.telemetry import Clock, Ground, Telemetry
+from companion.control.telemetry import GuidedVehicle
 from companion.guidance.braking import AssumedBraking
 from companion.recording.trace import FlightTrace
 
@@ -16,9 +16,7 @@ from companion.recording.trace import FlightTrace
 def make_loops(
     config: Config,
     send: SendSetpoint,
-    state: Telemetry,
-    ground: Ground,
-    vehicle_clock: Clock,
+    vehicle: GuidedVehicle,
     trace: FlightTrace,
     clock: Callable[[], float],
     clock_ns: Callable[[], int],
@@ -28,9 +26,7 @@ def make_loops(
     Args:
         config: configuration of the flight.
         send: sends setpoints.
-        state: telemetry of the vehicle.
-        ground: tells whether the vehicle stands on the ground.
-        vehicle_clock: the vehicle's clock.
+        vehicle: what guidance reads of the vehicle.
         trace: receives the records of both loops.
         clock: returns event-loop time, s.
         clock_ns: clock for latencies, ns.
@@ -45,16 +41,14 @@ def make_loops(
     guidance_loop = GuidanceLoop(
         loop,
         make_guidance(config),
-        motion_estimate(config, lambda: vehicle_clock.offset),
+        motion_estimate(config, lambda: vehicle.clock.offset),
         thrust,
-        state,
-        ground,
+        vehicle,
         trace,
         max_tilt=config.limits.max_tilt,
         assumed_braking=AssumedBraking(config.safety.reaction_s, config.safety.braking_m_s2),
         period=1.0 / config.guidance.rate_hz,
         max_position_age=deadman.position_stale,
         clock=clock,
-        vehicle_clock=vehicle_clock,
     )
     return loop, guidance_loop

@@ -6,7 +6,7 @@ from math import nan
 from companion.control.flown_source import FlownSource
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepRows
-from companion.control.telemetry import Clock, Telemetry
+from companion.control.telemetry import GuidedVehicle
 from companion.guidance.reference import Reference, VehicleMotion
 from companion.recording.recorder import FlightRecorder
 from companion.recording.trace import FlightTrace
@@ -17,14 +17,11 @@ class StepRecorder:
 
     Args:
         recorder: recorder of the flight, or None.
-        state: telemetry that the steps read.
-        vehicle_clock: the vehicle's clock.
+        vehicle: what the steps read.
     """
 
-    def __init__(
-        self, recorder: FlightRecorder | None, state: Telemetry, vehicle_clock: Clock
-    ) -> None:
-        self._recorder, self._state, self._vehicle_clock = recorder, state, vehicle_clock
+    def __init__(self, recorder: FlightRecorder | None, vehicle: GuidedVehicle) -> None:
+        self._recorder, self._vehicle = recorder, vehicle
         self._rows = StepRows()
 
     def step(
@@ -44,11 +41,11 @@ class StepRecorder:
         """
         if self._recorder is None:
             return
-        state = self._state
+        state = self._vehicle.state
         inputs = StepInput(
             now,
             state.position,
-            self._vehicle_clock.offset,
+            self._vehicle.clock.offset,
             state.battery,
             state.attitude_target_thrust,
             state.height,
@@ -60,7 +57,7 @@ class StepRecorder:
     def action(self, now: float, name: str) -> None:
         """Record a call at `now` by which a phase of the flight controls guidance; see `step`."""
         if self._recorder is not None:
-            self._recorder.action(now, name, self._vehicle_clock.offset)
+            self._recorder.action(now, name, self._vehicle.clock.offset)
 
 
 class TrackingRecord:

@@ -1,6 +1,6 @@
 """Interfaces of what guidance reads: telemetry, ground contact, the vehicle's clock."""
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
 
@@ -61,22 +61,23 @@ class Clock(Protocol):
         ...
 
 
-class FreshPosition:
-    """The newest position while it is fresh.
+class GuidedVehicle(NamedTuple):
+    """The vehicle as guidance reads it."""
 
-    Args:
-        state: telemetry of the vehicle.
-        vehicle_clock: the vehicle's clock.
-        max_age: largest age of a position that is used, s.
-    """
+    state: Telemetry
+    """Telemetry of the vehicle."""
+    ground: Ground
+    """Tells whether the vehicle stands on the ground."""
+    clock: Clock
+    """The vehicle's clock."""
 
-    def __init__(self, state: Telemetry, vehicle_clock: Clock, max_age: float) -> None:
-        self._state, self._vehicle_clock, self._max_age = state, vehicle_clock, max_age
+    def fresh_position(self, now: float, max_age: float) -> LocalPosition | None:
+        """The newest position; None if its arrival or measurement is over `max_age` s before `now`.
 
-    def at(self, now: float) -> LocalPosition | None:
-        """The newest position; None if its arrival or measurement is too old at `now`, s."""
-        position = self._state.position
-        if position is None or now - position.received > self._max_age:
+        `now` is event-loop time, s.
+        """
+        position = self.state.position
+        if position is None or now - position.received > max_age:
             return None
-        age = self._vehicle_clock.age(position.vehicle_time, now)
-        return None if age is not None and age > self._max_age else position
+        age = self.clock.age(position.vehicle_time, now)
+        return None if age is not None and age > max_age else position

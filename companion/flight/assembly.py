@@ -10,6 +10,7 @@ from companion.config import Config
 from companion.control.ground_contact import GroundContact
 from companion.control.loops import make_loops
 from companion.control.outer_loop import make_predictive_control
+from companion.control.telemetry import GuidedVehicle
 from companion.flight.changes import Changes
 from companion.flight.context import FlightContext
 from companion.flight.dead_time_watch import DeadTimeWatch
@@ -42,6 +43,7 @@ class AssembledFlight:
     drag_memory: DragMemory
     ladder: SafetyLadder
     reporter: StatusReporter
+    recorder: EventRecorder
     changes: Changes
 
     def close(self) -> None:
@@ -93,7 +95,7 @@ def assemble(
     dead_time_watch = DeadTimeWatch(trace, config.vehicle.axes, flight.note)
     reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
     return AssembledFlight(
-        flight, context, trace, dead_time_watch, memory, ladder, reporter, changes
+        flight, context, trace, dead_time_watch, memory, ladder, reporter, recorder, changes
     )
 
 
@@ -106,9 +108,7 @@ def _context(
     loop, guidance_loop = make_loops(
         config,
         link.send_setpoint,
-        link.state,
-        ground,
-        link.clock,
+        GuidedVehicle(link.state, ground, link.clock),
         trace,
         clock,
         environment.clock_ns,

@@ -1,7 +1,6 @@
 """What happened in a finished flight, for its report: counters, phases, early end, advice."""
 
 import asyncio
-from collections.abc import Sequence
 
 from companion.control.expected_response import gain_warning
 from companion.flight.assembly import AssembledFlight
@@ -60,17 +59,11 @@ def _learned_settings(context: FlightContext) -> dict[str, str]:
     return settings
 
 
-def facts_of(
-    assembled: AssembledFlight,
-    phases: Sequence[tuple[float, str]],
-    result: str,
-    advice_texts: tuple[str, ...],
-) -> FlightFacts:
+def facts_of(assembled: AssembledFlight, result: str, advice_texts: tuple[str, ...]) -> FlightFacts:
     """The facts of a finished flight.
 
     Args:
         assembled: the flight.
-        phases: beginning (s on our clock) and name of each phase.
         result: result of the flight.
         advice_texts: advice of the flight; see `advice`.
     """
@@ -81,7 +74,7 @@ def facts_of(
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
     return FlightFacts(
         began=began,
-        phases=tuple((at - began, name) for at, name in phases),
+        phases=tuple((at - began, name) for at, name in assembled.recorder.phases),
         takeoff=takeoff,
         early_end=_early_end(assembled, takeoff, result, now),
         vehicle_uid=context.replacement_detector.uid,

@@ -134,18 +134,14 @@ class FlightFiles:
 
     def summary(
         self,
-        stats: LinkStats,
         assembled: AssembledFlight,
-        recorder: EventRecorder,
         result: str,
         grants: tuple[realtime.SettingResult, ...],
     ) -> Summary:
         """The summary of a finished flight, before its log is closed. Also saves the learned drag.
 
         Args:
-            stats: counters of the flight's link.
             assembled: the flight.
-            recorder: has recorded the phases.
             result: "ok", or the reason why it ended early.
             grants: which requested real-time settings were granted.
         """
@@ -156,7 +152,7 @@ class FlightFiles:
             if text == dead_times.warning():
                 continue  # already reported in flight
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
-            recorder.write(text)
+            assembled.recorder.write(text)
         assembled.drag_memory.save()
         self._ended_at = asyncio.get_running_loop().time() - flight.began
         return Summary(
@@ -167,7 +163,7 @@ class FlightFiles:
             counts=loop_counts(assembled.context),
             link={
                 name: value - self._counted_before.get(name, 0)
-                for name, value in _counters(stats).items()
+                for name, value in _counters(assembled.context.link.stats).items()
             },
             trace=trace,
             events=list(flight.events),
@@ -175,7 +171,7 @@ class FlightFiles:
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            facts=facts_of(assembled, recorder.phases, result, advice_texts),
+            facts=facts_of(assembled, result, advice_texts),
         )
 
     def save(self, summary: Summary) -> Summary:

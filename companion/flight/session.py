@@ -7,9 +7,8 @@ from companion import realtime
 from companion.config import Config
 from companion.flight.assembly import AssembledFlight, assemble
 from companion.flight.changes import Changes
-from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
-from companion.flight.flight import AskLanding
+from companion.flight.flight import AskLanding, Flight
 from companion.flight.flight_files import FlightFiles
 from companion.flight.observer import Observer
 from companion.flight.opening import open_link, realtime_settings
@@ -17,8 +16,6 @@ from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
 from companion.recording.closing_words import LEFT_BY_USER
 from companion.recording.measurements.summary import Summary
-from companion.safety.actions import fault_message
-from companion.vehicle.link import Link
 
 
 class Session:
@@ -117,32 +114,17 @@ class Session:
                 )
                 for text in (*self._early_notes, *map(str, grants)):
                     self._assembled.flight.note(text)
-                try:
-                    result = await self._fly_connected(link, self._assembled)
-                finally:
-                    self._assembled.close()
-            summary = record.summary(link.stats, self._assembled, recorder, result, grants)
+                async with connected(self._assembled):
+                    result = await self._run(self._assembled.flight)
+            summary = record.summary(self._assembled, result, grants)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         return record.save(summary)
 
-    async def _fly_connected(self, link: Link, assembled: AssembledFlight) -> str:
-        flight = assembled.flight
-        with connected(link, assembled):
-            # In a task of its own: `leave` ends the flight but not the writing of the files.
-            self._flight_task = asyncio.ensure_future(flight.run())
-            reporting = asyncio.create_task(self._report_status(assembled))
-            try:
-                return await self._flight_task
-            except asyncio.CancelledError:
-                flight.failed_in = flight.failed_in or flight.phase
-                return LEFT_BY_USER
-            finally:
-                await cancel(reporting)
-
-    @staticmethod
-    async def _report_status(assembled: AssembledFlight) -> None:
-        """Record and show the state of the flight; an exception here does not end the flight."""
+    async def _run(self, flight: Flight) -> str:
+        # In a task of its own: `leave` ends the flight but not the writing of the files.
+        self._flight_task = asyncio.ensure_future(flight.run())
         try:
-            await assembled.reporter.run()
-        except Exception as error:
-            assembled.flight.note(fault_message(error))
+            return await self._flight_task
+        except asyncio.CancelledError:
+            flight.failed_in = flight.failed_in or flight.phase
+            return LEFT_BY_USER

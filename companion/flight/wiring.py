@@ -1,26 +1,58 @@
-"""Connects the link's callbacks and changes in flight to a flight; notes the vehicle's changes."""
+"""Connects a flight to the link and to changes in flight; notes the vehicle's changes."""
 
 import asyncio
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from itertools import takewhile
+from typing import Any
 
 from companion.control.retuning import Retuning
 from companion.flight.assembly import AssembledFlight
+from companion.flight.context import cancel
 from companion.mavlink.messages import Message
 from companion.mavlink.texts import StatusText
-from companion.vehicle.link import Link
+from companion.safety.actions import fault_message
 from companion.vehicle.records import AttitudeSample
 from companion.vehicle.state import VehicleState
 
 
-@contextmanager
-def connected(link: Link, assembled: AssembledFlight) -> Iterator[None]:
-    """Connect the link's callbacks, and changes of values, to the flight while the block runs.
+@asynccontextmanager
+async def connected(
+    assembled: AssembledFlight, *beside: Coroutine[Any, Any, None]
+) -> AsyncIterator[None]:
+    """Connect the flight to its link, and report its state, while the block runs it; then end both.
 
     Only one flight at a time may be connected to a link.
+
+    Args:
+        assembled: the flight.
+        beside: more to run meanwhile; an exception in it, or in the reporter, is noted as an event
+            and does not end the flight.
     """
-    flight, context = assembled.flight, assembled.context
+
+    async def run_guarded(work: Coroutine[Any, Any, None]) -> None:
+        try:
+            await work
+        except Exception as error:
+            assembled.flight.note(fault_message(error))
+
+    try:
+        with _callbacks(assembled):
+            works = assembled.reporter.run(), *beside
+            tasks = [asyncio.create_task(run_guarded(work)) for work in works]
+            try:
+                yield
+            finally:
+                for task in tasks:
+                    await cancel(task)
+    finally:
+        assembled.close()
+
+
+@contextmanager
+def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
+    """Connect the link's callbacks, and changes of values, to the flight while the block runs."""
+    flight, context, link = assembled.flight, assembled.context, assembled.context.link
     loop, guidance_loop = context.loop, context.guidance_loop
     time = asyncio.get_running_loop().time
     dead_time_watch = assembled.dead_time_watch

@@ -20,6 +20,7 @@ from companion.control.retuning import (
     loop_settings,
     reason_against_changes,
 )
+from companion.control.telemetry import GuidedVehicle
 from companion.drag import Drag
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose, Reference, VehicleMotion
@@ -89,9 +90,7 @@ class Replay:
         self._loop, self._guidance = make_loops(
             config,
             self._send,
-            vehicle,
-            vehicle,
-            vehicle,
+            GuidedVehicle(vehicle, vehicle, vehicle),
             FlightTrace(),
             lambda: self._now,
             lambda: 0,

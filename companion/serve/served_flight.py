@@ -1,15 +1,13 @@
 """One flight under a client's control: the takeover, the answers to the client, and the end."""
 
 import asyncio
-from collections.abc import Coroutine
 from math import inf
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from companion.attitude.representation import heading
 from companion.config import Config
 from companion.flight.assembly import assemble
 from companion.flight.changes import Changes
-from companion.flight.context import cancel
 from companion.flight.environment import Environment
 from companion.flight.observer import Observer, decline_landing
 from companion.flight.plan import TakeoverPlan
@@ -18,7 +16,6 @@ from companion.guidance.fence import FenceCentre
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 from companion.recording.measurements.summary import Summary
-from companion.safety.actions import fault_message
 from companion.serve.component import WARNING, Component
 from companion.serve.flight_records import FlightRecords
 from companion.serve.motion_settings import change_refusal, commanded_motion
@@ -84,9 +81,8 @@ class ServedFlight:
     ) -> None:
         config, link, component, observer, environment, records, changes = vehicle
         self._records, self._record = records, records.new_record(changes.begin_flight())
-        self._recorder = self._record.recorder(observer)
         self._summary: Summary | None = None
-        self._link, self._component, self._ownership = link, component, ownership
+        self._component, self._ownership = component, ownership
         self._changes, self._clock = changes, asyncio.get_running_loop().time
         self._autopilot = Address(link.settings.target_system, link.settings.target_component)
         self._owner_name, self._release_commanded_at = name, -inf
@@ -96,7 +92,7 @@ class ServedFlight:
         self._assembled = assemble(
             config,
             link,
-            self._recorder,
+            self._record.recorder(observer),
             decline_landing,
             self._record.folder,
             TakeoverPlan(self._source, from_ground=from_ground),
@@ -154,15 +150,14 @@ class ServedFlight:
         """Fly; answer `command`, if there is one; return whether control had begun."""
         with self._records.recording(self._record), self._changes.limited_by(change_refusal):
             result = "stopped at once"
-            self._record.begin_counting(self._link.stats)
+            self._record.begin_counting(self._assembled.context.link.stats)
             try:
-                result = await self._fly(command)
+                beside = self._answer_and_tell(command), self._send_values()
+                async with connected(self._assembled, *beside):
+                    result = await self._assembled.flight.run()
             finally:
-                self._assembled.close()
                 self._tell_end(command, result)
-                self._summary = self._record.summary(
-                    self._link.stats, self._assembled, self._recorder, result, self._records.grants
-                )
+                self._summary = self._record.summary(self._assembled, result, self._records.grants)
         return self._source.start_pose is not None
 
     async def save(self) -> None:
@@ -171,28 +166,6 @@ class ServedFlight:
             await self._records.discard(self._record)
         else:
             await self._records.keep(self._record, self._summary)
-
-    async def _fly(self, command: ControlRequest | None) -> str:
-        """Fly and inform clients; return the result."""
-        background = [
-            self._answer_and_tell(command),
-            self._send_values(),
-            self._assembled.reporter.run(),
-        ]
-        tasks = [asyncio.create_task(self._run_guarded(work)) for work in background]
-        try:
-            with connected(self._link, self._assembled):
-                return await self._assembled.flight.run()
-        finally:
-            for task in tasks:
-                await cancel(task)
-
-    async def _run_guarded(self, work: Coroutine[Any, Any, None]) -> None:
-        """Run a task beside the flight; a fault in it does not end the flight."""
-        try:
-            await work
-        except Exception as error:
-            self._assembled.flight.note(fault_message(error))
 
     def _released_by(self) -> str:
         """Name of the owner if it has just commanded another mode, else an empty text."""

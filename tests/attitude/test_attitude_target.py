@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Limits, Target, make_planner
-from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.rate_response import AxisResponse, RateLoopResponse
 from companion.attitude.yaw import OLDEST_ATTITUDE_TARGET, TargetFrame
 from tests.attitude.independent import attitudes, coefficients_of
 from tests.attitude.simulate import quaternion
@@ -155,7 +155,7 @@ def test_a_target_that_is_not_usable_changes_nothing(what, untold):
 def test_one_that_is_told_no_more_is_used_no_more():
     """It goes on by what is sent, for a while; then the lead in time serves."""
     axis = AxisResponse(LAG, 0.015, inf)
-    frame = TargetFrame(RateResponse(axis, axis, axis))
+    frame = TargetFrame(RateLoopResponse(axis, axis, axis))
     assert frame.heading() is None
     frame.note_heading(1.0, 0.0)
     assert frame.heading() == pytest.approx(1.0)
@@ -173,7 +173,7 @@ def test_one_that_is_told_no_more_is_used_no_more():
 
 def test_it_turns_no_faster_than_the_slew_limit():
     axis = AxisResponse(LAG, 0.0, 2.0)
-    frame = TargetFrame(RateResponse(axis, axis, axis))
+    frame = TargetFrame(RateLoopResponse(axis, axis, axis))
     frame.note_heading(0.0, 0.0)
     for _ in range(50):
         frame.advance(0.4, 0.0, 0.004)
@@ -183,15 +183,15 @@ def test_it_turns_no_faster_than_the_slew_limit():
 def test_the_lead_is_derived_where_acceleration_is_limited():
     """Yaw's dead time and lag, less the dead time of roll and pitch; 0 where nothing is limited."""
     tilt, yaw = AxisResponse(0.02, 0.015, 20.0), AxisResponse(0.056, 0.143, 4.7)
-    assert RateResponse(tilt, tilt, yaw).lead_time == pytest.approx(0.184)
-    assert RateResponse(tilt, tilt, yaw, 0.04).lead_time == 0.04
-    assert RateResponse(tilt, tilt, yaw, 0.0).lead_time == 0.0
-    assert RateResponse(AxisResponse(0.047, 0.04), yaw=AxisResponse(0.37, 0.1)).lead_time == 0.0
+    assert RateLoopResponse(tilt, tilt, yaw).lead_time == pytest.approx(0.184)
+    assert RateLoopResponse(tilt, tilt, yaw, 0.04).lead_time == 0.04
+    assert RateLoopResponse(tilt, tilt, yaw, 0.0).lead_time == 0.0
+    assert RateLoopResponse(AxisResponse(0.047, 0.04), yaw=AxisResponse(0.37, 0.1)).lead_time == 0.0
 
 
 def test_an_older_report_is_completed_by_the_rates_sent_since_it_was_measured():
     axis = AxisResponse(LAG, 0.008, inf)
-    frame = TargetFrame(RateResponse(axis, axis, axis))
+    frame = TargetFrame(RateLoopResponse(axis, axis, axis))
     frame.note_heading(1.0, 0.0)
     for _ in range(30):
         frame.advance(0.5, 0.1, 0.004)

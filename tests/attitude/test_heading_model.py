@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from companion.attitude import Limits, Target
 from companion.attitude.limits import make_constants
-from companion.attitude.rate_response import AxisResponse, RateResponse
+from companion.attitude.rate_response import AxisResponse, RateLoopResponse
 from companion.attitude.yaw import HeadingModel, YawModel
 
 UNLIMITED = Limits()
@@ -109,4 +109,4 @@ def test_the_body_turns_as_limit_and_lag_make_it(most):
 )
 def test_an_impossible_response_is_refused(axes, named):
     with pytest.raises(ValueError, match=f"^{named}"):
-        RateResponse(**axes)
+        RateLoopResponse(**axes)

@@ -13,6 +13,7 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.heading_frame import HeadingFrame
 from companion.control.outer_loop import make_guidance, motion_estimate
+from companion.control.telemetry import GuidedVehicle
 from companion.guidance import Doublets, ManeuverSequence, Pose
 from companion.guidance.braking import AssumedBraking
 from companion.guidance.source import ManeuverSource
@@ -63,15 +64,13 @@ class Bench:
             make_guidance(Config()),
             motion_estimate(Config(), lambda: None),
             self.hover,
-            self.state,
-            self.ground,
+            GuidedVehicle(self.state, self.ground, self.clock),
             FlightTrace(recorder=recorder),
             max_tilt=radians(30.0),
             assumed_braking=AssumedBraking(0.3, 2.5),
             period=0.02,
             max_position_age=0.3,
             clock=lambda: self.now,
-            vehicle_clock=self.clock,
         )
         if begun:
             self.fly(0.0, HERE)

@@ -30,7 +30,7 @@ from companion.control.retuning import (
     loop_settings,
     reason_against_changes,
 )
-from companion.control.telemetry import FreshPosition
+from companion.control.telemetry import GuidedVehicle
 from companion.drag import AxisDrag, Drag
 from companion.files.yaml_file import ConfigError
 from companion.guidance import (
@@ -187,9 +187,7 @@ def test_both_loops_are_made_and_answer_a_sample():
     loop, guidance_loop = make_loops(
         CONFIG,
         lambda *setpoint: sent.append(setpoint) or True,
-        vehicle,
-        vehicle,
-        vehicle,
+        GuidedVehicle(vehicle, vehicle, vehicle),
         trace,
         lambda: now,
         lambda: 3_005_000,
@@ -221,11 +219,11 @@ def test_both_loops_are_made_and_answer_a_sample():
 
 def test_a_position_that_is_exactly_as_old_as_allowed_counts():
     state = SimpleNamespace(position=None)
-    fresh = FreshPosition(state, SimpleNamespace(age=lambda *_: 0.25), 0.25)
-    assert fresh.at(10.0) is None
+    vehicle = GuidedVehicle(state, SimpleNamespace(), SimpleNamespace(age=lambda *_: 0.25))
+    assert vehicle.fresh_position(10.0, 0.25) is None
     state.position = LocalPosition(9.75, 3.0, (1.0, 2.0, -3.0), (0.0, 0.0, 0.0))
-    assert fresh.at(10.0) is state.position
-    assert fresh.at(10.25) is None
+    assert vehicle.fresh_position(10.0, 0.25) is state.position
+    assert vehicle.fresh_position(10.25, 0.25) is None
 
 
 def test_thrust_and_law():

@@ -170,6 +170,17 @@ def test_a_fault_in_what_is_shown_does_not_end_the_flight(tmp_path):
     assert motion[-1, 0] > faults[0] + 10.0
 
 
+def test_a_fault_in_the_report_of_the_state_is_an_event_and_does_not_end_the_flight(monkeypatch):
+    def broken(_):
+        raise ZeroDivisionError("the report")
+
+    monkeypatch.setattr("companion.flight.status.StatusReporter.record", broken)
+    summary = fly(QUICK_FLIGHT, QuickVehicle())
+    assert summary.result == "ok"
+    faults = [text for _, text in summary.events if "the report" in text]
+    assert faults == ["internal error: ZeroDivisionError('the report')"]
+
+
 def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypatch):
     def full(*_, **__):
         raise OSError(28, "No space left on device")
