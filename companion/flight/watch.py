@@ -23,6 +23,11 @@ PX4 sends one every 0.5 s.
 """
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
+_STATUS_AGE = 2.5
+"""Age from which a status is requested again, s: half of the age from which it counts as unknown,
+which ends the flight."""
+_HEARD_AGE = 0.5
+"""A status is requested only if a position came within this time, s: a silent link lacks all."""
 _COUNTING_TIME = 0.1
 """Time over which `set_rates` counts messages, s; the counts are not used."""
 
@@ -59,6 +64,22 @@ class RateRequester:
         if message not in self._tasks:
             self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
             self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
+
+    def check_statuses(self, now: float) -> None:
+        """Request each status that has come before and has not come for `_STATUS_AGE` at `now`."""
+        state, wanted = self._link.state, self._link.autopilot.wanted_rates
+        if state.position is None or now - state.position.received > _HEARD_AGE:
+            return
+        statuses = (
+            ("GPS_RAW_INT", state.gps),
+            ("SYS_STATUS", state.battery),
+            ("EXTENDED_SYS_STATE", state.landed_state),
+            ("ESTIMATOR_STATUS", state.estimator),
+            ("EKF_STATUS_REPORT", state.estimator),
+        )
+        for message, status in statuses:
+            if message in wanted and status is not None and now - status.received > _STATUS_AGE:
+                self._request_once(message, wanted[message])
 
     async def _request_rate(self, message: str, rate: float) -> None:
         try:
@@ -110,6 +131,7 @@ class Watch:
         if phase.monitored and self._context.loop.offboard_active:
             self._judge_snapshot(now)
         if phase.allowed_roles:
+            self._rate_requester.check_statuses(now)
             self._judge_heartbeat(now, monitored=phase.monitored)
 
     def on_current_mode(self, phase: Phase) -> None:

@@ -136,7 +136,8 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             UNSAFE,
             f"another program uses system/component {our_ids[0]}/{our_ids[1]}, our own ids",
             "each program receives answers to the other one, and both may send setpoints",
-            "end the other program, or give each its own link.source_component",
+            "end the other program, or give each its own link.source_component; if there is none, "
+            "a forwarder on the link may send our own frames back to us",
             "frames heard",
         )
     for system, component in sorted(others.companions - {our_ids}):

@@ -28,7 +28,8 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "position rate": "find what slows LOCAL_POSITION_NED; the limit is link.min_position_rate_hz",
     "late setpoints": "find what slows the link; the limit is 1.5 · deadman.telemetry_stale_ms",
     "lost setpoints": "find what loses the frames that this computer sends: the cable, the radio",
-    "foreign setpoints": "end the other program that sends SET_ATTITUDE_TARGET to this vehicle",
+    "foreign setpoints": "end the other program that sends SET_ATTITUDE_TARGET to this vehicle; if "
+    "there is none, a station may have changed a parameter in flight: run `companion doctor`",
     "link loss": "improve the radio link or lower its load; the limit is safety.max_loss",
     "round trip": "find what slows the link; the limit is safety.max_round_trip_ms",
     "deadlines": "end other programs on this computer, or set realtime.scheduler: fifo",

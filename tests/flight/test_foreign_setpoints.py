@@ -5,6 +5,7 @@ import asyncio
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
+from companion.recording.what_to_do import what_to_do
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
@@ -53,3 +54,15 @@ def test_a_program_that_cuts_the_thrust_is_noticed_before_the_ground(autopilot):
     assert "another program sends setpoints to the vehicle" in summary.result, summary.events
     assert not truth["crashed"]
     assert lowest > 0.5
+
+
+def test_a_parameter_changed_in_flight_may_look_like_another_program_and_the_advice_says_so():
+    """Without the thrust bit of GUID_OPTIONS, ArduPilot reports a thrust of its own."""
+    changed = dialect.MAVLink_param_set_message(1, 1, b"GUID_OPTIONS", 0.0, 9)
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        change = When("maneuvers", lambda: mock.transmit(changed), after=1.0)
+        summary = fly(mock, None, change, **HOVER)
+        assert not mock.state()["crashed"]
+    assert "that this program did not send" in summary.result, summary.events
+    advice = what_to_do("foreign setpoints", summary.phase)
+    assert "a station may have changed a parameter in flight" in advice

@@ -7,6 +7,7 @@ from pymavlink import mavutil
 
 from companion.flight.observer import SilentObserver
 from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
 
 ATTITUDE_QUATERNION, LOCAL_POSITION_NED = 31, 32
 SET_MESSAGE_INTERVAL = 511
@@ -63,6 +64,37 @@ def test_what_stays_rare_is_handed_back(tmp_path, autopilot, message, hz, words)
     assert words in summary.result, summary.events
     assert len(asked_again(summary)) == 1
     assert steepest(summary) < 45.0  # 35° are allowed; 53° it was where nobody watched
+
+
+STATUSES = {
+    "px4": {"GPS_RAW_INT": 24, "ESTIMATOR_STATUS": 230, "EXTENDED_SYS_STATE": 245},
+    "ardupilot": {"GPS_RAW_INT": 24, "EKF_STATUS_REPORT": 193, "EXTENDED_SYS_STATE": 245},
+}
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "status"), [(name, each) for name, all_ in STATUSES.items() for each in all_]
+)
+def test_a_status_that_a_station_stopped_is_asked_for_again_and_flown_on(autopilot, status):
+    """Otherwise the flight was landed, or waited for a touchdown that nobody reported."""
+    number = STATUSES[autopilot][status]
+    with mock_vehicle(autopilot=autopilot) as mock:
+        stop = When("maneuvers", lambda: mock.command(SET_MESSAGE_INTERVAL, number, -1.0), 1.0)
+        summary = fly(mock, None, stop, hover={"duration_s": 10.0})
+    assert summary.result == "ok", summary.events
+    (told,) = asked_again(summary)
+    assert told.startswith(f"{status} comes too rarely: requesting ")
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_status_that_is_kept_stopped_still_lands_the_vehicle(autopilot):
+    with mock_vehicle(autopilot=autopilot) as mock:
+        stop = When("maneuvers", lambda: mock.after_step.append(keep_stopped), 1.0)
+        keep_stopped = lambda: mock.command(SET_MESSAGE_INTERVAL, 24, -1.0)  # noqa: E731
+        summary = fly(mock, None, stop, hover={"duration_s": 10.0})
+    assert summary.result == "GPS is not reported any more", summary.events
+    assert len(asked_again(summary)) == 1
+    assert not mock.state()["armed"]
 
 
 def steepest(summary):
