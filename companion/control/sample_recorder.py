@@ -103,11 +103,10 @@ class SampleRecorder:
         Args:
             sample: the sample.
             flags: the state of the loop when the sample arrived.
-            reason: why the newest sample is unanswered, or None; ignored if the loop was off.
+            reason: see `SampleEntry`.
         """
         if self._recorder is None:
             return
-        reason = reason if flags.on else None
         entry = SampleEntry(sample, reason, flags, self.checked_at, self._answer)
         self._recorder.add(sample.received, self._rows.sample, entry)
 

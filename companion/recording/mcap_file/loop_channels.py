@@ -23,7 +23,8 @@ UNANSWERED_CODES = (
     "invalid_setpoint",
     "not_sent",
 )
-"""Names of the codes in the column "unanswered". From 2 on they are the members of `Unanswered`."""
+"""Names of the codes in the column "unanswered"; from "another_vehicle" on, the values of
+`Unanswered`."""
 ACTIONS = (
     "stand_by",
     "hold_here",

@@ -32,8 +32,6 @@ _REQUIRED_KEYS = frozenset(
     )
 )
 """Keys that `summary.json` of this version must have; without them it is not used."""
-_FIRST_UNANSWERED_CODE = 2
-"""First index in `UNANSWERED_CODES` of a reason: "answered" and "control_off" come before."""
 
 
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
@@ -140,13 +138,13 @@ def reference_positions(guidance: Rows) -> NDArray[np.float64]:
 
 def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
     sample, setpoint = record.rows("sample"), record.rows("setpoint")
-    controlled = sample[sample["unanswered"] != UNANSWERED_CODES.index("control_off")]
-    code_counts = np.bincount(controlled["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
-    counts = zip(UNANSWERED_CODES, code_counts, strict=True)
-    unanswered = dict(list(counts)[_FIRST_UNANSWERED_CODE:])
+    code_counts = np.bincount(sample["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
+    unanswered = dict(zip(UNANSWERED_CODES, code_counts, strict=True))
+    del unanswered["answered"]
+    control_off = unanswered.pop("control_off")
     refused = sum(unanswered[name] for name in _REFUSALS)
     return LoopCounts(
-        samples=len(controlled),
+        samples=len(sample) - control_off,
         setpoints=len(setpoint),
         missed_deadlines=int((setpoint["latency_us"] > 1e6 * deadline).sum()),
         stale=sum(unanswered.values()) - refused,
