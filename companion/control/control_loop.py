@@ -4,7 +4,7 @@ Read `ControlLoop` from `on_sample` downwards: its functions are in the order in
 """
 
 from collections.abc import Callable
-from math import inf, nan
+from math import inf
 from time import perf_counter_ns
 
 from companion.attitude import (
@@ -82,11 +82,8 @@ class ControlLoop:
         self._clock = clock
         self._clock_ns = clock_ns
         self._deadlines = deadlines
-        self._trace = trace
         self._last_command: GuidanceCommand | None = None
-        self._recorder = SampleRecorder(
-            trace.recorder, self.planner, limits, hover_thrust.limits, clock
-        )
+        self._recorder = SampleRecorder(trace, self.planner, limits, hover_thrust.limits, clock)
 
     def retune(self, constants: Constants, limits: Limits) -> None:
         """Use other gains and limits from the next sample on.
@@ -201,22 +198,10 @@ class ControlLoop:
         record.note_answer(sample.received, rates, thrust, deadlines.telemetry_stale)
         latency = record.latency_ns = self._clock_ns() - sample.received_ns
         record.missed_deadlines += latency > deadlines.deadline * 1e9
-        self._trace.add_latency(latency)
-        if self._recorder.on:
-            self._recorder.answer(command, rates, thrust, latency)
-        if self.offboard_active:
+        active = self.offboard_active
+        if active:
             self._hover_thrust.note_thrust(thrust, sample.q)
-            self._trace.add_rates(
-                sample.vehicle_time,
-                sample.received,
-                rates,
-                thrust,
-                sample.body_rates,
-                sample.age if sample.age_known else nan,
-            )
-        if command.is_step:
-            q = self.planner.attitude(sample.q)
-            self._trace.add_response(sample.vehicle_time, q, command.target)
+        self._recorder.answer(sample, command, rates, thrust, latency, offboard_active=active)
 
     def drop_command(self) -> None:
         """Drop the newest command, so that nothing is sent until guidance makes another one."""

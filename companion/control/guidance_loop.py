@@ -10,7 +10,7 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.hold import Hold
 from companion.control.hover_learning import HoverLearning
 from companion.control.motion_estimate import MotionEstimate
-from companion.control.step_recorder import StepRecorder, TrackingRecord
+from companion.control.step_recorder import StepRecorder
 from companion.control.step_rows import StepFlags, StepOutput
 from companion.control.telemetry import GuidedVehicle
 from companion.control.ticker import Ticker
@@ -45,7 +45,7 @@ class GuidanceLoop:
         maker: makes the commands.
         hold: brakes and holds.
         before_step: called at the beginning of each step with the time, s.
-        record: records how the reference is tracked.
+        recorder: records the steps.
     """
 
     def __init__(
@@ -72,14 +72,13 @@ class GuidanceLoop:
         self.learning = HoverLearning(hover_thrust, vehicle.state)
         self.maker = CommandMaker(guidance, self.flown_source, estimate, self.learning, period)
         self._loop, self._vehicle = loop, vehicle
-        self.record = TrackingRecord(trace, self.flown_source)
         self.hold = Hold(self.flown_source, self.maker, self.learning, max_tilt, assumed_braking)
         self._max_position_age = max_position_age
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._ticker = Ticker(period, clock)
-        self._recorder = StepRecorder(trace.recorder, vehicle)
+        self.recorder = StepRecorder(trace, self.flown_source, vehicle)
 
     def note_attitude(self, sample: AttitudeSample) -> None:
         """Use an attitude from now on, if it is a unit quaternion and fits the vehicle's clock."""
@@ -93,7 +92,7 @@ class GuidanceLoop:
 
     def stand_by(self) -> None:
         """Hold no pose: idle on the ground, damp the motion in the air."""
-        self._recorder.action(self._clock(), "stand_by")
+        self.recorder.action(self._clock(), "stand_by")
         self.flown_source.clear()
 
     def hold_here(self) -> None:
@@ -103,7 +102,7 @@ class GuidanceLoop:
             RuntimeError: no position has come yet.
         """
         now = self._clock()
-        self._recorder.action(now, "hold_here")
+        self.recorder.action(now, "hold_here")
         self.hold.begin(now, self._heading())
 
     @property
@@ -114,7 +113,7 @@ class GuidanceLoop:
     def hold_reference(self) -> None:
         """Hold the pose of the present reference, after a maneuver; raises as `hold_here`."""
         now = self._clock()
-        self._recorder.action(now, "hold_reference")
+        self.recorder.action(now, "hold_reference")
         motion = self.maker.guidance_input(now).now
         reference = self.flown_source.reference(now, motion, self._heading())(now)
         self.flown_source.clear()
@@ -123,7 +122,7 @@ class GuidanceLoop:
     def give_up(self) -> None:
         """Brake and hold, and never fly a source again; raises as `hold_here`."""
         now = self._clock()
-        self._recorder.action(now, "give_up")
+        self.recorder.action(now, "give_up")
         self.bound_to_hold = True
         self.hold.begin(now, self._heading())
 
@@ -138,7 +137,7 @@ class GuidanceLoop:
         if self.bound_to_hold:
             return
         now = self._clock()
-        self._recorder.action(now, "follow")
+        self.recorder.action(now, "follow")
         if self.flown_source.pose is None:
             self.hold.begin(now, self._heading())
         assert self.flown_source.pose is not None
@@ -181,7 +180,7 @@ class GuidanceLoop:
         before, active = self._loop.command, self._loop.offboard_active
         output = self._step(now, position, standing=standing, may_idle=may_idle)
         command = self._loop.command
-        self._recorder.step(
+        self.recorder.step(
             StepFlags(position is not None, standing, may_idle, active),
             now,
             output,
@@ -220,8 +219,6 @@ class GuidanceLoop:
                 steady=reference.thrust_is_steady,
             )
         vehicle_time = self.estimate.vehicle_time(now, position)
-        if self._loop.offboard_active:
-            self.record.add(now, vehicle_time, reference, inputs.now)
         return StepOutput(vehicle_time, self._q, inputs, reference, self.tracking_error)
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:

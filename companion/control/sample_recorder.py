@@ -1,4 +1,7 @@
-"""Records the samples that reach the control loop, and the setpoints that answer them."""
+"""Records the samples that reach the control loop, and the setpoints that answer them.
+
+`FlightTrace` gets the rows for the figures; `flight.mcap`, if the flight is recorded, gets all.
+"""
 
 from collections.abc import Callable
 from math import nan
@@ -8,39 +11,40 @@ from companion.control.guidance_command import GuidanceCommand
 from companion.control.loop_record import Unanswered
 from companion.control.planner_runner import PlannerRunner
 from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
-from companion.recording.recorder import FlightRecorder
+from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 
 class SampleRecorder:
-    """Records each sample and the loop's answer to it, if the flight is recorded.
+    """Records each sample and the loop's answer to it.
 
-    The loop calls `begin`, sets `checked_at`, calls `answer` if it sends a setpoint, then `end`.
+    The loop calls `begin`, sets `checked_at`, calls `answer` if it sends a setpoint, then `end`. If
+    the flight is not recorded in a file, `answer` suffices.
 
     Args:
-        recorder: recorder of the flight, or None.
+        trace: the trace of the flight, and its file.
         planner: provides the planner's input, and reports each new ATTITUDE_TARGET.
         limits: limits of the body rates.
         thrust_limits: smallest and largest thrust that is sent, 0..1.
         clock: returns event-loop time, s.
 
     Attributes:
-        on: whether the flight is recorded.
+        on: whether the flight is recorded in a file.
         checked_at: when the sample's age was checked before sending, s of event-loop time; NaN: it
             was not checked.
     """
 
     def __init__(
         self,
-        recorder: FlightRecorder | None,
+        trace: FlightTrace,
         planner: PlannerRunner,
         limits: Limits,
         thrust_limits: tuple[float, float],
         clock: Callable[[], float],
     ) -> None:
-        self.on = recorder is not None
+        self.on = trace.recorder is not None
         self.checked_at = nan
-        self._recorder, self._planner = recorder, planner
+        self._trace, self._recorder, self._planner = trace, trace.recorder, planner
         self._thrust_limits, self._clock = thrust_limits, clock
         self._answer: Answer | None = None
         self.retune(limits)
@@ -56,16 +60,36 @@ class SampleRecorder:
         self.checked_at, self._answer = nan, None
 
     def answer(
-        self, command: GuidanceCommand, rates: BodyRates, thrust: float, latency_ns: int
+        self,
+        sample: AttitudeSample,
+        command: GuidanceCommand,
+        rates: BodyRates,
+        thrust: float,
+        latency_ns: int,
+        *,
+        offboard_active: bool,
     ) -> None:
-        """Note the setpoint that was sent for this sample; `end` records it.
+        """Record the setpoint that was sent for this sample; `end` writes it to the file.
 
         Args:
+            sample: the sample.
             command: command of guidance.
             rates: body rates, rad/s.
             thrust: thrust, 0..1.
             latency_ns: time since the sample's arrival, ns.
+            offboard_active: whether the autopilot obeys the setpoints.
         """
+        trace, time = self._trace, sample.vehicle_time
+        trace.latencies_ns.add([latency_ns])
+        if offboard_active:
+            age = sample.age if sample.age_known else nan
+            trace.rates.add([time, sample.received, *rates, thrust, *sample.body_rates, age])
+        if command.is_step:
+            target = command.target
+            q = self._planner.attitude(sample.q)
+            trace.response.add([time, *q, target.north, target.east])
+        if not self.on:
+            return
         asked_planner = not command.idle and command.body_rates is None
         inputs = self._planner.planner_input if asked_planner else None
         plan = self._planner.planned_tilt if asked_planner else None
@@ -79,11 +103,10 @@ class SampleRecorder:
         Args:
             sample: the sample.
             flags: the state of the loop when the sample arrived.
-            reason: why the newest sample is unanswered, or None; ignored if the loop was off.
+            reason: see `SampleEntry`.
         """
         if self._recorder is None:
             return
-        reason = reason if flags.on else None
         entry = SampleEntry(sample, reason, flags, self.checked_at, self._answer)
         self._recorder.add(sample.received, self._rows.sample, entry)
 

@@ -12,15 +12,19 @@ from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import tilt_products
 from companion.control.loop_record import Unanswered
-from companion.recording.mcap_file.loop_channels import ATTITUDE_TARGET, SAMPLE, SETPOINT
+from companion.recording.mcap_file.loop_channels import (
+    ATTITUDE_TARGET,
+    SAMPLE,
+    SETPOINT,
+    UNANSWERED_CODES,
+)
 from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
 _REASON_CODES: dict[Unanswered | None, int] = {None: 0}
-_REASON_CODES.update({reason: number for number, reason in enumerate(Unanswered, start=2)})
-CONTROL_OFF = 1
-"""Code in the column `unanswered` of a sample that came while the loop was off."""
+_REASON_CODES.update({reason: UNANSWERED_CODES.index(reason.value) for reason in Unanswered})
+_CONTROL_OFF = UNANSWERED_CODES.index("control_off")
 _MISFIT_CODES = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
 _LIMIT_REACHED_SHARE = 1.0 - 1e-9
 """A body rate of at least this share of its limit counts as limited."""
@@ -65,7 +69,7 @@ class SampleEntry(NamedTuple):
 
     sample: AttitudeSample
     reason: Unanswered | None
-    """Why the sample is unanswered, or None."""
+    """Why the newest sample is unanswered, or None; ignored if the loop was off."""
     flags: LoopFlags
     """State of the loop before the answer."""
     checked_at: float
@@ -90,7 +94,7 @@ class SampleRows:
     def sample(self, writer: McapWriter, time_ns: int, entry: SampleEntry) -> None:
         """Write a sample, and the setpoint that answers it."""
         sample, reason, flags, checked_at, answer = entry
-        code = _REASON_CODES[reason] if flags.on else CONTROL_OFF
+        code = _REASON_CODES[reason] if flags.on else _CONTROL_OFF
         row = (
             sample.received,
             sample.vehicle_time,

@@ -1,4 +1,7 @@
-"""Records the steps of guidance, and how the vehicle tracks the reference."""
+"""Records the steps of guidance, and how the vehicle tracks the reference.
+
+`FlightTrace` gets the rows for the figures; `flight.mcap`, if the flight is recorded, gets all.
+"""
 
 from collections.abc import Callable
 from math import nan
@@ -7,21 +10,29 @@ from companion.control.flown_source import FlownSource
 from companion.control.guidance_command import GuidanceCommand
 from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOutput, StepRows
 from companion.control.telemetry import GuidedVehicle
-from companion.guidance.reference import Reference, VehicleMotion
-from companion.recording.recorder import FlightRecorder
 from companion.recording.trace import FlightTrace
 
 
 class StepRecorder:
-    """Records the inputs and outputs of each guidance step, if the flight is recorded.
+    """Records each guidance step, and the beginning of each maneuver.
 
     Args:
-        recorder: recorder of the flight, or None.
+        trace: the trace of the flight, and its file.
+        flown_source: the source that guidance flies.
         vehicle: what the steps read.
+
+    Attributes:
+        note: called with a message for each maneuver that begins.
     """
 
-    def __init__(self, recorder: FlightRecorder | None, vehicle: GuidedVehicle) -> None:
-        self._recorder, self._vehicle = recorder, vehicle
+    def __init__(
+        self, trace: FlightTrace, flown_source: FlownSource, vehicle: GuidedVehicle
+    ) -> None:
+        self.note: Callable[[str], None] = lambda _: None
+        self._trace, self._recorder = trace, trace.recorder
+        self._flown_source = flown_source
+        self._recorded_part: object = None
+        self._vehicle = vehicle
         self._rows = StepRows()
 
     def step(
@@ -39,6 +50,8 @@ class StepRecorder:
             output: result of the step, or None.
             command: the command for the control loop; None: no new command.
         """
+        if output is not None and flags.offboard_active:
+            self._track(now, output)
         if self._recorder is None:
             return
         state = self._vehicle.state
@@ -59,46 +72,21 @@ class StepRecorder:
         if self._recorder is not None:
             self._recorder.action(now, name, self._vehicle.clock.offset)
 
-
-class TrackingRecord:
-    """Writes reference, position, and the beginning of each maneuver to the trace.
-
-    Args:
-        trace: the trace of the flight.
-        flown_source: the source that guidance flies.
-
-    Attributes:
-        note: called with a message for each maneuver that begins.
-    """
-
-    def __init__(self, trace: FlightTrace, flown_source: FlownSource) -> None:
-        self.note: Callable[[str], None] = lambda _: None
-        self._trace = trace
-        self._flown_source = flown_source
-        self._recorded_part: object = None
-
-    def add(
-        self, now: float, vehicle_time: float, reference: Reference, motion: VehicleMotion
-    ) -> None:
-        """Record one step of guidance.
-
-        Args:
-            now: event-loop time, s.
-            vehicle_time: the same time on the vehicle's clock, s.
-            reference: reference at this time.
-            motion: motion of the vehicle at this time.
-        """
+    def _track(self, now: float, output: StepOutput) -> None:
+        """Write reference and position of a step under control, and note a maneuver that begins."""
         flown = self._flown_source.part(now)
         part = None if flown is None else flown.part
         if part is not self._recorded_part:
             self._recorded_part = part
             name = None if flown is None else flown.name
-            self._trace.begin_maneuver(now, vehicle_time, name)
+            self._trace.begin_maneuver(now, output.vehicle_time, name)
             if name is not None:
                 self.note(f"maneuver: {name}")
+        reference = output.reference
         north, east, down = reference.position_ned
         if not reference.holds_position:
             north = east = nan  # only the height is a reference
         if not reference.holds_height:
             down = nan
-        self._trace.add_tracking(vehicle_time, (north, east, down), motion.position_ned)
+        estimated = output.inputs.now.position_ned
+        self._trace.tracking.add([output.vehicle_time, north, east, down, *estimated])

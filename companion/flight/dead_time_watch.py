@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from companion.config.vehicle import AxisKeys
 from companion.identification import dead_time_by_correlation
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
-from companion.recording.trace import FlightTrace
+from companion.recording.trace import RATES, FlightTrace
 from companion.safety.actions import fault_message
 
 _MEASURING_PERIOD = 2.0
@@ -23,8 +23,7 @@ _MIN_ROW_AGE = 1.5
 _MAX_ROWS = 75_000
 """Largest number of rows for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
-_COMMANDED_COLUMN, _MEASURED_COLUMN, _AGE_COLUMN = 2, 6, 9
-"""Columns of `FlightTrace.rates`: first commanded rate, first measured rate, sample age."""
+_TIME, _AGE = RATES.index("vehicle_time_s"), RATES.index("age_s")
 
 
 class DeadTimeWatch:
@@ -84,7 +83,7 @@ class DeadTimeWatch:
         """
         first_row = max(0, len(self._trace.rates) - _MAX_ROWS)
         rows = self._trace.rates.rows(first_row)
-        ages = rows[:, _AGE_COLUMN]
+        ages = rows[:, _AGE]
         ages = ages[np.isfinite(ages)]
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
@@ -96,12 +95,12 @@ class DeadTimeWatch:
 
     def _dead_time(self, name: str, rows: NDArray[np.float64]) -> AxisDeadTime:
         """Measured and configured dead time of one axis."""
-        axis, column = self._axes[name], _AXES.index(name)
-        dead_time = None
+        axis, dead_time = self._axes[name], None
         if axis.lag is not None:
-            time, commanded_rates, measured_rates = rows[
-                :, [0, _COMMANDED_COLUMN + column, _MEASURED_COLUMN + column]
-            ].T
+            commanded, measured = (
+                RATES.index(f"{which}_{name}_rad_s") for which in ("commanded", "measured")
+            )
+            time, commanded_rates, measured_rates = rows[:, [_TIME, commanded, measured]].T
             is_certain = time < time[-1:] - _MIN_ROW_AGE
             dead_time = dead_time_by_correlation(
                 time[is_certain],

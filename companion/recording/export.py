@@ -32,8 +32,7 @@ def tables(record: FlightRecord) -> Iterator[tuple[str, Columns]]:
     for channel in CHANNELS:
         rows = record.rows(channel.name)
         if len(rows):
-            names = rows.dtype.names or ()
-            yield channel.name, {name: rows[name] for name in names}
+            yield channel.name, {name: rows[name] for name in channel.columns}
     trace = trace_of(record)
     for name in _JOINED_TABLES:
         series = getattr(trace, name)

@@ -143,6 +143,11 @@ class Series:
         if len(self._chunk) == self._chunk_length:
             self._spool_chunk()
 
+    def extend(self, rows: NDArray[np.float64]) -> None:
+        """Record rows (N, columns)."""
+        for row in rows.tolist():
+            self.add(row)
+
     def rows(self, since: int = 0) -> NDArray[np.float64]:
         """(N, columns), the rows from number `since` on; lost rows are left out.
 

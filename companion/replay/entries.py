@@ -95,8 +95,7 @@ class _Messages:
 
     def take(self, channel: Channel) -> Row:
         """Take the next message if it is of `channel`; else take none and return NaN values."""
-        names = channel.dtype.names or ()
         if self.next_topic() != channel.topic:
-            return dict.fromkeys(names, float("nan"))
+            return dict.fromkeys(channel.columns, float("nan"))
         self._index += 1
-        return dict(zip(names, next(self._rows[channel.topic]), strict=True))
+        return dict(zip(channel.columns, next(self._rows[channel.topic]), strict=True))

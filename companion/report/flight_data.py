@@ -15,13 +15,21 @@ from companion.config.files import load
 from companion.config.reference import ConfigKey, changed_keys
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import FlightRecord, RecordError, read_flight
-from companion.recording.mcap_file.fields import Rows
+from companion.recording.mcap_file.fields import Rows, matrix
 from companion.recording.mcap_file.flight_events import Event
-from companion.recording.measurements.recorded_summary import summary_of, trace_of
+from companion.recording.mcap_file.loop_channels import rate_names, vector_names
+from companion.recording.measurements.recorded_summary import (
+    reference_positions,
+    summary_of,
+    trace_of,
+)
 from companion.recording.measurements.second_order import StepRun, step_runs
 from companion.report.early_end import EndMark, early_end
 
 Floats = NDArray[np.float64]
+
+_NORTH_EAST_UP = (1, 1, -1)
+"""Factors by which a position in NED becomes north, east and height."""
 
 
 class Span(NamedTuple):
@@ -149,46 +157,28 @@ def _curves(record: FlightRecord) -> dict[str, Curve]:
     guidance, sent, sample = map(record.rows, ("guidance", "setpoint", "sample"))
     setpoint = sent[sent["idle"] == 0]  # on the ground there is no target
     motion, thrust = record.rows("motion"), record.rows("thrust")
+    estimated = matrix(guidance, vector_names("estimated", "m"))
     step_times = record.since_start(guidance["time_s"])
     setpoint_times = record.since_start(setpoint["received_s"])
     return {
-        "position": Curve(step_times, _positions(guidance, "estimated")),
-        "reference": Curve(step_times, _reference_positions(guidance)),
-        "error": Curve(step_times, _columns(guidance, "error_m")),
-        "motion": Curve(motion["time_s"], _columns(motion, "height_m", "speed_m_s", "tilt_deg")),
+        "position": Curve(step_times, estimated * _NORTH_EAST_UP),
+        "reference": Curve(step_times, reference_positions(guidance) * _NORTH_EAST_UP),
+        "error": Curve(step_times, matrix(guidance, ["error_m"])),
+        "motion": Curve(motion["time_s"], matrix(motion, ["height_m", "speed_m_s", "tilt_deg"])),
         "coefficients": Curve(
-            setpoint_times, _columns(setpoint, "measured_north", "measured_east")
+            setpoint_times, matrix(setpoint, ["measured_north", "measured_east"])
         ),
-        "target": Curve(setpoint_times, _columns(setpoint, "target_north", "target_east")),
+        "target": Curve(setpoint_times, matrix(setpoint, ["target_north", "target_east"])),
         "commanded": Curve(setpoint_times, _rates(setpoint, "commanded")),
         "measured": Curve(record.since_start(sample["received_s"]), _rates(sample, "measured")),
-        "thrust": Curve(record.since_start(sent["received_s"]), _columns(sent, "thrust")),
+        "thrust": Curve(record.since_start(sent["received_s"]), matrix(sent, ["thrust"])),
         "hover_thrust": Curve(
-            record.since_start(thrust["time_s"]), _columns(thrust, "hover_thrust")
+            record.since_start(thrust["time_s"]), matrix(thrust, ["hover_thrust"])
         ),
-        "latency": Curve(setpoint_times, 1e-3 * _columns(setpoint, "latency_us")),
+        "latency": Curve(setpoint_times, 1e-3 * matrix(setpoint, ["latency_us"])),
     }
-
-
-def _columns(rows: Rows, *names: str) -> Floats:
-    return np.column_stack([rows[name] for name in names])
-
-
-def _positions(rows: Rows, which: str) -> Floats:
-    """Positions (N, 3): north, east and height, m; `which` is "estimated" or "reference"."""
-    return _columns(rows, *(f"{which}_{axis}_m" for axis in ("north", "east", "down"))) * (1, 1, -1)
-
-
-def _reference_positions(guidance: Rows) -> Floats:
-    """Positions of the reference; NaN where there is none, as in open loop."""
-    reference = _positions(guidance, "reference")
-    reference[guidance["holds_position"] == 0, :2] = np.nan
-    reference[guidance["holds_height"] == 0, 2] = np.nan
-    return reference
 
 
 def _rates(rows: Rows, which: str) -> Floats:
     """Body rates (N, 3): roll, pitch and yaw rate, °/s; `which` is "commanded" or "measured"."""
-    return np.degrees(
-        _columns(rows, *(f"{which}_{axis}_rad_s" for axis in ("roll", "pitch", "yaw")))
-    )
+    return np.degrees(matrix(rows, rate_names(which)))

@@ -7,7 +7,8 @@ import pytest
 
 from companion.attitude import BodyRates, Coefficients
 from companion.control.flown_source import FlownPart, FlownSource
-from companion.control.step_recorder import TrackingRecord
+from companion.control.step_recorder import StepRecorder
+from companion.control.step_rows import StepFlags, StepOutput
 from companion.guidance import Doublets, ManeuverSequence, Pose, Reference, VehicleMotion
 from companion.guidance.follow import Follow
 from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
@@ -18,6 +19,22 @@ from companion.recording.trace import FlightTrace, ManeuverMark
 POSE = Pose((1.0, 2.0, -3.0), 0.5)
 HERE = VehicleMotion((1.5, 2.5, -3.5), (0.0, 0.0, 0.0))
 DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step_time=0.25, settle=1.0)
+
+
+class Steps:
+    """Steps of guidance that are recorded in memory only."""
+
+    def __init__(self, flown):
+        self.trace, self.told = FlightTrace(), []
+        self.recorder = StepRecorder(self.trace, flown, state=None, vehicle_clock=None)
+        self.recorder.note = self.told.append
+
+    def step(self, now, reference, *, offboard_active=True):
+        flags = StepFlags(True, False, False, offboard_active)
+        output = StepOutput(
+            now - 6.0, (1.0, 0.0, 0.0, 0.0), SimpleNamespace(now=HERE), reference, None
+        )
+        self.recorder.step(flags, now, output, None)
 
 
 def program(ends=20.0):
@@ -52,17 +69,27 @@ def test_only_a_trajectory_is_followed():
 
 
 def test_a_maneuver_is_told_once_and_its_end_is_marked():
-    trace, flown, told = FlightTrace(), FlownSource(), []
-    record = TrackingRecord(trace, flown)
-    record.note = told.append
-    record.add(9.0, 3.0, Reference((1.0, 2.0, -3.0)), HERE)
+    flown = FlownSource()
+    bench = Steps(flown)
+    bench.step(9.0, Reference((1.0, 2.0, -3.0)))
     flown.begin(program(), POSE, 10.0)
     for now in (10.0, 12.0, 21.0, 22.0):
-        record.add(now, now - 6.0, Reference((1.0, 2.0, -3.0)), HERE)
-    assert told == ["maneuver: program"]
-    assert trace.maneuvers == [ManeuverMark(10.0, 4.0, "program"), ManeuverMark(21.0, 15.0, None)]
-    rows = trace.tracking.rows()
+        bench.step(now, Reference((1.0, 2.0, -3.0)))
+    assert bench.told == ["maneuver: program"]
+    marks = [ManeuverMark(10.0, 4.0, "program"), ManeuverMark(21.0, 15.0, None)]
+    assert bench.trace.maneuvers == marks
+    rows = bench.trace.tracking.rows()
     assert rows[0].tolist() == pytest.approx([3.0, 1.0, 2.0, -3.0, 1.5, 2.5, -3.5])
+    assert len(rows) == 5
+
+
+def test_what_is_not_under_control_is_not_tracked():
+    flown = FlownSource()
+    bench = Steps(flown)
+    flown.begin(program(), POSE, 10.0)
+    bench.step(12.0, Reference((1.0, 2.0, -3.0)), offboard_active=False)
+    bench.recorder.step(StepFlags(True, False, False, True), 12.5, None, None)
+    assert (len(bench.trace.tracking), bench.trace.maneuvers, bench.told) == (0, [], [])
 
 
 @pytest.mark.parametrize(
@@ -74,9 +101,9 @@ def test_a_maneuver_is_told_once_and_its_end_is_marked():
     ],
 )
 def test_what_is_no_reference_is_nan(reference, known):
-    trace = FlightTrace()
-    TrackingRecord(trace, FlownSource()).add(9.0, 3.0, reference, HERE)
-    assert [not isnan(value) for value in trace.tracking.rows()[0, 1:4]] == known
+    bench = Steps(FlownSource())
+    bench.step(9.0, reference)
+    assert [not isnan(value) for value in bench.trace.tracking.rows()[0, 1:4]] == known
 
 
 def test_open_loop_before_a_vehicle_has_returned_gives_it_no_more_time_to_return():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from companion.attitude import BodyRates
 from companion.config.files import load
 from companion.config.vehicle import AxisKeys
 from companion.flight import dead_time_watch
@@ -38,8 +37,7 @@ class Bench:
         for asked, got, old in zip(commanded.tolist(), measured.tolist(), ages, strict=True):
             self.now += PERIOD
             stamp = self.now - 7.0 - np.nan_to_num(old)
-            rates = BodyRates(*asked), 0.5, BodyRates(*got)
-            self.trace.add_rates(stamp, self.now, *rates, old)
+            self.trace.rates.add([stamp, self.now, *asked, 0.5, *got, old])
             self.watch.after_answer(self.now)
 
 

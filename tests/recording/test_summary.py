@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.attitude import Coefficients, Target, attitude
+from companion.attitude import Coefficients, attitude
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.measurements.response import measure_response
 from companion.recording.measurements.second_order import step_runs
@@ -30,11 +30,9 @@ def trace_of(tau, bend=0.0, directions=(NORTH, EAST), wind=(0.0, 0.0), size=0.2,
             across = bend * math.sin(k / 100.0) + gust * math.cos(k / 100.0)
             north = wind[0] + along * direction[0] - across * direction[1]
             east = wind[1] + along * direction[1] + across * direction[0]
-            trace.add_response(
-                number * 10.0 + k * 0.005,
-                attitude(Coefficients(north, east), 0.4),
-                Target(wind[0] + target * direction[0], wind[1] + target * direction[1], 0.4),
-            )
+            q = attitude(Coefficients(north, east), 0.4)
+            asked = wind[0] + target * direction[0], wind[1] + target * direction[1]
+            trace.response.add([number * 10.0 + k * 0.005, *q, *asked])
             along = target + (along - target) * math.exp(-0.005 / tau)
     return trace
 
@@ -105,7 +103,7 @@ def test_speed_and_tilt_of_the_maneuvers_are_not_those_of_the_take_off():
     for vehicle_time, name in ((102.0, "hover"), (104.0, "steps"), (106.0, None)):
         trace.begin_maneuver(vehicle_time - 100.0, vehicle_time, name)
     trace.add_motion(3.0, (3.0, 103.0, 5.0, 0.2, 1.0, 0.1))
-    trace.add_response(105.0, attitude(Coefficients(math.sin(0.2), 0.0), 0.0), Target(0.2, 0, 0))
+    trace.response.add([105.0, *attitude(Coefficients(math.sin(0.2), 0.0), 0.0), 0.2, 0.0])
     trace.add_motion(7.0, (7.0, 107.0, 4.0, 1.2, 8.0, math.nan))
     extent = summary(trace).extent()
     assert (extent["speed_max_m_s"], extent["tilt_max_deg"]) == (
@@ -131,10 +129,10 @@ def summary(trace, dead_times=DeadTimes()):  # noqa: B008
 
 def test_json_has_the_promised_keys():
     trace = trace_of(0.2)
-    trace.add_latency(40_000)
-    trace.add_tracking(0.0, (0.0, 0.0, -5.0), (0.3, 0.4, -5.1))
-    trace.add_tracking(0.1, (math.nan, math.nan, -5.0), (9.0, 9.0, -4.9))
-    trace.add_tracking(0.2, (0.0, 0.0, math.nan), (9.0, 9.0, -9.0))  # a program's own thrust
+    trace.latencies_ns.add([40_000])
+    trace.tracking.add([0.0, 0.0, 0.0, -5.0, 0.3, 0.4, -5.1])
+    trace.tracking.add([0.1, math.nan, math.nan, -5.0, 9.0, 9.0, -4.9])
+    trace.tracking.add([0.2, 0.0, 0.0, math.nan, 9.0, 9.0, -9.0])  # a program's own thrust
     dead_times = DeadTimes(
         {"roll": AxisDeadTime(0.042, 0.04), "pitch": AxisDeadTime(), "yaw": AxisDeadTime()},
         SampleAge(0.002, 0.004),

@@ -7,7 +7,6 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from companion.attitude import BodyRates, Target
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.measurements.flight_facts import FlightFacts
 from companion.recording.measurements.summary import LoopCounts, PredictiveFigures, Summary
@@ -31,7 +30,7 @@ COUNTS = LoopCounts(7, 6, 1)
 
 def table(trace, dead_times=AS_CONFIGURED, counts=COUNTS):
     """The rows of the table as a user sees them, without its lines."""
-    trace.add_rates(1.0, 2.0, BodyRates(0.1, 0.2, 0.3), 0.5, BodyRates(0.0, 0.0, 0.0), 0.003)
+    trace.rates.add([1.0, 2.0, 0.1, 0.2, 0.3, 0.5, 0.0, 0.0, 0.0, 0.003])
     summary = Summary("ok", "disarm", "exact", 5.0, counts, {}, trace, dead_times=dead_times)
     out = io.StringIO()
     Console(file=out, width=80).print(flight_table(summary))
@@ -104,10 +103,10 @@ def test_each_maneuver_has_its_row():
     trace = FlightTrace()
     trace.begin_maneuver(0.0, 0.0, "hover")
     for k in range(100):
-        trace.add_tracking(0.1 * k, (0.0, 0.0, -5.0), (0.03, 0.04, -5.02))
+        trace.tracking.add([0.1 * k, 0.0, 0.0, -5.0, 0.03, 0.04, -5.02])
     trace.begin_maneuver(10.0, 10.0, "steps")
     for k in range(100):
-        trace.add_tracking(10.0 + 0.1 * k, (math.nan, math.nan, -5.0), (0.02 * k, 0.0, -5.01))
+        trace.tracking.add([10.0 + 0.1 * k, math.nan, math.nan, -5.0, 0.02 * k, 0.0, -5.01])
     lines = table(trace)
     assert cells(lines, "hover") == ["0.05 m", "0.05 m", "0.02 m", "0.02 m"]
     assert cells(lines, "steps") == ["open loop", "1.98 m away", "0.01 m", "0.01 m"]
@@ -139,7 +138,7 @@ def test_a_flight_without_samples_has_no_table():
 
 def test_a_step_that_was_cut_short_is_told_as_that():
     trace = FlightTrace()
-    trace.add_response(1.0, (1.0, 0.0, 0.0, 0.0), Target(0.1, 0.0, 0.0))
+    trace.response.add([1.0, 1.0, 0.0, 0.0, 0.0, 0.1, 0.0])
     told = text_of(Summary("ok", "", "exact", 5.0, LoopCounts(), {}, trace))
     assert told == "no acceleration step was flown to its end"
 

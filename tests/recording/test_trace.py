@@ -2,7 +2,6 @@
 
 import pytest
 
-from companion.attitude import BodyRates
 from companion.recording.measurements.verdict import LOST_ROWS
 from companion.recording.trace import FlightTrace
 
@@ -14,9 +13,8 @@ ROWS = [
 
 def noted(rows=ROWS):
     trace = FlightTrace()
-    for time, received, *commanded, thrust, roll, pitch, yaw, age in rows:
-        measured = BodyRates(roll, pitch, yaw)
-        trace.add_rates(time, received, BodyRates(*commanded), thrust, measured, age)
+    for row in rows:
+        trace.rates.add(list(row))
     return trace
 
 

@@ -5,6 +5,7 @@ fields. So every message of a channel has the same length, and NumPy reads many 
 """
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -78,6 +79,11 @@ class Channel:
             lines.append(f"uint8 {code.name}")
         return MessageType(f"{PACKAGE}/{words}", ("\n".join(lines) + "\n").encode())
 
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of the columns, in the order of the bytes."""
+        return tuple(field.name for field in (*self.numbers, *self.codes))
+
     @cached_property
     def packing(self) -> struct.Struct:
         """The packing of the header and the columns of one message."""
@@ -105,3 +111,8 @@ class Channel:
             if len(rows) and rows[code.name].max() >= len(code.names):
                 raise ValueError(f"{self.topic}: {code.name} is {rows[code.name].max()}")
         return rows
+
+
+def matrix(rows: Rows, names: Sequence[str]) -> NDArray[np.float64]:
+    """(N, len(names)), these columns of the rows."""
+    return np.column_stack([rows[name] for name in names])

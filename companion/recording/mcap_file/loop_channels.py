@@ -23,7 +23,8 @@ UNANSWERED_CODES = (
     "invalid_setpoint",
     "not_sent",
 )
-"""Names of the codes in the column "unanswered". From 2 on they are the members of `Unanswered`."""
+"""Names of the codes in the column "unanswered"; from "another_vehicle" on, the values of
+`Unanswered`."""
 ACTIONS = (
     "stand_by",
     "hold_here",
@@ -38,18 +39,32 @@ ACTIONS = (
 """Names of the codes in the column "action": how a phase controls guidance or the control loop."""
 
 
+QUATERNION = ("q_w", "q_x", "q_y", "q_z")
+"""Names of the columns of an attitude."""
+
+
+def vector_names(prefix: str, unit: str) -> tuple[str, ...]:
+    """Names of the columns of a vector: north, east, down."""
+    return tuple(f"{prefix}_{axis}_{unit}" for axis in _NED)
+
+
+def rate_names(prefix: str) -> tuple[str, ...]:
+    """Names of the columns of body rates: roll, pitch, yaw."""
+    return tuple(f"{prefix}_{axis}_rad_s" for axis in _AXES)
+
+
+_NED, _AXES = ("north", "east", "down"), ("roll", "pitch", "yaw")
+
+
 def _vector(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:
-    return tuple(
-        Field(f"{prefix}_{axis}_{unit}", f"{meaning}, {axis}, {unit.replace('_s', '/s')}.")
-        for axis in ("north", "east", "down")
-    )
+    axes = zip(vector_names(prefix, unit), _NED, strict=True)
+    shown_unit = unit.replace("_s", "/s")
+    return tuple(Field(name, f"{meaning}, {axis}, {shown_unit}.") for name, axis in axes)
 
 
 def _rates(prefix: str, meaning: str) -> tuple[Field, ...]:
-    return tuple(
-        Field(f"{prefix}_{axis}_rad_s", f"{meaning} about {axis}, rad/s.")
-        for axis in ("roll", "pitch", "yaw")
-    )
+    axes = zip(rate_names(prefix), _AXES, strict=True)
+    return tuple(Field(name, f"{meaning} about {axis}, rad/s.") for name, axis in axes)
 
 
 VEHICLE_TIME = Field("vehicle_time_s", "Time on the vehicle's clock, s.")
@@ -62,7 +77,7 @@ SAMPLE = Channel(
         VEHICLE_TIME,
         Field("time_boot_ms", "The vehicle's stamp as received, ms."),
         Field("age_s", "Age at arrival, s. NaN: the stamp does not fit the vehicle's clock."),
-        *(Field(f"q_{part}", "Attitude, body FRD to world NED.") for part in "wxyz"),
+        *(Field(name, "Attitude, body FRD to world NED.") for name in QUATERNION),
         *_rates("measured", "Measured rate"),
         Field("checked_s", "When the age was checked again before sending, on our clock, s."),
     ),
@@ -94,10 +109,7 @@ SETPOINT = Channel(
         Field("target_east", "Acceleration coefficient that the planner flies to, east."),
         Field("target_heading_rad", "Heading that the planner flies to, rad."),
         Field("target_heading_rate_rad_s", "Feedforward of the heading, rad/s."),
-        *(
-            Field(f"q_{part}", "Attitude as the planner sees it, body FRD to NED.")
-            for part in "wxyz"
-        ),
+        *(Field(name, "Attitude as the planner sees it, body FRD to NED.") for name in QUATERNION),
         Field("measured_north", "Acceleration coefficient of this attitude, north."),
         Field("measured_east", "Acceleration coefficient of this attitude, east."),
         Field("planned_north", "Coefficient that the planner plans for now, north; NaN: no plan."),
@@ -194,7 +206,7 @@ ATTITUDE_TARGET = Channel(
     "A new ATTITUDE_TARGET of an autopilot that takes body rates along its axes.",
     (
         Field("time_boot_ms", "The vehicle's stamp as received, ms."),
-        *(Field(f"q_{part}", "Attitude target, body FRD to world NED.") for part in "wxyz"),
+        *(Field(name, "Attitude target, body FRD to world NED.") for name in QUATERNION),
     ),
 )
 ACTION = Channel(

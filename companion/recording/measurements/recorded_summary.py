@@ -13,18 +13,15 @@ from numpy.typing import NDArray
 
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.recording.flight_record import FlightRecord, record_errors
-from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
+from companion.recording.mcap_file.channels import MOTION
+from companion.recording.mcap_file.fields import Rows, matrix
+from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES, vector_names
 from companion.recording.measurements.flight_facts import EarlyEnd, FlightFacts
 from companion.recording.measurements.summary import LoopCounts, Summary
-from companion.recording.trace import FlightTrace
+from companion.recording.trace import ANSWERED, RESPONSE, SENT, FlightTrace
 
 _MOST_BYTES = 1 << 26
 """Largest `summary.json` that is read, bytes."""
-_AXES = "roll", "pitch", "yaw"
-_SETPOINT_COLUMNS = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES), "thrust"]
-"""Columns of the channel "setpoint" that become columns of `FlightTrace.rates`."""
-_STEP_COLUMNS = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
-"""Columns of the channel "setpoint" that become columns of `FlightTrace.response`."""
 _REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent")
 """Reasons of unanswered samples that count as `LoopCounts.refused`."""
 _REQUIRED_KEYS = frozenset(
@@ -35,8 +32,6 @@ _REQUIRED_KEYS = frozenset(
     )
 )
 """Keys that `summary.json` of this version must have; without them it is not used."""
-_FIRST_UNANSWERED_CODE = 2
-"""First index in `UNANSWERED_CODES` of a reason: "answered" and "control_off" come before."""
 
 
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
@@ -103,61 +98,53 @@ def trace_of(record: FlightRecord) -> FlightTrace:
         RecordError: the record is not valid.
     """
     with record_errors(record.folder):
-        trace = FlightTrace()
         sample, setpoint, guidance = map(record.rows, ("sample", "setpoint", "guidance"))
-        sample = sample[sample["unanswered"] == 0]
-        # Matched by the vehicle's stamps, because two samples may arrive at the same time.
-        numbers = _sample_indices(sample["vehicle_time_s"], setpoint["vehicle_time_s"])
-        measured = np.column_stack([sample[f"measured_{axis}_rad_s"] for axis in _AXES])
-        ages = np.where(sample["age_known"] == 1, sample["age_s"], np.nan)
-        for row, number in zip(setpoint, numbers.tolist(), strict=True):
-            trace.add_latency(round(1e3 * float(row["latency_us"])))
-            time = float(row["vehicle_time_s"])
-            if row["offboard_active"] and number >= 0:  # else its sample was not recorded
-                sent = row[_SETPOINT_COLUMNS].tolist()
-                trace.rates.add([time, *sent, *measured[number].tolist(), float(ages[number])])
-            if row["is_step"]:
-                trace.response.add([time, *row[_STEP_COLUMNS].tolist()])
-        for row in tracking_rows(guidance):
-            trace.tracking.add(row.tolist())
-        for row in record.rows("motion").tolist():
-            trace.motion.add(list(row))
+        trace = FlightTrace()
+        for latency in setpoint["latency_us"].tolist():
+            trace.latencies_ns.add([round(1e3 * latency)])
+        trace.rates.extend(_rates(sample, setpoint))
+        trace.response.extend(matrix(setpoint[setpoint["is_step"] == 1], RESPONSE))
+        trace.tracking.extend(_tracking(guidance[guidance["offboard_active"] == 1]))
+        trace.motion.extend(matrix(record.rows("motion"), MOTION.columns))
         trace.maneuvers += record.maneuvers
         return trace
 
 
-def tracking_rows(guidance: NDArray[np.void]) -> NDArray[np.float64]:
-    """(N, 7), rows of `FlightTrace.tracking` from those of the channel "guidance"."""
-    controlled = guidance[guidance["offboard_active"] == 1]
-    columns = [controlled["vehicle_time_s"]]
-    for axis, held_quantity in zip(
-        ("north", "east", "down"), ("position", "position", "height"), strict=True
-    ):
-        reference = controlled[f"reference_{axis}_m"]
-        columns.append(np.where(controlled[f"holds_{held_quantity}"] == 1, reference, np.nan))
-    columns += [controlled[f"estimated_{axis}_m"] for axis in ("north", "east", "down")]
-    return np.column_stack(columns)
+def _rates(sample: Rows, setpoint: Rows) -> NDArray[np.float64]:
+    """(N, 10), rows of `FlightTrace.rates`, without those whose sample was not recorded."""
+    sample, setpoint = sample[sample["unanswered"] == 0], setpoint[setpoint["offboard_active"] == 1]
+    # Matched by the vehicle's stamps, because two samples may arrive at the same time.
+    _, answered, sent = np.intersect1d(
+        sample["vehicle_time_s"], setpoint["vehicle_time_s"], return_indices=True
+    )
+    rows = np.hstack([matrix(setpoint[sent], SENT), matrix(sample[answered], ANSWERED)])
+    rows[sample["age_known"][answered] == 0, -1] = np.nan
+    return rows
 
 
-def _sample_indices(
-    samples: NDArray[np.float64], setpoints: NDArray[np.float64]
-) -> NDArray[np.int64]:
-    """The index of each setpoint's sample; −1: the sample was not recorded."""
-    if len(samples) == 0:
-        return np.full(len(setpoints), -1)
-    at = np.minimum(np.searchsorted(samples, setpoints), len(samples) - 1)
-    return np.where(samples[at] == setpoints, at, -1)
+def _tracking(guidance: Rows) -> NDArray[np.float64]:
+    """(N, 7), rows of `FlightTrace.tracking`."""
+    estimated = matrix(guidance, vector_names("estimated", "m"))
+    return np.column_stack([guidance["vehicle_time_s"], reference_positions(guidance), estimated])
+
+
+def reference_positions(guidance: Rows) -> NDArray[np.float64]:
+    """(N, 3), positions of the reference, m, NED; NaN where there is none, as in open loop."""
+    positions = matrix(guidance, vector_names("reference", "m"))
+    positions[guidance["holds_position"] == 0, :2] = np.nan
+    positions[guidance["holds_height"] == 0, 2] = np.nan
+    return positions
 
 
 def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
     sample, setpoint = record.rows("sample"), record.rows("setpoint")
-    controlled = sample[sample["unanswered"] != UNANSWERED_CODES.index("control_off")]
-    code_counts = np.bincount(controlled["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
-    counts = zip(UNANSWERED_CODES, code_counts, strict=True)
-    unanswered = dict(list(counts)[_FIRST_UNANSWERED_CODE:])
+    code_counts = np.bincount(sample["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
+    unanswered = dict(zip(UNANSWERED_CODES, code_counts, strict=True))
+    del unanswered["answered"]
+    control_off = unanswered.pop("control_off")
     refused = sum(unanswered[name] for name in _REFUSALS)
     return LoopCounts(
-        samples=len(controlled),
+        samples=len(sample) - control_off,
         setpoints=len(setpoint),
         missed_deadlines=int((setpoint["latency_us"] > 1e6 * deadline).sum()),
         stale=sum(unanswered.values()) - refused,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from companion.attitude.kinematics import tilt_angle
+from companion.recording.mcap_file.channels import MOTION
 from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.flight_facts import FlightFacts
 from companion.recording.measurements.maneuver_figures import (
@@ -27,12 +28,12 @@ from companion.recording.measurements.response import (
     response_as_dict,
 )
 from companion.recording.measurements.verdict import checks, is_good
-from companion.recording.trace import FlightTrace
+from companion.recording.trace import RATES, FlightTrace
 
-_ROLL_AND_PITCH = [0, 6, 7]
-"""Columns of `FlightTrace.rates`: vehicle time, measured roll and pitch rate."""
-_HEIGHT, _SPEED, _TILT = 2, 3, 4
-"""Columns of `FlightTrace.motion`: height, speed, tilt."""
+_ROLL_AND_PITCH = [
+    RATES.index(name) for name in ("vehicle_time_s", "measured_roll_rad_s", "measured_pitch_rad_s")
+]
+_HEIGHT, _SPEED, _TILT = map(MOTION.columns.index, ("height_m", "speed_m_s", "tilt_deg"))
 
 
 @dataclass(frozen=True, slots=True)
