@@ -15,13 +15,13 @@ from sitl_mock.autopilot.stamp_slips import StampSlips
 from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.geodesy import Geodetic, to_geodetic
-from sitl_mock.physics.quaternion import euler, yaw
+from sitl_mock.physics.quaternion import Vector, euler, to_body, yaw
 from sitl_mock.physics.vehicle import Vehicle
 
 Builder = Callable[[], Message | None]
 """Builds a message; returns None when it has nothing valid."""
 _SEA_LEVEL_HPA = 1013.25
-MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)  # gauss; the body is taken as level, heading north
+_MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)  # gauss
 # Variances sent in ODOMETRY: m^2 and rad^2, (m/s)^2 and (rad/s)^2.
 _POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
 _VELOCITY_VARIANCES = (0.0095, 0.0086, 0.0052, 0.0, 0.0, 0.0)
@@ -46,6 +46,8 @@ class MotionTelemetry:
 
     airspeed = nan
     """Airspeed in VFR_HUD, m/s; NaN because there is no airspeed sensor."""
+    gauss_in_highres_imu = 1.0
+    """What HIGHRES_IMU sends for 1 gauss."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -157,14 +159,18 @@ class MotionTelemetry:
             0.0,
         )
 
+    def magnetic_field(self) -> Vector:
+        """Return the magnetic field along the body axes (FRD), gauss."""
+        return to_body(self._vehicle.truth.q, _MAGNETIC_FIELD_NED)
+
     def highres_imu(self) -> Message:
-        """Return HIGHRES_IMU; the magnetic field is that of a level vehicle heading north."""
+        """Return HIGHRES_IMU."""
         estimate = self._state.estimate
         return dialect.MAVLink_highres_imu_message(
             self._state.stamp_us,
             *estimate.specific_force_frd,
             *estimate.body_rates,
-            *MAGNETIC_FIELD_NED,
+            *(self.gauss_in_highres_imu * field for field in self.magnetic_field()),
             self.pressure_hpa(),
             0.0,
             self._altitude,
@@ -187,11 +193,21 @@ class MotionTelemetry:
         )
 
     def altitude(self) -> Message:
-        """Return ALTITUDE; altitude_terrain is always 0."""
+        """Return ALTITUDE; its altitude of the terrain shows the error of the estimated height.
+
+        PX4 subtracts the clearance, which a distance sensor measures, from the estimated height.
+        """
         state = self._state
         up, altitude = -state.estimate.position_ned[2], self._altitude
+        clearance = -self._vehicle.truth.position_ned[2]
         return dialect.MAVLink_altitude_message(
-            state.stamp_us, altitude, altitude, up, up + state.home_ned[2], 0.0, up
+            state.stamp_us,
+            altitude,
+            altitude,
+            up,
+            up + state.home_ned[2],
+            up - clearance,
+            clearance,
         )
 
     def servo_output_raw(self) -> Message:
