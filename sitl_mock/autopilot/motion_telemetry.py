@@ -193,21 +193,13 @@ class MotionTelemetry:
         )
 
     def altitude(self) -> Message:
-        """Return ALTITUDE; its altitude of the terrain shows the error of the estimated height.
-
-        PX4 subtracts the clearance, which a distance sensor measures, from the estimated height.
-        """
+        """Return ALTITUDE; the terrain is lower than the estimated height by the true clearance."""
         state = self._state
         up, altitude = -state.estimate.position_ned[2], self._altitude
         clearance = -self._vehicle.truth.position_ned[2]
+        terrain, relative = up - clearance, up + state.home_ned[2]
         return dialect.MAVLink_altitude_message(
-            state.stamp_us,
-            altitude,
-            altitude,
-            up,
-            up + state.home_ned[2],
-            up - clearance,
-            clearance,
+            state.stamp_us, altitude, altitude, up, relative, terrain, clearance
         )
 
     def servo_output_raw(self) -> Message:
@@ -229,18 +221,9 @@ class MotionTelemetry:
 
 def _type_mask(target: PositionTargetEcho) -> int:
     """Return the POSITION_TARGET_TYPEMASK of the components that are not controlled."""
-    groups = (
-        (POSITION_BITS, target.position),
-        (VELOCITY_BITS, target.velocity),
-        (ACCELERATION_BITS, target.acceleration),
-        ((YAW_IGNORED,), (target.yaw,)),
-    )
-    return sum(
-        bit
-        for bits, values in groups
-        for bit, value in zip(bits, values, strict=True)
-        if isnan(value)
-    )
+    bits = (*POSITION_BITS, *VELOCITY_BITS, *ACCELERATION_BITS, YAW_IGNORED)
+    values = (*target.position, *target.velocity, *target.acceleration, target.yaw)
+    return sum(bit for bit, value in zip(bits, values, strict=True) if isnan(value))
 
 
 def upper_triangle(variances: Sequence[float]) -> tuple[float, ...]:
