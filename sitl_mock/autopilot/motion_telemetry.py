@@ -31,10 +31,8 @@ class MotionTelemetry:
     """Builds messages from the estimate.
 
     Args:
-        state: the autopilot's state.
         vehicle: the simulated vehicle; its rotors, its reset counter and (for ArduPilot) its
             shaped attitude target are reported.
-        origin: origin of the local frame.
         slips: lag of the time stamp of LOCAL_POSITION_NED behind the true time.
     """
 
