@@ -1,10 +1,19 @@
-"""Ends the worker processes of a command when the command ends, even if it is killed."""
+"""The worker processes of a command: how many run at a time, and which signals reach them."""
 
 import ctypes
+import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 
 _PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None)
+
+
+def usable_cores() -> int:
+    """Number of processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
 
 
 def end_with_parent() -> None:
@@ -13,3 +22,17 @@ def end_with_parent() -> None:
     A parent that is killed cannot end its children, and these would wait for work for ever.
     """
     _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+@contextmanager
+def interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT in this thread, and in the threads and processes that start in the context.
+
+    Ctrl-C in a terminal reaches all processes. Only the command acts on it, and ends the workers.
+    """
+    resource_tracker.ensure_running()  # started below, it would unblock SIGINT
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)

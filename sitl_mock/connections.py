@@ -21,7 +21,6 @@ class Connections:
     """The endpoints, each with its link, and the control channel.
 
     Args:
-        settings: settings of this vehicle.
         simulation: the vehicle, on which the control channel acts.
         exchange: takes arriving datagrams, and provides datagrams to send.
 

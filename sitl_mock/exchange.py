@@ -36,10 +36,6 @@ def burst_time(elapsed_s: float, burst_s: float) -> float:
 class Exchange:
     """Passes datagrams to the autopilot, and takes those that it sends.
 
-    Args:
-        settings: settings of this vehicle.
-        simulation: the vehicle.
-
     Attributes:
         on_message: called with each message that arrives over the companion link after the faults,
             also if the autopilot does not accept it.

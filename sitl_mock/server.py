@@ -29,7 +29,6 @@ class Server:
 
     Args:
         settings: settings of this vehicle (see `MockSettings.for_vehicle`).
-        system_id: MAVLink system id.
         show_status: shows the running vehicle after each slot, None = headless.
 
     Raises:

@@ -64,10 +64,7 @@ def load_settings(
 ) -> MockSettings:
     """Read the ``mock:`` section of a YAML file; without a file, the defaults.
 
-    Args:
-        path: the file; its other sections are ignored.
-        overrides: values of top-level keys (and of ``lockstep``), which replace those of the file.
-        origin: where the overrides come from, for messages.
+    ``overrides`` replace keys of the section and of ``lockstep``; messages call them ``origin``.
 
     Raises:
         ConfigError: the file cannot be read, or a key or value is invalid.

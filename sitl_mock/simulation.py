@@ -31,8 +31,6 @@ class Simulation:
     """One vehicle with its autopilot.
 
     Args:
-        settings: settings of this vehicle.
-        system_id: MAVLink system id.
         plant: computes the physics, see `Vehicle`.
 
     Attributes:

@@ -1,17 +1,16 @@
 """Dask: starts local worker processes or uses an existing cluster, and runs tasks on it."""
 
 import logging
-import os
 import signal
 import threading
 from collections.abc import Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
-from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from companion.campaign.unit import UnitResult
 from companion.campaign.versions import VersionError, as_versions, require_equal, versions
+from companion.child_process import interrupts_blocked, usable_cores
 from companion.extras import require
 from companion.files.yaml_file import ConfigError
 
@@ -61,11 +60,6 @@ def require_packages() -> None:
         require(package, "campaign", "`companion campaign`")
 
 
-def local_workers() -> int:
-    """Number of worker processes on this computer: one for each core that this process may use."""
-    return len(os.sched_getaffinity(0))
-
-
 @contextmanager
 def cluster_client(scheduler: str | None, workers: int | None) -> "Iterator[Client]":
     """Connect to a cluster whose workers have the same versions as this process.
@@ -91,9 +85,9 @@ def cluster_client(scheduler: str | None, workers: int | None) -> "Iterator[Clie
                 raise ConfigError(f"no Dask scheduler answers at {scheduler}: {error}") from error
             cluster = None
         else:
-            with _interrupts_blocked(), _termination_deferred():
+            with interrupts_blocked(), _termination_deferred():
                 cluster = LocalCluster(
-                    n_workers=workers or local_workers(),
+                    n_workers=workers or usable_cores(),
                     threads_per_worker=1,  # flights are pure Python
                     dashboard_address="127.0.0.1:0",
                     silence_logs=logging.CRITICAL + 1,
@@ -114,20 +108,6 @@ def _silence_dask() -> None:
     for name in ("tornado", *logging.root.manager.loggerDict):
         if name.startswith(("distributed", "tornado")):
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT in this thread, and in the threads and processes that start in the context.
-
-    Ctrl-C in a terminal reaches all processes. Only the client acts on it, and ends the workers.
-    """
-    resource_tracker.ensure_running()  # started below, it would unblock SIGINT
-    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
 @contextmanager

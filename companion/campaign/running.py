@@ -26,7 +26,6 @@ from companion.campaign.campaign_file import NOUNS
 from companion.campaign.cluster import (
     ClusterError,
     cluster_client,
-    local_workers,
     number_of_workers,
     require_packages,
     wait_for_workers,
@@ -37,6 +36,7 @@ from companion.campaign.loading import load
 from companion.campaign.report.results import Results
 from companion.campaign.unit import check_cases, size_of_units, unit_ranges
 from companion.campaign.versions import VersionError
+from companion.child_process import usable_cores
 from companion.files.yaml_file import ConfigError
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class _Run:
     def _check_all_cases(self) -> float | None:
         """Check every case; return the wall time that a case takes, s; None: not measured."""
         campaign, kind = self._campaign, self._campaign.file.kind
-        workers = self._options.workers or local_workers()
+        workers = self._options.workers or usable_cores()
         if campaign.number_of_cases > estimate.most_cases(campaign) and not self._options.yes:
             # The time of one case is enough to refuse; checking all cases would take long.
             first_case = [campaign.case(next(campaign.planned_cases()))]

@@ -87,12 +87,7 @@ def fly(
 ) -> Summary:
     """Fly as configured, record in `folder`, and print phases, tables and summary to `console`.
 
-    Args:
-        config: configuration of the flight.
-        folder: folder for the flight's files.
-        console: console for messages.
-        invocation: command line of this run, to suggest the next command; None: no suggestion.
-        helper: helper process that watches a file or serves the live page, or None.
+    `invocation` is the command line of this run, to suggest the next command.
 
     Raises:
         LinkError: the link could not be opened; nothing was sent.

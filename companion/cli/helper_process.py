@@ -28,14 +28,8 @@ def helper_process(
 ) -> Iterator[Helper | None]:
     """Run the helper process that the options ask for, if any, while the block runs.
 
-    Args:
-        options: options of the command line: `watch`, `live` and `foxglove`.
-        config: configuration of the flight.
-        path: file of the configuration, which `--watch` watches.
-        config_as_read: the configuration as it was read from this file.
-        folder: folder of the flight, or None.
-        console: shows where the live page and the live stream are.
-        flies_maneuvers: whether the flight flies the maneuvers of its configuration.
+    `--watch` watches the file `path`, which was read as `config_as_read`. `console` shows where the
+    live page and the live stream are.
 
     Raises:
         ConfigError: the page or the stream cannot be served at this address.

@@ -158,10 +158,7 @@ def _flight_name(log: Path) -> str:
 def _write_fit(out: Path, text: str, flown_folder: Path | None) -> None:
     """Write a file completely or not at all, because a flight may read it.
 
-    Args:
-        out: the file.
-        text: its text.
-        flown_folder: folder of the flight that was just flown; None: no flight was flown.
+    `flown_folder` is the folder of the flight that was just flown, if one was.
 
     Raises:
         OSError: the file cannot be written; the error is a complete sentence.

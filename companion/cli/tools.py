@@ -6,6 +6,7 @@ from importlib import import_module
 
 from rich.console import Console
 
+from companion.child_process import usable_cores
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.files.yaml_file import ConfigError
 from companion.study import registry
@@ -35,9 +36,9 @@ def study(options: argparse.Namespace) -> int:
             " tables as CSV"
         )
     registry.check_extras(options.name)
-    from companion.study import runner, workers  # noqa: PLC0415  needs the extra
+    from companion.study import runner  # noqa: PLC0415  needs the extra
 
-    count = options.workers or workers.cores()
+    count = options.workers or usable_cores()
     console = Console(stderr=options.json, markup=False)
     try:
         page, rows = runner.run(options.name, options.case, options.out, console, count)

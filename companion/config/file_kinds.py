@@ -40,11 +40,6 @@ _USED_BY: Mapping[FileKind, str] = {
 def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> None:
     """Refuse a file whose top-level keys are rather those of another kind of file.
 
-    Args:
-        path: path of the file.
-        keys: its keys at the top level.
-        wanted: the kind of file that the user was to give.
-
     Raises:
         ConfigError: it is another kind of file; the message names the command or key that takes it.
     """

@@ -176,12 +176,7 @@ def _merge(merged: Contents, part: Contents) -> None:
 
 
 def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str) -> Config:
-    """The configuration with some keys changed, checked again.
-
-    Args:
-        config: the configuration to change.
-        changes: new values by section and key.
-        name: name of the changes in error messages.
+    """The configuration with new values by section and key, checked again; errors call them `name`.
 
     Raises:
         ConfigError: the result is not valid.

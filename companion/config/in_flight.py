@@ -63,13 +63,7 @@ def differences(before: Config, after: Config) -> Iterator[Difference]:
 
 
 def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> Config:
-    """Apply new values to the configuration `now`.
-
-    Args:
-        start: the configuration with which the flight began.
-        now: the configuration in force.
-        values: the new values.
-        name: name of the change in error messages.
+    """`now` with new values, which errors call `name`; `start` is the flight's first configuration.
 
     Raises:
         ConfigError: a key must not change in flight, or the result is not valid.

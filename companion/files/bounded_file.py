@@ -10,13 +10,9 @@ class FileRefusedError(Exception):
 
 
 def read_text(path: Path, max_bytes: int) -> str:
-    """Read a regular UTF-8 file, with or without a byte order mark.
+    """Read a regular UTF-8 file of limited size, with or without a byte order mark.
 
     Devices and pipes are refused: they may block or never end.
-
-    Args:
-        path: path of the file.
-        max_bytes: largest size, bytes.
 
     Raises:
         FileRefusedError: the file cannot be read, is not regular, too large, or not text.

@@ -78,10 +78,14 @@ def read(text: str) -> Document:
         YamlError: it is not valid YAML, holds a key twice, an alias or a tag, or exceeds a limit of
             this module.
     """
-    builder = _Builder()
+    lines: dict[KeyPath, int] = {}
     try:
-        for event in yaml.parse(text, yaml.SafeLoader):
-            builder.take(event)
+        composer = _Composer(text)
+        root = composer.get_node() if composer.check_node() else None
+        if composer.check_node():
+            second: Any = composer.peek_event()  # type: ignore[no-untyped-call]
+            raise YamlError("not valid YAML: more than one document", _line(second))
+        value = None if root is None else _value(root, (), lines)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
         raise YamlError(_error_text(error, text), line) from error
@@ -90,7 +94,7 @@ def read(text: str) -> Document:
         raise YamlError(f"not valid YAML: {error.reason}", line) from error
     except (ValueError, OverflowError) as error:  # for example the escape "\\U99999999"
         raise YamlError(f"not valid YAML: {error}") from error
-    return Document(builder.root, builder.lines)
+    return Document(value, lines)
 
 
 def _error_text(error: yaml.MarkedYAMLError, text: str) -> str:
@@ -130,81 +134,55 @@ for _pattern, _tag in ((_INTEGER, "int"), (_FLOAT, "float")):
     )
 
 
-class _Builder:
-    """Builds values from parser events, without recursion, however deep they nest.
+class _Composer(yaml.BaseLoader):
+    """Composes the nodes of a text within the limits; refuses aliases and tags."""
 
-    Attributes:
-        root: the document so far.
-        lines: line number of each key and each item of a list, from 1.
-    """
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._nodes = self._depth = 0
 
-    def __init__(self) -> None:
-        self.root: Any = None
-        self.lines: dict[KeyPath, int] = {}
-        self._path: list[str | int] = []
-        # From the outermost node to the innermost; a key is None while the next event is a key.
-        self._open_nodes: list[dict[str, Any] | list[Any]] = []
-        self._pending_keys: list[str | None] = []
-        self._nodes = 0
-        self._documents = 0
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Compose a key or a value and all that is in it.
 
-    def take(self, event: yaml.Event) -> None:
-        """Take the next event."""
-        line = event.start_mark.line + 1 if event.start_mark else 1
-        match event:
-            case yaml.DocumentStartEvent():
-                self._documents += 1
-                if self._documents > 1:
-                    raise YamlError("not valid YAML: more than one document", line)
-            case yaml.AliasEvent():
-                raise YamlError(f"write out what the alias *{event.anchor:.40} stands for", line)
-            case yaml.ScalarEvent():
-                self._add(_scalar(event, line), event, line)
-            case yaml.SequenceStartEvent():
-                self._begin([], event, line)
-            case yaml.MappingStartEvent():
-                self._begin({}, event, line)
-            case yaml.SequenceEndEvent() | yaml.MappingEndEvent():
-                self._open_nodes.pop()
-                self._pending_keys.pop()
-                if self._path:
-                    self._path.pop()
-
-    def _begin(
-        self, node: dict[str, Any] | list[Any], event: yaml.CollectionStartEvent, line: int
-    ) -> None:
-        path_part: list[str | int] = []
-        if self._open_nodes:
-            parent, key = self._open_nodes[-1], self._pending_keys[-1]
-            path_part = [len(parent) if isinstance(parent, list) else key or ""]
-        self._add(node, event, line)
-        self._path += path_part
-        self._open_nodes.append(node)
-        self._pending_keys.append(None)
-        if len(self._open_nodes) > DEEPEST_NESTING:
-            raise YamlError(f"nested deeper than {DEEPEST_NESTING} levels", line)
-
-    def _add(
-        self, value: Any, event: yaml.ScalarEvent | yaml.CollectionStartEvent, line: int
-    ) -> None:
+        Raises:
+            YamlError: an alias, a tag, too many nodes, or a node that is nested too deeply.
+        """
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        line = _line(event)
         self._nodes += 1
+        self._depth += 1
+        if isinstance(event, yaml.AliasEvent):
+            raise YamlError(f"write out what the alias *{event.anchor:.40} stands for", line)
         if self._nodes > MOST_NODES:
             raise YamlError(f"more than {MOST_NODES} keys and values", line)
         if event.tag is not None:
             raise YamlError(f"take out the tag {event.tag:.40}: tags are refused", line)
-        if not self._open_nodes:
-            self.root = value
-            return
-        parent, key = self._open_nodes[-1], self._pending_keys[-1]
-        if isinstance(parent, list):
-            self.lines[(*self._path, len(parent))] = line
-            parent.append(value)
-        elif key is None:
-            self._pending_keys[-1] = _new_key(value, parent, line)
-            self.lines[(*self._path, value)] = line
-        else:
-            parent[key] = value
-            self._pending_keys[-1] = None
+        if self._depth > DEEPEST_NESTING and isinstance(event, yaml.CollectionStartEvent):
+            raise YamlError(f"nested deeper than {DEEPEST_NESTING} levels", line)
+        self.anchors = {}  # without aliases, a second anchor of the same name is no mistake
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+def _line(at: Any) -> int:
+    """The line, from 1, on which an event or a node begins."""
+    return int(at.start_mark.line) + 1
+
+
+def _value(node: yaml.Node, where: KeyPath, lines: dict[KeyPath, int]) -> Any:
+    """The value of the node at a path; adds the lines of all keys and items in it to `lines`."""
+    if isinstance(node, yaml.ScalarNode):
+        return _scalar(node)
+    if isinstance(node, yaml.SequenceNode):
+        lines.update({(*where, place): _line(item) for place, item in enumerate(node.value)})
+        return [_value(item, (*where, place), lines) for place, item in enumerate(node.value)]
+    section: dict[str, Any] = {}
+    for key_node, value_node in node.value:
+        key = _new_key(_value(key_node, where, {}), section, _line(key_node))
+        lines[(*where, key)] = _line(key_node)
+        section[key] = _value(value_node, (*where, key), lines)
+    return section
 
 
 def _new_key(key: Any, parent: dict[str, Any], line: int) -> str:
@@ -218,13 +196,13 @@ def _new_key(key: Any, parent: dict[str, Any], line: int) -> str:
     return key
 
 
-def _scalar(event: yaml.ScalarEvent, line: int) -> Any:
-    text: str = event.value
+def _scalar(node: yaml.ScalarNode) -> Any:
+    text, line = str(node.value), _line(node)
     if len(text) > LONGEST_TEXT:
         raise YamlError(f"a value is longer than {LONGEST_TEXT} characters", line)
     if _CONTROL_CHARACTER.search(text):
         raise YamlError("a value holds a control character", line)
-    return _unquoted_value(text, line) if event.style is None else text
+    return _unquoted_value(text, line) if node.style is None else text
 
 
 def _unquoted_value(text: str, line: int) -> Any:

@@ -71,9 +71,8 @@ def mistaken_unit(key: str, value: float) -> tuple[str, float]:
 def value_fault(detail: Any, key: str | int) -> str:
     """What is wrong with a value, as the end of a sentence that begins with its key.
 
-    Args:
-        detail: error reported by pydantic, about the value and not about its key.
-        key: the last key that leads to the value, or its place in a list.
+    `detail` is pydantic's error about the value, not about its key. `key` is the last key that
+    leads to the value, or its place in a list.
     """
     if remedy := _remedy(detail, key):
         return remedy

@@ -86,10 +86,7 @@ def _is_missing_item(detail: Any) -> bool:
 def error_sentence(detail: Any, model: type[BaseModel], former: Mapping[str, str]) -> str:
     """The message about an error that pydantic reports, as one sentence.
 
-    Args:
-        detail: the error.
-        model: model of the file's top level.
-        former: renamed or removed key -> what replaces it.
+    `former` has, for each renamed or removed key, what replaces it.
     """
     kind, value = detail["type"], detail["input"]
     location = tuple(part for part in detail["loc"] if not _is_member(part))
@@ -112,12 +109,7 @@ def error_sentence(detail: Any, model: type[BaseModel], former: Mapping[str, str
 
 
 def _length_fault(detail: Any, types: list[Any]) -> str:
-    """How many values a list has, and how many it needs.
-
-    Args:
-        detail: error reported by pydantic.
-        types: the types that the list may have.
-    """
+    """How many values a list has, and how many it needs; it may have one of these types."""
     value, bounds = detail["input"], detail.get("ctx", {})
     count = f"has {len(value)} {'value' if len(value) == 1 else 'values'}"
     lengths = [

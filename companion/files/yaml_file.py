@@ -184,13 +184,7 @@ def validated(
     model: type[Model],
     places: Mapping[KeyPath, Place] | None = None,
 ) -> Model:
-    """Check data that was already read; errors call it `name`.
-
-    Args:
-        data: keys and values.
-        name: name of the file.
-        model: model to check against.
-        places: places of the keys.
+    """Check data that was already read; errors call it `name`, or the place of the key.
 
     Raises:
         ConfigError: an unknown key or a bad value.

@@ -1,15 +1,12 @@
 """Runs studies in worker processes; each process runs one study at a time."""
 
-import os
-import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from multiprocessing import get_context
 from typing import Any, NamedTuple
 
-from companion.child_process import end_with_parent
+from companion.child_process import end_with_parent, interrupts_blocked
 from companion.study.outcome import Outcome, Tick
 
 RunStudy = Callable[[str, Tick], Outcome]
@@ -35,11 +32,6 @@ _worker_channels: list[_Channels] = []
 
 class _StoppedError(Exception):
     """Ends the study of a worker after the run was interrupted."""
-
-
-def cores() -> int:
-    """Number of processor cores that this process may use."""
-    return len(os.sched_getaffinity(0))
 
 
 def run_in_workers(
@@ -79,19 +71,6 @@ def run_in_workers(
     finally:
         channels.stop_event.set()
         pool.shutdown(cancel_futures=True)
-
-
-@contextmanager
-def interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT in the context, and unblock it afterwards.
-
-    Processes started in the context inherit the blocked signal, so Ctrl-C does not end them.
-    """
-    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def _forward_ticks(

@@ -28,14 +28,10 @@ class ArduPilotCommander:
     """The `Commander` of ArduCopter.
 
     Args:
-        state: the autopilot's state.
-        parameters: the autopilot's parameters.
         vehicle: the simulated vehicle; the failsafe reads its battery.
         control: controls the vehicle in each mode.
-        guided: the task of GUIDED.
         stream: receives the accepted setpoints.
         notifier: sends texts, the home position and changed parameters.
-        boot: progress of the boot.
     """
 
     def __init__(

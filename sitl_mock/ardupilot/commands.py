@@ -48,8 +48,6 @@ class ArduPilotCommands(Commands):
     """The `Commands` of ArduCopter.
 
     Args:
-        state: the autopilot's state.
-        commander: changes arming and modes.
         builders: message id -> builder of the message, for requests.
         announce: sends the reason for a refusal.
     """

@@ -38,10 +38,7 @@ class ArduPilotFailsafe:
     critical.
 
     Args:
-        state: the autopilot's state.
-        parameters: the autopilot's parameters.
         vehicle: the simulated vehicle, which has the battery's voltage.
-        announce: sends texts.
         act: enters the mode of a failsafe, or disarms a vehicle that is on the ground.
     """
 

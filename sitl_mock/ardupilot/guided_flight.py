@@ -33,7 +33,6 @@ class GuidedFlight:
     """Executes the task of GUIDED.
 
     Args:
-        state: the autopilot's state.
         parameters: speeds and options.
         guided: the task.
         hold: holds a point, a heading and a height.

@@ -85,12 +85,9 @@ class PositionHold:
         self.yaw += yaw_step
 
     def step(self, climb_rate: float, dt: float, *, level: bool = False) -> PositionOutput:
-        """Return attitude and thrust of one period.
+        """Return attitude and thrust of one period of `dt` s, at a climb rate, m/s up.
 
-        Args:
-            climb_rate: setpoint, m/s up.
-            dt: the period, s.
-            level: keep level instead of holding the point.
+        With ``level`` the vehicle keeps level instead of holding the point.
         """
         parameters, profile = self._parameters, self.climb_profile
         profile.step(climb_rate, 0.01 * parameters["WPNAV_ACCEL_Z"], dt)

@@ -23,7 +23,6 @@ class ArduPilotModeControl:
     Args:
         state: the autopilot's state; its command and targets are written here.
         parameters: gains, limits and speeds; MOT_THST_HOVER is written here.
-        guided: the task of GUIDED.
         to_throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
     """
 

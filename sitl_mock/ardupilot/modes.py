@@ -59,13 +59,7 @@ def arming_problem(
 ) -> str | None:
     """Return why arming is refused now, in ArduCopter's words; None if it is allowed.
 
-    Args:
-        state: the autopilot's state.
-        initialised: whether the autopilot accepts commands: see `Boot.initialised`.
-        home_set: whether home is set.
-        crashed: whether the vehicle has crashed.
-        gcs_failsafe: whether the ground station failsafe is active.
-        refusal: reason of an active `RefuseArming` fault, None without one.
+    ``refusal`` is the reason of an active `RefuseArming` fault; ``initialised``: see `Boot`.
     """
     mode: Mode = state.mode
     problems = (

@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.motion_telemetry import MAGNETIC_FIELD_NED, Builder, MotionTelemetry
+from sitl_mock.autopilot.motion_telemetry import Builder, MotionTelemetry
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.rigid_body import GRAVITY
 
@@ -11,6 +11,8 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
     """Builds messages from the estimate, as ArduCopter does."""
 
     airspeed = 0.0
+    gauss_in_highres_imu = 1e6
+    """ArduPilot multiplies by 1000 although its field is in mgauss already; as recorded."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder; ArduCopter has no ODOMETRY and no ALTITUDE."""
@@ -40,13 +42,13 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
         return super().global_position_int() or zero_message
 
     def raw_imu(self) -> Message:
-        """Return RAW_IMU in mg, mrad/s and mgauss (the field of a level vehicle heading north)."""
+        """Return RAW_IMU in mg, mrad/s and mgauss."""
         estimate = self._state.estimate
         return dialect.MAVLink_raw_imu_message(
             self._state.stamp_us,
             *(round(1e3 * force / GRAVITY) for force in estimate.specific_force_frd),
             *(round(1e3 * rate) for rate in estimate.body_rates),
-            *(round(1e3 * field) for field in MAGNETIC_FIELD_NED),
+            *(round(1e3 * field) for field in self.magnetic_field()),
         )
 
     def scaled_pressure(self) -> Message:

@@ -25,7 +25,6 @@ class ReturnHome:
     """The height and the leg of a return.
 
     Args:
-        state: the autopilot's state.
         parameters: heights and times.
     """
 

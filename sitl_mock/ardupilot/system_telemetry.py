@@ -37,11 +37,7 @@ class ArduPilotSystemTelemetry(SystemTelemetry):
     """Builds messages about the state, the battery, GPS and the estimator.
 
     Args:
-        state: the autopilot's state.
-        origin: origin of the local frame.
-        identity: content of AUTOPILOT_VERSION.
         vehicle: the simulated vehicle, whose battery is reported.
-        boot: progress of the boot.
     """
 
     def __init__(

@@ -29,11 +29,7 @@ ARDUPILOT_EVENTS: dict[EventKind, Event] = {
 
 
 class ArduPilotAnnouncer:
-    """Sends the texts of events, and other texts, on every link with a client.
-
-    Args:
-        links: links to send on.
-    """
+    """Sends the texts of events, and other texts, on every link with a client."""
 
     def __init__(self, links: Iterable[Link]) -> None:
         self._links = list(links)

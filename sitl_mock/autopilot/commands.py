@@ -36,8 +36,6 @@ class Commands:
     """Executes commands.
 
     Args:
-        state: the autopilot's state.
-        commander: changes arming and modes.
         builders: message id -> builder of the message, for requests.
     """
 

@@ -40,9 +40,6 @@ class _ScheduledFault:
 class FaultSchedule:
     """The faults that are still to come or active now.
 
-    Args:
-        faults: faults of the configuration.
-
     Attributes:
         link_faults: the link faults that are active now.
     """
@@ -114,7 +111,6 @@ class FaultEffects:
     """Applies vehicle faults; `Exchange` applies those of the link.
 
     Args:
-        state: the autopilot's state.
         vehicle: the simulated vehicle; faults change its estimator and its battery.
         commander: refuses arming or changes the mode when a fault demands it.
         control: moves its held position and heading when the estimator resets.

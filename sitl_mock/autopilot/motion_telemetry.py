@@ -15,13 +15,13 @@ from sitl_mock.autopilot.stamp_slips import StampSlips
 from sitl_mock.autopilot.state import PositionTargetEcho, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.geodesy import Geodetic, to_geodetic
-from sitl_mock.physics.quaternion import euler, yaw
+from sitl_mock.physics.quaternion import Vector, euler, to_body, yaw
 from sitl_mock.physics.vehicle import Vehicle
 
 Builder = Callable[[], Message | None]
 """Builds a message; returns None when it has nothing valid."""
 _SEA_LEVEL_HPA = 1013.25
-MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)  # gauss; the body is taken as level, heading north
+_MAGNETIC_FIELD_NED = (0.21, 0.01, 0.42)  # gauss
 # Variances sent in ODOMETRY: m^2 and rad^2, (m/s)^2 and (rad/s)^2.
 _POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
 _VELOCITY_VARIANCES = (0.0095, 0.0086, 0.0052, 0.0, 0.0, 0.0)
@@ -31,10 +31,8 @@ class MotionTelemetry:
     """Builds messages from the estimate.
 
     Args:
-        state: the autopilot's state.
         vehicle: the simulated vehicle; its rotors, its reset counter and (for ArduPilot) its
             shaped attitude target are reported.
-        origin: origin of the local frame.
         slips: lag of the time stamp of LOCAL_POSITION_NED behind the true time.
     """
 
@@ -46,6 +44,8 @@ class MotionTelemetry:
 
     airspeed = nan
     """Airspeed in VFR_HUD, m/s; NaN because there is no airspeed sensor."""
+    gauss_in_highres_imu = 1.0
+    """What HIGHRES_IMU sends for 1 gauss."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""
@@ -157,14 +157,18 @@ class MotionTelemetry:
             0.0,
         )
 
+    def magnetic_field(self) -> Vector:
+        """Return the magnetic field along the body axes (FRD), gauss."""
+        return to_body(self._vehicle.truth.q, _MAGNETIC_FIELD_NED)
+
     def highres_imu(self) -> Message:
-        """Return HIGHRES_IMU; the magnetic field is that of a level vehicle heading north."""
+        """Return HIGHRES_IMU."""
         estimate = self._state.estimate
         return dialect.MAVLink_highres_imu_message(
             self._state.stamp_us,
             *estimate.specific_force_frd,
             *estimate.body_rates,
-            *MAGNETIC_FIELD_NED,
+            *(self.gauss_in_highres_imu * field for field in self.magnetic_field()),
             self.pressure_hpa(),
             0.0,
             self._altitude,
@@ -187,11 +191,13 @@ class MotionTelemetry:
         )
 
     def altitude(self) -> Message:
-        """Return ALTITUDE; altitude_terrain is always 0."""
+        """Return ALTITUDE; the terrain is lower than the estimated height by the true clearance."""
         state = self._state
         up, altitude = -state.estimate.position_ned[2], self._altitude
+        clearance = -self._vehicle.truth.position_ned[2]
+        terrain, relative = up - clearance, up + state.home_ned[2]
         return dialect.MAVLink_altitude_message(
-            state.stamp_us, altitude, altitude, up, up + state.home_ned[2], 0.0, up
+            state.stamp_us, altitude, altitude, up, relative, terrain, clearance
         )
 
     def servo_output_raw(self) -> Message:
@@ -213,18 +219,9 @@ class MotionTelemetry:
 
 def _type_mask(target: PositionTargetEcho) -> int:
     """Return the POSITION_TARGET_TYPEMASK of the components that are not controlled."""
-    groups = (
-        (POSITION_BITS, target.position),
-        (VELOCITY_BITS, target.velocity),
-        (ACCELERATION_BITS, target.acceleration),
-        ((YAW_IGNORED,), (target.yaw,)),
-    )
-    return sum(
-        bit
-        for bits, values in groups
-        for bit, value in zip(bits, values, strict=True)
-        if isnan(value)
-    )
+    bits = (*POSITION_BITS, *VELOCITY_BITS, *ACCELERATION_BITS, YAW_IGNORED)
+    values = (*target.position, *target.velocity, *target.acceleration, target.yaw)
+    return sum(bit for bit, value in zip(bits, values, strict=True) if isnan(value))
 
 
 def upper_triangle(variances: Sequence[float]) -> tuple[float, ...]:

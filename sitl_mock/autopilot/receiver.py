@@ -31,10 +31,7 @@ class Receiver:
     """Calls the handler of every message addressed to this autopilot.
 
     Args:
-        state: the autopilot's state.
-        behaviour: the autopilot's behaviour.
         personality: decodes custom modes, and defines which components the autopilot answers for.
-        system_id: system id of this vehicle.
     """
 
     def __init__(

@@ -24,9 +24,6 @@ class SystemTelemetry:
     """Builds messages about state and link; an autopilot adds its own.
 
     Args:
-        state: the autopilot's state.
-        origin: origin of the local frame.
-        identity: content of AUTOPILOT_VERSION.
         vehicle: the simulated vehicle, whose battery is reported.
     """
 

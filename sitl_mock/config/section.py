@@ -48,13 +48,8 @@ class Section(BaseModel):
 def resolve_preset(presets: Mapping[str, object], value: object, plural: str) -> object:
     """Return the preset that a text names; return any other value unchanged.
 
-    Args:
-        presets: preset by name.
-        value: value of the key in the configuration.
-        plural: what the presets are, for the message, such as "airframes".
-
     Raises:
-        ValueError: no preset has this name.
+        ValueError: no preset has this name; ``plural`` says what they are, such as "airframes".
     """
     if not isinstance(value, str):
         return value
@@ -128,14 +123,8 @@ def describe_wrong_value(error: ValidationError) -> str:
 def describe_wrong_member(detail: Any, annotation: Any) -> str:
     """Return what is wrong with a value that has a ``kind``, such as a fault.
 
-    The value may be no mapping, or its ``kind`` may be missing or unknown.
-
-    Args:
-        detail: error reported by pydantic.
-        annotation: the union of the possible models, or a section with a key of this type.
-
-    Returns:
-        the text to put after the path of the value; empty for other errors.
+    The value may be no mapping, or its ``kind`` may be missing or unknown; for other errors the
+    text is empty. ``annotation`` is the union of the possible models, or a section with such a key.
     """
     if detail["type"] == "model_attributes_type":
         return f" must be a mapping of keys to values (got {detail['input']!r:.60})"

@@ -40,10 +40,7 @@ def link_signing(
 ) -> "Signing | None":
     """Return the signing of a link (``companion`` or ``gcs``), None if there is none.
 
-    Args:
-        config: the user's settings, None = no signing.
-        link: name of the link.
-        unsigned_links: links on which the autopilot accepts unsigned frames by default.
+    On ``unsigned_links`` the autopilot accepts unsigned frames by default.
 
     Raises:
         ConfigError: the passphrase cannot be used.

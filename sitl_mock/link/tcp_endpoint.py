@@ -9,10 +9,6 @@ from sitl_mock.link.byte_stream import ByteStream
 class TcpEndpoint:
     """Serves one client at a time; after it disconnects, another may connect.
 
-    Args:
-        host: address to listen on.
-        port: port to listen on.
-
     Raises:
         ConfigError: the port cannot be used, or the address is not local.
     """

@@ -13,12 +13,9 @@ MAX_DATAGRAM = 2048
 def bound_socket(port: int, option: str) -> socket.socket:
     """Return a non-blocking socket that is bound to a port on this machine.
 
-    Args:
-        port: port to bind.
-        option: command-line option of the port, for the error message.
-
     Raises:
-        ConfigError: there is no such port, or it cannot be bound, for example because it is in use.
+        ConfigError: there is no such port, or it cannot be bound, for example because it is in use;
+            the message names the command-line option of the port.
     """
     udp_socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:

@@ -31,7 +31,6 @@ class Multirotor:
         specific_thrust: specific thrust of all rotors at the start, m/s^2.
 
     Attributes:
-        law: constants.
         body: motion after the latest step. To stop the vehicle, assign `at_rest(q)`.
         actuation: state of controller and rotors after the latest step, its `Mix` first.
     """
@@ -71,10 +70,7 @@ class Multirotor:
     def drive(self, setpoint: Vector, throttle: float, *, controlled: bool = True) -> Load:
         """Run controller, allocation and rotors for one step in still air; return the load.
 
-        Args:
-            setpoint: body rates, rad/s, FRD; NaN and infinity as in `multirotor_step.drive`.
-            throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
-            controlled: whether the rate loop runs; otherwise it idles.
+        The arguments are those of `multirotor_step.drive`.
         """
         load, self.actuation = drive(
             self.law,

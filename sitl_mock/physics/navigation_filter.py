@@ -42,7 +42,6 @@ class NavigationFilter:
     Args:
         config: noise, delays and gains.
         start: the true motion at time 0.
-        seed: seed of the noise.
 
     Attributes:
         law: constants of the errors between two fixes.

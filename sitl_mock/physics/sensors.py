@@ -91,13 +91,8 @@ def estimate(
 ) -> tuple[Estimate, Vector]:
     """Return the present estimate, and the filter's attitude error in it, rad, NED (pure).
 
-    Args:
-        law: constants.
-        state: errors after the latest fix, and all resets.
-        history: the true motion of the latest steps.
-        steps: steps since boot.
-        time: present time, s.
-        noise: 15 numbers, three each for attitude, rates, position, velocity and force.
+    `history` is the true motion of the latest steps, `time` the present time, s. `noise` has three
+    numbers each for attitude, rates, position, velocity and force.
     """
     attitude_row = history[(steps - law.attitude_delay) % len(history)]
     position_row = history[(steps - law.position_delay) % len(history)]
@@ -142,7 +137,6 @@ class Estimator:
         start: the true motion at time 0.
         gravity: acceleration of gravity, m/s^2.
         dt: length of a step, s.
-        seed: seed of all noise.
         make_noise: like `white_noise`, but it may return the numbers in another container.
 
     Attributes:

@@ -68,7 +68,6 @@ class Vehicle:
         wind: steady wind and gusts.
         battery: capacity and voltages.
         sensors: errors of the estimate.
-        seed: seed of all noise.
         heading: heading at the start, rad clockwise from north.
         plant: computes steps and estimates: `PythonPlant`, or `compiled.CompiledPlant`.
 
@@ -77,7 +76,6 @@ class Vehicle:
         on_ground: whether the vehicle stands on the ground.
         crashed: whether a touchdown was a crash.
         estimator: errors of the estimate.
-        plant: the argument `plant`.
     """
 
     def __init__(

@@ -78,16 +78,10 @@ def advance(
     conditions: Conditions,
     count: int,
 ) -> VehicleState:
-    """Advance by `count` steps under one command.
+    """Advance by `count` steps under one command and the same conditions.
 
-    Args:
-        law: constants.
-        rings: ring buffers of the latest setpoints; changed in place.
-        history: the latest rows of `truth_row`, one for each step. It is changed.
-        state: state before the steps.
-        command: command for all steps.
-        conditions: conditions for all steps.
-        count: number of steps.
+    `rings`, the latest setpoints, and `history`, a row of `truth_row` for each of the latest steps,
+    are changed in place.
     """
     steps, body, actuation, position, on_ground, crashed, touchdown_speed = state
     armed, roll, pitch, yaw, thrust = command
@@ -158,12 +152,8 @@ class Plant(Protocol):
     """A vehicle whose steps and estimates are computed in Python, or compiled.
 
     Args:
-        law: constants.
         state: state at the start.
         history_length: number of the latest steps whose motion is kept.
-
-    Attributes:
-        law: the argument `law`.
     """
 
     law: VehicleLaw

@@ -20,7 +20,6 @@ class ArmingChecks:
     Args:
         state: the autopilot's state; the problem found is written here.
         parameters: NAV_DLL_ACT and COM_OF_LOSS_T.
-        stream: the offboard setpoints.
         health: sends the failing checks as events.
         ready_us: vehicle time at which the estimator is ready.
 
@@ -53,10 +52,7 @@ class ArmingChecks:
     ) -> str | None:
         """Store in the state and return why arming is refused now; None if it is allowed.
 
-        Args:
-            gcs_alive: whether a ground station is connected.
-            pilot_present: whether a pilot holds the sticks.
-            refusal: reason of an active `RefuseArming` fault, None without one.
+        ``refusal`` is the reason of an active `RefuseArming` fault.
         """
         state = self._state
         problems = (
@@ -92,7 +88,6 @@ class AutoDisarm:
     """Decides when an armed vehicle on the ground disarms.
 
     Args:
-        state: the autopilot's state.
         parameters: COM_DISARM_LAND and COM_DISARM_PRFLT, s; 0 or less means never.
     """
 

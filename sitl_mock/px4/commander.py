@@ -26,11 +26,7 @@ class Px4Commander:
     """The `Commander` of PX4.
 
     Args:
-        state: the autopilot's state.
-        parameters: the autopilot's parameters.
         control: begins each mode that is entered.
-        stream: the offboard setpoints.
-        announce: sends texts and events.
         checks: finds what forbids arming, and sends the health report.
     """
 

@@ -26,10 +26,7 @@ class Px4Commands(Commands):
     """The `Commands` of PX4.
 
     Args:
-        state: the autopilot's state.
-        commander: changes arming and modes.
         builders: message id -> builder of the message, for requests.
-        origin: origin of the local frame.
     """
 
     def __init__(

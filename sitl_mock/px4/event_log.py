@@ -41,7 +41,6 @@ class EventLog:
 
     Args:
         state: the autopilot's state, which gives the vehicle time.
-        links: links to send on.
     """
 
     def __init__(self, state: State, links: list[Link]) -> None:

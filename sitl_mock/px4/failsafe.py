@@ -38,9 +38,6 @@ class Failsafe:
     """Detects losses, and starts failsafes while armed.
 
     Args:
-        state: the autopilot's state.
-        parameters: the autopilot's parameters.
-        announce: sends texts and events.
         actions: executes the action of a failsafe.
     """
 

@@ -81,7 +81,6 @@ class FailsafeActions:
     Args:
         state: the autopilot's state; ``failsafe`` is written here.
         parameters: COM_FAIL_ACT_T, and the parameters that name actions.
-        announce: sends texts and events.
         enter: enters a mode and leaves the intended mode as it is.
         stop: stops the motors and announces the event.
     """
@@ -120,10 +119,7 @@ class FailsafeActions:
     def act(self, cause: Cause, action: Action, next_action: Action | None = None) -> None:
         """Execute an action unless a more severe cause is active; announce a new action.
 
-        Args:
-            cause: cause of the failsafe.
-            action: action to execute now.
-            next_action: action after COM_FAIL_ACT_T, None if ``action`` is the last.
+        ``next_action`` is the action after COM_FAIL_ACT_T, None if ``action`` is the last.
         """
         if self.cause is not None and self.cause.severity > cause.severity:
             return
@@ -161,10 +157,7 @@ class FailsafeActions:
     def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
         """Execute the action that a parameter selects; before RTL or LAND, hold for COM_FAIL_ACT_T.
 
-        Args:
-            cause: cause of the failsafe.
-            parameter: name of the parameter.
-            lost_us: vehicle time of the loss.
+        ``lost_us`` is the vehicle time of the loss.
         """
         action = LINK_ACTIONS.get(int(self._parameters[parameter]))
         if action is None:

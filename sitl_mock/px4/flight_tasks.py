@@ -21,7 +21,6 @@ class FlightTasks:
     """Computes the demand on the position controller, from the mode or from a setpoint.
 
     Args:
-        state: the autopilot's state.
         parameters: speeds, heights and times.
     """
 

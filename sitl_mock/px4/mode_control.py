@@ -30,8 +30,6 @@ class Px4ModeControl:
 
     Args:
         state: the autopilot's state; its command and targets are written here.
-        parameters: gains, limits and speeds.
-        stream: the offboard setpoints.
     """
 
     def __init__(self, state: State, parameters: ParameterTable, stream: OffboardStream) -> None:

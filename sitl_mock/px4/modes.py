@@ -56,11 +56,6 @@ def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
     """Return HEARTBEAT.base_mode (recorded): 29 in automatic modes, 81 in those of a pilot.
 
     In OFFBOARD it is 1 while PX4 follows body rates, else 17. When armed, it is 128 more.
-
-    Args:
-        mode: the flight mode.
-        armed: whether the motors may turn.
-        attitude_controlled: whether OFFBOARD follows an attitude or a position, not body rates.
     """
     flags = _CUSTOM | (_ARMED if armed else 0)
     if mode is Mode.OFFBOARD:

@@ -28,11 +28,7 @@ class Px4SystemTelemetry(SystemTelemetry):
     """Builds messages about the state, the battery, GPS and the link.
 
     Args:
-        state: the autopilot's state.
-        origin: origin of the local frame.
-        identity: content of AUTOPILOT_VERSION.
         vehicle: the simulated vehicle, whose battery is reported.
-        stream: the offboard setpoints.
     """
 
     def __init__(

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from companion.campaign import store
+from companion.child_process import end_with_parent
 from companion.files import bounded_yaml
 from tests.campaign.test_campaign_file import CONFIGS
 from tests.campaign.test_flights import QUICK
@@ -47,6 +48,7 @@ class Processes:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
+                preexec_fn=end_with_parent,  # noqa: PLW1509  pytest may be killed, too
             )
         return self.running[name]
 

@@ -45,7 +45,7 @@ def test_a_unit_that_is_given_up_is_told_and_can_be_gone_on_with(
 
     monkeypatch.setattr(unit, "fly_case", fly)
     file, out = written(tmp_path, sweep=TILT), tmp_path / "out [bold] of it"
-    monkeypatch.setattr(running, "local_workers", lambda: 2)
+    monkeypatch.setattr(running, "usable_cores", lambda: 2)
     command = ["campaign", str(file), "--out", str(out)]
     assert main([*command, "--scheduler", "tcp://192.0.2.1:8786"]) == 1
     told = capsys.readouterr().out

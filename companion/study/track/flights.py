@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from companion.batch import can_compile
-from companion.child_process import end_with_parent
+from companion.child_process import end_with_parent, interrupts_blocked, usable_cores
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files import bounded_yaml
@@ -20,7 +20,6 @@ from companion.flight.observer import SilentObserver
 from companion.study.outcome import Tick
 from companion.study.step import Floats
 from companion.study.track.tasks import Task
-from companion.study.workers import cores, interrupts_blocked
 from companion.testing import MockVehicle
 from companion.testing import fly as fly_in_memory
 
@@ -80,7 +79,7 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> TrackedFlights:
     Raises:
         ConfigError: raised by a flight, see `fly`; no further flights are begun.
     """
-    core_count = cores()
+    core_count = usable_cores()
     futures: dict[Task, Future[TrackedFlight]] = {}
     workers = min(core_count, len(tasks))
     with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
