@@ -22,6 +22,7 @@ UNANSWERED_CODES = (
     "invalid_attitude",
     "invalid_setpoint",
     "not_sent",
+    "invalid_rates",
 )
 """Names of the codes in the column "unanswered". From 2 on they are the members of `Unanswered`."""
 ACTIONS = (

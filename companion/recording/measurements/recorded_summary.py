@@ -25,7 +25,7 @@ _SETPOINT_COLUMNS = ["received_s", *(f"commanded_{axis}_rad_s" for axis in _AXES
 """Columns of the channel "setpoint" that become columns of `FlightTrace.rates`."""
 _STEP_COLUMNS = ["q_w", "q_x", "q_y", "q_z", "target_north", "target_east"]
 """Columns of the channel "setpoint" that become columns of `FlightTrace.response`."""
-_REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent")
+_REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent", "invalid_rates")
 """Reasons of unanswered samples that count as `LoopCounts.refused`."""
 _REQUIRED_KEYS = frozenset(
     (
