@@ -153,7 +153,10 @@ def read_unit(folder: Path, number: int) -> "pa.Table":
     try:
         return pq.read_table(path)
     except (pa.ArrowException, OSError) as error:
-        raise ConfigError(f"{path}: cannot be read: {error}") from error
+        raise ConfigError(
+            f"{path}: cannot be read: {str(error).rstrip('.')}; delete this file and continue the "
+            "campaign: only its flights are flown again"
+        ) from error
 
 
 def metadata(results: "pa.Table") -> dict[str, Any]:

@@ -84,7 +84,9 @@ class CommandMaker:
         target, later = (self._learning.limit_tilt(each, down) for each in (target, later))
         if not all(map(isfinite, (*target, *later, down))):
             return reference, None
-        self._estimate.vertical_thrust = GRAVITY - down if offboard_active else GRAVITY
+        # Guidance of another package may want more thrust than there is; it does not accelerate.
+        vertical = min(max(0.0, GRAVITY - down), inputs.thrust_limits[1])
+        self._estimate.vertical_thrust = vertical if offboard_active else GRAVITY
         command = GuidanceCommand(
             target,
             down,

@@ -163,8 +163,8 @@ class ControlLoop:
                 return Unanswered.LATE
             if not self._send(sample.time_boot_ms, rates, thrust):
                 return Unanswered.NOT_SENT
-        except AttitudeError:
-            return Unanswered.INVALID_ATTITUDE
+        except AttitudeError as error:
+            return Unanswered.of(error)
         except InvalidSetpoint:
             return Unanswered.INVALID_SETPOINT
         self._note_answer(sample, command, rates, thrust)

@@ -37,6 +37,7 @@ class GuidanceLoop:
         flown_source: the held pose and the source that is flown from it.
         bound_to_hold: True after `give_up`: from then on no source may be flown.
         motion: motion of the vehicle at the last step, without resets, or None.
+        command_not_finite: True if guidance returned NaN or infinity at the last step.
         acceleration: horizontal acceleration of the vehicle at the last step, m/s², NED.
         tracking_error: distance from the reference at the last step, m; see
             `FlownSource.tracking_error`.
@@ -65,6 +66,7 @@ class GuidanceLoop:
     ) -> None:
         self.flown_source = FlownSource()
         self.bound_to_hold = False
+        self.command_not_finite = False
         self.motion: VehicleMotion | None = None
         self.acceleration: NorthEast = (0.0, 0.0)
         self.tracking_error: float | None = None
@@ -230,6 +232,7 @@ class GuidanceLoop:
             self._loop.resets.frame,
             offboard_active=self._loop.offboard_active,
         )
+        self.command_not_finite = command is None
         if command is not None:  # else the command before grows stale
             self._loop.command = command
         return reference

@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 from math import inf
 
-from companion.attitude import BodyRates
+from companion.attitude import AttitudeError, BodyRates
+from companion.attitude.types import InvalidBodyRatesError, InvalidQuaternionError
 from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.records import AttitudeSample
 
@@ -28,6 +29,14 @@ class Unanswered(Enum):
     INVALID_ATTITUDE = "invalid_attitude"
     INVALID_SETPOINT = "invalid_setpoint"
     NOT_SENT = "not_sent"
+    INVALID_RATES = "invalid_rates"
+
+    @classmethod
+    def of(cls, error: AttitudeError) -> "Unanswered":
+        """Whether the attitude could not be used, or the planner did not answer it."""
+        if isinstance(error, InvalidQuaternionError | InvalidBodyRatesError):
+            return cls.INVALID_ATTITUDE
+        return cls.INVALID_RATES
 
     @property
     def words(self) -> str:
@@ -58,11 +67,14 @@ _REASON_WORDS = {
     Unanswered.INVALID_SETPOINT: "the setpoints cannot be used: they are not finite or out of "
     "range",
     Unanswered.NOT_SENT: "setpoints cannot be sent: the connection does not accept them",
+    Unanswered.INVALID_RATES: "the planner gives no body rates: they are NaN or infinite, or it "
+    "refuses the target",
 }
 _REFUSALS = {
     Unanswered.INVALID_ATTITUDE,
     Unanswered.INVALID_SETPOINT,
     Unanswered.NOT_SENT,
+    Unanswered.INVALID_RATES,
 }
 
 

@@ -32,4 +32,7 @@ class PluginGuidance:
         """
         with naming_user_code("guidance", self.guidance):
             target, later, down = self.guidance.command(reference_at, time, inputs)
-            return LinearCommand(Target(*target), Target(*later), float(down))
+            # A number of NumPy is as good as a float; anything else is an error of the guidance.
+            return LinearCommand(
+                Target(*map(float, target)), Target(*map(float, later)), float(down)
+            )

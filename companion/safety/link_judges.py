@@ -12,11 +12,11 @@ _STALL_SHARE = 0.5
 computer is named as the cause."""
 
 
-def silence(limit: float, *, heard: bool) -> Judge:
+def silence(limit: float, *, heard: bool, planner: str = "auto", guidance: str = "linear") -> Judge:
     """No setpoint was sent for longer than `limit` s.
 
     `heard`: True: the judge applies only while frames come from the vehicle; False: only while no
-    frames come.
+    frames come. `planner` and `guidance`: their names in the configuration, for the message.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
@@ -26,7 +26,15 @@ def silence(limit: float, *, heard: bool) -> Judge:
             or (now - control.last_heard < UNHEARD_S) is not heard
         ):
             return None
-        return _silence_cause(now, control, limit)
+        cause = _silence_cause(now, control, limit)
+        if cause == Unanswered.INVALID_RATES.words:
+            return (
+                f"the planner (planner.name: {planner}) gives no body rates: they are NaN or "
+                "infinite, or it refuses the target"
+            )
+        if cause == Unanswered.OLD_TARGET.words and control.command_not_finite:
+            return f"the commands of guidance (guidance.kind: {guidance}) are NaN or infinite"
+        return cause
 
     return judge
 

@@ -67,6 +67,8 @@ class Control(NamedTuple):
     """Arrival of the last position that was newer than all before."""
     position_not_finite: bool = False
     """Whether the newest position was refused for a NaN or infinity."""
+    command_not_finite: bool = False
+    """Whether the newest command of guidance was refused for a NaN or infinity."""
     last_heard: float = inf
     """When the arrival of a frame of any kind from the vehicle was last noticed."""
     position_fresh: bool = True

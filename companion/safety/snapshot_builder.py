@@ -129,6 +129,7 @@ class SnapshotBuilder:
                 record.reason,
                 position_received,
                 refused_at.get("LOCAL_POSITION_NED", -inf) > position_received,
+                self._guidance_loop.command_not_finite,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
                 None if clock.change_count == self._clock_changes else clock.last_change,

@@ -51,7 +51,9 @@ def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of silence, clock, arming, landing and failsafe; all their actions are fixed."""
     limit = config.deadman.silence_limit
     unheard = link_judges.silence(limit, heard=False)
-    silence = link_judges.silence(limit, heard=True)
+    silence = link_judges.silence(
+        limit, heard=True, planner=config.planner.name, guidance=config.guidance.kind
+    )
     return (
         Monitor("unheard", unheard, Action.LISTEN, stream=StreamEffect.STOPS),
         Monitor("silence", silence, _HAND_BACK, stream=StreamEffect.STOPS),

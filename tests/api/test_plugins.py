@@ -19,6 +19,7 @@ from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
 CODE = """
 import sys
+from companion.attitude import AttitudeError
 from companion.attitude.first_order import first_order
 from companion.guidance.linear import LinearGuidance
 
@@ -37,6 +38,14 @@ def raising(q, target, dt, constants):
 def later(q, target, dt, constants):
     if q[1] > 0.02:
         raise RuntimeError("not at this roll")
+    return first_order(q, target, dt, constants)
+
+def blank(q, target, dt, constants):
+    return first_order(q, target, dt, constants) if q[1] < 0.02 else (float("nan"), 0.0, 0.0)
+
+def refusing(q, target, dt, constants):
+    if q[1] > 0.02:
+        raise AttitudeError("not at this roll")
     return first_order(q, target, dt, constants)
 
 def leaving(q, target, dt, constants):
@@ -113,6 +122,15 @@ class Nowhere(LinearGuidance):
     def command(self, reference_at, time, inputs):
         return super().command(reference_at, time, inputs)._replace(down=float("nan"))
 
+class Greedy(LinearGuidance):
+    def command(self, reference_at, time, inputs):
+        target, later, down = super().command(reference_at, time, inputs)
+        return target, later, -1e6 if inputs.now.velocity_ned[0] > 0.5 else down
+
+class Unset(Stumbling):
+    def direction(self):
+        return (None, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0
+
 class Broken(LinearGuidance):
     def command(self, reference_at, time, inputs):
         target, later, down = super().command(reference_at, time, inputs)
@@ -126,6 +144,8 @@ nothing = theirs:nothing
 pair = theirs:pair
 raising = theirs:raising
 later = theirs:later
+blank = theirs:blank
+refusing = theirs:refusing
 leaving = theirs:leaving
 number = theirs:number
 wild = theirs:wild
@@ -140,6 +160,8 @@ calm = theirs:Calm
 drifting = theirs:Drifting
 number = theirs:number
 broken = theirs:Broken
+greedy = theirs:Greedy
+unset = theirs:Unset
 stumbling = theirs:Stumbling
 quitting = theirs:Quitting
 vanishing = theirs:Vanishing
@@ -261,7 +283,7 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
         ("planner: {name: pair}", r"returned \(0.0, 0.0\), not three"),
         (
             "planner: {name: raising}",
-            r"RuntimeError: no \(.*theirs.py:16\); `companion.testing.check_pl",
+            r"RuntimeError: no \(.*theirs.py:17\); `companion.testing.check_pl",
         ),
         ("planner: {name: number}", "unknown planner 5"),
         ("guidance: {kind: number}", "guidance.kind: number cannot be made: TypeError"),
@@ -303,6 +325,27 @@ def test_a_planner_that_fails_before_take_off_is_named_and_nothing_is_handed_bac
     assert vehicle.state()["on_ground"]
 
 
+@pytest.mark.parametrize("name", ["blank", "refusing"])
+def test_a_planner_without_rates_is_named_and_the_attitude_is_not_blamed(name):
+    vehicle = QuickVehicle("px4")
+    flight = {"planner": {"name": name}, "flight": {"maneuvers": ["steps"]}}
+    summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
+    assert summary.result == (
+        f"the planner (planner.name: {name}) gives no body rates: they are NaN or infinite, or it "
+        "refuses the target"
+    )
+    assert not vehicle.state()["crashed"]
+
+
+def test_thrust_that_the_vehicle_does_not_have_is_not_taken_for_motion():
+    """The estimate must not believe that a million m/s² carries the vehicle out of the fence."""
+    vehicle = QuickVehicle("px4")
+    flight = {"guidance": {"kind": "greedy"}, "flight": {"maneuvers": ["circle"]}}
+    summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
+    assert "limits.fence_radius_m" not in summary.result
+    assert not vehicle.state()["crashed"]
+
+
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 @pytest.mark.parametrize(
     ("kind", "raised", "line"),
@@ -310,6 +353,11 @@ def test_a_planner_that_fails_before_take_off_is_named_and_nothing_is_handed_bac
         ("stumbling", "KeyError: 'north'", 'return {}["north"]'),
         ("quitting", "SystemExit", "sys.exit()"),
         ("vanishing", "TypeError: cannot unpack non-iterable NoneType object", ""),
+        (
+            "unset",
+            "TypeError: float() argument must be a string or a real number, not 'NoneType'",
+            "",
+        ),
     ],
 )
 def test_guidance_that_fails_in_flight_is_named_and_the_vehicle_is_handed_back(
@@ -364,7 +412,8 @@ def test_guidance_that_is_not_finite_is_never_sent_and_the_vehicle_is_handed_bac
     vehicle = QuickVehicle(autopilot)
     flight = {"guidance": {"kind": "broken"}, "flight": {"maneuvers": ["circle"]}}
     summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
-    assert summary.result == "guidance makes no commands any more"
+    words = "the commands of guidance (guidance.kind: broken) are NaN or infinite"
+    assert summary.result == words
     assert vehicle.state()["mode"] == {"px4": "LOITER", "ardupilot": "BRAKE"}[autopilot]
     assert not vehicle.state()["crashed"]
     for setpoint in vehicle.setpoints:

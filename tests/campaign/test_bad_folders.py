@@ -144,7 +144,9 @@ def test_results_that_cannot_be_read_are_named(begun, capsys):
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     assert main(["campaign", "report", str(out)]) == 2
-    assert f"{path}: cannot be read: " in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert f"{path}: cannot be read: " in said
+    assert "; delete this file and continue the campaign" in said
     with pytest.raises(ConfigError, match=r"unit-00001.*cannot be read"):
         again._stored_row(out, campaign, SimpleNamespace(unit=1), 1)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)

@@ -26,7 +26,7 @@ class Steps:
 
     def __init__(self, flown):
         self.trace, self.told = FlightTrace(), []
-        self.recorder = StepRecorder(self.trace, flown, state=None, vehicle_clock=None)
+        self.recorder = StepRecorder(self.trace, flown, vehicle=None)
         self.recorder.note = self.told.append
 
     def step(self, now, reference, *, offboard_active=True):

@@ -271,5 +271,7 @@ def test_a_comment_before_the_header_says_the_frame_and_unused_columns_are_known
     lines = ["t,x,y,z,battery", *(f"{t},1,2,{t},9" for t in range(5))]
     assert parse_csv(lines, "x").frame is None
     assert parse_csv(["# made by hand", "# frame: NED", *lines], "x").frame == "ned"
-    assert parse_csv([*lines[:3], "# frame: ned", *lines[3:]], "x").frame is None
+    for below in (1, 3):  # it would be flown as ENU: down instead of up
+        with pytest.raises(TrajectoryError, match=f"x, line {below + 1}: the frame is named below"):
+            parse_csv([*lines[:below], "# frame: ned", *lines[below:]], "x")
     assert parse_csv(lines, "x").unused_columns == ("battery",)

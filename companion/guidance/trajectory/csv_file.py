@@ -98,7 +98,7 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
 
     Args:
         lines: the text. Empty lines are skipped, and so are lines that begin with #, except that a
-            frame before the header is read from them.
+            frame before the header is read from them, and one after it is refused.
         name: the file's name, for error messages.
 
     Raises:
@@ -106,7 +106,7 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
         csv.Error: the text is not CSV.
     """
     frames: list[str] = []
-    rows = list(itertools.islice(rows_of(csv.reader(lines), frames), _MOST_SAMPLES + 2))
+    rows = list(itertools.islice(rows_of(csv.reader(lines), frames, name), _MOST_SAMPLES + 2))
     too_few = f"{name}: needs a header and at least {FEWEST_SAMPLES} samples"
     if not rows:
         raise TrajectoryError(too_few)

@@ -34,12 +34,17 @@ _LONGEST_EXCERPT = 60
 """Largest number of characters that a message quotes from the file."""
 
 
-def rows_of(reader: Any, frames: list[str]) -> Iterator[tuple[int, list[str]]]:
+def rows_of(reader: Any, frames: list[str], name: str) -> Iterator[tuple[int, list[str]]]:
     """Yield the line number and the cells of the header and of each sample.
 
     Args:
         reader: a reader of the `csv` module.
         frames: receives the name of each frame in comments before the header.
+        name: the file's name, for error messages.
+
+    Raises:
+        TrajectoryError: a comment after the header names a frame. Ignored, it would let the vehicle
+            fly the table in another frame: down instead of up.
     """
     header = True
     for row in reader:
@@ -48,7 +53,12 @@ def rows_of(reader: Any, frames: list[str]) -> Iterator[tuple[int, list[str]]]:
         if not row[0].lstrip().startswith("#"):
             header = False
             yield reader.line_num, row
-        elif header and (found := _FRAME.fullmatch(",".join(row).strip().lower())):
+        elif found := _FRAME.fullmatch(",".join(row).strip().lower()):
+            if not header:
+                raise TrajectoryError(
+                    f"{name}, line {reader.line_num}: the frame is named below the header; move "
+                    "this comment to the first line"
+                )
             frames.append(found[1])
 
 

@@ -22,6 +22,7 @@ UNANSWERED_CODES = (
     "invalid_attitude",
     "invalid_setpoint",
     "not_sent",
+    "invalid_rates",
 )
 """Names of the codes in the column "unanswered"; from "another_vehicle" on, the values of
 `Unanswered`."""

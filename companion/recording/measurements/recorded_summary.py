@@ -22,7 +22,7 @@ from companion.recording.trace import ANSWERED, RESPONSE, SENT, FlightTrace
 
 _MOST_BYTES = 1 << 26
 """Largest `summary.json` that is read, bytes."""
-_REFUSALS = ("invalid_attitude", "invalid_setpoint", "not_sent")
+_REFUSALS = ("invalid_attitude", "invalid_rates", "invalid_setpoint", "not_sent")
 """Reasons of unanswered samples that count as `LoopCounts.refused`."""
 _REQUIRED_KEYS = frozenset(
     (
