@@ -6,18 +6,15 @@ from collections.abc import Callable
 from math import degrees
 
 from companion.flight.commands import (
-    ask_to_hold,
     command_if_ours,
     in_role,
     leave_offboard,
     require_role,
-    requiring_roles,
 )
 from companion.flight.context import FlightContext
 from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
 from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
-from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
@@ -136,39 +133,16 @@ async def hand_back(context: FlightContext) -> None:
     await hand_over_to_hold(context)
 
 
-async def hold_when_heard(context: FlightContext) -> None:
-    """Send nothing until the vehicle is heard; if it still obeys us, command it to hold.
-
-    A vehicle that refuses to hold is landed, as in a hand back.
-    ArduPilot stays in GUIDED when setpoints end, and does not hold its position.
-    """
-    frames = context.link.stats.frames
-    await context.until(lambda: context.link.stats.frames > frames, "its next frame")
-    await context.fresh_heartbeat()  # only now, because a request during the silence is lost
-    mode = context.link.state.mode
-    if not context.armed() or not in_role(context.link, Role.OFFBOARD):
-        armed = "armed" if context.armed() else "disarmed"
-        context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
-        return
-    context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
-    context.detail = "its report that it holds"
-    while True:
-        try:
-            await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
-        except CommandRefused as error:  # without setpoints it would drift, so it must land
-            await context.fresh_heartbeat()
-            require_role(context.link, {Role.OFFBOARD})  # a pilot may have taken over meanwhile
-            raise FlightEnded(str(error), Exit.LAND) from error
-        except (CommandTimeout, LinkLost) as error:
-            context.detail = str(error)
-        else:
-            return
-
-
 async def land(context: FlightContext) -> None:
-    """Command the landing, send setpoints until the autopilot lands, and wait for touchdown."""
+    """Command the landing, send setpoints until the autopilot lands, and wait for touchdown.
+
+    Raises:
+        FlightEnded: somebody else has the vehicle, or it does not land in time.
+    """
     context.detail = "the autopilot to accept the landing"
+    context.landing_requested = True
     await hand_over_to_landing(context)
+    allowed = context.config.flight.landing_timeout_s
 
     def touched_down() -> bool:
         height = context.link.state.height
@@ -176,7 +150,11 @@ async def land(context: FlightContext) -> None:
         _require_landing(context)
         return context.ground.touched_down
 
-    await context.until(touched_down)
+    try:
+        async with asyncio.timeout(allowed):
+            await context.until(touched_down)
+    except TimeoutError:
+        raise FlightEnded(f"waited {allowed:g} s for touchdown: {context.detail}") from None
 
 
 async def disarm(context: FlightContext) -> None:
