@@ -7,7 +7,6 @@ from math import degrees
 
 from companion.flight.commands import (
     command_if_ours,
-    in_role,
     leave_offboard,
     require_role,
 )
