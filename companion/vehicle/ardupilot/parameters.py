@@ -175,7 +175,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("FLTMODE_GCSBLOCK",),
         "which modes ArduPilot lets nobody command over MAVLink",
-        bit_clear(UNSAFE, 4096, "BRAKE (value 4096) is refused: asked to hold, it lands instead"),
+        bit_clear(INEFFECTIVE, 4096, "BRAKE (4096) is refused: asked to hold, it lands instead"),
         _REFERENCE,
     ),
     ParameterRule(("MOT_THST_HOVER",), "at which thrust ArduPilot hovers", hover_thrust, _MEASURED),
