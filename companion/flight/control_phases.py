@@ -5,6 +5,8 @@ from collections import deque
 from collections.abc import Callable
 from math import degrees
 
+from companion.attitude import is_unit
+from companion.attitude.kinematics import tilt_angle
 from companion.flight.commands import (
     command_if_ours,
     leave_offboard,
@@ -19,6 +21,12 @@ from companion.vehicle.autopilot import Role
 
 _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
+
+_UPRIGHT_TILT = 45.0
+"""Largest tilt of a vehicle that stands after a landing, °; no vehicle lands on a steeper slope."""
+
+_ATTITUDE_AGE = 1.0
+"""Largest age of the attitude that tells how the vehicle lies, s."""
 
 _MIN_HOLDING_TILT = 5.0
 """Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
@@ -157,7 +165,11 @@ async def land(context: FlightContext) -> None:
 
 
 async def disarm(context: FlightContext) -> None:
-    """Wait until the autopilot disarms, else command disarming; leave modes that forbid arming."""
+    """Wait until the autopilot disarms, else command disarming; leave modes that forbid arming.
+
+    Raises:
+        FlightEnded: somebody else has the vehicle, or it does not stand upright.
+    """
     context.detail = "the autopilot to disarm itself"
 
     def disarmed() -> bool:
@@ -183,6 +195,19 @@ async def disarm(context: FlightContext) -> None:
         await context.until(disarmed)
     await context.fresh_heartbeat()
     await leave_offboard(context)
+    _require_upright(context)
+
+
+def _require_upright(context: FlightContext) -> None:
+    """Raise `FlightEnded` if the vehicle that has landed lies on its side or on its back."""
+    sample, now = context.loop.resets.newest_attitude, asyncio.get_running_loop().time()
+    if sample is None or now - sample.received > _ATTITUDE_AGE or not is_unit(sample.q):
+        return
+    tilt = degrees(tilt_angle(sample.q[1], sample.q[2]))
+    if tilt > _UPRIGHT_TILT:
+        raise FlightEnded(
+            f"the vehicle lies tilted by {tilt:.0f}° after the landing: it tipped over or crashed"
+        )
 
 
 def _require_landing(context: FlightContext) -> None:

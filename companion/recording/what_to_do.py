@@ -47,7 +47,7 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
     "hand back": "read the events before the end; the pilot may have taken over",
     "listen": ADVICE_BY_MONITOR["unheard"],
     "land": "read the events before the end; the pilot may have taken over",
-    "disarm": "disarm by the pilot's switch",
+    "disarm": "if it is still armed, disarm by the pilot's switch; read the events before the end",
 }
 """Advice by the name of the phase."""
 
