@@ -182,7 +182,7 @@ class Vehicle:
 
     async def land(self) -> None:
         """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
-        await self._request(lambda context: landing_phases(context.config.flight), ends_flight=True)
+        await self._request(lambda _: landing_phases(), ends_flight=True)
 
     async def hand_back(self) -> None:
         """Let the autopilot hold the vehicle; the flight ends."""

@@ -52,7 +52,8 @@ class FlightConfig(Section):
     takeoff_timeout_s: Seconds = 40.0
     """Time allowed to reach takeoff_height_m."""
     landing_timeout_s: Seconds = 90.0
-    """Time allowed for the autopilot to report that it landed."""
+    """Time allowed to begin the landing, and again to report that it landed. ArduPilot, which would
+    drift without setpoints, is held until it lands or a pilot takes over."""
 
 
 class HoverConfig(Section):

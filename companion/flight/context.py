@@ -72,6 +72,8 @@ class FlightContext:
     must_disarm: bool = False
     """Whether the flight must disarm the vehicle on the ground, because we commanded arming or
     take-off."""
+    landing_requested: bool = False
+    """Whether the landing has begun or was to begin; a vehicle lost meanwhile must still land."""
     fence_centre: FenceCentre | None = None
     """Centre of the fence in an earlier flight, if the vehicle has not been disarmed since; None:
     the fence is centred where control begins."""

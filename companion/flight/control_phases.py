@@ -5,24 +5,28 @@ from collections import deque
 from collections.abc import Callable
 from math import degrees
 
+from companion.attitude import is_unit
+from companion.attitude.kinematics import tilt_angle
 from companion.flight.commands import (
-    ask_to_hold,
     command_if_ours,
-    in_role,
     leave_offboard,
     require_role,
-    requiring_roles,
 )
 from companion.flight.context import FlightContext
 from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
 from companion.guidance import ManeuverSequence
 from companion.guidance.source import ManeuverSource, Source
-from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
 _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
+
+_UPRIGHT_TILT = 45.0
+"""Largest tilt of a vehicle that stands after a landing, °; no vehicle lands on a steeper slope."""
+
+_ATTITUDE_AGE = 1.0
+"""Largest age of the attitude that tells how the vehicle lies, s."""
 
 _MIN_HOLDING_TILT = 5.0
 """Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
@@ -136,39 +140,16 @@ async def hand_back(context: FlightContext) -> None:
     await hand_over_to_hold(context)
 
 
-async def hold_when_heard(context: FlightContext) -> None:
-    """Send nothing until the vehicle is heard; if it still obeys us, command it to hold.
-
-    A vehicle that refuses to hold is landed, as in a hand back.
-    ArduPilot stays in GUIDED when setpoints end, and does not hold its position.
-    """
-    frames = context.link.stats.frames
-    await context.until(lambda: context.link.stats.frames > frames, "its next frame")
-    await context.fresh_heartbeat()  # only now, because a request during the silence is lost
-    mode = context.link.state.mode
-    if not context.armed() or not in_role(context.link, Role.OFFBOARD):
-        armed = "armed" if context.armed() else "disarmed"
-        context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
-        return
-    context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
-    context.detail = "its report that it holds"
-    while True:
-        try:
-            await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
-        except CommandRefused as error:  # without setpoints it would drift, so it must land
-            await context.fresh_heartbeat()
-            require_role(context.link, {Role.OFFBOARD})  # a pilot may have taken over meanwhile
-            raise FlightEnded(str(error), Exit.LAND) from error
-        except (CommandTimeout, LinkLost) as error:
-            context.detail = str(error)
-        else:
-            return
-
-
 async def land(context: FlightContext) -> None:
-    """Command the landing, send setpoints until the autopilot lands, and wait for touchdown."""
+    """Command the landing, send setpoints until the autopilot lands, and wait for touchdown.
+
+    Raises:
+        FlightEnded: somebody else has the vehicle, or it does not land in time.
+    """
     context.detail = "the autopilot to accept the landing"
+    context.landing_requested = True
     await hand_over_to_landing(context)
+    allowed = context.config.flight.landing_timeout_s
 
     def touched_down() -> bool:
         height = context.link.state.height
@@ -176,11 +157,19 @@ async def land(context: FlightContext) -> None:
         _require_landing(context)
         return context.ground.touched_down
 
-    await context.until(touched_down)
+    try:
+        async with asyncio.timeout(allowed):
+            await context.until(touched_down)
+    except TimeoutError:
+        raise FlightEnded(f"waited {allowed:g} s for touchdown: {context.detail}") from None
 
 
 async def disarm(context: FlightContext) -> None:
-    """Wait until the autopilot disarms, else command disarming; leave modes that forbid arming."""
+    """Wait until the autopilot disarms, else command disarming; leave modes that forbid arming.
+
+    Raises:
+        FlightEnded: somebody else has the vehicle, or it does not stand upright.
+    """
     context.detail = "the autopilot to disarm itself"
 
     def disarmed() -> bool:
@@ -206,6 +195,19 @@ async def disarm(context: FlightContext) -> None:
         await context.until(disarmed)
     await context.fresh_heartbeat()
     await leave_offboard(context)
+    _require_upright(context)
+
+
+def _require_upright(context: FlightContext) -> None:
+    """Raise `FlightEnded` if the vehicle that has landed lies on its side or on its back."""
+    sample, now = context.loop.resets.newest_attitude, asyncio.get_running_loop().time()
+    if sample is None or now - sample.received > _ATTITUDE_AGE or not is_unit(sample.q):
+        return
+    tilt = degrees(tilt_angle(sample.q[1], sample.q[2]))
+    if tilt > _UPRIGHT_TILT:
+        raise FlightEnded(
+            f"the vehicle lies tilted by {tilt:.0f}° after the landing: it tipped over or crashed"
+        )
 
 
 def _require_landing(context: FlightContext) -> None:

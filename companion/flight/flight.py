@@ -202,7 +202,7 @@ class Flight:
         self.note(exit_.value)
         self._end_future = self._new_end_future()
         try:
-            for phase in exit_phases(self._context.config.flight, exit_):
+            for phase in exit_phases(exit_):
                 await self._fly(phase)
         except FlightEnded as ended:
             next_exit = ended.exit or self._usual_exit()

@@ -14,12 +14,21 @@ from companion.flight.commands import (
 from companion.flight.context import FlightContext, cancel
 from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkError, LinkLost
+from companion.mavlink.messages import dialect
+from companion.mavlink.texts import status_texts
 from companion.safety.actions import FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
 _REPETITION_PAUSE = 1.0
 """Time from a refused or unanswered landing command to the next landing command, s. The reason for
 a refusal may have ended by then."""
+
+_PILOT_WARNING_TIME = 10.0
+"""Time for which the vehicle may not have begun to land before its pilot is warned, s; also the
+time between two warnings."""
+
+_PILOT_WARNING = "Companion: it does not land. Switch its mode!"
+"""Text for the pilot's ground station; it fits into one STATUSTEXT."""
 
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 """Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
@@ -56,11 +65,15 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     Before each repetition, a vehicle that still obeys us is asked to hold: ArduPilot would not hold
     its position after our last setpoint. If others command a hold meanwhile, they keep control.
 
+    The time allowed is `flight.landing_timeout_s`. A vehicle that obeys us and would drift without
+    us is held and asked for longer, until somebody takes it over.
+
     Raises:
-        FlightEnded: somebody else has the vehicle.
+        FlightEnded: somebody else has the vehicle, or the time allowed is over.
     """
     require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
     refusal_noted = False
+    patience = _Patience(context)
 
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
@@ -70,6 +83,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         if isinstance(error, CommandRefused) and not refusal_noted:
             refusal_noted = True
             context.note(f"{error}; the landing is requested again every second")
+        patience.check()
         was_offboard = in_role(context.link, Role.OFFBOARD)
         await asyncio.sleep(_REPETITION_PAUSE)
         if was_offboard and not landing():
@@ -78,6 +92,46 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         return requiring_roles(context.link, _OFFBOARD_OR_LAND) if is_offboard else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
+
+
+class _Patience:
+    """Judges how long a vehicle that does not begin to land is asked to, and warns its pilot."""
+
+    def __init__(self, context: FlightContext) -> None:
+        self._context, self._clock = context, asyncio.get_running_loop().time
+        self._began = self._warned_at = self._clock()
+        self._extension_noted = False
+
+    def check(self) -> None:
+        """Call this before each repetition.
+
+        Raises:
+            FlightEnded: the time allowed is over, and the vehicle does not need us.
+        """
+        context, now = self._context, self._clock()
+        allowed = context.config.flight.landing_timeout_s
+        if now - self._warned_at >= _PILOT_WARNING_TIME:
+            self._warned_at = now
+            for text in status_texts(_PILOT_WARNING, dialect.MAV_SEVERITY_CRITICAL, 1):
+                context.link.send(text)
+        if now - self._began < allowed:
+            return
+        if not _drifts_without_us(context):
+            raise FlightEnded(
+                f"waited {allowed:g} s for the autopilot to begin the landing: {context.detail}"
+            )
+        if not self._extension_noted:
+            self._extension_noted = True
+            context.note(
+                f"the vehicle has not begun to land for {allowed:g} s, and would drift without "
+                "setpoints: it is held and asked to land until its pilot switches its mode"
+            )
+
+
+def _drifts_without_us(context: FlightContext) -> bool:
+    """Whether the vehicle obeys our setpoints, and its autopilot would not stop it without them."""
+    obeys = context.loop.offboard_active and in_role(context.link, Role.OFFBOARD)
+    return obeys and not context.link.autopilot.offboard_loss_failsafe.brakes
 
 
 async def _hand_over(

@@ -6,7 +6,7 @@ from math import inf
 from typing import Any
 
 from companion.config.flight import FlightConfig
-from companion.flight import control_phases, preflight_phases, takeoff, takeover
+from companion.flight import control_phases, listening, preflight_phases, takeoff, takeover
 from companion.flight.context import FlightContext
 from companion.flight.hand_over import ROLES_BEFORE_LANDING
 from companion.safety.actions import Exit
@@ -21,8 +21,6 @@ _COMMAND_TIMEOUT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKEOVER_TIMEOUT = 15.0
 """Timeout for the takeover with its preflight checks, s; a lossy link delays their parameters."""
-_LISTENING_TIMEOUT = 10.0
-"""Time to wait for a vehicle that is not heard any more, s."""
 
 Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
 
@@ -82,7 +80,7 @@ def flight_phases(
         allowed_roles=_OFFBOARD_ROLES,
         monitored=True,
     )
-    return (*takeoff_phases(config, autopilot), maneuvers, *landing_phases(config))
+    return (*takeoff_phases(config, autopilot), maneuvers, *landing_phases())
 
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
@@ -168,12 +166,12 @@ def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) 
     )
 
 
-def landing_phases(config: FlightConfig) -> tuple[Phase, ...]:
+def landing_phases() -> tuple[Phase, ...]:
     """The phases from our control back to the ground."""
-    return hand_back_phase(), _land(config), _disarm()
+    return hand_back_phase(), _land(), _disarm()
 
 
-def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
+def exit_phases(exit_: Exit) -> tuple[Phase, ...]:
     """The phases that the flight runs for an exit."""
     return {
         Exit.LEAVE: (),
@@ -181,7 +179,7 @@ def exit_phases(config: FlightConfig, exit_: Exit) -> tuple[Phase, ...]:
         Exit.RELEASE: (),
         Exit.DISARM: (_undo_arming(),),
         Exit.HOLD: (hand_back_phase(),),
-        Exit.LAND: (_land(config), _disarm()),
+        Exit.LAND: (_land(), _disarm()),
     }[exit_]
 
 
@@ -198,20 +196,25 @@ def hand_back_phase() -> Phase:
 
 
 def _listen() -> Phase:
+    """The phase after a lost link; its work limits the time to hear, and the time to hold."""
     return Phase(
         "listen",
         "the vehicle to be heard and to hold",
-        control_phases.hold_when_heard,
-        _LISTENING_TIMEOUT,
+        listening.hold_when_heard,
+        inf,
     )
 
 
-def _land(config: FlightConfig) -> Phase:
+def _land() -> Phase:
+    """The phase of the landing; its work limits the time to begin it, and the time to touch down.
+
+    A vehicle that would drift without us is not left because the time is over.
+    """
     return Phase(
         "land",
         "touchdown",
         control_phases.land,
-        config.landing_timeout_s,
+        inf,
         allowed_roles=ROLES_BEFORE_LANDING | {Role.LAND},
     )
 

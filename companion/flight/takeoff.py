@@ -17,6 +17,10 @@ _MAX_OVERSHOOT = 3.0
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after hold mode is shown, s; then the climb counts as stopped."""
 
+_GROUND_FLAG_TIME = 5.0
+"""Longest time for which a vehicle at its height may be reported on the ground, s. Its motors may
+need some seconds to spool up, and the height may read 1.5 m on the ground."""
+
 
 async def takeoff(context: FlightContext) -> None:
     """Let the autopilot take off, and wait for the height."""
@@ -50,6 +54,7 @@ class _Climb:
         self._context, self._height = context, height
         self._has_begun = False
         self._held_at: float | None = None
+        self._high_on_ground_from: float | None = None
         motion = context.guidance_loop.motion
         self._start_down = None if motion is None else motion.position_ned[2]
 
@@ -70,6 +75,9 @@ class _Climb:
         is_near_height = height > self._height - _MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
             raise self._early_end(height)
+        if is_near_height and state.landed:
+            self._require_leaving_ground(height)
+            return False  # a vehicle that stands must not be taken over: the thrust would lift it
         return is_near_height and abs(position.velocity_ned[2]) < 0.3 and not state.taking_off
 
     def _was_stopped(self) -> bool:
@@ -80,6 +88,18 @@ class _Climb:
         elif self._has_begun and self._held_at is None:
             self._held_at = now
         return self._held_at is not None and now - self._held_at > _ARRIVAL_TIME
+
+    def _require_leaving_ground(self, height: float) -> None:
+        """Raise `FlightEnded` if the vehicle is reported high, and on the ground, for too long."""
+        now = asyncio.get_running_loop().time()
+        if self._high_on_ground_from is None:
+            self._high_on_ground_from = now
+        if now - self._high_on_ground_from > _GROUND_FLAG_TIME:
+            raise FlightEnded(
+                f"the height above home is {height:.1f} m, but the autopilot reports that the "
+                "vehicle is on the ground: home or the height estimate has jumped",
+                Exit.LAND,
+            )
 
     def _early_end(self, height: float) -> FlightEnded:
         """Why the climb ended at a `height` above home (m) that is not the commanded one."""

@@ -7,6 +7,7 @@ from companion.user_code import MESSAGE_START
 ADVICE_BY_MONITOR: Mapping[str, str] = {
     "unheard": "check cable, radio and power: the vehicle was not heard any more",
     "silence": "fix the cause named above: the telemetry, its values, or this computer",
+    "frozen": "find what repeats old telemetry: a relay, a bridge, or the autopilot's estimator",
     "clock": "find why the autopilot restarted or its clock jumped; check its power supply",
     "disarmed": "find who disarmed the vehicle in flight: the pilot's switch or the autopilot",
     "landed": "check the autopilot's land detector, or fly higher: it reported the ground",
@@ -48,7 +49,7 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
     "hand back": "read the events before the end; the pilot may have taken over",
     "listen": ADVICE_BY_MONITOR["unheard"],
     "land": "read the events before the end; the pilot may have taken over",
-    "disarm": "disarm by the pilot's switch",
+    "disarm": "if it is still armed, disarm by the pilot's switch; read the events before the end",
 }
 """Advice by the name of the phase."""
 

@@ -23,7 +23,9 @@ class Action(Enum):
     LAND = "land"
     """Command the autopilot to land, and end offboard control."""
     LISTEN = "listen"
-    """Stop sending setpoints; if the vehicle is heard again and still obeys us, command a hold."""
+    """Stop sending setpoints; if the vehicle is heard again and still obeys us, command a hold.
+
+    A vehicle that was asked to land already is asked to land again."""
     RELEASE = "release"
     """Stop sending setpoints: the pilot or the autopilot's failsafe flies the vehicle."""
 
@@ -42,7 +44,7 @@ class Exit(Enum):
     LAND = "handing back: asking the autopilot to land"
     LISTEN = (
         "releasing control, and listening: if the vehicle is heard again while it still obeys us, "
-        "it is asked to hold"
+        "it is asked to hold, or to land if it was to land"
     )
     RELEASE = "releasing control: the vehicle is left to its pilot and its autopilot"
 

@@ -153,6 +153,12 @@ def foreign_setpoints(max_reports: int) -> Judge:
     return judge
 
 
+def frozen(snapshot: Snapshot, _: bool) -> str | None:
+    """Attitude or position repeats one measurement under new time stamps."""
+    what = snapshot.health.frozen
+    return None if what is None else f"frozen telemetry: {what}"
+
+
 def deadlines(max_share: float) -> Judge:
     """More than the share `max_share` of the setpoints misses deadman.deadline_ms."""
 

@@ -9,6 +9,7 @@ from companion.control.heading_frame import HeadingFrame
 from companion.guidance.fence import FenceCentre, Place
 from companion.guidance.reference import Vector, minus
 from companion.safety.counter_window import CounterWindow
+from companion.safety.frozen_telemetry import FrozenTelemetry
 from companion.safety.setpoint_echo import SetpointEcho
 from companion.safety.snapshot import (
     UNHEARD_S,
@@ -51,6 +52,7 @@ class SnapshotBuilder:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
         self.echo = SetpointEcho(loop.record.sent_setpoints)
         self.counters = CounterWindow(link, loop.record, real_time=real_time)
+        self._frozen = FrozenTelemetry()
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
@@ -82,6 +84,7 @@ class SnapshotBuilder:
         self._clock_changes = self._link.clock.change_count
         self.counters.clear()
         self.echo.begin(self._link.autopilot)
+        self._frozen.begin(now)
 
     @property
     def fence_centre(self) -> FenceCentre | None:
@@ -168,7 +171,15 @@ class SnapshotBuilder:
             gaps=sum(at > since for at in self._loop.record.gaps),
             uplink=timesync.uplink,
             foreign_reports=self.echo.foreign_reports(now),
+            frozen=self._frozen_now(now),
         )
+
+    def _frozen_now(self, now: float) -> str | None:
+        sent = self._loop.record.sent_setpoints
+        if not sent:
+            return None
+        sample, position = self._loop.resets.newest_attitude, self._link.state.position
+        return self._frozen.look(now, sample, sent[-1][0], position)
 
     def _resets(self, now: float) -> Resets:
         resets = self._loop.resets

@@ -48,7 +48,7 @@ def monitors(config: Config) -> tuple[Monitor, ...]:
 
 
 def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
-    """Monitors of silence, clock, arming, landing and failsafe; all their actions are fixed."""
+    """Monitors of silence, frozen data, clock, arming, landing, failsafe; all actions are fixed."""
     limit = config.deadman.silence_limit
     unheard = link_judges.silence(limit, heard=False)
     silence = link_judges.silence(
@@ -57,6 +57,7 @@ def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
     return (
         Monitor("unheard", unheard, Action.LISTEN, stream=StreamEffect.STOPS),
         Monitor("silence", silence, _HAND_BACK, stream=StreamEffect.STOPS),
+        Monitor("frozen", link_judges.frozen, _HAND_BACK, stream=StreamEffect.ENDS),
         Monitor("clock", link_judges.clock_changed, _HAND_BACK, stream=StreamEffect.STOPS),
         Monitor("disarmed", autopilot_judges.disarmed, _RELEASE),
         Monitor("landed", autopilot_judges.landed, _LAND),

@@ -46,6 +46,7 @@ _PARAMETERS: tuple[tuple[str, int | float, int], ...] = (
     ("DISARM_DELAY", 10, _INT8),  # *
     ("FENCE_ACTION", 1, _INT8),
     ("FENCE_ENABLE", 0, _INT8),
+    ("FLTMODE_GCSBLOCK", 0, _INT32),
     ("FRAME_CLASS", 1, _INT8),
     ("FRAME_TYPE", 0, _INT8),
     ("FS_EKF_ACTION", 1, _INT8),  # *

@@ -44,3 +44,12 @@ def disarms(message):
 def climbing(mock):
     """Whether an ArduPilot vehicle, which stays in GUIDED, has accepted the take-off."""
     return mock.autopilot == "ardupilot" and mock.state()["velocity"][2] < -0.01
+
+
+def test_a_landing_in_which_the_vehicle_crashed_is_not_called_good():
+    """PX4 with motors this slow swings up in its own landing, and its failure detector disarms."""
+    mock = QuickVehicle("px4", lockstep=False, airframe={"rotor_lag_ms": 300.0})
+    summary = run(mock, session_for(mock, hover={"duration_s": 10.0}).fly())
+    assert mock.state()["crashed"]
+    assert summary.result.startswith("the vehicle lies tilted by "), summary.events
+    assert summary.result.endswith("after the landing: it tipped over or crashed")

@@ -30,7 +30,7 @@ class Bench:
         landing = (self.phase("land"),)
         monkeypatch.setattr(
             "companion.flight.flight.exit_phases",
-            lambda _, exit_: landing if exit_ is Exit.LAND else (),
+            lambda exit_: landing if exit_ is Exit.LAND else (),
         )
         self.context = SimpleNamespace(
             config=SimpleNamespace(flight=None),

@@ -1,4 +1,4 @@
-"""A vehicle that was silent is heard again while it still obeys us, and refuses to hold."""
+"""A vehicle that was silent is heard again while it still obeys us: it holds, or it lands."""
 
 import pytest
 from pymavlink.dialects.v20 import common as dialect
@@ -71,3 +71,50 @@ def test_a_pilot_who_holds_it_meanwhile_is_not_overruled_by_the_landing():
         truth = mock.state()
     assert (truth["mode"], truth["armed"]) == ("LOITER", True), summary.events
     assert summary.events[-1][1] == "the pilot or another station took over: mode AUTO.LOITER"
+
+
+def test_a_vehicle_heard_late_has_its_own_time_to_hold():
+    """It is listened for until 10.5 s after the loss, and hears us only 1.6 s after we hear it."""
+    with mock_vehicle(autopilot="ardupilot") as mock:
+
+        def lose():
+            for direction, seconds in (("to_companion", 10.4), ("from_companion", 12.0)):
+                mock.inject({"kind": "drop", "direction": direction, "duration_s": seconds})
+
+        observer = When("maneuvers", lose, after=1.0)
+        summary = fly(mock, None, observer, hover={"duration_s": 9.0})
+        assert mock.state()["mode"] == "BRAKE", summary.events
+    assert "asking it to hold" in summary.events[-2][1]
+
+
+def test_a_vehicle_that_hears_no_hold_is_asked_to_land():
+    """The way back heals later: until then it may be asked for `flight.landing_timeout_s`."""
+
+    def lose():
+        for direction, seconds in (("to_companion", 1.0), ("from_companion", 15.0)):
+            mock.inject({"kind": "drop", "direction": direction, "duration_s": seconds})
+
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        observer = When("maneuvers", lose, after=1.0)
+        summary = fly(mock, None, observer, hover={"duration_s": 9.0})
+        truth = mock.state()
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False), (
+        summary.events
+    )
+
+
+def test_a_vehicle_lost_as_it_was_to_land_is_asked_to_land_again():
+    """A battery that is empty does not allow a hold."""
+
+    def lose():
+        mock.inject({"kind": "low_battery", "remaining": 0.15})
+        for direction, after in (("from_companion", 0.0), ("to_companion", 1.0)):
+            begin = {"at_s": mock.time + after, "duration_s": 6.0}
+            mock.inject({"kind": "drop", "direction": direction, **begin})
+
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        observer = When("maneuvers", lose, after=1.0)
+        summary = fly(mock, None, observer, hover={"duration_s": 9.0})
+        truth = mock.state()
+    assert "battery at 15 %" in summary.result
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)

@@ -79,6 +79,21 @@ def test_a_height_that_jumps_in_the_take_off_is_named_and_the_vehicle_lands(jump
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
 
 
+def test_a_vehicle_whose_height_jumps_on_the_ground_is_not_taken_over_there():
+    """It was taken for a climb that had ended, and got setpoints with the thrust of a hover."""
+    jump = {"kind": "estimator_reset", "position_ned_m": (0.0, 0.0, -2.5)}
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        summary = fly(mock, None, When("takeoff", lambda: mock.inject(jump)))
+        truth = mock.state()
+    assert summary.phase == "takeoff"
+    assert summary.result == (
+        "the height above home is 2.5 m, but the autopilot reports that the vehicle is on the "
+        "ground: home or the height estimate has jumped"
+    )
+    assert mock.setpoints == []
+    assert (truth["armed"], truth["position"][2]) == (False, 0.0)
+
+
 def test_a_take_off_from_a_boat_that_moves_is_flown():
     """As seen from the water, which is where the program sees it from."""
     with mock_vehicle() as mock:

@@ -90,5 +90,5 @@ def test_an_unknown_mode_plays_no_role():
 
 def test_each_exit_ends_on_the_ground_or_in_other_hands():
     for exit_ in Exit:
-        names = [phase.name for phase in exit_phases(FlightConfig(), exit_)]
+        names = [phase.name for phase in exit_phases(exit_)]
         assert names in ([], ["disarm"], ["hand back"], ["listen"], ["land", "disarm"])

@@ -1,10 +1,13 @@
 """COMMAND_ACK lies, or does not come; what a vehicle does with a take-off."""
 
+from itertools import pairwise
+
 from tests.hostile import actions
 from tests.hostile import personality as kinds
 from tests.hostile.actions import acks, sets, tells
 from tests.hostile.endings import failed, never_took_off, never_took_over, ok, on_the_ground
-from tests.hostile.personality import PX4
+from tests.hostile.judge import setpoints
+from tests.hostile.personality import BOTH, PX4
 from tests.hostile.scenario import Scenario, flights, in_turn
 
 DONE = ("does it and never answers", "answers twice", "does it and answers somebody else")
@@ -50,9 +53,12 @@ OFFBOARD = tuple(
 
 
 def asked_to_hold(kind):
+    """ArduPilot is asked to land by SET_MODE, too; it would drift without us, so we go on."""
+    pilot = (("in control", 20.0, actions.takes("PILOT")),) if kind.enters_by_setpoint else ()
     for how in (*NOT_DONE, *DONE, "refuses it and does it"):
         name = f"the vehicle, asked to hold, {how}"
-        yield row(name, "in control", kinds.SET_MODE, how, (), kind)
+        scenario = row(name, "in control", kinds.SET_MODE, how, (), kind)
+        yield scenario._replace(script=(*scenario.script, *(pilot if how in NOT_DONE else ())))
 
 
 def mode_told_late(autopilot):
@@ -171,15 +177,36 @@ def holds_in_between(kind):
     )
 
 
-FOR_EVER = Scenario(
-    "the battery is empty, and PX4 refuses to land for ever",
-    (("in control", 0.7, actions.together(actions.BATTERY_EMPTY, acks(kinds.LAND, "refuses it"))),),
-    (failed, left_holding),
-    (PX4,),
-)
+def held_until_the_pilot_has_it(flown):
+    """Past the 5 s of `landing_timeout_s` it is steered, and its pilot is warned."""
+    taken = flown.autopilot.marks["taken"]
+    steered = [sent.t for sent in setpoints(flown) if taken - 15.0 < sent.t < taken]
+    gaps = [later - sooner for sooner, later in pairwise(steered)]
+    assert max(gaps) < 0.1, gaps
+    assert flown.autopilot.vehicle.mode == "PILOT"
+    texts = [sent for sent in flown.autopilot.sent if sent.name == "STATUSTEXT"]
+    assert len(texts) >= 2, flown.events
+    assert "until its pilot switches its mode" in flown.events
 
 
-@flights((*in_turn(endings), *in_turn(holds_in_between), FOR_EVER))
+def for_ever(kind):
+    """PX4's own failsafe acts once we stop; ArduPilot would drift."""
+    commands = {kinds.LAND, kinds.SET_MODE} if kind.enters_by_setpoint else {kinds.LAND}
+    refusals = [acks(command, "refuses it") for command in commands]
+    pilot = (("in control", 30.0, actions.takes("PILOT")),) if kind.enters_by_setpoint else ()
+    demand = held_until_the_pilot_has_it if kind.enters_by_setpoint else left_holding
+    yield Scenario(
+        "the battery is empty, and the vehicle refuses to land for ever",
+        (("in control", 0.7, actions.together(actions.BATTERY_EMPTY, *refusals)), *pilot),
+        (failed, demand),
+        (kind,),
+    )
+
+
+FOR_EVER = tuple(row for kind in BOTH for row in for_ever(kind))
+
+
+@flights((*in_turn(endings), *in_turn(holds_in_between), *FOR_EVER))
 def test_a_command_of_an_exit_has_no_effect(scenario, kind, tmp_path):
     scenario.fly(kind, tmp_path)
 

@@ -347,7 +347,7 @@ def test_every_monitor_and_every_phase_has_its_advice():
     for autopilot in AUTOPILOTS:
         phases += flight_phases(config, 1.0, autopilot)
     for way in Exit:
-        phases += exit_phases(config, way)
+        phases += exit_phases(way)
     assert {phase.name for phase in phases} <= set(ADVICE_BY_PHASE)
 
 

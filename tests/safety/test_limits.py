@@ -163,6 +163,11 @@ SAID = [
         "this program did not send (ATTITUDE_TARGET)",
     ),
     (
+        lambda: link_judges.frozen,
+        at(health=Health(frozen="ATTITUDE_QUATERNION repeats one attitude")),
+        "frozen telemetry: ATTITUDE_QUATERNION repeats one attitude",
+    ),
+    (
         lambda: link_judges.deadlines(0.2),
         at(health=Health(missed_share=0.6)),
         "60 % of the setpoints miss deadman.deadline_ms, more than safety.max_missed = 0.2 (20 %)",

@@ -101,6 +101,7 @@ BREACHES = [
     ("silence", unanswered(Unanswered.AWAITING_MODE), HAND_BACK, 0.0, "did not confirm"),
     ("silence", unanswered(Unanswered.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
     ("silence", unanswered(Unanswered.NOT_SENT), HAND_BACK, 0.0, "cannot be sent"),
+    ("frozen", health(frozen="it repeats"), HAND_BACK, 0.0, "frozen telemetry: it repeats"),
     ("clock", control(clock_change="the vehicle's clock jumped"), HAND_BACK, 0.0, "jumped"),
     ("disarmed", autopilot(armed=False), RELEASE, 0.0, "disarmed in flight"),
     ("landed", autopilot(landed=True), LAND, 0.0, "landed"),
@@ -219,6 +220,7 @@ def test_what_the_rows_of_the_table_say_besides_action_and_time():
         "clock",
     ]
     assert [row.name for row in table if row.stream is StreamEffect.ENDS] == [
+        "frozen",
         "late setpoints",
         "lost setpoints",
     ]

@@ -12,6 +12,7 @@ from companion.control.loop_record import LoopRecord, Unanswered
 from companion.guidance.fence import Place
 from companion.safety.snapshot import AutopilotStatus, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
+from companion.vehicle.records import LocalPosition
 from companion.vehicle.timesync import Uplink
 
 Q = (0.6, 0.0, 0.8, 0.0)
@@ -29,7 +30,7 @@ class Flight:
             battery="battery",
             gps="gps",
             estimator=SimpleNamespace(flags=0x33F),
-            position=SimpleNamespace(received=9.75),
+            position=LocalPosition(9.75, 9.75, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
             global_position=SimpleNamespace(latitude_deg=47.0, longitude_deg=8.0, received=9.0),
             height=12.5,
             reset_counter=3,
@@ -46,7 +47,7 @@ class Flight:
             timesync=SimpleNamespace(round_trip_s=0.04, uplink=Uplink(0.05, 1)),
         )
         self.resets = SimpleNamespace(
-            newest_attitude=SimpleNamespace(q=Q, body_rates=(0.1, 0.2, 0.3)),
+            newest_attitude=SimpleNamespace(received=9.9, q=Q, body_rates=(0.1, 0.2, 0.3)),
             reset_times=[],
             position_shift=(1.0, 2.0, 3.0),
             frame=HeadingFrame(3.0),

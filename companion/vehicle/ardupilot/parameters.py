@@ -114,9 +114,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         ("GUID_OPTIONS",),
         "whether ArduPilot takes the thrust of a setpoint as thrust or as climb rate",
         bit_set(
-            UNSAFE,
-            8,
-            "thrust would be obeyed as a climb rate (bit 3, value 8, makes it thrust)",
+            UNSAFE, 8, "thrust would be obeyed as a climb rate (bit 3, value 8, makes it thrust)"
         ),
         f"{_REFERENCE}; {_MEASURED}",
         vital=True,
@@ -149,11 +147,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("FS_GCS_ENABLE",),
         "what ArduPilot does when the ground station's heartbeat stops",
-        forbidden(
-            INEFFECTIVE,
-            {2.0: "the value 2 was removed in 4.0; its effect depends on the version"},
-            1.0,
-        ),
+        forbidden(INEFFECTIVE, {2.0: "removed in 4.0; its effect depends on the version"}, 1.0),
         f"{_REFERENCE}; {_MEASURED}",
     ),
     ParameterRule(
@@ -176,6 +170,12 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         ("FS_OPTIONS",),
         "in which modes failsafes are ignored",
         bit_clear(INEFFECTIVE, 4, "in GUIDED nothing is done about a lost transmitter"),
+        _REFERENCE,
+    ),
+    ParameterRule(
+        ("FLTMODE_GCSBLOCK",),
+        "which modes ArduPilot lets nobody command over MAVLink",
+        bit_clear(INEFFECTIVE, 4096, "BRAKE (4096) is refused: asked to hold, it lands instead"),
         _REFERENCE,
     ),
     ParameterRule(("MOT_THST_HOVER",), "at which thrust ArduPilot hovers", hover_thrust, _MEASURED),

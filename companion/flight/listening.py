@@ -1,0 +1,67 @@
+"""The phase after a lost link: wait until the vehicle is heard again, then let it hold or land."""
+
+import asyncio
+
+from companion.flight.commands import ask_to_hold, in_role, require_role, requiring_roles
+from companion.flight.context import FlightContext
+from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
+from companion.safety.actions import Exit, FlightEnded
+from companion.vehicle.autopilot import Role
+
+_LISTENING_TIMEOUT = 10.0
+"""Time to wait for a vehicle that is not heard any more, s."""
+
+_HOLD_TIMEOUT = 10.0
+"""Time for a vehicle that is heard again to hold, s; then it is asked to land."""
+
+
+async def hold_when_heard(context: FlightContext) -> None:
+    """Send nothing until the vehicle is heard; if it still obeys us, command it to hold.
+
+    A vehicle that we had asked to land, or that does not hold, is asked to land.
+    ArduPilot stays in GUIDED when setpoints end, and does not hold its position.
+
+    Raises:
+        FlightEnded: it is not heard in time, or it must land, or somebody else has it.
+    """
+    frames = context.link.stats.frames
+    heard = False
+    try:
+        async with asyncio.timeout(_LISTENING_TIMEOUT) as deadline:
+            await context.until(lambda: context.link.stats.frames > frames, "its next frame")
+            heard = True
+            deadline.reschedule(asyncio.get_running_loop().time() + _HOLD_TIMEOUT)
+            await _hold_if_ours(context)
+    except TimeoutError:
+        obeys = heard and context.armed() and in_role(context.link, Role.OFFBOARD)
+        raise FlightEnded(
+            f"waited {_HOLD_TIMEOUT if heard else _LISTENING_TIMEOUT:g} s for the vehicle to be "
+            f"heard and to hold: {context.detail}",
+            Exit.LAND if obeys else None,
+        ) from None
+
+
+async def _hold_if_ours(context: FlightContext) -> None:
+    """Command a vehicle that is heard again, and still obeys us, until it holds."""
+    context.detail = "its heartbeat"
+    await context.fresh_heartbeat()  # only now, because a request during the silence is lost
+    mode = context.link.state.mode
+    if not context.armed() or not in_role(context.link, Role.OFFBOARD):
+        armed = "armed" if context.armed() else "disarmed"
+        context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
+        return
+    if context.landing_requested:
+        raise FlightEnded(f"the vehicle is heard again, still in {mode}: it was to land", Exit.LAND)
+    context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
+    context.detail = "its report that it holds"
+    while True:
+        try:
+            await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
+        except CommandRefused as error:  # without setpoints it would drift, so it must land
+            await context.fresh_heartbeat()
+            require_role(context.link, {Role.OFFBOARD})  # a pilot may have taken over meanwhile
+            raise FlightEnded(str(error), Exit.LAND) from error
+        except (CommandTimeout, LinkLost) as error:
+            context.detail = str(error)
+        else:
+            return

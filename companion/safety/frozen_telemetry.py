@@ -1,0 +1,92 @@
+"""Detects attitudes or positions that repeat one measurement under new time stamps."""
+
+from math import hypot, inf
+
+from companion.attitude import BodyRates
+from companion.vehicle.records import AttitudeSample, LocalPosition
+
+_MIN_REPETITIONS = 10
+"""Smallest number of looks in a row, each with a newer message, that show the same numbers."""
+_MAX_TURN = 0.05
+"""Largest turn that setpoints command while the attitude repeats itself, rad."""
+_MAX_WAY = 0.02
+"""Largest way by the reported speed while the position repeats itself, m."""
+_POSITION_TIME = 0.5
+"""Shortest time for which a position must repeat itself, s: an estimate may be made at 5 Hz."""
+_LONGEST_LOOK_INTERVAL = 0.1
+"""Of a longer time between two looks, only this much counts, s."""
+
+
+class _Repetition:
+    """Counts for how long a message brings the same numbers."""
+
+    def __init__(self) -> None:
+        self.count, self.since = 0, 0.0
+        self._numbers: object = None
+        self._received = -inf
+
+    def take(self, now: float, received: float, numbers: object) -> bool:
+        """Take the newest message at `now`; return whether it is newer and repeats the last one."""
+        if received == self._received:
+            return False
+        self._received = received
+        if numbers != self._numbers:
+            self.count, self.since, self._numbers = 0, now, numbers
+            return False
+        self.count += 1
+        return True
+
+
+class FrozenTelemetry:
+    """Compares attitude and position with what they must do, because we fly by them alone.
+
+    An estimator's numbers change with each message, by the noise of its sensors. Numbers that
+    repeat to the last bit count as frozen only if they contradict themselves: the setpoints turn
+    the vehicle, or the reported speed moves it. So a simulated vehicle at perfect rest is not
+    frozen.
+    """
+
+    def __init__(self) -> None:
+        self.begin(0.0)
+
+    def begin(self, now: float) -> None:
+        """Note that control begins at `now`, s of event-loop time: forget what was before."""
+        self._attitude, self._position = _Repetition(), _Repetition()
+        self._turn, self._looked_at = 0.0, now
+
+    def look(
+        self,
+        now: float,
+        sample: AttitudeSample | None,
+        rates: BodyRates,
+        position: LocalPosition | None,
+    ) -> str | None:
+        """Take the newest messages; return what is frozen, in words, or None.
+
+        Args:
+            now: s of event-loop time; to be called about 50 times a second.
+            sample: the newest attitude.
+            rates: body rates of the newest setpoint, rad/s.
+            position: the newest position.
+        """
+        elapsed = min(now - self._looked_at, _LONGEST_LOOK_INTERVAL)
+        self._looked_at = now
+        if sample is not None:
+            if self._attitude.take(now, sample.received, sample.q):
+                self._turn += hypot(*rates) * elapsed
+            elif self._attitude.count == 0:
+                self._turn = 0.0
+            if self._attitude.count >= _MIN_REPETITIONS and self._turn > _MAX_TURN:
+                return (
+                    "ATTITUDE_QUATERNION repeats one attitude, although setpoints turn the vehicle"
+                )
+        if position is None:
+            return None
+        numbers = position.position_ned, position.velocity_ned
+        self._position.take(now, position.received, numbers)
+        time = now - self._position.since
+        if self._position.count < _MIN_REPETITIONS or time < _POSITION_TIME:
+            return None
+        if hypot(*position.velocity_ned) * time <= _MAX_WAY:
+            return None
+        return "LOCAL_POSITION_NED repeats one position, although it reports a speed"

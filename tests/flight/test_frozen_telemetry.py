@@ -1,0 +1,107 @@
+"""Attitude or position repeats one measurement under new time stamps, as from a broken relay."""
+
+from math import acos, degrees
+from types import SimpleNamespace
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from companion.attitude import BodyRates
+from companion.safety.frozen_telemetry import FrozenTelemetry
+from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
+
+ATTITUDE = ("ATTITUDE_QUATERNION", ("q1", "q2", "q3", "q4"))
+POSITION = ("LOCAL_POSITION_NED", ("x", "y", "z", "vx", "vy", "vz"))
+
+
+class Frozen:
+    """Repeats the first numbers of a message for ever; the time stamps go on."""
+
+    def __init__(self, mock, name, fields):
+        self._name, self._fields, self._kept = name, fields, None
+        self._parser, self._packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
+        mock.to_companion = self._datagram
+
+    def _datagram(self, data):
+        sent = b""
+        for message in self._parser.parse_buffer(data) or ():
+            if message.get_type() != self._name:
+                sent += message.get_msgbuf()
+                continue
+            self._kept = self._kept or [getattr(message, field) for field in self._fields]
+            for field, value in zip(self._fields, self._kept, strict=True):
+                setattr(message, field, value)
+            self._packer.seq = message.get_seq()
+            sent += message.pack(self._packer)
+        return [bytes(sent)] if sent else []
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    ("name", "fields", "told"),
+    [
+        (*ATTITUDE, "repeats one attitude, although setpoints turn the vehicle"),
+        (*POSITION, "repeats one position, although it reports a speed"),
+    ],
+)
+def test_a_vehicle_is_not_flown_by_telemetry_that_stands_still(autopilot, name, fields, told):
+    """It flew on for ten seconds: 15 to 25 m away, or upside down into the ground."""
+    tilts = []
+
+    def look():
+        state = mock.state()
+        _, x, y, _ = state["q"]
+        if not state["on_ground"]:
+            tilts.append(degrees(acos(1.0 - 2.0 * (x * x + y * y))))
+
+    wind = {"speed_m_s": 3.0, "gust_m_s": 1.0}
+    with mock_vehicle(autopilot=autopilot, wind=wind) as mock:
+        mock.after_step.append(look)
+        observer = When("maneuvers", lambda: Frozen(mock, name, fields), after=1.0)
+        summary = fly(
+            mock, None, observer, flight={"takeoff_height_m": 6.0}, hover={"duration_s": 10.0}
+        )
+        mock.run(5.0)
+        truth = mock.state()
+    assert summary.result == f"frozen telemetry: {name} {told}"
+    assert (truth["mode"] in ("LOITER", "BRAKE"), truth["crashed"]) == (True, False)
+    assert max(tilts) < 45.0
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_simulated_vehicle_at_perfect_rest_is_not_frozen(autopilot):
+    noises = ("attitude_noise_deg", "rate_noise_rad_s", "position_noise_m", "velocity_noise_m_s")
+    quiet = {**dict.fromkeys(noises, 0.0), "ekf": "none"}
+    with mock_vehicle(autopilot=autopilot, sensors=quiet) as mock:
+        summary = fly(mock, hover={"duration_s": 20.0})
+    assert summary.result == "ok", summary.events
+
+
+def looks(times, attitude=lambda t: 1.0, rate=0.0, place=lambda t: t, speed=1.0):
+    """What is found frozen in looks at these times, each at new messages."""
+    frozen = FrozenTelemetry()
+    for t in times:
+        sample = SimpleNamespace(received=t, q=(attitude(t), 0.0, 0.0, 0.0))
+        position = SimpleNamespace(
+            received=t, position_ned=(place(t), 0.0, 0.0), velocity_ned=(speed, 0.0, 0.0)
+        )
+        found = frozen.look(t, sample, BodyRates(rate, 0.0, 0.0), position)
+        if found:
+            return found
+    return None
+
+
+TIMES = [0.02 * step for step in range(100)]
+
+
+def test_what_contradicts_itself_is_frozen():
+    assert "attitude" in looks(TIMES, rate=0.1)
+    assert "position" in looks(TIMES, place=lambda t: 3.0)
+
+
+def test_what_only_repeats_itself_is_not_frozen():
+    assert looks(TIMES) is None, "no turn is commanded"
+    assert looks(TIMES, place=lambda t: 3.0, speed=0.0) is None, "it reports that it stands"
+    at_5_hz = looks(TIMES, attitude=lambda t: t // 0.1, rate=0.4, place=lambda t: t // 0.2)
+    assert at_5_hz is None, "estimates made at 5 and 10 Hz, sent at 50 Hz"
