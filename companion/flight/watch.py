@@ -26,8 +26,11 @@ _HEARTBEAT_REQUEST_PERIOD = 0.15
 _STATUS_AGE = 2.5
 """Age from which a status is requested again, s: half of the age from which it counts as unknown,
 which ends the flight."""
-_HEARD_AGE = 0.5
-"""A status is requested only if a position came within this time, s: a silent link lacks all."""
+_HEARTBEAT_SHARE = 0.5
+"""Share of the largest age of the mode at which HEARTBEAT is requested again."""
+_HEARD_AGE = 0.2
+"""A status is requested only while positions come at least this often, s: a silent link lacks
+all."""
 _COUNTING_TIME = 0.1
 """Time over which `set_rates` counts messages, s; the counts are not used."""
 
@@ -50,6 +53,7 @@ class RateRequester:
         self._link = link
         self._link_config = link_config
         self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._silent_at = -inf
 
     def check(self, health: Health) -> None:
         """Request each message whose rate is too low now."""
@@ -65,20 +69,30 @@ class RateRequester:
             self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
             self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
 
-    def check_statuses(self, now: float) -> None:
-        """Request each status that has come before and has not come for `_STATUS_AGE` at `now`."""
+    def check_statuses(self, now: float, heartbeat_limit: float) -> None:
+        """Request each status that has come before, is overdue at `now`, and has a requested rate.
+
+        Args:
+            now: our clock, s.
+            heartbeat_limit: age from which the mode counts as unknown, s.
+        """
         state, wanted = self._link.state, self._link.autopilot.wanted_rates
         if state.position is None or now - state.position.received > _HEARD_AGE:
+            self._silent_at = now
             return
+        heartbeat_age = heartbeat_limit * _HEARTBEAT_SHARE
         statuses = (
-            ("GPS_RAW_INT", state.gps),
-            ("SYS_STATUS", state.battery),
-            ("EXTENDED_SYS_STATE", state.landed_state),
-            ("ESTIMATOR_STATUS", state.estimator),
-            ("EKF_STATUS_REPORT", state.estimator),
+            ("HEARTBEAT", state.heartbeat, heartbeat_age),
+            ("GPS_RAW_INT", state.gps, _STATUS_AGE),
+            ("SYS_STATUS", state.battery, _STATUS_AGE),
+            ("EXTENDED_SYS_STATE", state.landed_state, _STATUS_AGE),
+            ("ESTIMATOR_STATUS", state.estimator, _STATUS_AGE),
+            ("EKF_STATUS_REPORT", state.estimator, _STATUS_AGE),
         )
-        for message, status in statuses:
-            if message in wanted and status is not None and now - status.received > _STATUS_AGE:
+        for message, status, longest in statuses:
+            if message not in wanted or status is None:
+                continue
+            if now - max(status.received, self._silent_at) > longest:
                 self._request_once(message, wanted[message])
 
     async def _request_rate(self, message: str, rate: float) -> None:
@@ -131,7 +145,7 @@ class Watch:
         if phase.monitored and self._context.loop.offboard_active:
             self._judge_snapshot(now)
         if phase.allowed_roles:
-            self._rate_requester.check_statuses(now)
+            self._rate_requester.check_statuses(now, self._context.heartbeat_limit)
             self._judge_heartbeat(now, monitored=phase.monitored)
 
     def on_current_mode(self, phase: Phase) -> None:

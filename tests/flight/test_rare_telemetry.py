@@ -68,7 +68,12 @@ def test_what_stays_rare_is_handed_back(tmp_path, autopilot, message, hz, words)
 
 STATUSES = {
     "px4": {"GPS_RAW_INT": 24, "ESTIMATOR_STATUS": 230, "EXTENDED_SYS_STATE": 245},
-    "ardupilot": {"GPS_RAW_INT": 24, "EKF_STATUS_REPORT": 193, "EXTENDED_SYS_STATE": 245},
+    "ardupilot": {
+        "HEARTBEAT": 0,  # PX4's cannot be stopped
+        "GPS_RAW_INT": 24,
+        "EKF_STATUS_REPORT": 193,
+        "EXTENDED_SYS_STATE": 245,
+    },
 }
 
 
@@ -84,6 +89,24 @@ def test_a_status_that_a_station_stopped_is_asked_for_again_and_flown_on(autopil
     assert summary.result == "ok", summary.events
     (told,) = asked_again(summary)
     assert told.startswith(f"{status} comes too rarely: requesting ")
+
+
+@pytest.mark.parametrize("phase", ["takeoff", "land"])
+def test_a_heartbeat_that_a_station_stopped_ends_neither_take_off_nor_landing(phase):
+    """The vehicle was left to its pilot, and armed after the landing."""
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        stop = When(phase, lambda: mock.command(SET_MESSAGE_INTERVAL, 0, -1.0), 1.0)
+        summary = fly(mock, None, stop)
+        assert not mock.state()["armed"]
+    assert summary.result == "ok", summary.events
+
+
+def test_a_silence_of_the_whole_link_is_no_reason_to_ask_for_a_status_again():
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        lose = lambda: mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 0.7})  # noqa: E731
+        summary = fly(mock, None, When("land", lose, 1.0))
+    assert summary.result == "ok", summary.events
+    assert not asked_again(summary)
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
