@@ -12,6 +12,7 @@ from companion.guidance import ManeuverSequence
 from companion.preflight.all_checks import blocking_findings, run_checks, unsafe_findings
 from companion.preflight.evidence import Evidence, Identity, Stage
 from companion.preflight.finding import Finding
+from companion.preflight.parameters import parameters
 from companion.preflight.session import gather, wanted_rates
 from companion.safety.actions import FlightEnded
 from companion.vehicle.link import Link
@@ -101,6 +102,28 @@ class PreflightChecks:
         evidence = replace(evidence, stage=stage, maneuvers=planned, known_drag=drag)
         self._act_on(run_checks(self._config, evidence, repeated=before is not None))
         return evidence
+
+    def on_parameter(self, name: str, value: float) -> None:
+        """Warn if a station has changed a checked parameter, of an armed vehicle, to an unsafe one.
+
+        The flight goes on: to end it would need the failsafes that the change may have worsened.
+        """
+        before = self._evidence
+        if before is None or self._link.state.armed is not True:
+            return
+        survey = before.survey
+        newest_name = next((new for new, old in survey.present_names.items() if old == name), "")
+        if survey.values.get(newest_name, value) == value:
+            return
+        changed_survey = survey._replace(values={**survey.values, newest_name: float(value)})
+        self._evidence = replace(before, survey=changed_survey)
+        known = unsafe_findings(parameters(self._config, before))
+        for finding in unsafe_findings(parameters(self._config, self._evidence)):
+            if finding not in known:
+                self._note_once(
+                    f"another station changed a parameter in flight, which is unsafe now: "
+                    f"{finding.sentence()}"
+                )
 
     def _act_on(self, findings: list[Finding]) -> None:
         """End the flight for findings that block it; report other unsafe and ineffective ones."""

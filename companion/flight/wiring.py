@@ -84,6 +84,7 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
         link.subscribe("HEARTBEAT", on_heartbeat),
         link.subscribe("CURRENT_MODE", on_current_mode),
         link.subscribe("ATTITUDE_TARGET", on_attitude_target),
+        link.subscribe_parameters(context.preflight.on_parameter),
     )
     try:
         retuning, record = Retuning(loop, guidance_loop), assembled.trace.recorder

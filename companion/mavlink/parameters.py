@@ -117,6 +117,11 @@ class ParameterClient:
             "probably has no parameter of that name (names change between versions)"
         )
 
+    def value_in(self, payload: bytes) -> tuple[str, float | int]:
+        """Name and value in the payload of a PARAM_VALUE; the autopilot must be known."""
+        name, value = _name_and_value(payload)
+        return name, self._decoded(value)
+
     def _require_valid_name(self, name: str) -> None:
         if not (0 < len(name) <= _MAX_NAME_LENGTH and name.isascii()):
             raise UnknownParameter(f"{name!r} is no parameter name: 1 to 16 ASCII characters")
@@ -144,17 +149,21 @@ class ParameterClient:
             raise ParameterRefused(f"{name} cannot hold {value}: {error}") from error
 
     def _on_value(self, payload: bytes) -> None:
-        padded = payload.ljust(_VALUE_LAYOUT.size, b"\0")
-        raw, _, _, name, param_type = _VALUE_LAYOUT.unpack_from(padded)
-        name_text = name.split(b"\0", 1)[0].decode("ascii", errors="replace")
-        answers = self._pending.get(name_text)
+        name, value = _name_and_value(payload)
+        answers = self._pending.get(name)
         if answers is not None:
-            answers.put(_Value(raw, param_type))
+            answers.put(value)
 
     def _on_error(self, message: Message) -> None:
         answers = self._pending.get(message.param_id)
         if answers is not None:
             answers.put(message.error)
+
+
+def _name_and_value(payload: bytes) -> tuple[str, _Value]:
+    padded = payload.ljust(_VALUE_LAYOUT.size, b"\0")
+    raw, _, _, name, param_type = _VALUE_LAYOUT.unpack_from(padded)
+    return name.split(b"\0", 1)[0].decode("ascii", errors="replace"), _Value(raw, param_type)
 
 
 def _refusal(name: str, code: int) -> UnknownParameter | ParameterRefused:

@@ -132,6 +132,18 @@ class VehicleClient:
         """
         return await self._parameters.read(name, timeout_s, retries)
 
+    def subscribe_parameters(self, callback: Callable[[str, float | int], None]) -> Unsubscribe:
+        """Call `callback` with name and value of each parameter that the autopilot reports.
+
+        It also reports those that another station has read or changed.
+        """
+
+        def on_payload(payload: bytes) -> None:
+            if self.state.autopilot is not None:  # else the encoding is unknown
+                callback(*self._parameters.value_in(payload))
+
+        return self._dispatcher.subscribe_raw("PARAM_VALUE", on_payload)
+
     async def write_parameter(
         self, name: str, value: float, *, timeout_s: float = 1.0, retries: int = 3
     ) -> float | int:

@@ -66,3 +66,20 @@ def test_a_parameter_changed_in_flight_may_look_like_another_program_and_the_adv
     assert "that this program did not send" in summary.result, summary.events
     advice = what_to_do("foreign setpoints", summary.phase)
     assert "a station may have changed a parameter in flight" in advice
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "name"), [("px4", b"COM_OF_LOSS_T"), ("ardupilot", b"GUID_TIMEOUT")]
+)
+def test_a_failsafe_that_a_station_makes_unsafe_in_flight_is_told(autopilot, name):
+    """Read only before take-off, the rates held for 10 s were flown with without a word."""
+    changed = dialect.MAVLink_param_set_message(1, 1, name, 10.0, 9)
+    harmless = dialect.MAVLink_param_set_message(1, 1, name, 0.9, 9)
+    with mock_vehicle(autopilot=autopilot) as mock:
+        mock.at(13.0, lambda: mock.transmit(harmless))
+        change = When("maneuvers", lambda: mock.transmit(changed), after=3.0)
+        summary = fly(mock, None, change, **HOVER)
+    assert summary.result == "ok", summary.events
+    (told,) = [text for _, text in summary.events if "changed a parameter" in text]
+    assert "which is unsafe now" in told
+    assert f"{name.decode()} is 10: when setpoints stop, the last rates are held for 10 s" in told
