@@ -22,6 +22,9 @@ from companion.vehicle.autopilot import Role
 _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
+_FALLING_SPEED = 2.5
+"""Speed downward, m/s, at which a disarmed vehicle falls: one that has landed stands still."""
+
 _UPRIGHT_TILT = 45.0
 """Largest tilt of a vehicle that stands after a landing, °; no vehicle lands on a steeper slope."""
 
@@ -144,7 +147,7 @@ async def land(context: FlightContext) -> None:
     """Command the landing, send setpoints until the autopilot lands, and wait for touchdown.
 
     Raises:
-        FlightEnded: somebody else has the vehicle, or it does not land in time.
+        FlightEnded: somebody else has the vehicle or disarmed it, or it does not land in time.
     """
     context.detail = "the autopilot to accept the landing"
     context.landing_requested = True
@@ -155,6 +158,7 @@ async def land(context: FlightContext) -> None:
         height = context.link.state.height
         context.detail = "touchdown" + ("" if height is None else f", now {height:.1f} m")
         _require_landing(context)
+        _require_not_falling(context)
         return context.ground.touched_down
 
     try:
@@ -196,6 +200,14 @@ async def disarm(context: FlightContext) -> None:
     await context.fresh_heartbeat()
     await leave_offboard(context)
     _require_upright(context)
+
+
+def _require_not_falling(context: FlightContext) -> None:
+    """Raise `FlightEnded` if the vehicle falls without its motors: this is no landing."""
+    position = context.fresh_position()
+    falls = position is not None and position.velocity_ned[2] > _FALLING_SPEED
+    if falls and not context.armed():
+        raise FlightEnded("the vehicle disarmed in the landing, not by us, and fell", Exit.RELEASE)
 
 
 def _require_upright(context: FlightContext) -> None:

@@ -140,9 +140,12 @@ class Watch:
         self._context.ground.update()
         self._context.replacement_detector.update()
         self._context.replacement_detector.require()
+        in_control = phase.monitored and self._context.loop.offboard_active
+        if in_control and self._context.link.state.armed is False:
+            self._judge_snapshot(now)  # ArduPilot's mode changes, too, but nobody took over
         if phase.allowed_roles:
             require_role(self._context.link, phase.allowed_roles, self._context.released_by())
-        if phase.monitored and self._context.loop.offboard_active:
+        if in_control:
             self._judge_snapshot(now)
         if phase.allowed_roles:
             self._rate_requester.check_statuses(now, self._context.heartbeat_limit)

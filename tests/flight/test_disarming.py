@@ -3,9 +3,11 @@
 import pytest
 
 from sitl_mock.link.framing import decode
-from tests.flight.fly import QuickVehicle, run, session_for
+from tests.flight.fly import QuickVehicle, fly, mock_vehicle, run, session_for
+from tests.flight.others import When
 
 ARM = 400
+EVEN_IN_THE_AIR = 21196.0
 LOST_S = 6.0
 
 
@@ -53,3 +55,21 @@ def test_a_landing_in_which_the_vehicle_crashed_is_not_called_good():
     assert mock.state()["crashed"]
     assert summary.result.startswith("the vehicle lies tilted by "), summary.events
     assert summary.result.endswith("after the landing: it tipped over or crashed")
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize(
+    ("phase", "result"),
+    [
+        ("maneuvers", "the vehicle disarmed in flight"),
+        ("land", "the vehicle disarmed in the landing, not by us, and fell"),
+    ],
+)
+def test_motors_that_somebody_stops_in_the_air_end_no_good_flight(autopilot, phase, result):
+    """In the landing the fall was called a touchdown, and on ArduPilot a takeover in GUIDED."""
+    with mock_vehicle(autopilot=autopilot) as mock:
+        kill = When(phase, lambda: mock.command(ARM, 0.0, EVEN_IN_THE_AIR), 1.0)
+        summary = fly(mock, None, kill, flight={"takeoff_height_m": 6.0})
+        height = -mock.state()["position"][2]
+    assert summary.result == result, summary.events
+    assert height > 1.0
