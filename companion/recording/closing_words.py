@@ -149,7 +149,9 @@ def _gain_warning(figures: Figures) -> list[str]:
 def _when_ended(end: dict[str, Any]) -> str:
     words = f"at {end['time_s']:.1f} s, in phase `{end['phase']}`"
     if end["since_takeoff_s"] is None:
-        words += ", before take-off"
+        # In later phases it may fly although it was not heard to.
+        is_on_ground = end["phase"] in _PHASES_BEFORE_TAKEOFF
+        words += ", before take-off" if is_on_ground else ", before a lift-off was heard"
     if end["maneuver"] is not None:
         words += f", {end['into_maneuver_s']:.1f} s into {end['maneuver']}"
     return words
