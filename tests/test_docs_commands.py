@@ -18,7 +18,6 @@ from pathlib import Path
 import pytest
 import yaml
 
-from companion.attitude import BodyRates
 from companion.campaign.loading import load as load_campaign
 from companion.cli import command_line, flying
 from companion.cli.main import main
@@ -197,14 +196,3 @@ def test_configurations_on_pages_are_valid(page: Path, block: str, tmp_path: Pat
         ):  # a name that an installed package of the reader's brings
             return
         yaml_file.parse(yaml.safe_dump(data), named(page), Config)
-
-
-def test_the_example_of_the_law_shows_what_it_says() -> None:
-    page = (ROOT / "docs/the-law.md").read_text("utf-8")
-    ((_, block),) = [found for found in BLOCK.findall(page) if found[0] == "python"]
-    *program, expression, shown = block.strip().splitlines()
-    scope: dict[str, object] = {}
-    exec("\n".join(program), scope)
-    value = eval(expression, scope)
-    assert isinstance(value, BodyRates)
-    assert shown.removeprefix("# ").startswith(repr(value))
