@@ -19,7 +19,7 @@ SPEED, GAIN = 4.0, 2.0  # m/s, 1/s
 async def main() -> None:
     async with connect(fenced, mock) as vehicle:
         await vehicle.take_off()
-        print(f"control began {vehicle.state.position_ned[0]:.1f} m north")
+        print(f"control began {vehicle.state.position_ned[0]:z.1f} m north")
         async with vehicle.control() as control:
             async for state in control.states(seconds=20.0):
                 north, east, down = state.velocity_ned

@@ -32,8 +32,8 @@ for k in range(301):
         north, east = coefficients(tuple(q))
         ideal = 1.0 - exp(-GAIN * k * DT)
         print(
-            f"{k * DT:.1f} s: north {north:+.3f} (model {ideal * target.north:+.3f}),"
-            f" east {east:+.3f} (model {ideal * target.east:+.3f})"
+            f"{k * DT:.1f} s: north {north:+z.3f} (model {ideal * target.north:+z.3f}),"
+            f" east {east:+z.3f} (model {ideal * target.east:+z.3f})"
         )
     wanted = np.array(planner.rates(tuple(q), target, DT))
     omega += (wanted - omega) * (1.0 - exp(-DT / LAG))

@@ -29,7 +29,7 @@ INDEX = ROOT / "docs/index.md"
 PAGES = [README, ROOT / "examples/README.md", *sorted((ROOT / "docs").glob("*.md"))]
 MOST_WORDS = 900  # of README.md: it is read in five minutes
 
-BLOCK = re.compile(r"^[ \t]*```(\w*)\n(.*?)^[ \t]*```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^[ \t]*```(\w*)(?: title=[^\n]*)?\n(.*?)^[ \t]*```$", re.MULTILINE | re.DOTALL)
 INLINE = re.compile(r"`([^`\n]+)`")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 COMMAND = re.compile(r"(\.venv/bin/)?companion (?=--|[a-z])")

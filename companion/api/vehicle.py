@@ -14,7 +14,11 @@ from companion.api.state import ConnectedFlight, State
 from companion.config import Config, trajectory_file
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded, fly_maneuvers
-from companion.flight.maneuver_checks import naming_trajectory_errors, require_followable
+from companion.flight.maneuver_checks import (
+    naming_trajectory_errors,
+    require_followable,
+    slowed_from,
+)
 from companion.flight.phases import (
     Phase,
     hand_back_phase,
@@ -135,13 +139,14 @@ class Vehicle:
             path = line(to, speed, acceleration, jerk)
             await self.follow(replace(path, heading=FixedHeading(new_heading)))
 
-    async def follow(self, trajectory: Trajectory | Path | str) -> None:
+    async def follow(self, trajectory: Trajectory | Path | str, *, slow_down: bool = False) -> None:
         """Follow a trajectory from the present position.
 
         Unless the trajectory holds the heading, the vehicle first turns to its initial heading.
 
         Args:
             trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
+            slow_down: slow it down where it breaks a limit, as `--slow-down` does; its path stays.
 
         Raises:
             ConfigError: the trajectory is unreadable, inconsistent, or breaks a limit or the fence.
@@ -155,6 +160,9 @@ class Vehicle:
         else:
             with naming_trajectory_errors(str(getattr(trajectory, "name", ""))):
                 trajectory = await call_in_thread(checked_trajectory, trajectory)
+        if slow_down:
+            config, drag = self._flight.context.config, self._flight.context.known_drag
+            trajectory = await call_in_thread(slowed_from, config, trajectory, self._begin(), drag)
         await self._fly(Follow(trajectory, self._flight.context.config.limits.max_yaw_rate))
 
     @asynccontextmanager
@@ -206,10 +214,13 @@ class Vehicle:
         )
 
     def _require_followable(self, maneuver: Maneuver) -> None:
-        context, position = self._flight.context, self._held_pose().position_ned
-        centre = context.snapshot_builder.fence_centre_ned or (0.0, 0.0, 0.0)
-        north, east, down = minus(position, centre)
-        require_followable(context.config, maneuver, (north, east, down), context.known_drag)
+        context = self._flight.context
+        require_followable(context.config, maneuver, self._begin(), context.known_drag)
+
+    def _begin(self) -> Vector:
+        """Where the vehicle is held, relative to the centre of the fence, m NED."""
+        centre = self._flight.context.snapshot_builder.fence_centre_ned or (0.0, 0.0, 0.0)
+        return minus(self._held_pose().position_ned, centre)
 
     def _held_pose(self) -> Pose:
         """The pose that guidance holds, or at which its present maneuver began.

@@ -6,6 +6,7 @@ from pathlib import Path
 from shlex import quote
 
 from companion.cli.exit_codes import EXIT_OK
+from companion.cli.flying import program_command
 from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
 from companion.config.files import json_schema, load, shipped, with_assignments
@@ -92,7 +93,7 @@ def init(options: argparse.Namespace) -> int:
     except OSError as error:
         raise ConfigError(f"--out: cannot write {out}: {error.strerror}") from error
     out_words = quote(str(out))  # it may have a space
-    print(f"Wrote {out}. Check it with: companion check-config {out_words}")
+    print(f"Wrote {out}. Check it with: {program_command()} check-config {out_words}")
     return EXIT_OK
 
 

@@ -67,15 +67,18 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     return flown_config
 
 
-def invocation(options: argparse.Namespace) -> Invocation:
-    """The command line of this run, for messages."""
+def program_command() -> str:
+    """The command by which a shell starts this program again."""
     program = Path(sys.argv[0])
     if program.name != "companion":  # `python -m companion`
-        program_command = f"{sys.executable} -m companion"
-    else:
-        program_command = "companion" if shutil.which("companion") == str(program) else str(program)
+        return f"{sys.executable} -m companion"
+    return "companion" if shutil.which("companion") == str(program) else str(program)
+
+
+def invocation(options: argparse.Namespace) -> Invocation:
+    """The command line of this run, for messages."""
     config = None if options.config is None else str(options.config)
-    return Invocation(program_command, options.typed, config)
+    return Invocation(program_command(), options.typed, config)
 
 
 def fly(

@@ -149,8 +149,9 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
     for section, values in part.items():
         if section == "mock":
             raise ConfigError(
-                f"{included}: `mock` is not allowed in an included file: "
-                "the mock vehicle reads only the main file; move the section there"
+                f"{included}: `mock` is not allowed in an included file: the mock vehicle reads "
+                "only the main file; move the section there (`companion init mock` writes a file "
+                "that has one)"
             )
         if section == _INCLUDE:
             continue

@@ -51,25 +51,27 @@ class ExpectedResponse:
         """Whether the gain is larger than the largest sensible gain."""
         return self.largest_gain is not None and self.gain > self.largest_gain
 
-    def sentence(self) -> str:
-        """A message for the user: time constant, its main cause, and the effect of each cause."""
+    def clauses(self) -> list[str]:
+        """The parts of `sentence`: time constant, its causes by their effect, the shortest one."""
         changes = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
-            for name, time in self.time_constants_without.items()
+            for name, time in sorted(self.time_constants_without.items(), key=lambda item: item[1])
             if time < _NOTICEABLE_SHARE * self.time_constant
         )
         tilt = degrees(asin(self.coefficient))
-        shortest_text = ""
+        told = [
+            f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
+            f"expected to have a time constant of {self.time_constant:.2f} s",
+            f"{self.limited_by} limits it most ({changes})",
+        ]
         shortest = self.shortest_time_constant
         if shortest is not None:
-            shortest_text = (
-                f"; the largest sensible gain without rate limit would give {shortest:.2f} s"
-            )
-        return (
-            f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
-            f"expected to have a time constant of {self.time_constant:.2f} s; "
-            f"{self.limited_by} limits it most ({changes}){shortest_text}"
-        )
+            told.append(f"the largest sensible gain without rate limit would give {shortest:.2f} s")
+        return told
+
+    def sentence(self) -> str:
+        """A message for the user: time constant, its main cause, and the effect of each cause."""
+        return "; ".join(self.clauses())
 
     def gain_sentence(self) -> str:
         """A message for the user about the largest sensible gain."""
@@ -144,12 +146,14 @@ def _largest_coefficient_rate(config: Config) -> float:
 def expectations(config: Config) -> list[str]:
     """Messages for the user: expected response, largest sensible gain, position-hold gains.
 
+    The message about the response has a line for each clause, because it is long.
     For a planner of another package, only the message about the position hold.
     """
     if config.planner_name not in PLANNER_NAMES:
         return [hold_sentence(config)]
     response = expected_response(config)
-    return [response.sentence(), response.gain_sentence(), hold_sentence(config)]
+    lines = "\n  ".join(response.clauses())
+    return [lines, response.gain_sentence(), hold_sentence(config)]
 
 
 def hold_sentence(config: Config) -> str:

@@ -34,7 +34,7 @@ _BACKLOG_DRAIN_TIME = 0.5
 """Time after a stall of this program within which the queued telemetry is read, s."""
 
 _SHORTEST_STALL = 0.2
-"""A heartbeat during whose wait this program did not run for longer is not called fresh, s."""
+"""A heartbeat is not fresh if the stalls of this program while waiting for it add up to this, s."""
 
 _MAX_STALLED_WAITS = 3
 """After so many waits with a stall, a heartbeat counts as fresh: a computer that always stalls must
@@ -123,12 +123,16 @@ class FlightContext:
         `_BACKLOG_DRAIN_TIME` is fresh. If this program stalls meanwhile, the answer may be queued
         as well, and a pilot may have taken over since: then this function waits again.
         """
+        # The watch reads these counters on each heartbeat, so before the wait below ends.
+        counters, now = self.snapshot_builder.counters, asyncio.get_running_loop().time
         for _ in range(_MAX_STALLED_WAITS):
-            if await self._wait_for_heartbeat() < _SHORTEST_STALL:
+            began = now()
+            await self._wait_for_heartbeat()
+            if counters.stall_time(since=began) < _SHORTEST_STALL:
                 return
 
-    async def _wait_for_heartbeat(self) -> float:
-        """Wait as `fresh_heartbeat` says; return the longest stall meanwhile, s."""
+    async def _wait_for_heartbeat(self) -> None:
+        """Wait as `fresh_heartbeat` says, but only once."""
         loop = asyncio.get_running_loop()
         fresh_from = loop.time() + _BACKLOG_DRAIN_TIME
         fresh = loop.create_future()
@@ -149,16 +153,11 @@ class FlightContext:
 
         unsubscribe = self.link.subscribe("HEARTBEAT", on_heartbeat)
         request_task = asyncio.create_task(ask())
-        longest_stall = 0.0
         try:
-            while not fresh.done():
-                began = loop.time()
-                await asyncio.wait({fresh}, timeout=_POLL_PERIOD)
-                longest_stall = max(longest_stall, loop.time() - began - _POLL_PERIOD)
+            await fresh
         finally:
             request_task.cancel()
             unsubscribe()
-        return longest_stall
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it is stale."""

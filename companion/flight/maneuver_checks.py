@@ -23,17 +23,19 @@ from companion.guidance.reference import Vector
 from companion.guidance.trajectory import (
     Envelope,
     Motion,
+    Trajectory,
     TrajectoryError,
     Violation,
     judge,
+    slow_down,
     violations,
 )
 from companion.safety.table import fence_of
 
 _SLOWER_REMEDY = "make it slower or smaller, or change the limit"
 _SLOWER_IN_PROGRAM = (
-    "fly it more slowly (go_to: a lower speed, acceleration or jerk; flight.slow_down does not "
-    "change what a program flies), or change the limit"
+    "fly it more slowly (follow: slow_down=True; go_to: a lower speed, acceleration or jerk), or "
+    "change the limit"
 )
 
 
@@ -88,19 +90,27 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
         ConfigError: the trajectory cannot be computed, or not be flown within the limits and the
             fence.
     """
-    envelope = envelope_of(config, drag)
-    check = envelope.fence
-    assert check is not None
-
-    def fence(motion: Motion) -> Violation | None:
-        return check(replace(motion, position=motion.position + np.array(begin)))
-
     if isinstance(maneuver, Follow | HeldHeadingManeuver):
         with naming_trajectory_errors(maneuver.name):
-            found = violations(maneuver.trajectory, replace(envelope, fence=fence))
+            found = violations(maneuver.trajectory, _envelope_from(begin, config, drag))
         if found:
             remedy = _SLOWER_IN_PROGRAM if found[0].slowing_helps else found[0].remedy
             raise ConfigError(f"{maneuver.name}: {found[0]}; {remedy}")
+
+
+def slowed_from(
+    config: Config, trajectory: Trajectory, begin: Vector, drag: KnownDrag
+) -> Trajectory:
+    """The trajectory slowed down where it breaks a limit from the present place.
+
+    Arguments as in `require_followable`.
+
+    Raises:
+        ConfigError: it breaks a limit at any speed, or cannot be computed.
+    """
+    envelope = with_reserve(config, _envelope_from(begin, config, drag))
+    with naming_trajectory_errors(trajectory.name):
+        return slow_down(trajectory, envelope).trajectory
 
 
 def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: KnownDrag) -> None:
@@ -201,6 +211,18 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
         drag=drag.most,
         gravity=GRAVITY,
     )
+
+
+def _envelope_from(begin: Vector, config: Config, drag: KnownDrag) -> Envelope:
+    """The limits for a trajectory that begins at `begin`, m NED from where control began."""
+    envelope = envelope_of(config, drag)
+    check = envelope.fence
+    assert check is not None
+
+    def fence(motion: Motion) -> Violation | None:
+        return check(replace(motion, position=motion.position + np.array(begin)))
+
+    return replace(envelope, fence=fence)
 
 
 def with_reserve(config: Config, envelope: Envelope) -> Envelope:

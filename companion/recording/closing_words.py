@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from companion.recording.measurements.verdict import (
+    LATENCY,
     LOST_ROWS,
     Check,
     Figures,
@@ -19,6 +20,7 @@ from companion.recording.what_to_do import what_to_do
 
 _PHASES_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
 _SHARED_OPTIONS = ("--endpoint", "--set")
+_SLOW_COMPUTER_MONITORS = ("deadlines", "starvation")
 LEFT_BY_USER = "left at once by the user"
 """Result of a flight that was cancelled, for example by Ctrl-C in a user's program."""
 _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
@@ -185,12 +187,24 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
         and end["since_takeoff_s"] is None
     ):
         return None if config_options is None else command("doctor", *config_options)
+    if again[:1] == ["demo"] and _computer_was_slow(figures):
+        return command(*again, "--lockstep")
     if end is None and figures["settings"]:
         changes = [f"{key}={value}" for key, value in figures["settings"].items()]
         return command(*again, *(word for change in changes for word in ("--set", change)))
     if end is None and config_options is not None and figures["planner"] == "first-order":
         return command("identify", *config_options)
     return command("plot", figures["log"]) if figures["log"] is not None else None
+
+
+def _computer_was_slow(figures: Figures) -> bool:
+    """Whether this computer was too slow to fly in real time, where lockstep would wait for it."""
+    if figures["lockstep"]:
+        return False
+    end = figures["early_end"]
+    if end is not None:
+        return end["monitor"] in _SLOW_COMPUTER_MONITORS
+    return any(check.what == LATENCY and not check.good for check in checks(figures))
 
 
 def _shared_options(arguments: Sequence[str]) -> list[str]:

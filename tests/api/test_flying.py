@@ -22,6 +22,8 @@ from tests.flight.test_tracking import FAST
 
 EIGHT = trajectory_file.load(CONFIGS / "trajectories" / "figure8.yaml")
 
+FAST_LINE = line((4.0, 0.0, 0.0), speed=3.0, acceleration=4.0, jerk=20.0)
+
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 
 
@@ -500,3 +502,23 @@ def test_a_fast_vehicle_that_is_to_hold_stops_and_does_not_swing_back(autopilot)
     assert max(speeds) > 4.0
     assert min(speeds) > -0.5  # it was -4
     assert abs(speeds[-1]) < 0.2
+
+
+def test_follow_slows_a_trajectory_down_to_the_limits_but_not_into_the_fence():
+    """`--slow-down` is for `companion fly`; a program had to know our limits as an `Envelope`."""
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        with pytest.raises(ConfigError, match="follow: slow_down=True"):
+            await vehicle.follow(FAST_LINE)
+        await vehicle.follow(FAST_LINE, slow_down=True)
+        with pytest.raises(ConfigError, match="fence"):  # it begins 4 m from the centre now
+            await vehicle.follow(FAST_LINE, slow_down=True)
+        await vehicle.land()
+
+    limits = {"max_tilt_deg": 15.0, "fence_radius_m": 6.5}
+    summary, _ = flown(program, QuickVehicle("px4"), limits=limits)
+    assert summary.result == "ok"
+    (flown_line,) = [figures for figures in summary.maneuvers() if figures.name == "line"]
+    assert flown_line.duration > 1.2 * FAST_LINE.duration
+    assert summary.extent()["maneuver_tilt_max_deg"] < 17.0

@@ -13,9 +13,11 @@ from companion.cli.main import main
 from companion.config import Config
 from companion.control.inner_loop import planner
 from companion.control.outer_loop import make_guidance
+from companion.drag import Drag
 from companion.files.yaml_file import ConfigError, parse
+from companion.guidance import GuidanceInput, Reference, VehicleMotion
 from companion.testing import check_guidance, check_planner, conformance, fly
-from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
+from tests.flight.fly import CONFIGS, QUICK_FLIGHT, QuickVehicle, merged
 
 CODE = """
 import sys
@@ -168,13 +170,17 @@ vanishing = theirs:Vanishing
 half = theirs:Half
 empty = theirs:Empty
 nowhere = theirs:Nowhere
+my-guidance = my_package:MyGuidance
 """
+PAGE = (CONFIGS.parent / "docs/extending.md").read_text("utf-8")
+(SHOWN,) = re.findall(r'^```python title="my_package\.py"\n(.*?)^```$', PAGE, re.M | re.S)
 
 
 @pytest.fixture(autouse=True)
 def installed(tmp_path, monkeypatch):
     """A package with plug-ins, installed as pip does."""
     (tmp_path / "theirs.py").write_text(CODE)
+    (tmp_path / "my_package.py").write_text(SHOWN)
     info = tmp_path / "their_package-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: their-package\nVersion: 1.0\n")
@@ -182,7 +188,8 @@ def installed(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     invalidate_caches()
     yield
-    sys.modules.pop("theirs", None)
+    for module in ("theirs", "my_package"):
+        sys.modules.pop(module, None)
 
 
 def told(role, name, raised, line):
@@ -256,6 +263,23 @@ def quick(monkeypatch):
 def test_guidance_of_another_package_flies_by_its_name():
     assert type(make_guidance(config("guidance: {kind: calm}")).guidance).__name__ == "Calm"
     check_guidance("calm")
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_guidance_of_the_page_flies_and_corrects_a_part_at_most():
+    check_guidance("my-guidance")
+    still = VehicleMotion((0.0, 0.0, -5.0), (0.0, 0.0, 0.0))
+    inputs = GuidanceInput(still, still, (0.0, 0.0), (0.0, 0.0), Drag(0.3), (5.0, 18.0))
+
+    def tilt(kind, away):
+        guidance = make_guidance(config(f"guidance: {{kind: {kind}}}"))
+        reference = Reference((0.6 * away, 0.8 * away, -5.0))
+        target = guidance.command(lambda _: reference, 0.0, inputs).target
+        return target.north, target.east
+
+    assert tilt("my-guidance", 0.1) == pytest.approx(tilt("linear", 0.1))
+    assert tilt("my-guidance", 8.0) == pytest.approx(tilt("linear", 0.2))
+    assert hypot(*tilt("linear", 0.2)) < 0.7 * hypot(*tilt("linear", 8.0))
 
 
 @pytest.mark.parametrize(

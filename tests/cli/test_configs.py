@@ -214,8 +214,12 @@ def test_a_file_that_changes_nothing_is_told_when_it_is_checked(tmp_path, capsys
 def test_a_command_to_copy_has_its_path_in_quotes(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["init", "px4", "--out", "my drone.yaml"]) == 0
-    command = capsys.readouterr().out.partition("Check it with: companion ")[2]
-    assert main(shlex.split(command)) == 0
+    monkeypatch.setattr("sys.argv", [".venv/bin/companion"])
+    assert main(["init", "px4", "--out", "my other drone.yaml"]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert second.startswith("Wrote my other drone.yaml. Check it with: .venv/bin/companion ")
+    for told in (first, second):
+        assert main(["check-config", *shlex.split(told.partition(" check-config ")[2])]) == 0
 
 
 def test_a_refused_path_names_the_key_that_every_command_takes(tmp_path, capsys):

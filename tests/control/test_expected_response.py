@@ -110,8 +110,8 @@ def test_the_words_about_a_response():
     found = ExpectedResponse(0.25, 0.5, time_constants_without, 5.0, 5.0)
     assert found.sentence() == (
         "a step from -0.25 to 0.25 (±14° of tilt) is expected to have a time constant of 0.50 s; "
-        "limits.max_tilt_rate_deg_s limits it most (0.40 s with twice planner.gain_per_s, "
-        "0.30 s without limits.max_tilt_rate_deg_s)"
+        "limits.max_tilt_rate_deg_s limits it most (0.30 s without limits.max_tilt_rate_deg_s, "
+        "0.40 s with twice planner.gain_per_s)"
     )
     assert not found.gain_is_too_high
     assert found.gain_sentence() == (

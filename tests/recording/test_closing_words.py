@@ -242,6 +242,22 @@ def test_a_flight_that_ended_early_says_when_why_and_what_to_do():
     assert told.next_command == "companion plot flights/one"
 
 
+@pytest.mark.parametrize("monitor", ["deadlines", "starvation"])
+def test_a_demo_that_the_computer_was_too_slow_for_is_flown_in_lockstep_next(monitor):
+    """On a busy computer the first `make demo` failed, and the words led to realtime.scheduler."""
+    demo = Invocation(".venv/bin/companion", ["demo", "--maneuvers", "steps"], None)
+    slow = {**GOOD, **ENDED, "early_end": {**END, "monitor": monitor}}
+    late = changed(("latency_us", "p99"), 9000.0)
+    for figures in (slow, late):
+        told = words(figures, demo)[0]
+        assert told.next_command == ".venv/bin/companion demo --maneuvers steps --lockstep"
+        assert words({**figures, "lockstep": True}, DEMO)[0].next_command == (
+            "companion plot flights/one"
+        )
+        assert "--lockstep" not in str(words(figures, MINE)[0].next_command)
+    assert "--lockstep" not in str(words({**GOOD, **ENDED}, demo)[0].next_command)
+
+
 def test_a_vehicle_that_is_left_armed_in_the_air_comes_before_all_else():
     armed = {**GOOD, **ENDED, "at_the_end": {"armed": True, "mode": "AUTO.LOITER"}}
     _, text = words(armed)

@@ -62,6 +62,7 @@ class Flight:
             motion=Motions(self.course.position_ned, self.course.velocity),
             acceleration=(0.0, 0.0),
             tracking_error=0.9,
+            command_not_finite=False,
             fresh_position=lambda: "fresh",
         )
         self.builder = SnapshotBuilder(

@@ -19,7 +19,10 @@ _NO_PERMISSION = "not permitted; add yourself to its group: sudo adduser $USER d
 _IN_USE = "in use by another program (a ground station?); end that first"
 _NO_HARDWARE = "no hardware answers under this name; is it plugged in and enabled?"
 _OPEN_FAULTS: dict[int | None, str] = {
-    errno.ENOENT: "there is no such device; is it plugged in? `ls /dev/serial/by-id` helps",
+    errno.ENOENT: (
+        "there is no such device; is it plugged in? `ls /dev/serial/by-id` lists USB devices; a "
+        "port of the computer's own (ttyAMA0, ttyTHS1) must be enabled first"
+    ),
     errno.EACCES: _NO_PERMISSION,
     errno.EPERM: _NO_PERMISSION,
     errno.EBUSY: _IN_USE,

@@ -32,6 +32,8 @@ MIN_BATTERY_MARGIN = 0.10
 """Smallest charge at the end beyond `limits.min_battery_percent`, 0..1."""
 
 
+LATENCY = "latency"
+"""`Check.what` of the time from sample to setpoint."""
 LOST_ROWS = "rows of the flight's figures were lost"
 """Words that mark the advice about lost rows; their cause is the disk, not the configuration."""
 
@@ -223,7 +225,7 @@ def _latency(figures: Figures) -> Iterator[Check]:
         return  # vehicle time has no latency
     deadline = figures["deadline_ms"]
     yield Check(
-        "latency",
+        LATENCY,
         f"{1e-3 * late:.2f} ms in 99 % of the answers (deadline {deadline:g} ms)",
         1e-3 * late <= deadline,
         "end other programs on this computer, or set realtime.scheduler: fifo",
