@@ -63,7 +63,7 @@ def taken_over(mock, source, program=None):
                 environment,
                 Changes(config),
             )
-            with connected(link, assembled):
+            async with connected(assembled):
                 flight = asyncio.ensure_future(assembled.flight.run())
                 if program is not None:
                     await asyncio.wait_for(program(assembled.context), 60.0)
