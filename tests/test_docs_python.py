@@ -5,10 +5,12 @@ docs/python.md in `api/test_python_page`.
 """
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
 
+from companion import testing
 from companion.attitude import BodyRates
 from tests.flight.fly import QuickVehicle, fly
 
@@ -49,7 +51,8 @@ def test_a_program_of_ones_own_is_tested_as_the_page_on_serving_shows():
     given["test_it_is_answered"]()
 
 
-def test_a_flight_of_ones_own_is_tested_as_the_page_on_python_shows():
+def test_a_flight_of_ones_own_is_tested_as_the_page_on_python_shows(monkeypatch):
+    monkeypatch.setattr(testing, "MockVehicle", partial(QuickVehicle, full_rate=True))
     (block,) = [block for block in blocks("docs/python.md") if "def test_" in block]
     flown = []
 
