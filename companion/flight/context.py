@@ -17,6 +17,7 @@ from companion.guidance import ManeuverSequence
 from companion.guidance.fence import FenceCentre
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import dialect
+from companion.safety.actions import Exit, FlightEnded
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
@@ -114,6 +115,10 @@ class FlightContext:
             self.detail = detail
         while not condition():  # noqa: ASYNC110 - telemetry sets no events
             await asyncio.sleep(_POLL_PERIOD)
+
+    def timed_out(self, seconds: float, waited_for: str, exit_: Exit | None = None) -> FlightEnded:
+        """The failure of a wait that took longer than the `seconds` allowed."""
+        return FlightEnded(f"waited {seconds:g} s for {waited_for}: {self.detail}", exit_)
 
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that left the vehicle after this call.

@@ -165,7 +165,7 @@ async def land(context: FlightContext) -> None:
         async with asyncio.timeout(allowed):
             await context.until(touched_down)
     except TimeoutError:
-        raise FlightEnded(f"waited {allowed:g} s for touchdown: {context.detail}") from None
+        raise context.timed_out(allowed, "touchdown") from None
 
 
 async def disarm(context: FlightContext) -> None:

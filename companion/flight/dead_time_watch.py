@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from companion.config.vehicle import AxisKeys
 from companion.identification import dead_time_by_correlation
+from companion.recording.mcap_file.loop_channels import rate_names
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
 from companion.recording.trace import RATES, FlightTrace
 from companion.safety.actions import fault_message
@@ -97,8 +98,9 @@ class DeadTimeWatch:
         """Measured and configured dead time of one axis."""
         axis, dead_time = self._axes[name], None
         if axis.lag is not None:
+            axis_number = _AXES.index(name)
             commanded, measured = (
-                RATES.index(f"{which}_{name}_rad_s") for which in ("commanded", "measured")
+                RATES.index(rate_names(which)[axis_number]) for which in ("commanded", "measured")
             )
             time, commanded_rates, measured_rates = rows[:, [_TIME, commanded, measured]].T
             is_certain = time < time[-1:] - _MIN_ROW_AGE

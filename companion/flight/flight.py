@@ -172,9 +172,7 @@ class Flight:
             if self._end_future.done():
                 return None
             if not task.done():
-                raise FlightEnded(
-                    f"waited {seconds:g} s for {self.phase.waits_for}: {self._context.detail}"
-                )
+                raise self._context.timed_out(seconds, self.phase.waits_for)
             return task.result()
         except (FlightEnded, asyncio.CancelledError):
             raise

@@ -117,9 +117,7 @@ class _Patience:
         if now - self._began < allowed:
             return
         if not _drifts_without_us(context):
-            raise FlightEnded(
-                f"waited {allowed:g} s for the autopilot to begin the landing: {context.detail}"
-            )
+            raise context.timed_out(allowed, "the autopilot to begin the landing")
         if not self._extension_noted:
             self._extension_noted = True
             context.note(

@@ -34,9 +34,9 @@ async def hold_when_heard(context: FlightContext) -> None:
             await _hold_if_ours(context)
     except TimeoutError:
         obeys = heard and context.armed() and in_role(context.link, Role.OFFBOARD)
-        raise FlightEnded(
-            f"waited {_HOLD_TIMEOUT if heard else _LISTENING_TIMEOUT:g} s for the vehicle to be "
-            f"heard and to hold: {context.detail}",
+        raise context.timed_out(
+            _HOLD_TIMEOUT if heard else _LISTENING_TIMEOUT,
+            "the vehicle to be heard and to hold",
             Exit.LAND if obeys else None,
         ) from None
 

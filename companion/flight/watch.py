@@ -15,7 +15,7 @@ from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, 
 from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
-from companion.vehicle.records import is_outdated
+from companion.vehicle.records import MAX_TELEMETRY_AGE, is_outdated
 
 _CURRENT_MODE_PERIOD = 0.45
 """A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
@@ -23,11 +23,9 @@ PX4 sends one every 0.5 s.
 """
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
-_STATUS_AGE = 2.5
-"""Age from which a status is requested again, s: half of the age from which it counts as unknown,
-which ends the flight."""
-_HEARTBEAT_SHARE = 0.5
-"""Share of the largest age of the mode at which HEARTBEAT is requested again."""
+_REQUEST_SHARE = 0.5
+"""A status, or HEARTBEAT, is requested again at this share of the age from which it counts as
+unknown, which ends the flight."""
 _HEARD_AGE = 0.2
 """A status is requested only while positions come at least this often, s: a silent link lacks
 all."""
@@ -80,19 +78,18 @@ class RateRequester:
         if state.position is None or now - state.position.received > _HEARD_AGE:
             self._silent_at = now
             return
-        heartbeat_age = heartbeat_limit * _HEARTBEAT_SHARE
         statuses = (
-            ("HEARTBEAT", state.heartbeat, heartbeat_age),
-            ("GPS_RAW_INT", state.gps, _STATUS_AGE),
-            ("SYS_STATUS", state.battery, _STATUS_AGE),
-            ("EXTENDED_SYS_STATE", state.landed_state, _STATUS_AGE),
-            ("ESTIMATOR_STATUS", state.estimator, _STATUS_AGE),
-            ("EKF_STATUS_REPORT", state.estimator, _STATUS_AGE),
+            ("HEARTBEAT", state.heartbeat, heartbeat_limit),
+            ("GPS_RAW_INT", state.gps, MAX_TELEMETRY_AGE),
+            ("SYS_STATUS", state.battery, MAX_TELEMETRY_AGE),
+            ("EXTENDED_SYS_STATE", state.landed_state, MAX_TELEMETRY_AGE),
+            ("ESTIMATOR_STATUS", state.estimator, MAX_TELEMETRY_AGE),
+            ("EKF_STATUS_REPORT", state.estimator, MAX_TELEMETRY_AGE),
         )
-        for message, status, longest in statuses:
+        for message, status, unknown_from in statuses:
             if message not in wanted or status is None:
                 continue
-            if now - max(status.received, self._silent_at) > longest:
+            if now - max(status.received, self._silent_at) > _REQUEST_SHARE * unknown_from:
                 self._request_once(message, wanted[message])
 
     async def _request_rate(self, message: str, rate: float) -> None:

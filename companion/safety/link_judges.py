@@ -26,20 +26,12 @@ def silence(limit: float, *, heard: bool, planner: str = "auto", guidance: str =
             or (now - control.last_heard < UNHEARD_S) is not heard
         ):
             return None
-        cause = _silence_cause(now, control, limit)
-        if cause == Unanswered.INVALID_RATES.words:
-            return (
-                f"the planner (planner.name: {planner}) gives no body rates: they are NaN or "
-                "infinite, or it refuses the target"
-            )
-        if cause == Unanswered.OLD_TARGET.words and control.command_not_finite:
-            return f"the commands of guidance (guidance.kind: {guidance}) are NaN or infinite"
-        return cause
+        return _silence_cause(now, control, limit, planner, guidance)
 
     return judge
 
 
-def _silence_cause(now: float, control: Control, limit: float) -> str:
+def _silence_cause(now: float, control: Control, limit: float, planner: str, guidance: str) -> str:
     if control.stall_time > _STALL_SHARE * (now - control.last_answer):
         # Data that came during the stall were read late, so they only seem old.
         still = control.stall_time
@@ -50,17 +42,24 @@ def _silence_cause(now: float, control: Control, limit: float) -> str:
         return f"no attitude from the vehicle for {now - control.last_sample:.1f} s"
     reason = control.reason
     if reason in (Unanswered.NO_TARGET, Unanswered.OLD_TARGET):
-        return _missing_command_cause(now, control, limit)
+        return _missing_command_cause(now, control, limit, guidance)
+    if reason is Unanswered.INVALID_RATES:
+        return (
+            f"the planner (planner.name: {planner}) gives no body rates: they are NaN or "
+            "infinite, or it refuses the target"
+        )
     return "no setpoint was sent" if reason is None else reason.words
 
 
-def _missing_command_cause(now: float, control: Control, limit: float) -> str:
+def _missing_command_cause(now: float, control: Control, limit: float, guidance: str) -> str:
     if now - control.last_position > limit:
         if control.position_not_finite:
             return "the vehicle's position is not finite (NaN or infinity)"
         return "no position from the vehicle"
     if not control.position_fresh:
         return "positions arrive, but older than deadman.position_stale_ms"
+    if control.command_not_finite:
+        return f"the commands of guidance (guidance.kind: {guidance}) are NaN or infinite"
     return Unanswered.OLD_TARGET.words
 
 

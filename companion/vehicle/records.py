@@ -7,7 +7,7 @@ from companion.vehicle.clock_jumps import Misfit
 
 Vector = tuple[float, float, float]
 
-_MAX_TELEMETRY_AGE = 5.0
+MAX_TELEMETRY_AGE = 5.0
 """Age from which telemetry counts as unknown, s; every message should come at 1 Hz or faster."""
 
 _MAX_CHARGE_AGE = 1.5
@@ -18,7 +18,7 @@ The charge is in SYS_STATUS and BATTERY_STATUS, which come at 1 Hz or faster."""
 
 def is_outdated(received: float, now: float) -> bool:
     """Whether telemetry received at `received` is too old at `now`; both are loop times, s."""
-    return now - received > _MAX_TELEMETRY_AGE
+    return now - received > MAX_TELEMETRY_AGE
 
 
 GPS_FIX_3D = 3

@@ -11,6 +11,7 @@ import numpy as np
 
 from companion.attitude.kinematics import tilt_angle
 from companion.recording.mcap_file.channels import MOTION
+from companion.recording.mcap_file.loop_channels import rate_names
 from companion.recording.measurements.dead_time import DeadTimes
 from companion.recording.measurements.flight_facts import FlightFacts
 from companion.recording.measurements.maneuver_figures import (
@@ -30,9 +31,7 @@ from companion.recording.measurements.response import (
 from companion.recording.measurements.verdict import checks, is_good
 from companion.recording.trace import RATES, FlightTrace
 
-_ROLL_AND_PITCH = [
-    RATES.index(name) for name in ("vehicle_time_s", "measured_roll_rad_s", "measured_pitch_rad_s")
-]
+_ROLL_AND_PITCH = [RATES.index(name) for name in ("vehicle_time_s", *rate_names("measured")[:2])]
 _HEIGHT, _SPEED, _TILT = map(MOTION.columns.index, ("height_m", "speed_m_s", "tilt_deg"))
 
 
