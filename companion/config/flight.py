@@ -98,7 +98,7 @@ class CircleConfig(Section):
     """Radius. The circle begins at the vehicle, and its centre lies north of it."""
     speed_m_s: Annotated[float, Field(ge=0.01, le=50.0)] = 2.0
     """Speed along the circle. It rises smoothly at the beginning and falls smoothly at the end."""
-    laps: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
+    laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Number of laps, acceleration and braking included."""
 
 

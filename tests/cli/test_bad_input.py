@@ -58,6 +58,7 @@ def config(tmp_path, text):
             "telemetry_stale_ms must be longer than a period of link.attitude_rate_hz",
         ),
         ("link: {attitude_rate_hz: 40}", "min_attitude_rate_hz must not exceed"),
+        ("circle: {laps: 1.0e-270}", "`circle.laps` must be at least 0.01"),
         ("link: {source_component: 1}", "must not both equal"),
         ("thrust: {hover_thrust: 0.92}", "between limits.min_thrust and limits.max_thrust"),
         (
