@@ -147,7 +147,7 @@ class Summary:
             "tilt_max_deg": _largest_known(rows[:, _TILT], tilts),
             "maneuver_speed_max_m_s": _largest_known(maneuvers[:, _SPEED]),
             "maneuver_tilt_max_deg": _largest_known(maneuvers[:, _TILT], tilts),
-            "under_control_s": float(tracked[-1, 0] - tracked[0, 0]) if len(tracked) else 0.0,
+            "under_control_s": float(tracked[-1, 0]) - float(tracked[0, 0]) if len(tracked) else 0.0,
         }
 
     def as_dict(self) -> dict[str, Any]:
