@@ -141,13 +141,14 @@ class Summary:
         rows, tracked = self.trace.motion.rows(), self.trace.tracking.rows()
         maneuvers = rows[in_maneuvers(rows[:, 1], self.trace.maneuvers)]
         tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response.rows()])
+        times = tracked[:, 0].tolist()
         return {
             "height_max_m": _largest_known(rows[:, _HEIGHT]),
             "speed_max_m_s": _largest_known(rows[:, _SPEED]),
             "tilt_max_deg": _largest_known(rows[:, _TILT], tilts),
             "maneuver_speed_max_m_s": _largest_known(maneuvers[:, _SPEED]),
             "maneuver_tilt_max_deg": _largest_known(maneuvers[:, _TILT], tilts),
-            "under_control_s": float(tracked[-1, 0]) - float(tracked[0, 0]) if len(tracked) else 0.0,
+            "under_control_s": times[-1] - times[0] if times else 0.0,
         }
 
     def as_dict(self) -> dict[str, Any]:
