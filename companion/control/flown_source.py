@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.control.predictive import FollowedTrajectory
 from companion.guidance import Pose, Reference, VehicleMotion
-from companion.guidance.braking import Braking
+from companion.guidance.braking import Braking, BrakingUpwind
 from companion.guidance.follow import Follow
 from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
@@ -36,32 +36,34 @@ class FlownSource:
         pose: the held pose, or the pose from which the source began; None: neither.
         source: the source of references, or None.
         begun_at: when the source began, s of event-loop time, or None.
+        braking: the braking that ends in the held pose, also after its end; None: the pose was
+            given, or none is held.
     """
 
     def __init__(self) -> None:
         self.pose: Pose | None = None
         self.source: Source | None = None
         self.begun_at: float | None = None
-        self._braking: Braking | None = None
+        self.braking: Braking | BrakingUpwind | None = None
         self._returning_since: float | None = None  # inf: still off the reference
 
     def clear(self) -> None:
         """Fly no source and hold no pose."""
-        self.pose, self.source, self.begun_at, self._braking = None, None, None, None
+        self.pose, self.source, self.begun_at, self.braking = None, None, None, None
 
-    def hold(self, braking: Braking) -> None:
+    def hold(self, braking: Braking | BrakingUpwind) -> None:
         """Brake, and hold the pose where the vehicle stops."""
         self.clear()
-        self.pose, self._braking = Pose(braking.stopping_point, braking.heading), braking
+        self.pose, self.braking = Pose(braking.stopping_point, braking.heading), braking
 
     def begin(self, source: Source, pose: Pose, now: float) -> None:
         """Fly `source` from `pose`; `now` is event-loop time, s."""
         source.begin(now, pose)
-        self.pose, self.source, self.begun_at, self._braking = pose, source, now, None
+        self.pose, self.source, self.begun_at, self.braking = pose, source, now, None
 
     def remaining_braking_time(self, now: float) -> float:
         """Time until the vehicle has come to rest for a hold, s; `now` is event-loop time, s."""
-        return 0.0 if self._braking is None else max(0.0, self._braking.end_time - now)
+        return 0.0 if self.braking is None else max(0.0, self.braking.end_time - now)
 
     def finished(self, now: float) -> bool:
         """Whether there is a source and it has reached its end."""
@@ -80,8 +82,8 @@ class FlownSource:
         pose, source = self.pose, self.source
         if source is not None:
             return source.reference(now, motion)
-        if self._braking is not None:
-            return self._braking.at
+        if self.braking is not None:
+            return self.braking.at
         held_reference = (
             Reference(motion.position_ned, heading=heading)
             if pose is None

@@ -128,6 +128,12 @@ class GuidanceLoop:
         self.bound_to_hold = True
         self.hold.begin(now, self._heading())
 
+    def move_upwind(self) -> None:
+        """End the hold upwind of where it would end; see `Hold.move_upwind`."""
+        now = self._clock()
+        self.recorder.action(now, "move_upwind")
+        self.hold.move_upwind(now, self.estimate.disturbance)
+
     def follow(self, source: Source) -> None:
         """Fly `source` from the held pose; after `give_up`, keep holding.
 

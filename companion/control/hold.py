@@ -8,7 +8,8 @@ from companion.control.command_maker import CommandMaker
 from companion.control.flown_source import FlownSource
 from companion.control.hover_learning import HoverLearning
 from companion.guidance import GRAVITY, VehicleMotion
-from companion.guidance.braking import AssumedBraking, brake
+from companion.guidance.braking import AssumedBraking, Braking, brake, brake_upwind
+from companion.guidance.reference import NorthEast
 
 
 class Hold:
@@ -52,6 +53,15 @@ class Hold:
         motion = self._maker.guidance_input(now).now
         deceleration = GRAVITY * tan(self._largest_tilt())
         self._flown_source.hold(brake(now, motion, heading, deceleration, self._assumed_braking))
+
+    def move_upwind(self, now: float, wind: NorthEast) -> None:
+        """Also move upwind by the drift of the autopilot that will take over; see `brake_upwind`.
+
+        Nothing changes if no hold has begun, or if it moves upwind already.
+        """
+        braking = self._flown_source.braking
+        if isinstance(braking, Braking):
+            self._flown_source.hold(brake_upwind(now, braking, wind))
 
     def begin_if_tilted(
         self, now: float, motion: VehicleMotion, q: Quaternion, heading: float

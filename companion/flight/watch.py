@@ -8,6 +8,7 @@ from companion.config.computer import LinkConfig
 from companion.flight.commands import require_role, roles_of
 from companion.flight.context import FlightContext
 from companion.flight.hand_over import stop_moving
+from companion.flight.hold_inside import give_up_inside
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
 from companion.safety import SafetyLadder
@@ -206,7 +207,7 @@ class Watch:
         if verdict is None:
             return
         if verdict.action is Action.HOLD:
-            self._context.guidance_loop.give_up()
+            give_up_inside(self._context, snapshot.motion)
             return
         if verdict.stream is StreamEffect.STOPS:
             self._context.release()

@@ -3,7 +3,7 @@
 from math import hypot, sqrt
 from typing import NamedTuple
 
-from companion.guidance.reference import Reference, Vector, VehicleMotion
+from companion.guidance.reference import NorthEast, Reference, Vector, VehicleMotion
 
 _DECELERATION_SHARE = 0.47
 """Mean deceleration of a smooth stop, as a share of the largest horizontal acceleration. The peak
@@ -12,6 +12,12 @@ _LARGEST_JERK = 8.0
 """Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
 _REST_SPEED = 0.1
 """A vehicle slower than this counts as at rest, m/s."""
+_UPWIND_PEAK_ACCELERATION = 1.5
+"""Largest acceleration of the move upwind, m/s²; it leaves tilt for braking and for the wind."""
+_DRIFT_TIME_SQUARED = 0.47
+"""Distance by which PX4 drifts when it takes over a vehicle that leans against wind, per
+acceleration by the wind, s². PX4 in simulation drifted by 1.40 and 1.42 m at 3.0 m/s² and was
+farthest after 3 s. It grows if MPC_XY_P, MPC_XY_VEL_P_ACC or MPC_XY_VEL_I_ACC is smaller."""
 _NOTICE_TIME = 0.1
 """Time within which the fence's monitor and guidance notice a breach, s."""
 
@@ -97,6 +103,84 @@ class Braking(NamedTuple):
             (-deceleration * v_north, -deceleration * v_east, 0.0),
             self.heading,
         )
+
+
+class BrakingUpwind(NamedTuple):
+    """Brakes, and meanwhile moves upwind; stays where both have ended.
+
+    The distance moved grows by the share 10u³ − 15u⁴ + 6u⁵, where u grows from 0 to 1 over the
+    duration, so speed and acceleration begin and end with 0.
+
+    Attributes:
+        braking: the braking, as if there were no move.
+        begun_at: when the move begins, s of event-loop time.
+        displacement: where the move ends, from the stopping point of `braking`, m north and east.
+        duration: duration of the move, s.
+    """
+
+    braking: Braking
+    begun_at: float
+    displacement: NorthEast
+    duration: float
+
+    @property
+    def heading(self) -> float:
+        """The heading to keep, rad."""
+        return self.braking.heading
+
+    @property
+    def end_time(self) -> float:
+        """When the vehicle is at rest, s of event-loop time."""
+        return max(self.braking.end_time, self.begun_at + self.duration)
+
+    @property
+    def stopping_point(self) -> Vector:
+        """Place where the vehicle stops, m NED."""
+        return self.at(self.end_time).position_ned
+
+    def at(self, time: float) -> Reference:
+        """The reference at `time`, s of event-loop time."""
+        reference, duration = self.braking.at(time), self.duration
+        u = min(max(0.0, (time - self.begun_at) / duration), 1.0)
+        distance = u * u * u * (10.0 - u * (15.0 - 6.0 * u))
+        speed = 30.0 * u * u * (1.0 - u) * (1.0 - u) / duration
+        acceleration = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (duration * duration)
+
+        def added(vector: Vector, factor: float) -> Vector:
+            north, east = self.displacement
+            return (vector[0] + factor * north, vector[1] + factor * east, vector[2])
+
+        return reference._replace(
+            position_ned=added(reference.position_ned, distance),
+            velocity_ned=added(reference.velocity_ned, speed),
+            acceleration_ned=added(reference.acceleration_ned, acceleration),
+        )
+
+
+def drift(wind: NorthEast) -> NorthEast:
+    """How far an autopilot that forgets the lean drifts when it takes over, m north and east.
+
+    Args:
+        wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
+    """
+    return _DRIFT_TIME_SQUARED * wind[0], _DRIFT_TIME_SQUARED * wind[1]
+
+
+def brake_upwind(now: float, braking: Braking, wind: NorthEast) -> BrakingUpwind | Braking:
+    """The same braking, with a move that begins now and that the drift will take back.
+
+    Args:
+        now: event-loop time, s.
+        braking: the braking that is flown.
+        wind: as in `drift`.
+    """
+    north, east = drift(wind)
+    distance = hypot(north, east)
+    if distance == 0.0:
+        return braking
+    # The largest acceleration of the move is 10/√3 times distance / duration².
+    duration = sqrt(10.0 / sqrt(3.0) * distance / _UPWIND_PEAK_ACCELERATION)
+    return BrakingUpwind(braking, now, (-north, -east), duration)
 
 
 def brake(

@@ -177,14 +177,10 @@ class Replay:
                 guidance.estimate.drag.begin(prior)
             case "follow":
                 guidance.follow(self._source)
-            case "stand_by":
-                guidance.stand_by()
-            case "hold_here":
-                guidance.hold_here()
-            case "hold_reference":
-                guidance.hold_reference()
+            case "stand_by" | "hold_here" | "hold_reference" | "give_up" | "move_upwind" as name:
+                getattr(guidance, name)()
             case _:
-                guidance.give_up()
+                raise ValueError(f"unknown action: {entry.name}")
 
     def _replay_change(self, entry: ValuesChange) -> None:
         """Begin a change of values, if the loops can change values in flight."""

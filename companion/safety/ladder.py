@@ -23,8 +23,8 @@ class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
     The action HOLD aborts the maneuver and ends the flight. If all breaches with this action end
-    within `hold_time`, the vehicle lands. Otherwise the most severe `Monitor.then` of the breaches
-    that have not ended is the next action.
+    within `hold_time`, the vehicle lands once it rests, at the latest after this time. Otherwise
+    the most severe `Monitor.then` of the breaches that have not ended is the next action.
 
     Args:
         monitors: the monitors of the flight; among equally severe breaches the first one decides.
@@ -60,19 +60,20 @@ class SafetyLadder:
         if worst is not None and worst.monitor.action.severity > Action.HOLD.severity:
             return _verdict(worst, worst.monitor.action)
         if self._held_at is not None:
-            return self._after_hold(snapshot.now, self._held_at)
+            return self._after_hold(snapshot, self._held_at)
         if worst is not None and worst.monitor.action is Action.HOLD:
             self._held_at, self._hold_reason = snapshot.now, worst.reason or ""
             return _verdict(worst, Action.HOLD)
         return None
 
-    def _after_hold(self, now: float, held_at: float) -> Verdict | None:
+    def _after_hold(self, snapshot: Snapshot, held_at: float) -> Verdict | None:
         """The verdict if all breaches with HOLD have ended or `hold_time` is over; else None."""
         breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
+        has_time = snapshot.now - held_at < self._hold_time
+        if has_time and (breaches or snapshot.motion.moves_to_hold):
+            return None
         if not breaches:
             return Verdict(Action.LAND, self._hold_reason)
-        if now - held_at < self._hold_time:
-            return None
         worst = max(breaches, key=lambda alarm: alarm.monitor.then.severity)
         return _verdict(worst, worst.monitor.then)
 

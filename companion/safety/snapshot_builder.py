@@ -161,6 +161,7 @@ class SnapshotBuilder:
             None if idle else loop.record.thrust,
             self._fence_place,
             guidance_loop.acceleration,
+            guidance_loop.remaining_braking_time > 0.0,
         )
 
     def _health(self, now: float) -> Health:

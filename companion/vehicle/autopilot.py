@@ -99,6 +99,8 @@ class Autopilot(Protocol):
             from the present yaw, not from north.
         can_compensate_tilt: whether the autopilot can divide thrust by cos(tilt) itself; a rule in
             `parameters` then compares its setting with the configuration.
+        forgets_lean: whether the autopilot's own modes begin level, so that a vehicle that leaned
+            against the wind drifts downwind until their integral has grown.
         offboard_loss_failsafe: what the autopilot does when setpoints stop.
         cannot_arm_in: roles of the modes in which a disarmed vehicle cannot be armed.
         parameters: rules for the parameters that matter to a flight by body rates.
@@ -116,6 +118,7 @@ class Autopilot(Protocol):
     rates_about_target_axes: bool
     body_yaw_is_relative: bool
     can_compensate_tilt: bool
+    forgets_lean: bool
     offboard_loss_failsafe: OffboardLossFailsafe
     cannot_arm_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]

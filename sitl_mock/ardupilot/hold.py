@@ -2,6 +2,7 @@
 
 from math import nan, radians, sqrt
 
+from sitl_mock.autopilot.attitude_control import body_z
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.position_control import (
     PositionController,
@@ -10,7 +11,8 @@ from sitl_mock.autopilot.position_control import (
     PositionOutput,
 )
 from sitl_mock.autopilot.state import PositionTargetEcho, State
-from sitl_mock.physics.quaternion import Vector, yaw
+from sitl_mock.physics.quaternion import Quaternion, Vector, yaw
+from sitl_mock.physics.rigid_body import GRAVITY
 
 STOPPING_S = 0.65
 """Ratio of stopping distance to speed when a hold begins, s (recorded on entering LAND)."""
@@ -19,6 +21,9 @@ _CLIMB_RATE_INTEGRAL_GAIN = 1.0
 _CLIMB_LIMIT = 10.0
 """Largest climb rate and sink rate of the height controller, m/s. It is high, because the callers
 limit the climb rate that they request."""
+
+_LEAST_COS_TILT = 0.3
+"""Lower bound of cos(tilt) (73 degrees), so that the acceleration by the tilt stays bounded."""
 
 
 class ClimbProfile:
@@ -49,6 +54,13 @@ def approach_speed(distance: float, deceleration: float, max_speed: float) -> fl
     return min(max_speed, sqrt(2.0 * deceleration * max(0.0, distance)))
 
 
+def lean_acceleration(q: Quaternion) -> tuple[float, float]:
+    """Return the acceleration (NED, m/s^2) of a vehicle that holds its height at an attitude."""
+    north, east, down = body_z(q)
+    lift = max(down, _LEAST_COS_TILT) / GRAVITY
+    return (-north / lift, -east / lift)
+
+
 class PositionHold:
     """Holds a point and a heading, and follows a climb rate.
 
@@ -75,7 +87,8 @@ class PositionHold:
         self.point = (x + STOPPING_S * vx, y + STOPPING_S * vy)
         self.yaw = yaw(estimate.q)
         self.climb_profile.begin(-z, -vz)
-        self._controller.reset()
+        # A vehicle that leans against the wind goes on leaning: the real one drifts by 0.03 m.
+        self._controller.reset((0.0, 0.0) if self._state.landed else lean_acceleration(estimate.q))
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
         """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""

@@ -87,9 +87,9 @@ class PositionController:
     gains: Callable[[], PositionGains]
     _integral: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
-    def reset(self) -> None:
-        """Reset the integrals."""
-        self._integral = [0.0, 0.0, 0.0]
+    def reset(self, acceleration: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Start the horizontal integrals at an acceleration (NED, m/s^2), the vertical one at 0."""
+        self._integral = [*acceleration, 0.0]
 
     def step(
         self,

@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.guidance import VehicleMotion
-from companion.guidance.braking import AssumedBraking, Braking, brake, braking_time
+from companion.guidance.braking import (
+    AssumedBraking,
+    Braking,
+    brake,
+    brake_upwind,
+    braking_time,
+    drift,
+)
 
 HERE, BEGUN, HEADING = (3.0, -2.0, -5.0), 100.0, 0.7
 SPEEDS = st.floats(-10.0, 10.0)
@@ -63,3 +70,31 @@ def test_the_braking_that_begins_now_is_as_long_as_the_horizontal_speed_needs(ve
     found = brake(7.0, motion, 0.4, 6.0, assumed)
     assert found == Braking(7.0, motion, 0.4, braking_time(5.0, 6.0, assumed))
     assert found.duration > 0.0
+
+
+WIND = st.floats(-6.0, 6.0)
+
+
+@given(st.tuples(SPEEDS, SPEEDS), st.tuples(WIND, WIND), st.floats(0.0, 3.0))
+def test_a_move_upwind_is_smooth_and_the_drift_takes_it_back(velocity, wind, later):
+    braking = Braking(BEGUN, VehicleMotion(HERE, (*velocity, 0.0)), HEADING, 2.0)
+    moving, h, begun = brake_upwind(BEGUN + later, braking, wind), 1e-4, BEGUN + later
+    assert moving.at(begun) == braking.at(begun)
+    ends = moving.at(moving.end_time + 5.0)
+    assert (ends.position_ned, ends.heading) == (pytest.approx(moving.stopping_point), HEADING)
+    assert (*ends.velocity_ned, *ends.acceleration_ned) == pytest.approx((0.0,) * 6)
+    back = np.add(moving.stopping_point[:2], drift(wind))
+    assert back == pytest.approx(braking.stopping_point[:2])
+    for time in np.linspace(begun + 0.01, moving.end_time + 0.5, 7):
+        before, now, after = (moving.at(time + k * h) for k in (-1.0, 0.0, 1.0))
+        moved = np.subtract(after.position_ned, before.position_ned) / (2.0 * h)
+        assert moved == pytest.approx(now.velocity_ned, abs=1e-3)
+        sped = np.subtract(after.velocity_ned, before.velocity_ned) / (2.0 * h)
+        assert sped == pytest.approx(now.acceleration_ned, abs=0.05)
+        added = np.subtract(now.acceleration_ned, braking.at(time).acceleration_ned)
+        assert hypot(*added) <= 1.5 + 1e-6
+
+
+def test_without_wind_it_is_the_same_braking():
+    braking = Braking(BEGUN, VehicleMotion(HERE, (1.0, 0.0, 0.0)), HEADING, 2.0)
+    assert brake_upwind(BEGUN, braking, (0.0, 0.0)) is braking

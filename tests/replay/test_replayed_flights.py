@@ -362,6 +362,7 @@ class Loops:
         ("hold_reference", None, "hold_reference"),
         ("follow", None, "follow"),
         ("give_up", None, "give_up"),
+        ("move_upwind", None, "move_upwind"),
         ("drag_prior", Drag(0.2, 0.1), "begin"),
         ("drag_prior", None, "begin"),
     ],

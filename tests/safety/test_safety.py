@@ -267,6 +267,19 @@ def test_a_hold_that_mends_it_ends_by_landing_with_what_it_was_for():
     assert climb.told[-1] == "safety: tracking alarm is over"
 
 
+def test_a_vehicle_that_still_brakes_is_not_landed_before_it_rests_but_after_the_hold_time():
+    moving = FINE._replace(motion=FINE.motion._replace(moves_to_hold=True))
+    for braked_for, expected in ((2.0, 2.0), (60.0, CONFIG.safety.hold_s)):
+        climb = Climb()
+        verdict, _ = climb.see(motion(tracking_error=6.0, moves_to_hold=True), 2.0)
+        assert verdict.action is HOLD
+        held_at = climb.now - 0.02
+        climb.see(moving, min(braked_for, expected) - 0.06)
+        verdict, _ = climb.see(FINE if braked_for == expected else moving, 2.0)
+        assert verdict.action is LAND
+        assert climb.now - held_at == pytest.approx(expected, abs=0.1)
+
+
 def test_a_graver_breach_ends_a_hold_and_the_gravest_of_two_decides():
     climb = Climb()
     climb.see(motion(tracking_error=6.0), 2.0)

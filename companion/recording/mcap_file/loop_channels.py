@@ -36,6 +36,7 @@ ACTIONS = (
     "restart_planner",
     "drag_prior",
     "stop_turning",
+    "move_upwind",
 )
 """Names of the codes in the column "action": how a phase controls guidance or the control loop."""
 

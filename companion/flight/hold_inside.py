@@ -1,0 +1,53 @@
+"""A hold near the fence, from which the autopilot's landing does not drift out of it."""
+
+from dataclasses import replace
+from math import inf
+
+from companion.flight.context import FlightContext
+from companion.guidance.braking import drift
+from companion.guidance.fence import Fence, Place
+from companion.guidance.reference import NorthEast, Vector, minus
+from companion.safety.snapshot import Motion
+from companion.safety.table import fence_of
+
+_MARGIN = 0.3
+"""Smallest distance inside the fence at which the autopilot's drift must end, m: the estimates of
+position and wind have errors."""
+
+
+def give_up_inside(context: FlightContext, motion: Motion) -> None:
+    """Give up what is flown, brake and hold; upwind, if the landing would drift out of the fence.
+
+    PX4 begins its own modes level, so a vehicle that leans against the wind drifts downwind first.
+
+    Args:
+        context: context of the flight.
+        motion: motion of the vehicle now; only its `origin` is used.
+    """
+    guidance = context.guidance_loop
+    guidance.give_up()
+    centre, pose = context.snapshot_builder.fence_centre_ned, guidance.flown_source.pose
+    if not context.link.autopilot.forgets_lean or centre is None or pose is None:
+        return
+    stop, wind = minus(pose.position_ned, centre), guidance.estimate.disturbance
+    if upwind_is_inside(fence_of(context.config), motion.origin, stop, wind):
+        guidance.move_upwind()
+
+
+def upwind_is_inside(fence: Fence, origin: Place | None, stop: Vector, wind: NorthEast) -> bool:
+    """Whether the drift would leave the fence from where the vehicle stops, but not from upwind.
+
+    Args:
+        fence: the fence; its ceiling and floor are not used.
+        origin: place of the fence's centre; None: it is not known.
+        stop: where the vehicle stops, from the fence's centre, m NED.
+        wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
+    """
+    walls = replace(fence, ceiling=inf, floor=-inf)
+    (north, east, down), (drift_north, drift_east) = stop, drift(wind)
+    downwind = (north + drift_north, east + drift_east, down)
+    upwind = (north - drift_north, east - drift_east, down)
+    return (
+        walls.breach(downwind, None, origin, _MARGIN) is not None
+        and walls.breach(upwind, None, origin) is None
+    )
