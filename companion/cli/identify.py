@@ -116,7 +116,9 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
     vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
     configured_axes = _configured_axes(log)
     try:
-        text = vehicle_fragment(vehicle, GRAVITY, configured_axes, _flight_name(log))
+        text = vehicle_fragment(
+            vehicle, GRAVITY, configured_axes, _flight_name(log), autopilot=rows.autopilot
+        )
     except BadFitError as error:
         with suppress(OSError):
             console.print(vehicle_table(vehicle, GRAVITY))

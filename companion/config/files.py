@@ -77,7 +77,10 @@ def _read(path: Path) -> Contents:
 
 
 def _drop_foreign_identified(merged: Contents) -> None:
-    """Drop `vehicle.identified` if another key of `vehicle` comes from another file."""
+    """Drop `vehicle.identified` if another key of `vehicle` comes from another file.
+
+    The values are then not those of the identified vehicle, nor of its `vehicle.autopilot`.
+    """
     identified_place = merged.places.get(("vehicle", "identified"))
     files = {
         place.file
@@ -85,7 +88,7 @@ def _drop_foreign_identified(merged: Contents) -> None:
         if where[:1] == ("vehicle",) and len(where) > 1
     }
     if identified_place is not None and files != {identified_place.file}:
-        merged.keys["vehicle"]["identified"] = None
+        merged.keys["vehicle"] |= {"identified": None, "autopilot": None}
 
 
 class _IncludeReader:

@@ -57,6 +57,10 @@ class VehicleConfig(Section):
     """Flight in which `companion identify` measured the keys below; it writes this key. null: the
     keys are estimated or from another vehicle, and `companion doctor` warns.
     """
+    autopilot: Annotated[str, Field(min_length=1, max_length=40)] | None = None
+    """Autopilot of the vehicle on which `companion identify` measured the keys below; it writes
+    this key. `companion doctor` and every flight warn if the vehicle has another one. null:
+    unknown."""
     lag_ms: Milliseconds | None = None
     """Time constant of the roll rate after its dead time. For a second-order response it is
     2·damping/frequency."""

@@ -14,6 +14,12 @@ _CLEAR_HEIGHT = 1.0
 _MAX_THRUST_AGE = 0.3
 """Largest age of an ATTITUDE_TARGET whose thrust is used, s; PX4 sends it at 10 Hz."""
 
+_BEYOND_LEARNING_SHARE = 0.1
+"""Largest relative excess of the measured hover thrust over the limit of learning at takeover."""
+
+_LARGEST_IDLE_SHARE = 0.9
+"""Largest share of the weight that the smallest thrust may carry: the rest is for descending."""
+
 _MISMATCH_SHARE = 0.15
 """Largest relative error of the configured hover thrust that is not reported."""
 
@@ -73,10 +79,31 @@ class HoverLearning:
         else:
             self.hover_thrust.pause()
 
+    def takeover_refusal(self) -> str | None:
+        """Why a vehicle with this hover thrust would climb or fall away in our control; else None.
+
+        Known only where the autopilot reports its own thrust.
+        """
+        thrust = self.hover_thrust
+        measured, learned, (lowest, _) = thrust.measured_hover, thrust.learned_hover, thrust.limits
+        if thrust.smallest_specific_thrust * learned / measured > _LARGEST_IDLE_SHARE * GRAVITY:
+            return (
+                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}: "
+                f"limits.min_thrust {lowest:g} leaves nothing to descend with; set it to "
+                f"{0.4 * measured:.2f}, and thrust.hover_thrust to {measured:.2f}"
+            )
+        if abs(measured - learned) > _BEYOND_LEARNING_SHARE * learned:
+            return (
+                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}, farther from "
+                f"thrust.hover_thrust {thrust.configured_hover:.2f} than thrust.correction_limit "
+                f"lets us correct; set thrust.hover_thrust to {measured:.2f}"
+            )
+        return None
+
     def mismatch_warning(self) -> str | None:
         """Advice to set thrust.hover_thrust, if the learned one differs by over 15 %; else None."""
         hover_thrust = self.hover_thrust
-        configured, learned = hover_thrust.configured_hover, hover_thrust.learned_hover
+        configured, learned = hover_thrust.configured_hover, hover_thrust.measured_hover
         if not self._had_control or abs(learned - configured) <= _MISMATCH_SHARE * configured:
             return None
         return (

@@ -51,7 +51,7 @@ def _learned_settings(context: FlightContext) -> dict[str, str]:
     learning, estimate = context.guidance_loop.learning, context.guidance_loop.estimate
     settings: dict[str, str] = {}
     if learning.mismatch_warning() is not None:
-        settings["thrust.hover_thrust"] = f"{learning.hover_thrust.learned_hover:.2f}"
+        settings["thrust.hover_thrust"] = f"{learning.hover_thrust.measured_hover:.2f}"
     if estimate.mismatch_warning() is not None:
         drag = estimate.drag.drag
         settings["guidance.drag_per_s"] = f"{drag.linear:.2f}"

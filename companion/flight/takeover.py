@@ -27,6 +27,9 @@ _LARGEST_HELD_SPEED = 3.0
 _BRAKING_TIME = 5.0
 """Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
 
+_HOVER_LEARNING_TIME = 3.0
+"""Time to learn from the autopilot's thrust that the vehicle can be held by ours, s."""
+
 _SETTLE_TIME = 1.0
 """Time of holding in offboard before the maneuvers begin, s: the takeover must not disturb them."""
 
@@ -91,6 +94,7 @@ async def offboard(context: FlightContext) -> None:
     context.detail = "the preflight checks before the takeover"
     await context.preflight.require(Stage.AIRBORNE)
     await _wait_until_held(context)
+    await _require_learned_hover(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
     await _take_over(context)
@@ -113,6 +117,22 @@ async def _wait_until_held(context: FlightContext) -> None:
             f"not taken over: waited {_BRAKING_TIME:g} s for {context.detail}; fly in less wind, "
             "or take over a vehicle that hovers"
         ) from None
+
+
+async def _require_learned_hover(context: FlightContext) -> None:
+    """Wait until the hover thrust that guidance would use holds the vehicle.
+
+    Raises:
+        FlightEnded: the hover thrust is too far from the configured one, or below our smallest.
+    """
+    learning = context.guidance_loop.learning
+    try:
+        async with asyncio.timeout(_HOVER_LEARNING_TIME):
+            await context.until(lambda: learning.takeover_refusal() is None, "the hover thrust")
+    except TimeoutError:
+        refusal = learning.takeover_refusal()
+        if refusal is not None:
+            raise FlightEnded(refusal) from None
 
 
 def _is_held(context: FlightContext) -> bool:

@@ -82,6 +82,11 @@ class HoverThrust:
         return self._curve.signal(GRAVITY / self._filter.gain)
 
     @property
+    def measured_hover(self) -> float:
+        """As `learned_hover`, but not limited by `correction_limit`."""
+        return self._curve.signal(GRAVITY / self._filter.measured_gain)
+
+    @property
     def present_hover(self) -> float:
         """Learned normalised thrust at hover, at the present battery voltage, 0..1."""
         return self._to_normalised(GRAVITY)

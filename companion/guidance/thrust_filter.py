@@ -45,7 +45,8 @@ class ThrustFilter:
     thrust is that of a linear thrust curve. The noise is learned from the residuals (Akhlaghi et
     al., Adaptive Adjustment of Noise Covariance in Kalman Filter for Dynamic State Estimation,
     2017). After a load is picked up or dropped, all measurements would be rejected: if rejections
-    last, the variance of the state is reset to its initial value.
+    last, the variance of the state is reset to its initial value, or to a larger one that accepts
+    the measurement.
 
     PX4 estimates the hover thrust instead of k, and must linearise its measurement. Here the
     measurement is linear in k, so the filter converges from a poor first guess as fast as from a
@@ -53,23 +54,29 @@ class ThrustFilter:
 
     Args:
         hover: expected share of thrust at hover.
-        limit: the learned share is at most `hover`·(1 + limit), and at least `hover`/(1 + limit).
+        limit: limit of `gain`: the share at hover that it implies is at most `hover`·(1 + limit),
+            and at least `hover`/(1 + limit).
         time_constant: time constant with which a slow change is followed, s; it grows with the
             standard deviation of the measurements.
 
     Attributes:
-        gain: k, the specific thrust at full thrust, m/s².
+        measured_gain: k, the specific thrust at full thrust, m/s², as measured, without `limit`.
     """
 
     def __init__(self, hover: float, limit: float, time_constant: float) -> None:
-        self.gain = GRAVITY / hover
-        self._bounds = self.gain / (1.0 + limit), self.gain * (1.0 + limit)
-        self._first_variance = (_FIRST_DEVIATION * self.gain) ** 2
+        self.measured_gain = GRAVITY / hover
+        self._bounds = self.measured_gain / (1.0 + limit), self.measured_gain * (1.0 + limit)
+        self._first_variance = (_FIRST_DEVIATION * self.measured_gain) ** 2
         # In the steady state of ẋ = noise the filter is a low pass of this time constant.
         self._drift = _USUAL_NOISE * SHORTEST_WINDOW / (time_constant * hover) ** 2
         self._variance = self._first_variance
         self._noise = _FIRST_NOISE
         self._rejections = 0.0
+
+    @property
+    def gain(self) -> float:
+        """The specific thrust at full thrust, m/s², within the limit of learning."""
+        return min(max(self.measured_gain, self._bounds[0]), self._bounds[1])
 
     def learn(
         self, duration: float, share: float, specific_thrust: float, extra_variance: float
@@ -82,21 +89,33 @@ class ThrustFilter:
             specific_thrust: measured mean specific thrust along the same axis, m/s².
             extra_variance: variance to add to the learned variance of the measurements, (m/s²)².
         """
-        self._variance = min(self._variance + self._drift * duration, self._first_variance)
-        innovation = specific_thrust - self.gain * share
+        self._variance = min(
+            self._variance + self._drift * duration, max(self._variance, self._first_variance)
+        )
+        innovation = specific_thrust - self.measured_gain * share
         expected = share * share * self._variance + self._noise + extra_variance
         ratio = innovation * innovation / (_GATE_DEVIATIONS * _GATE_DEVIATIONS * expected)
         new_weight = min(1.0, duration / _REJECTION_TIME)
         self._rejections += new_weight * (copysign(min(ratio, 1.0), innovation) - self._rejections)
         if ratio > 1.0:
             if abs(self._rejections) > _LASTING_REJECTION:
-                self._variance, self._rejections = self._first_variance, 0.0
+                self._variance = max(
+                    self._first_variance, self._variance_to_accept(innovation, share)
+                )
+                self._rejections = 0.0
             return
         kalman_gain = self._variance * share / expected
-        gain = self.gain + kalman_gain * innovation
-        self.gain = min(max(gain, self._bounds[0]), self._bounds[1])
+        self.measured_gain += kalman_gain * innovation
         self._variance *= 1.0 - kalman_gain * share
-        self._learn_noise(duration, share, specific_thrust - self.gain * share)
+        self._learn_noise(duration, share, specific_thrust - self.measured_gain * share)
+
+    @staticmethod
+    def _variance_to_accept(innovation: float, share: float) -> float:
+        """Variance of the state with which the gate accepts this innovation.
+
+        It exceeds the initial one if the configured hover thrust is far off, as 0.5 for 0.13.
+        """
+        return (innovation / (_GATE_DEVIATIONS * share)) ** 2 if share > 0.0 else 0.0
 
     def _learn_noise(self, duration: float, share: float, residual: float) -> None:
         estimate = residual * residual + share * share * self._variance

@@ -50,6 +50,7 @@ def vehicle_fragment(
     configured: ConfiguredValues,
     flight: str = "",
     allow_second_order: bool = True,
+    autopilot: str = "",
 ) -> str:
     """YAML for the configuration to include, with a comment on the quality of each fit.
 
@@ -65,6 +66,7 @@ def vehicle_fragment(
         configured: configured values by axis; axes may be missing, and values None.
         flight: name of the flight, written as `identified`; empty: it is not written.
         allow_second_order: whether second-order lags may be written.
+        autopilot: name of the vehicle's autopilot, written as `autopilot`; empty: not written.
 
     Raises:
         BadFitError: no fit is good, or an axis with a bad fit has no configured values; the message
@@ -82,7 +84,8 @@ def vehicle_fragment(
     if allow_second_order:
         axes |= second_order_axes(vehicle)
     identified = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
-    lines += ["vehicle:", *identified, *_tilt_lines(axes["roll"], axes["pitch"])]
+    flown_by = [f"  autopilot: {bounded_yaml.dump_value(autopilot)}"] if autopilot else []
+    lines += ["vehicle:", *identified, *flown_by, *_tilt_lines(axes["roll"], axes["pitch"])]
     lines += _axis_lines("yaw", axes["yaw"], axes["roll"].slew)
     return "\n".join(lines) + "\n"
 

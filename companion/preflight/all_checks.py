@@ -23,6 +23,7 @@ CHECKED_ONCE: tuple[Check, ...] = (
     configuration_checks.planner,
     configuration_checks.dead_time,
     configuration_checks.doubtful_values,
+    configuration_checks.identified_autopilot,
     configuration_checks.tilt_compensation,
     configuration_checks.unknown_accept_entries,
 )

@@ -78,6 +78,20 @@ def doubtful_values(config: Config, _: Evidence) -> Iterator[Finding]:
         yield Finding(key, INEFFECTIVE, value.description, value.consequence, value.fix, value.key)
 
 
+def identified_autopilot(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the response in `vehicle` was identified on a vehicle with this autopilot."""
+    known, flown = config.vehicle.autopilot, evidence.autopilot.name
+    if known is not None and known != flown:
+        yield Finding(
+            Key.IDENTIFIED_ON,
+            INEFFECTIVE,
+            f"`vehicle` was identified on {known}, and this vehicle flies {flown}",
+            "the planner predicts another vehicle's response: steps bend, and the hold may swing",
+            "include the file that `companion identify` wrote for this vehicle, or fly it anew",
+            "vehicle.autopilot",
+        )
+
+
 def tilt_compensation(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the autopilot can divide thrust by cos(tilt), if the configuration says it does."""
     autopilot = evidence.autopilot

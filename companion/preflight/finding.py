@@ -53,6 +53,7 @@ class Key(StrEnum):
     TILT_COMPENSATION = "thrust.autopilot_compensates_tilt"
     ACCEPT = "flight.accept"
     IDENTIFIED = "vehicle.identified"
+    IDENTIFIED_ON = "vehicle.autopilot"
     UNITS = "configuration.units"
     RESPONSE = "planner.gain_per_s"
     BODY_RATE = "safety.max_body_rate_deg_s"

@@ -17,7 +17,8 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "estimator": "let the autopilot's estimator settle; check its sensors and calibration",
     "reset": "check GPS and compass: the autopilot's estimate jumped",
     "resets": "check GPS and compass; the limits are safety.max_reset_m, max_reset_deg, max_resets",
-    "tilt": "find what tilted the vehicle beyond limits.max_tilt_deg: wind, a collision, a motor",
+    "tilt": "find what tilted the vehicle beyond limits.max_tilt_deg: wind, a collision, a motor; "
+    "if it swung more and more, lower planner.gain_per_s, then run `companion identify`",
     "body rate": "check the autopilot's rate loop; the limit is safety.max_body_rate_deg_s",
     "fence": "make the maneuver smaller, fly in less wind, or widen the fence: limits.fence_*",
     "braking": "make the maneuver smaller or slower near the fence, or widen it: limits.fence_*",

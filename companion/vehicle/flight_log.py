@@ -41,6 +41,8 @@ class FlightLog:
     """Measured rates: (time, roll, pitch, yaw rate in rad/s)."""
     specific_thrust: list[Row]
     """The accelerometer's −z axis (body FRD): (time, m/s²)."""
+    autopilot: str
+    """Name of the autopilot, such as `PX4`."""
 
 
 def read_flight_log(path: Path | str) -> FlightLog:
@@ -57,7 +59,7 @@ def read_flight_log(path: Path | str) -> FlightLog:
     path, reader = Path(path), _Reader()
     for frame, message in messages(path, _MESSAGE_NAMES):
         reader.take((frame.system, frame.component), message)
-    if reader.vehicle is None:
+    if reader.autopilot is None:
         raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
     if not reader.obeyed_setpoints:
         raise LogError(
@@ -69,6 +71,7 @@ def read_flight_log(path: Path | str) -> FlightLog:
         reader.obeyed_setpoints,
         max(reader.rates_with_quaternion, reader.rates_with_euler, key=len),
         reader.specific_thrust,
+        reader.autopilot.name,
     )
 
 
@@ -78,6 +81,8 @@ class _Reader:
 
     vehicle: tuple[int, int] | None = None
     """System and component of the autopilot, from its first heartbeat."""
+    autopilot: Autopilot | None = None
+    """The autopilot, by its first heartbeat."""
     obeyed_setpoints: list[Row] = field(default_factory=list)
     """Setpoints that the autopilot obeyed."""
     rates_with_quaternion: list[Row] = field(default_factory=list)
@@ -86,7 +91,6 @@ class _Reader:
     """Body rates from ATTITUDE."""
     specific_thrust: list[Row] = field(default_factory=list)
     """The accelerometer's −z axis; see `FlightLog.specific_thrust`."""
-    _autopilot: Autopilot | None = None
     _was_obeying: bool = False
     _unconfirmed_setpoints: list[Row] = field(default_factory=list)
     _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT_SAMPLES))
@@ -103,12 +107,12 @@ class _Reader:
 
     def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
         if self.vehicle is None and heartbeat.autopilot in AUTOPILOTS_BY_NUMBER:
-            self.vehicle, self._autopilot = source, AUTOPILOTS_BY_NUMBER[heartbeat.autopilot]
-        if source != self.vehicle or self._autopilot is None:
+            self.vehicle, self.autopilot = source, AUTOPILOTS_BY_NUMBER[heartbeat.autopilot]
+        if source != self.vehicle or self.autopilot is None:
             return
-        mode = self._autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
+        mode = self.autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
         armed = bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
-        obeying = armed and Role.OFFBOARD in self._autopilot.roles(mode)
+        obeying = armed and Role.OFFBOARD in self.autopilot.roles(mode)
         if obeying and self._was_obeying:
             self.obeyed_setpoints.extend(self._unconfirmed_setpoints)
         self._unconfirmed_setpoints.clear()

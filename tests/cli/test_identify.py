@@ -247,6 +247,7 @@ def test_a_folder_named_in_another_encoding_gives_a_file_that_can_be_read(capsys
     log.write_bytes((fitted / "flight.tlog").read_bytes())
     assert run(capsys, "--log", log, "--force")[0] == 0
     assert load(fitted / "vehicle.yaml").vehicle.identified == "caf?.tlog"
+    assert load(fitted / "vehicle.yaml").vehicle.autopilot == "PX4"
 
 
 def test_an_axis_that_is_not_good_is_kept_from_the_flights_configuration(capsys, tmp_path):

@@ -104,6 +104,48 @@ def test_a_hover_thrust_that_is_far_off_is_told_after_control(learned):
     assert bench.learning.mismatch_warning() == (expected if learned == 0.4 else None)
 
 
+@pytest.mark.parametrize(
+    ("told", "refusal"),
+    [
+        (0.4, None),
+        (0.3, None),
+        (0.13, "farther from thrust.hover_thrust 0.50 than thrust.correction_limit lets us"),
+        (0.105, "limits.min_thrust 0.1 leaves nothing to descend with; set it to 0.04, and"),
+    ],
+)
+def test_a_hover_thrust_that_cannot_be_held_forbids_the_takeover(told, refusal):
+    bench = Learning()
+    bench.hover(told=told, seconds=3.0)
+    assert bench.hover_thrust.measured_hover == pytest.approx(told, rel=0.02)
+    assert (
+        refusal in (bench.learning.takeover_refusal() or "")
+        if refusal
+        else (bench.learning.takeover_refusal() is None)
+    )
+
+
+STRONG = {
+    "airframe": {"thrust_slope_m_s2": 78.4, "thrust_offset_m_s2": 0.0, "thrust_linear_from": 0.02},
+    "parameters": {"MPC_THR_MIN": 0.03, "MPC_THR_HOVER": 0.125, "MPC_TKO_SPEED": 1.5},
+}
+"""A racing quadrotor: it hovers at an eighth of its thrust."""
+
+
+def test_a_racing_quadrotor_is_refused_with_the_hover_thrust_that_it_then_flies_with():
+    """It climbed 15 m out of the fence, and 0.28 was told where 0.13 was meant."""
+    with mock_vehicle(**STRONG, **SPARSE) as mock:
+        heights = []
+        mock.after_step.append(lambda: heights.append(-mock.state()["position"][2]))
+        refused = fly(mock, None, thrust={"hover_thrust": 0.5})
+    told = re.search(r"not taken over: .*; set thrust.hover_thrust to (0\.\d\d)$", refused.result)
+    assert told is not None, refused.result
+    assert max(heights) < 3.0  # of 2 m
+    with mock_vehicle(**STRONG, **SPARSE) as mock:
+        summary = fly(mock, None, thrust={"hover_thrust": float(told[1])})
+    _, error = height_errors(summary)
+    assert error.max() < 0.2
+
+
 def height_errors(summary):
     """Vehicle time since control began, s, and the height error, m."""
     assert summary.result == "ok"

@@ -86,6 +86,19 @@ def test_nothing_is_amiss_with_good_evidence():
 
 
 @pytest.mark.parametrize(
+    ("autopilot", "expected"),
+    [
+        ({}, {}),
+        ({"autopilot": "PX4"}, {}),
+        ({"autopilot": "ArduPilot"}, {Key.IDENTIFIED_ON: INEFFECTIVE}),
+    ],
+)
+def test_a_vehicle_file_of_another_autopilot_is_told(autopilot, expected):
+    config = changed(CONFIG, {"vehicle": autopilot}, "test")
+    assert found(configuration_checks.identified_autopilot, config=config) == expected
+
+
+@pytest.mark.parametrize(
     ("quality", "key", "verdict"),
     [
         ({"lost_count": 15}, None, None),
