@@ -75,7 +75,7 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     failed_checks = [check for check in flight_checks if not check.good]
     names = _joined_by_and([maneuver["name"] for maneuver in figures["maneuvers"]])
     if is_good(figures):
-        headline = f"The flight was good: {names}, all within their limits."
+        headline = f"The flight was good: {names}, every figure within its limit."
     elif failed_checks:
         headline = (
             f"The flight was not good: {names}, {len(failed_checks)} of {len(flight_checks)} "

@@ -89,8 +89,10 @@ def words(figures, called=DEMO):
 def test_a_good_flight_is_called_good_with_its_figures_and_limits():
     told, text = words(GOOD)
     assert (told.good, told.completed) == (True, True)
+    alone = words({**GOOD, "maneuvers": [CIRCLE]})[0]
+    assert alone.headline == "The flight was good: circle, every figure within its limit."
     assert told.headline == (
-        "The flight was good: hover, steps and circle, all within their limits."
+        "The flight was good: hover, steps and circle, every figure within its limit."
     )
     assert "  circle: 0.20 m RMS from its path (limit 0.25 m), at most 0.06 m; 0.02 m" in text
     assert "  latency: 0.26 ms in 99 % of the answers (deadline 4 ms)" in text
