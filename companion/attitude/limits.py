@@ -74,20 +74,33 @@ RECOVERY_BLEND_ANGLE = radians(10.0)
 class Constants(NamedTuple):
     """Gains, limits and recovery angle of one planner; a limit that is not set is infinite.
 
-    `tilt_rate_weight` and `speed_weight` are 1/limit², 0 without a limit: a value exceeds the limit
-    if weight·value² > 1.
+    A law needs `gain`, `max_tilt_rate` and `max_yaw_rate`; the others are computed once for the
+    laws of this package.
+
+    Attributes:
+        gain: p, 1/s.
+        yaw_gain: proportional gain on the heading error, 1/s.
+        max_tilt_rate: W_M, largest √(ω_x² + ω_y²), rad/s.
+        max_yaw_rate: largest |ω_z|, rad/s.
+        max_speed: largest speed of the coefficients, 1/s: `Limits.coefficient_speed`.
+        tilt_rate_weight: 1/max_tilt_rate², s²/rad², 0 without a limit: a tilt rate exceeds the
+            limit if weight·rate² > 1.
+        speed_weight: the same for `max_speed`, s².
+        longest_target: largest length of target coefficients: sin of the largest tilt.
+        cos_recovery: cosine of the recovery angle.
+        recovery_slope: 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND_ANGLE)).
     """
 
-    gain: float  # p, 1/s
-    yaw_gain: float  # 1/s
-    max_tilt_rate: float  # W_M, rad/s
-    max_yaw_rate: float  # rad/s
-    max_speed: float  # of the coefficients, 1/s: `Limits.coefficient_speed`
-    tilt_rate_weight: float  # s²/rad²
-    speed_weight: float  # s²
-    longest_target: float  # largest length of target coefficients: sin of the largest tilt
-    cos_recovery: float  # cosine of the recovery angle
-    recovery_slope: float  # 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND_ANGLE))
+    gain: float
+    yaw_gain: float
+    max_tilt_rate: float
+    max_yaw_rate: float
+    max_speed: float
+    tilt_rate_weight: float
+    speed_weight: float
+    longest_target: float
+    cos_recovery: float
+    recovery_slope: float
 
 
 def make_constants(

@@ -1,5 +1,8 @@
 """Body rates, attitudes and histories of many vehicles under one planner."""
 
+# So that `help` names `ArrayLike`, instead of the twelve lines that it stands for.
+from __future__ import annotations
+
 import importlib.util
 from math import ceil
 from operator import index
@@ -62,7 +65,8 @@ def rates(
         targets: (4, n) coefficients north and east, heading in rad, heading rate in rad/s.
         dt: the sample period, s; positive and finite.
         compiled: True: numba. False: Python. None: numba, if installed, from `COMPILE_FROM` steps
-            on, for a law that is a function at the top of a module.
+            in this call on, for a law that is a function at the top of a module. In a loop of your
+            own pass True.
 
     Returns:
         (3, n) roll, pitch, yaw in rad/s, body FRD. The results of numba and Python differ by about

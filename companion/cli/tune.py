@@ -3,6 +3,7 @@
 import argparse
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import asdict
 from math import isfinite
 from pathlib import Path
@@ -57,13 +58,29 @@ def tune(options: argparse.Namespace) -> int:
     write_whole(output, proposal_text(proposal, vehicle_source, flights, source.name))
     load(output)
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
-    console.print(
-        f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "
-        "from your own file: keys there override those of an included file."
-    )
+    own = vehicle if included and not _is_vehicle_file(vehicle) else None
+    console.print(_next_step(output, keys, own))
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
     return EXIT_OK if worse_flights_warning(flights) is None else EXIT_FAILURE
+
+
+def _is_vehicle_file(path: Path) -> bool:
+    """Whether a file has only the sections that `companion identify` writes."""
+    return load(path).model_fields_set <= set(_VEHICLE_SECTIONS)
+
+
+def _next_step(output: Path, keys: Sequence[str], own: Path | None) -> str:
+    """What to do with `output`; `own` is the user's configuration if `output` includes it."""
+    if own is not None:
+        return (
+            f"Written to {output}. It includes {own}, which therefore must not include it: name "
+            f"{output} instead of {own} with --config."
+        )
+    return (
+        f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "
+        "from your own file: keys there override those of an included file."
+    )
 
 
 def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:

@@ -34,38 +34,47 @@ def predictive_figures(context: FlightContext) -> PredictiveFigures | None:
     return PredictiveFigures(record.flown_answers, troubles, tuple(record.computing_seconds))
 
 
-def advice(assembled: AssembledFlight, dead_times: DeadTimes) -> tuple[str, ...]:
-    """Advice: what differs from the configuration and which key to set, one sentence each."""
+def advice(
+    assembled: AssembledFlight, dead_times: DeadTimes, *, drag_kept: bool
+) -> tuple[str, ...]:
+    """Advice: what differs from the configuration and which key to set, one sentence each.
+
+    With `drag_kept` the vehicle's next flight begins with the learned drag, so no key is advised:
+    a configured drag would end that learning.
+    """
     guidance_loop = assembled.context.guidance_loop
     warnings = (
         guidance_loop.learning.mismatch_warning(),
-        guidance_loop.estimate.mismatch_warning(),
+        None if drag_kept else guidance_loop.estimate.mismatch_warning(),
         dead_times.warning(),
         assembled.trace.lost_rows_warning(),
     )
     return tuple(warning for warning in warnings if warning is not None)
 
 
-def _learned_settings(context: FlightContext) -> dict[str, str]:
+def _learned_settings(context: FlightContext, *, drag_kept: bool) -> dict[str, str]:
     """The keys of thrust and drag that the advice names, with the values that were learned."""
     learning, estimate = context.guidance_loop.learning, context.guidance_loop.estimate
     settings: dict[str, str] = {}
     if learning.mismatch_warning() is not None:
         settings["thrust.hover_thrust"] = f"{learning.hover_thrust.measured_hover:.2f}"
-    if estimate.mismatch_warning() is not None:
+    if not drag_kept and estimate.mismatch_warning() is not None:
         drag = estimate.drag.drag
         settings["guidance.drag_per_s"] = f"{drag.linear:.2f}"
         settings["guidance.quadratic_drag_per_m"] = f"{drag.quadratic:.3f}"
     return settings
 
 
-def facts_of(assembled: AssembledFlight, result: str, advice_texts: tuple[str, ...]) -> FlightFacts:
+def facts_of(
+    assembled: AssembledFlight, result: str, advice_texts: tuple[str, ...], *, drag_kept: bool
+) -> FlightFacts:
     """The facts of a finished flight.
 
     Args:
         assembled: the flight.
         result: result of the flight.
         advice_texts: advice of the flight; see `advice`.
+        drag_kept: see `advice`.
     """
     flight, context, reporter = assembled.flight, assembled.context, assembled.reporter
     state, began, config = context.link.state, flight.began, context.config
@@ -88,7 +97,8 @@ def facts_of(assembled: AssembledFlight, result: str, advice_texts: tuple[str, .
         lockstep=not reporter.real_time,
         advice=advice_texts,
         gain_warning=gain_warning(config),
-        settings=_learned_settings(context),
+        settings=_learned_settings(context, drag_kept=drag_kept),
+        drag_learned=context.guidance_loop.estimate.learned_note() if drag_kept else None,
         changes=tuple(change.as_dict(began) for change in assembled.changes.made_in_flight),
     )
 

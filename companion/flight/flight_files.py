@@ -147,13 +147,13 @@ class FlightFiles:
         """
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.measure_whole_flight()
-        advice_texts = advice(assembled, dead_times)
+        drag_kept = assembled.drag_memory.save()
+        advice_texts = advice(assembled, dead_times, drag_kept=drag_kept)
         for text in advice_texts:  # shown with the figures, not here
             if text == dead_times.warning():
                 continue  # already reported in flight
             flight.events.append((asyncio.get_running_loop().time() - flight.began, text))
             assembled.recorder.write(text)
-        assembled.drag_memory.save()
         self._ended_at = asyncio.get_running_loop().time() - flight.began
         return Summary(
             result=result,
@@ -171,7 +171,7 @@ class FlightFiles:
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
             realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            facts=facts_of(assembled, result, advice_texts),
+            facts=facts_of(assembled, result, advice_texts, drag_kept=drag_kept),
         )
 
     def save(self, summary: Summary) -> Summary:

@@ -182,11 +182,18 @@ class DragMemory:
                 f"quadratic {known.drag.quadratic:.3f} 1/m ({file.path})"
             )
 
-    def save(self) -> None:
-        """After the flight, save the learned drag if the flight had enough motion to learn it."""
+    def save(self) -> bool:
+        """After the flight, save the learned drag if the flight had enough motion to learn it.
+
+        Returns:
+            Whether the vehicle's next flight begins with it: it was saved, and no drag is
+            configured, which would take precedence.
+        """
         if self._file is None or not self._estimate.certain:
-            return
+            return False
         try:
             self._file.save(self._estimate.drag, self._estimate.top_speed)
         except OSError as error:
             self._note(f"{self._file.path}: cannot keep the learned drag: {error.strerror}")
+            return False
+        return self._config.guidance.drag is None

@@ -14,7 +14,7 @@ from companion.preflight.parameter_fixes import ChangeOutcome
 from companion.vehicle.parameter_rules import CheckResult
 
 _GROUP_TITLES = {
-    CheckResult.NOT_CONNECTED: ("NOT CONNECTED: nothing was checked", "bold red"),
+    CheckResult.NOT_CONNECTED: ("NOT CONNECTED", "bold red"),
     CheckResult.UNSAFE: ("UNSAFE: somebody may be hurt or the vehicle lost", "bold red"),
     CheckResult.INEFFECTIVE: ("INEFFECTIVE: something will not work as configured", "bold yellow"),
     CheckResult.NOT_READY: ("NOT READY: the vehicle cannot be armed yet", "bold yellow"),

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from companion.recording.measurements.verdict import (
     LATENCY,
     LOST_ROWS,
+    OFF_COURSE,
     Check,
     Figures,
     checks,
@@ -75,7 +76,7 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     failed_checks = [check for check in flight_checks if not check.good]
     names = _joined_by_and([maneuver["name"] for maneuver in figures["maneuvers"]])
     if is_good(figures):
-        headline = f"The flight was good: {names}, all within their limits."
+        headline = f"The flight was good: {names}, every figure within its limit."
     elif failed_checks:
         headline = (
             f"The flight was not good: {names}, {len(failed_checks)} of {len(flight_checks)} "
@@ -88,6 +89,7 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
     lines = _beyond_limit(failed_checks)
     lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
     lines += _by_subject([check for check in flight_checks if check.good])
+    lines += [] if figures.get("drag_learned") is None else [f"  {figures['drag_learned']}"]
     return headline, [*lines, _extent_line(figures)]
 
 
@@ -178,7 +180,7 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
         if invocation.config is None
         else ["--config", invocation.config, *_shared_options(again)]
     )
-    if figures["result"].startswith(_INTERRUPTED):
+    if figures["result"].startswith(_INTERRUPTED) or _flies_better_again(figures):
         return command(*again)
     end = figures["early_end"]
     if (
@@ -197,12 +199,19 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
     return command("plot", figures["log"]) if figures["log"] is not None else None
 
 
+def _flies_better_again(figures: Figures) -> bool:
+    """Whether the same flight again is better, because it knows the drag that this one learned."""
+    if figures["early_end"] is not None or figures["settings"] or not figures.get("drag_learned"):
+        return False
+    return any(not check.good and check.fault.endswith(OFF_COURSE) for check in checks(figures))
+
+
 def _computer_was_slow(figures: Figures) -> bool:
     """Whether this computer was too slow to fly in real time, where lockstep would wait for it."""
     if figures["lockstep"]:
         return False
     end = figures["early_end"]
-    if end is not None:
+    if end is not None and end["monitor"] is not None:
         return end["monitor"] in _SLOW_COMPUTER_MONITORS
     return any(check.what == LATENCY and not check.good for check in checks(figures))
 

@@ -93,12 +93,9 @@ def session(
         ConfigError: the configuration is wrong.
     """
     flown_config = config_in_memory(config, vehicle)
-    records = None if folder is None else Path(folder)
-    if records is not None:
-        records.mkdir(parents=True, exist_ok=True)
     return Session(
         flown_config,
-        records,
+        _made(folder),
         observer or SilentObserver(),
         ask_landing or decline_landing,
         environment=environment,
@@ -145,7 +142,7 @@ async def connect(
     Args:
         config: configuration of the flight.
         vehicle: vehicle that was passed to `run`.
-        folder: existing folder for the files of the flight; None: nothing is written.
+        folder: folder for the files of the flight; None: nothing is written.
         observer: receives phases and events as they happen.
 
     Raises:
@@ -158,9 +155,17 @@ async def connect(
             "connect flies on the vehicle's clock: call it inside run(vehicle, main())"
         )
     flown_config = config_in_memory(config, vehicle)
-    records = None if folder is None else Path(folder)
-    async with connect_configured(flown_config, records, observer, environment) as connected:
+    async with connect_configured(flown_config, _made(folder), observer, environment) as connected:
         yield connected
+
+
+def _made(folder: Path | str | None) -> Path | None:
+    """The folder of a flight, made if it does not exist."""
+    if folder is None:
+        return None
+    path = Path(folder)
+    path.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 def config_in_memory(configuration: Configuration, vehicle: MockVehicle) -> Config:

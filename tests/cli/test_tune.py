@@ -49,6 +49,20 @@ def test_it_writes_a_file_that_a_configuration_includes(vehicle, tmp_path, capsy
     assert "exists; choose another file with --out," in error
 
 
+def test_the_users_own_configuration_is_not_told_to_include_what_includes_it(vehicle, capsys):
+    own = vehicle.with_name("my.yaml")
+    own.write_text(f"include: {vehicle.name}\nlimits: {{max_tilt_deg: 20}}\n")
+    code, told, _ = run(capsys, own, "--config", own, "--no-flights")
+    tuned = vehicle.with_name("tuned.yaml")
+    assert code == 0
+    assert f"name {tuned} instead of {own} with --config" in told
+    assert "Let your configuration include it" not in told
+    assert load(tuned).limits.max_tilt_deg == 20.0  # so it can be flown itself
+    code, told, _ = run(capsys, vehicle, "--config", own, "--no-flights", "--force")
+    assert code == 0
+    assert "Let your configuration include it" in told
+
+
 def test_a_folder_gives_its_configuration_and_the_drag_that_was_learned(vehicle, tmp_path, capsys):
     folder = vehicle.parent
     (folder / "config.yaml").write_text(

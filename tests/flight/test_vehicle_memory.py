@@ -39,6 +39,10 @@ def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_pa
     (told,) = [text for _, text in flown.events if "earlier flight" in text]
     assert "linear 0.70 1/s, quadratic 0.000 1/m" in told
     assert f"learned-{BUNDLED}.json" in told
+    # A key would end the learning, so none is advised and the flight is not called bad for it.
+    figures = flown.as_dict()
+    assert (figures["advice"], figures["settings"]) == ([], {})
+    assert "began with 0.70 and learned it" in figures["drag_learned"]
     kept, _ = LearnedFile(tmp_path, BUNDLED).load()
     assert kept.drag.per_velocity(3.0) == pytest.approx(1.0, abs=0.08)
 
@@ -120,15 +124,25 @@ def test_what_the_configuration_tells_wins(tmp_path):
 def test_nothing_is_kept_of_a_flight_that_hardly_moved_or_of_nobody(tmp_path):
     memory, estimate, _ = remembered(tmp_path)
     memory.load(Identity(uid="aa"))
-    memory.save()
+    assert not memory.save()
     moved, estimate, _ = remembered(tmp_path)
     for n in range(600):
         fast = 4.0 if n % 200 < 100 else -4.0
         estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
     assert estimate.certain
     moved.load(Identity(uid=None))
-    moved.save()
+    assert not moved.save()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("told", [None, 0.3])
+def test_the_next_flight_begins_with_it_unless_a_drag_is_configured(tmp_path, told):
+    memory, estimate, _ = remembered(tmp_path, told)
+    memory.load(Identity(uid="aa"))
+    for n in range(600):
+        fast = 4.0 if n % 200 < 100 else -4.0
+        estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
+    assert memory.save() is (told is None)
 
 
 def test_a_directory_that_cannot_be_written_costs_a_sentence(tmp_path):
@@ -137,6 +151,6 @@ def test_a_directory_that_cannot_be_written_costs_a_sentence(tmp_path):
     for n in range(600):
         fast = 4.0 if n % 200 < 100 else -4.0
         estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
-    memory.save()
+    assert not memory.save()
     assert len(notes) == 1
     assert "cannot keep the learned drag" in notes[0]

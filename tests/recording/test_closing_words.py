@@ -89,8 +89,10 @@ def words(figures, called=DEMO):
 def test_a_good_flight_is_called_good_with_its_figures_and_limits():
     told, text = words(GOOD)
     assert (told.good, told.completed) == (True, True)
+    alone = words({**GOOD, "maneuvers": [CIRCLE]})[0]
+    assert alone.headline == "The flight was good: circle, every figure within its limit."
     assert told.headline == (
-        "The flight was good: hover, steps and circle, all within their limits."
+        "The flight was good: hover, steps and circle, every figure within its limit."
     )
     assert "  circle: 0.20 m RMS from its path (limit 0.25 m), at most 0.06 m; 0.02 m" in text
     assert "  latency: 0.26 ms in 99 % of the answers (deadline 4 ms)" in text
@@ -172,6 +174,19 @@ def test_a_gain_above_the_sensible_one_is_told_after_good_and_bad_flights():
     told, _ = words(figures)
     assert (told.good, told.lines[0]) == (True, "! planner.gain_per_s is 10, and 5.2 is …")
     assert words({**figures, **ENDED})[0].lines[-1] == told.lines[0]
+
+
+def test_a_drag_that_the_next_flight_begins_with_makes_no_flight_bad_and_is_flown_again():
+    figures = {**GOOD, "drag_learned": "the vehicle's drag at 5.1 m/s is 1.00 1/s; …"}
+    told, text = words(figures)
+    assert (told.good, told.next_command) == (True, "companion plot flights/one")
+    assert "  the vehicle's drag at 5.1 m/s is 1.00 1/s; …" in text
+    off_course = changed(["maneuvers", 2, "level_rms_m"], 0.26, figures)
+    told, text = words(off_course)
+    assert (told.good, told.next_command) == (False, "companion demo --lockstep")
+    assert "the next flight knows the drag that this one learned: fly again" in told.lines[0]
+    other_fault = changed(["battery", "end"], 0.29, figures)
+    assert words(other_fault)[0].next_command == "companion plot flights/one"
 
 
 def test_a_step_that_the_tilt_limit_cut_is_told_with_the_tilt_it_asked_for():
@@ -256,6 +271,9 @@ def test_a_demo_that_the_computer_was_too_slow_for_is_flown_in_lockstep_next(mon
         )
         assert "--lockstep" not in str(words(figures, MINE)[0].next_command)
     assert "--lockstep" not in str(words({**GOOD, **ENDED}, demo)[0].next_command)
+    late = changed(["latency_us", "p99"], 128_000.0, {**GOOD, **ENDED})
+    unmonitored = changed(["early_end", "monitor"], None, late)  # such as samples that came late
+    assert words(unmonitored, demo)[0].next_command.endswith("demo --maneuvers steps --lockstep")
 
 
 def test_a_vehicle_that_is_left_armed_in_the_air_comes_before_all_else():

@@ -1,13 +1,18 @@
 """Monitors of another package: they run beside ours, and none can stop or soften the others."""
 
+import importlib
+import socket
 import sys
 from importlib import invalidate_caches
+from threading import Event, Thread
 
 import pytest
 
 from companion.cli.main import main
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
+from companion.flight.observer import SilentObserver
+from companion.recording.closing_words import closing_words
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.actions import StreamEffect
 from companion.safety.snapshot import AutopilotStatus, Motion, Snapshot
@@ -80,19 +85,52 @@ LEVEL = (1.0, 0.0, 0.0, 0.0)
 def installed(tmp_path, monkeypatch):
     """A package with the monitor of docs/extending.md and others, installed as pip does."""
     (tmp_path / "my_monitors.py").write_text(block("my_monitors.py") + CODE, "utf-8")
+    (tmp_path / "my_rangefinder.py").write_text(block("my_rangefinder.py"), "utf-8")
     info = tmp_path / "my_monitors-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-monitors\nVersion: 1.0\n")
     entries = "".join(f"{name} = my_monitors:{name}\n" for name in NAMES)
+    entries += "rangefinder = my_rangefinder:rangefinder\n"
     (info / "entry_points.txt").write_text(f"[companion.monitors]\n{entries}")
     monkeypatch.syspath_prepend(tmp_path)
     invalidate_caches()
     yield
     sys.modules.pop("my_monitors", None)
+    sys.modules.pop("my_rangefinder", None)
 
 
 def configured(*names):
     return Config(safety={"monitors": names})
+
+
+def test_the_rangefinder_of_the_page_lands_the_vehicle_and_the_words_name_it():
+    rangefinder = importlib.import_module("my_rangefinder")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        rangefinder.PORT = free.getsockname()[1]
+    distance, ended = [b"5.0"], Event()
+
+    def send():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            while not ended.wait(0.01):
+                sender.sendto(distance[0], ("127.0.0.1", rangefinder.PORT))
+
+    class Near(SilentObserver):
+        def phase(self, name, waits_for):
+            if name == "maneuvers":
+                distance[0] = b"1.2"
+
+    Thread(target=send).start()
+    long = {"hover": {"duration_s": 60.0}, "safety": {"monitors": ["rangefinder"]}}
+    vehicle = QuickVehicle("px4")
+    try:
+        summary = fly(merged(QUICK_FLIGHT, long), vehicle, observer=Near())
+    finally:
+        ended.set()
+    assert (summary.result, summary.phase) == ("an obstacle is 1.2 m away", "maneuvers")
+    assert vehicle.state()["armed"] is False
+    told = closing_words(summary.as_dict(), None)
+    assert "  what to do: remove what your own monitor `rangefinder` told" in "\n".join(told.lines)
 
 
 def test_the_monitor_of_the_page_flies_and_raises_its_alarm():

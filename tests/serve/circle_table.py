@@ -1,10 +1,12 @@
-"""The circle of docs/serve.md in memory: `python -m tests.serve.circle_table`.
+"""The circle of docs/serve.md in memory: `python -m tests.serve.circle_table [SPEED]`.
 
-One program streams a circle of 5 m at 5 m/s, 50 setpoints a second. Directly means that `serve`
-passes the setpoints on (`serve.control: false`), so the mock autopilot flies them itself.
+One program streams a circle of 5 m at 5 m/s, or at SPEED, 50 setpoints a second. Directly means
+that `serve` passes the setpoints on (`serve.control: false`), so the mock autopilot flies them
+itself.
 """
 
 import math
+import sys
 
 from companion import testing
 from tests.serve.test_control import circle
@@ -28,8 +30,8 @@ _SETTLED = 5.0
 _SECONDS = 20.0
 
 
-def circle_rms(autopilot, *, control, wind):
-    """RMS of the true horizontal distance from the setpoints at full speed, m."""
+def circle_rms(autopilot, *, control, wind, speed=5.0):
+    """RMS of the true horizontal distance from the setpoints at the full `speed` (m/s), m."""
     vehicle = mock(autopilot, full_rate=True, wind=WINDS[wind])
     squares = []
 
@@ -42,7 +44,7 @@ def circle_rms(autopilot, *, control, wind):
             centre = (start[0] - 5.0, start[1], start[2])
 
             def send(time):
-                commanded = circle(time, centre)
+                commanded = circle(time, centre, speed=speed)
                 script.local(ALL, *commanded)
                 if time > _SETTLED:
                     true = vehicle.state()["position"]
@@ -65,15 +67,16 @@ async def begin(session, script, autopilot, start, control):
         await stream(2.0, lambda _: script.local(POSITION, start))
 
 
-def main():
+def main(speed):
     print("| | direct (the autopilot's own control) | through us |\n|---|---|---|")
     for autopilot, name in (("px4", "PX4"), ("ardupilot", "ArduPilot")):
         for wind in WINDS:
             direct, ours = (
-                circle_rms(autopilot, control=control, wind=wind) for control in (False, True)
+                circle_rms(autopilot, control=control, wind=wind, speed=speed)
+                for control in (False, True)
             )
             print(f"| {name}, {wind} | {direct:.2f} m | {ours:.2f} m |", flush=True)
 
 
 if __name__ == "__main__":
-    main()
+    main(float(sys.argv[1]) if len(sys.argv) > 1 else 5.0)

@@ -352,6 +352,18 @@ def test_a_link_that_cannot_be_opened_is_told_once():
     run(mock, main())  # raises UnseenError if nobody took it
 
 
+def test_a_program_gets_a_folder_of_its_flight_that_there_was_not_before(tmp_path):
+    """`fly` made it, `connect` failed on it with a FileNotFoundError."""
+    mock, folder = QuickVehicle(), tmp_path / "flights" / "mine"
+
+    async def main():
+        async with connect(QUICK_FLIGHT, mock, str(folder)):
+            pass
+
+    run(mock, main())
+    assert {"config.yaml", "flight.mcap", "flight.tlog"} <= {path.name for path in folder.iterdir()}
+
+
 def test_paths_may_be_text_and_a_channel_that_there_is_not_is_named_with_all(tmp_path):
     mock = QuickVehicle()
     assert fly(config(mock), mock, folder=str(tmp_path / "one")).result == "ok"

@@ -76,6 +76,9 @@ class FlightFacts:
     """A sentence if the gain is above the largest sensible one, or None."""
     settings: dict[str, str] = field(default_factory=dict)
     """Keys of hover thrust and drag that the advice names, with values for `--set`."""
+    drag_learned: str | None = None
+    """A sentence if the drag was far from the assumed one and the vehicle's next flight begins with
+    it, or None."""
     changes: tuple[dict[str, Any], ...] = ()
     """Changes in flight, each with `time_s`, `by` and `keys` (values before and after)."""
 
@@ -99,6 +102,7 @@ class FlightFacts:
             "gain_warning": self.gain_warning,
             "max_tilt_deg": None if self.max_tilt is None else _rounded(degrees(self.max_tilt)),
             "settings": self.settings,
+            "drag_learned": self.drag_learned,
             "changes": list(self.changes),
         }
 

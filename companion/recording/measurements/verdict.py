@@ -31,9 +31,10 @@ MAX_LOST_SHARE = 0.02
 MIN_BATTERY_MARGIN = 0.10
 """Smallest charge at the end beyond `limits.min_battery_percent`, 0..1."""
 
-
 LATENCY = "latency"
 """`Check.what` of the time from sample to setpoint."""
+OFF_COURSE = "too far from its path"
+"""End of `Check.fault` of a maneuver whose horizontal error was too large."""
 LOST_ROWS = "rows of the flight's figures were lost"
 """Words that mark the advice about lost rows; their cause is the disk, not the configuration."""
 
@@ -85,8 +86,8 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
                 f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
                 f"at most {maneuver['level_max_m']:.2f} m",
                 level <= limit,
-                _horizontal_remedy(speed),
-                f"{maneuver['name']}: too far from its path",
+                _horizontal_remedy(speed, learned=bool(figures.get("drag_learned"))),
+                f"{maneuver['name']}: {OFF_COURSE}",
             )
         if height is not None:
             yield Check(
@@ -99,8 +100,10 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
         yield from _swing(maneuver)
 
 
-def _horizontal_remedy(speed: float) -> str:
-    """The remedy for a maneuver too far from its path; `speed` is its largest speed, m/s."""
+def _horizontal_remedy(speed: float, *, learned: bool) -> str:
+    """The remedy at `speed`, m/s; `learned`: the next flight knows a drag that this one did not."""
+    if learned:
+        return "the next flight knows the drag that this one learned: fly again"
     first = "fly it slower" if speed > 0.0 else "fly in less wind"
     return f"{first}; against wind and drag see guidance and `companion identify`"
 
@@ -234,11 +237,10 @@ def _latency(figures: Figures) -> Iterator[Check]:
 
 
 def _battery(figures: Figures) -> Iterator[Check]:
-    battery = figures["battery"]
-    end = battery["end"]
+    end, least = figures["battery"]["end"], figures["battery"]["min"]
     if end is None:
         return
-    limit = battery["min"] + MIN_BATTERY_MARGIN
+    limit = least + MIN_BATTERY_MARGIN
     yield Check(
         "battery",
         f"{100.0 * end:.0f} % at the end (at least {100.0 * limit:.0f} %)",

@@ -88,6 +88,7 @@ class Network:
         self.overflowed = 0
         self.setpoint_ids: frozenset[int] = frozenset()
         self._setpoint_limit = SetpointLimit(self._route)
+        self.routing.on_taken_ids = self._note_taken_ids
         self._link, self._note_event = link, note
         self._faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
@@ -132,7 +133,7 @@ class Network:
 
     def send_to(self, client: Client, frame: bytes) -> None:
         """Send a frame of our own component to one client."""
-        client.put(frame)
+        self.routing.send_to_client(client, frame)
         self._flush_later()
 
     def attach(self, client: Client) -> None:
@@ -187,6 +188,13 @@ class Network:
             self.routing.forward_from_client(client, frame)
         except Exception as error:
             self._note_fault_once(f"{fault_message(error)}; a frame of {client.name} was dropped")
+
+    def _note_taken_ids(self, client: Client) -> None:
+        ids = f"{self._link.settings.source_system}/{self._link.settings.source_component}"
+        self._note_fault_once(
+            f"{client.name} sends under our own ids {ids}, so nothing of it is passed on: give "
+            "that program another component id, or change link.source_component"
+        )
 
     def _note_fault_once(self, text: str) -> None:
         if text not in self._faults and len(self._faults) < _MAX_FAULTS:

@@ -58,6 +58,7 @@ class Routing:
         stats: counters of frames.
         clients: the clients, in the order of `attach`.
         intercept: see `Intercept`. Until it is set, no frame of a client is forwarded.
+        on_taken_ids: called with a client whose frame names our component as its sender.
         on_own_frame: called with each client's frame for our component; None: it is dropped.
     """
 
@@ -70,6 +71,7 @@ class Routing:
     ) -> None:
         self.stats = RoutingStats()
         self.intercept: Intercept = lambda *_: True
+        self.on_taken_ids: Callable[[Client], None] = lambda _: None
         self.on_own_frame: Callable[[Client, Frame], None] | None = None
         self._vehicle, self._autopilot, self._our_address = vehicle, autopilot, our_address
         self._heard: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
@@ -123,6 +125,8 @@ class Routing:
             or self._repeats.is_repeat(frame.raw)
         ):
             self.stats.looped += 1
+            if source == self._our_address:
+                self._tell_taken_ids(client, frame)
             return
         if source.system != 0:
             self._learn(client, source)
@@ -138,7 +142,17 @@ class Routing:
     def send_to_clients(self, frame: bytes) -> None:
         """Send a frame of our own component to every client."""
         for client in self.clients:
-            client.put(frame)
+            self.send_to_client(client, frame)
+
+    def send_to_client(self, client: Client, frame: bytes) -> None:
+        """Send a frame of our own component to one client."""
+        self._repeats.is_repeat(frame)  # remembered, so that its echo is known
+        client.put(frame)
+
+    def _tell_taken_ids(self, client: Client, frame: Frame) -> None:
+        """Tell that another program uses our ids, unless a client only sends our frame back."""
+        if not self._repeats.is_repeat(frame.raw):
+            self.on_taken_ids(client)
 
     def _learn(self, channel: Client | UplinkQueue, source: Address) -> None:
         if len(self._heard[channel]) < _MAX_ADDRESSES:
