@@ -19,13 +19,15 @@ from companion.vehicle.records import MAX_TELEMETRY_AGE, is_outdated
 
 _CURRENT_MODE_PERIOD = 0.45
 """A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
-PX4 sends one every 0.5 s.
-"""
+PX4 sends one every 0.5 s."""
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
 _REQUEST_SHARE = 0.5
 """A status, or HEARTBEAT, is requested again at this share of the age from which it counts as
 unknown, which ends the flight."""
+_REQUEST_PERIOD = 5.0
+"""Shortest time between two requests for one message, s; a rate that stays low ends the flight
+sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
 _HEARD_AGE = 0.2
 """A status is requested only while positions come at least this often, s: a silent link lacks
 all."""
@@ -36,7 +38,7 @@ _COUNTING_TIME = 0.1
 class RateRequester:
     """Requests a message again if its rate has become too low: another station may have changed it.
 
-    It sends SET_MESSAGE_INTERVAL at most once a flight for each message, and does not block.
+    It sends SET_MESSAGE_INTERVAL, at most every `_REQUEST_PERIOD` a message, and does not block.
 
     Attributes:
         note: called with messages about requests and their errors.
@@ -51,21 +53,27 @@ class RateRequester:
         self._link = link
         self._link_config = link_config
         self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._requested_at: dict[str, float] = {}
         self._silent_at = -inf
 
-    def check(self, health: Health) -> None:
-        """Request each message whose rate is too low now."""
+    def check(self, now: float, health: Health) -> None:
+        """Request each message whose rate is too low at `now`, our clock, s."""
         wanted = self._link_config
         answers, positions = health.answer_rate, health.position_rate
-        if health.gaps or (answers is not None and answers < wanted.min_attitude_rate_hz):
-            self._request_once("ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
+        # One later gap may be any other disturbance; a lowered rate makes a second one at once.
+        accepted_gaps = 1 if "ATTITUDE_QUATERNION" in self._tasks else 0
+        is_slow = answers is not None and answers < wanted.min_attitude_rate_hz
+        if is_slow or health.gaps > accepted_gaps:
+            self._request(now, "ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
         if positions is not None and positions < wanted.min_position_rate_hz:
-            self._request_once("LOCAL_POSITION_NED", wanted.position_rate_hz)
+            self._request(now, "LOCAL_POSITION_NED", wanted.position_rate_hz)
 
-    def _request_once(self, message: str, rate: float) -> None:
-        if message not in self._tasks:
-            self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
-            self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
+    def _request(self, now: float, message: str, rate: float) -> None:
+        if now - self._requested_at.get(message, -inf) < _REQUEST_PERIOD:
+            return
+        self._requested_at[message] = now
+        self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
+        self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
 
     def check_statuses(self, now: float, heartbeat_limit: float) -> None:
         """Request each status that has come before, is overdue at `now`, and has a requested rate.
@@ -90,7 +98,7 @@ class RateRequester:
             if message not in wanted or status is None:
                 continue
             if now - max(status.received, self._silent_at) > _REQUEST_SHARE * unknown_from:
-                self._request_once(message, wanted[message])
+                self._request(now, message, wanted[message])
 
     async def _request_rate(self, message: str, rate: float) -> None:
         try:
@@ -201,7 +209,7 @@ class Watch:
         # A foreign setpoint may also be the autopilot's own, in a new mode.
         if snapshot.health.foreign_reports:
             self._request_heartbeat(now)
-        self._rate_requester.check(snapshot.health)
+        self._rate_requester.check(now, snapshot.health)
         verdict = self._safety_ladder.step(snapshot)
         if verdict is None:
             return
