@@ -6,7 +6,7 @@ from math import inf
 
 from companion.config.computer import LinkConfig
 from companion.flight.commands import require_role, roles_of
-from companion.flight.context import FlightContext
+from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.hand_over import stop_moving
 from companion.flight.phases import Phase
 from companion.mavlink.errors import LinkError
@@ -23,14 +23,12 @@ PX4 sends one every 0.5 s."""
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
 _REQUEST_SHARE = 0.5
-"""A status, or HEARTBEAT, is requested again at this share of the age from which it counts as
-unknown, which ends the flight."""
+"""A status is requested again at this share of the age from which it counts as unknown."""
 _REQUEST_PERIOD = 5.0
 """Shortest time between two requests for one message, s; a rate that stays low ends the flight
 sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
 _HEARD_AGE = 0.2
-"""A status is requested only while positions come at least this often, s: a silent link lacks
-all."""
+"""A status is requested only while positions are newer than this, s: a silent link lacks all."""
 _COUNTING_TIME = 0.1
 """Time over which `set_rates` counts messages, s; the counts are not used."""
 
@@ -239,7 +237,9 @@ class Watch:
             stalled = self._context.snapshot_builder.counters.stall_time(since=received)
             return now - received - (0.0 if in_control and monitored else stalled)
 
-        if age(state.mode_received) > self._context.heartbeat_limit:
+        # While the autopilot flies by itself, as in a take-off, a short silence changes nothing.
+        shortest_limit = 0.0 if in_control else INITIAL_HEARTBEAT_LIMIT
+        if age(state.mode_received) > max(self._context.heartbeat_limit, shortest_limit):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )

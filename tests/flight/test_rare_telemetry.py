@@ -142,6 +142,21 @@ def test_a_heartbeat_that_a_station_stopped_ends_neither_take_off_nor_landing(ph
     assert summary.result == "ok", summary.events
 
 
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize("phase", ["takeoff", "land"])
+def test_a_serial_link_that_restarts_ends_neither_take_off_nor_landing(autopilot, phase):
+    """ArduPilot was left climbing in GUIDED, armed, after a silence of 0.8 s."""
+    with mock_vehicle(autopilot=autopilot) as mock:
+
+        def restart():
+            for direction in ("to_companion", "from_companion"):
+                mock.inject({"kind": "drop", "direction": direction, "duration_s": 1.5})
+
+        summary = fly(mock, None, When(phase, restart, 0.8), flight={"takeoff_height_m": 6.0})
+        assert not mock.state()["armed"]
+    assert summary.result == "ok", summary.events
+
+
 def test_a_silence_of_the_whole_link_is_no_reason_to_ask_for_a_status_again():
     with mock_vehicle(autopilot="ardupilot") as mock:
         lose = lambda: mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 0.7})  # noqa: E731
