@@ -87,13 +87,10 @@ class PreflightChecks:
         """
         before = evidence = self._evidence
         if evidence is None or self._clock() - self._gathered_at > _MAX_EVIDENCE_AGE:
-            evidence = await gather(
-                self._link,
-                self._granted_rates,
-                _COUNTING_TIME,
-                stage=stage,
-                earlier_survey=None if before is None else before.survey,
-            )
+            evidence = await self._gather(stage, before)
+            if self._lowered(evidence):
+                await self.ask_for_telemetry()
+                evidence = await self._gather(stage, before)
             self._evidence, self._gathered_at = evidence, self._clock()
             self._replacement_detector.note_identity(evidence.identity)
         self._replacement_detector.require()
@@ -102,6 +99,35 @@ class PreflightChecks:
         evidence = replace(evidence, stage=stage, maneuvers=planned, known_drag=drag)
         self._act_on(run_checks(self._config, evidence, repeated=before is not None))
         return evidence
+
+    async def _gather(self, stage: Stage, before: Evidence | None) -> Evidence:
+        return await gather(
+            self._link,
+            self._granted_rates,
+            _COUNTING_TIME,
+            stage=stage,
+            earlier_survey=None if before is None else before.survey,
+        )
+
+    def _lowered(self, evidence: Evidence) -> bool:
+        """Whether attitude or position comes too rarely; say so.
+
+        A ground station that connects after the telemetry was requested lowers its rates.
+        """
+        link = self._config.link
+        minimum_rates = {
+            "ATTITUDE_QUATERNION": link.min_attitude_rate_hz,
+            "LOCAL_POSITION_NED": link.min_position_rate_hz,
+        }
+        streams = evidence.streams
+        lowered = [
+            name
+            for name, minimum in minimum_rates.items()
+            if name in streams and streams[name].achieved < minimum
+        ]
+        for name in lowered:
+            self.note(f"{name} comes too rarely: requesting {streams[name].requested:g} Hz again")
+        return bool(lowered)
 
     def on_parameter(self, name: str, value: float) -> None:
         """Warn if a station has changed a checked parameter, of an armed vehicle, to an unsafe one.

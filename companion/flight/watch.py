@@ -6,7 +6,7 @@ from math import inf
 
 from companion.config.computer import LinkConfig
 from companion.flight.commands import require_role, roles_of
-from companion.flight.context import FlightContext
+from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.hand_over import stop_moving
 from companion.flight.hold_inside import give_up_inside
 from companion.flight.phases import Phase
@@ -20,16 +20,16 @@ from companion.vehicle.records import MAX_TELEMETRY_AGE, is_outdated
 
 _CURRENT_MODE_PERIOD = 0.45
 """A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
-PX4 sends one every 0.5 s.
-"""
+PX4 sends one every 0.5 s."""
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
 _REQUEST_SHARE = 0.5
-"""A status, or HEARTBEAT, is requested again at this share of the age from which it counts as
-unknown, which ends the flight."""
+"""A status is requested again at this share of the age from which it counts as unknown."""
+_REQUEST_PERIOD = 5.0
+"""Shortest time between two requests for one message, s; a rate that stays low ends the flight
+sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
 _HEARD_AGE = 0.2
-"""A status is requested only while positions come at least this often, s: a silent link lacks
-all."""
+"""A status is requested only while positions are newer than this, s: a silent link lacks all."""
 _COUNTING_TIME = 0.1
 """Time over which `set_rates` counts messages, s; the counts are not used."""
 
@@ -37,7 +37,7 @@ _COUNTING_TIME = 0.1
 class RateRequester:
     """Requests a message again if its rate has become too low: another station may have changed it.
 
-    It sends SET_MESSAGE_INTERVAL at most once a flight for each message, and does not block.
+    It sends SET_MESSAGE_INTERVAL, at most every `_REQUEST_PERIOD` a message, and does not block.
 
     Attributes:
         note: called with messages about requests and their errors.
@@ -52,21 +52,27 @@ class RateRequester:
         self._link = link
         self._link_config = link_config
         self._tasks: dict[str, asyncio.Task[None]] = {}
+        self._requested_at: dict[str, float] = {}
         self._silent_at = -inf
 
-    def check(self, health: Health) -> None:
-        """Request each message whose rate is too low now."""
+    def check(self, now: float, health: Health) -> None:
+        """Request each message whose rate is too low at `now`, our clock, s."""
         wanted = self._link_config
         answers, positions = health.answer_rate, health.position_rate
-        if health.gaps or (answers is not None and answers < wanted.min_attitude_rate_hz):
-            self._request_once("ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
+        # One later gap may be any other disturbance; a lowered rate makes a second one at once.
+        accepted_gaps = 1 if "ATTITUDE_QUATERNION" in self._tasks else 0
+        is_slow = answers is not None and answers < wanted.min_attitude_rate_hz
+        if is_slow or health.gaps > accepted_gaps:
+            self._request(now, "ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
         if positions is not None and positions < wanted.min_position_rate_hz:
-            self._request_once("LOCAL_POSITION_NED", wanted.position_rate_hz)
+            self._request(now, "LOCAL_POSITION_NED", wanted.position_rate_hz)
 
-    def _request_once(self, message: str, rate: float) -> None:
-        if message not in self._tasks:
-            self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
-            self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
+    def _request(self, now: float, message: str, rate: float) -> None:
+        if now - self._requested_at.get(message, -inf) < _REQUEST_PERIOD:
+            return
+        self._requested_at[message] = now
+        self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
+        self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
 
     def check_statuses(self, now: float, heartbeat_limit: float) -> None:
         """Request each status that has come before, is overdue at `now`, and has a requested rate.
@@ -91,7 +97,7 @@ class RateRequester:
             if message not in wanted or status is None:
                 continue
             if now - max(status.received, self._silent_at) > _REQUEST_SHARE * unknown_from:
-                self._request_once(message, wanted[message])
+                self._request(now, message, wanted[message])
 
     async def _request_rate(self, message: str, rate: float) -> None:
         try:
@@ -202,7 +208,7 @@ class Watch:
         # A foreign setpoint may also be the autopilot's own, in a new mode.
         if snapshot.health.foreign_reports:
             self._request_heartbeat(now)
-        self._rate_requester.check(snapshot.health)
+        self._rate_requester.check(now, snapshot.health)
         verdict = self._safety_ladder.step(snapshot)
         if verdict is None:
             return
@@ -232,7 +238,9 @@ class Watch:
             stalled = self._context.snapshot_builder.counters.stall_time(since=received)
             return now - received - (0.0 if in_control and monitored else stalled)
 
-        if age(state.mode_received) > self._context.heartbeat_limit:
+        # While the autopilot flies by itself, as in a take-off, a short silence changes nothing.
+        shortest_limit = 0.0 if in_control else INITIAL_HEARTBEAT_LIMIT
+        if age(state.mode_received) > max(self._context.heartbeat_limit, shortest_limit):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )

@@ -32,6 +32,7 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "lost setpoints": "find what loses the frames that this computer sends: the cable, the radio",
     "foreign setpoints": "end the other program that sends SET_ATTITUDE_TARGET to this vehicle; if "
     "there is none, a station may have changed a parameter in flight: run `companion doctor`",
+    "rare setpoint": "end the other program or station that commands this vehicle",
     "link loss": "improve the radio link or lower its load; the limit is safety.max_loss",
     "round trip": "find what slows the link; the limit is safety.max_round_trip_ms",
     "deadlines": "end other programs on this computer, or set realtime.scheduler: fifo",

@@ -152,6 +152,16 @@ def foreign_setpoints(max_reports: int) -> Judge:
     return judge
 
 
+def rare_foreign_setpoint(snapshot: Snapshot, _: bool) -> str | None:
+    """The autopilot has reported a setpoint of another program since control began."""
+    if not snapshot.health.any_foreign_report:
+        return None
+    return (
+        "another program may send setpoints to the vehicle now and then: the autopilot reported "
+        "one that this program did not send (ATTITUDE_TARGET)"
+    )
+
+
 def frozen(snapshot: Snapshot, _: bool) -> str | None:
     """Attitude or position repeats one measurement under new time stamps."""
     what = snapshot.health.frozen

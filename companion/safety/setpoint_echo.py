@@ -21,6 +21,9 @@ class SetpointEcho:
     thrust (ArduPilot), as every report of recorded flights confirms. So a report that fits no
     setpoint of ours shows that another program sends setpoints, too; the autopilot obeys both.
 
+    Attributes:
+        any_foreign: whether a report since control began showed a setpoint of another program.
+
     Args:
         sent: the latest setpoints of this program, the newest last; the control loop appends them.
     """
@@ -28,14 +31,14 @@ class SetpointEcho:
     def __init__(self, sent: deque[tuple[BodyRates, float]]) -> None:
         self._sent = sent
         self._compares_thrust = False
-        self._matched_once = False
+        self._matched_once = self.any_foreign = False
         self._foreign_times: deque[float] = deque(maxlen=_KEPT_REPORTS)
 
     def begin(self, autopilot: Autopilot) -> None:
         """Note that control of this autopilot begins: earlier reports do not count."""
         # With rates about the axes of its target, an autopilot reports the rates of that target.
         self._compares_thrust = autopilot.rates_about_target_axes
-        self._matched_once = False
+        self._matched_once = self.any_foreign = False
         self._foreign_times.clear()
 
     def take(self, message: Message, now: float) -> None:
@@ -44,6 +47,7 @@ class SetpointEcho:
         if self._is_ours(rates, message.thrust):
             self._matched_once = True
         elif self._matched_once and isfinite(sum(rates) + message.thrust):
+            self.any_foreign = True
             self._foreign_times.append(now)
 
     def foreign_reports(self, now: float) -> int:

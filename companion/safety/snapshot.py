@@ -104,6 +104,8 @@ class Health(NamedTuple):
     foreign_reports: int = 0
     """Number of reports of the last 5 s in which the autopilot obeyed another program's setpoint
     (`SetpointEcho`)."""
+    any_foreign_report: bool = False
+    """Whether there was such a report since control began."""
     frozen: str | None = None
     """Which telemetry repeats itself although it must change (`FrozenTelemetry`), in words."""
 

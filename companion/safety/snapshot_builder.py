@@ -172,6 +172,7 @@ class SnapshotBuilder:
             gaps=sum(at > since for at in self._loop.record.gaps),
             uplink=timesync.uplink,
             foreign_reports=self.echo.foreign_reports(now),
+            any_foreign_report=self.echo.any_foreign,
             frozen=self._frozen_now(now),
         )
 

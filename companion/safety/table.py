@@ -125,6 +125,8 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
         # In a mode of the pilot the autopilot reports its own setpoints; `lasts` leaves time for
         # the requested heartbeat, which tells the mode.
         Monitor("foreign setpoints", foreign, _HAND_BACK, lasts=0.3),
+        # `lasts` lets a change of the mode, or the row above, end control first.
+        Monitor("rare setpoint", link_judges.rare_foreign_setpoint, Action.WARN, lasts=1.0),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
         Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
         # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.

@@ -56,6 +56,24 @@ def test_a_program_that_cuts_the_thrust_is_noticed_before_the_ground(autopilot):
     assert lowest > 0.5
 
 
+def test_one_setpoint_in_seconds_is_told_once_and_flown_on():
+    """Each turns the vehicle until our next setpoint only, but its pilot should know."""
+    other = dialect.MAVLink_set_attitude_target_message(
+        0, 1, 1, BODY_RATES, (1.0, 0.0, 0.0, 0.0), 0.4, 0.0, 0.0, 0.5
+    )
+    with mock_vehicle(autopilot="ardupilot") as mock:
+
+        def send():
+            loop = asyncio.get_running_loop()
+            loop.call_later(AFTER_OURS_S, mock.transmit, other, OTHER_PROGRAM)
+            mock.at(mock.time + 5.5, send)
+
+        summary = fly(mock, None, When("maneuvers", send, after=1.0), **HOVER)
+    assert summary.result == "ok", summary.events
+    (told,) = [text for _, text in summary.events if "rare setpoint" in text]
+    assert "may send setpoints to the vehicle now and then" in told
+
+
 def test_a_parameter_changed_in_flight_may_look_like_another_program_and_the_advice_says_so():
     """Without the thrust bit of GUID_OPTIONS, ArduPilot reports a thrust of its own."""
     changed = dialect.MAVLink_param_set_message(1, 1, b"GUID_OPTIONS", 0.0, 9)

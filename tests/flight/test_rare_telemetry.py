@@ -1,9 +1,10 @@
-"""Telemetry that becomes rare in flight is asked for again, once; if it stays rare: hand back."""
+"""Telemetry that becomes rare in flight is asked for again; if it stays rare: hand back."""
 
 from math import acos, degrees
 
 import pytest
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import common as dialect
 
 from companion.flight.observer import SilentObserver
 from tests.flight.fly import fly, mock_vehicle
@@ -66,6 +67,46 @@ def test_what_stays_rare_is_handed_back(tmp_path, autopilot, message, hz, words)
     assert steepest(summary) < 45.0  # 35° are allowed; 53° it was where nobody watched
 
 
+def connects(mock, every=None):
+    """QGroundControl connects to ArduPilot, and again `every` so many s."""
+    for group, hz in ((1, 2), (2, 2), (3, 2), (6, 3), (10, 10), (11, 10), (12, 3)):
+        mock.transmit(dialect.MAVLink_request_data_stream_message(1, 1, group, hz, 1))
+    if every is not None:
+        mock.at(mock.time + every, lambda: connects(mock, every))
+
+
+def test_a_station_that_lowers_positions_every_11_s_does_not_end_the_flight():
+    """QGroundControl does so while no BATTERY_STATUS comes; the second time was handed back."""
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        begin = When("maneuvers", lambda: connects(mock, every=11.0), after=1.0)
+        summary = fly(mock, None, begin, hover={"duration_s": 26.0})
+    assert summary.result == "ok", summary.events
+    assert len(asked_again(summary)) == 3
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_attitude_lowered_by_one_program_after_another_is_asked_for_each_time(autopilot):
+    with mock_vehicle(autopilot=autopilot) as mock:
+
+        def lower():
+            mock.command(SET_MESSAGE_INTERVAL, ATTITUDE_QUATERNION, 1e6 / 5.0)
+
+        begin = When("maneuvers", lambda: (lower(), mock.at(mock.time + 8.0, lower)), after=1.0)
+        summary = fly(mock, None, begin, hover={"duration_s": 12.0})
+    assert summary.result == "ok", summary.events
+    assert len(asked_again(summary)) == 2
+
+
+@pytest.mark.parametrize(("phase", "after"), [("arm", 0.0), ("takeoff", 0.0), ("takeoff", 2.5)])
+def test_a_station_that_connects_before_the_takeover_does_not_end_the_flight(phase, after):
+    """The vehicle was landed for positions at 3 Hz, as if its link were too slow."""
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        summary = fly(mock, None, When(phase, lambda: connects(mock), after))
+    assert summary.result == "ok", summary.events
+    (told,) = asked_again(summary)
+    assert told == "LOCAL_POSITION_NED comes too rarely: requesting 50 Hz again"
+
+
 STATUSES = {
     "px4": {"GPS_RAW_INT": 24, "ESTIMATOR_STATUS": 230, "EXTENDED_SYS_STATE": 245},
     "ardupilot": {
@@ -101,6 +142,21 @@ def test_a_heartbeat_that_a_station_stopped_ends_neither_take_off_nor_landing(ph
     assert summary.result == "ok", summary.events
 
 
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize("phase", ["takeoff", "land"])
+def test_a_serial_link_that_restarts_ends_neither_take_off_nor_landing(autopilot, phase):
+    """ArduPilot was left climbing in GUIDED, armed, after a silence of 0.8 s."""
+    with mock_vehicle(autopilot=autopilot) as mock:
+
+        def restart():
+            for direction in ("to_companion", "from_companion"):
+                mock.inject({"kind": "drop", "direction": direction, "duration_s": 1.5})
+
+        summary = fly(mock, None, When(phase, restart, 0.8), flight={"takeoff_height_m": 6.0})
+        assert not mock.state()["armed"]
+    assert summary.result == "ok", summary.events
+
+
 def test_a_silence_of_the_whole_link_is_no_reason_to_ask_for_a_status_again():
     with mock_vehicle(autopilot="ardupilot") as mock:
         lose = lambda: mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 0.7})  # noqa: E731
@@ -116,7 +172,9 @@ def test_a_status_that_is_kept_stopped_still_lands_the_vehicle(autopilot):
         keep_stopped = lambda: mock.command(SET_MESSAGE_INTERVAL, 24, -1.0)  # noqa: E731
         summary = fly(mock, None, stop, hover={"duration_s": 10.0})
     assert summary.result == "GPS is not reported any more", summary.events
-    assert len(asked_again(summary)) == 1
+    first, *later = [at for at, text in summary.events if "comes too rarely" in text]
+    assert all(at - first >= 5.0 for at in later)
+    assert len(later) <= 1
     assert not mock.state()["armed"]
 
 

@@ -163,6 +163,12 @@ SAID = [
         "this program did not send (ATTITUDE_TARGET)",
     ),
     (
+        lambda: link_judges.rare_foreign_setpoint,
+        at(health=Health(any_foreign_report=True)),
+        "another program may send setpoints to the vehicle now and then: the autopilot reported "
+        "one that this program did not send (ATTITUDE_TARGET)",
+    ),
+    (
         lambda: link_judges.frozen,
         at(health=Health(frozen="ATTITUDE_QUATERNION repeats one attitude")),
         "frozen telemetry: ATTITUDE_QUATERNION repeats one attitude",

@@ -142,6 +142,7 @@ BREACHES = [
         0.3,
         "another program sends setpoints",
     ),
+    ("rare setpoint", health(any_foreign_report=True), WARN, 1.0, "now and then"),
     ("link loss", health(lost_share=0.45), WARN, 2.0, "45 % of the vehicle's frames"),
     ("round trip", health(round_trip=0.2), WARN, 5.0, "200 ms"),
     ("deadlines", health(missed_share=0.3), HAND_BACK, 1.5, "30 % of the setpoints"),

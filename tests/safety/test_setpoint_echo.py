@@ -75,8 +75,10 @@ def test_nothing_is_foreign_before_a_report_has_shown_a_setpoint_of_ours():
     heard.take(report(*OURS[0]), 0.0)
     heard.take(report((0.7, 0.0, 0.0), 0.3), 0.0)
     assert heard.foreign_reports(0.0) == 1
+    assert heard.any_foreign
     heard.begin(PX4)
     assert heard.foreign_reports(0.0) == 0
+    assert not heard.any_foreign
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
