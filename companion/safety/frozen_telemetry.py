@@ -1,6 +1,6 @@
-"""Detects attitudes or positions that repeat one measurement under new time stamps."""
+"""Detects attitudes, positions or velocities that repeat one measurement under new time stamps."""
 
-from math import hypot, inf
+from math import hypot, inf, nan
 
 from companion.attitude import BodyRates
 from companion.vehicle.records import AttitudeSample, LocalPosition
@@ -10,9 +10,12 @@ _MIN_REPETITIONS = 10
 _MAX_TURN = 0.05
 """Largest turn that setpoints command while the attitude repeats itself, rad."""
 _MAX_WAY = 0.02
-"""Largest way by the reported speed while the position repeats itself, m."""
+"""Largest way by the reported speed while the position repeats itself, m: to and fro add up, since
+each of them must change the numbers."""
 _POSITION_TIME = 0.5
 """Shortest time for which a position must repeat itself, s: an estimate may be made at 5 Hz."""
+_MAX_DRIFT = 0.05
+"""Largest way by which the position departs from the velocity that repeats itself, m."""
 _LONGEST_LOOK_INTERVAL = 0.1
 """Of a longer time between two looks, only this much counts, s."""
 
@@ -36,14 +39,49 @@ class _Repetition:
         self.count += 1
         return True
 
+    def is_long(self, time: float) -> bool:
+        """Whether the numbers repeat often enough, and for long enough (`time`, s)."""
+        return self.count >= _MIN_REPETITIONS and time >= _POSITION_TIME
+
+
+class _Axis:
+    """Compares position and velocity along one axis, each of which may stand still alone."""
+
+    def __init__(self) -> None:
+        self._position, self._velocity = _Repetition(), _Repetition()
+        self._newest = nan
+        self._start = self._way = self._taken_at = 0.0
+
+    def take(self, now: float, received: float, position: float, velocity: float) -> str | None:
+        """Take the newest position (m) and velocity (m/s); return what is frozen, or None."""
+        moved, self._newest = position != self._newest, position
+        if self._position.take(now, received, position):
+            self._way += abs(velocity) * (now - self._taken_at)
+            self._taken_at = now
+        elif moved:
+            self._way, self._taken_at = 0.0, now
+        if self._position.is_long(now - self._position.since) and self._way > _MAX_WAY:
+            return "LOCAL_POSITION_NED repeats one position, although it reports a speed"
+        # Only positions that move count: a simulated vehicle at rest may repeat both.
+        if not moved:
+            return None
+        self._velocity.take(now, received, velocity)
+        if self._velocity.count == 0:
+            self._start = position
+        time = now - self._velocity.since
+        drift = abs(position - self._start - velocity * time)
+        if self._velocity.is_long(time) and drift > _MAX_DRIFT:
+            return "LOCAL_POSITION_NED repeats one velocity, although its position moves otherwise"
+        return None
+
 
 class FrozenTelemetry:
-    """Compares attitude and position with what they must do, because we fly by them alone.
+    """Compares attitude, position and velocity with what they must do: we fly by them alone.
 
     An estimator's numbers change with each message, by the noise of its sensors. Numbers that
     repeat to the last bit count as frozen only if they contradict themselves: the setpoints turn
-    the vehicle, or the reported speed moves it. So a simulated vehicle at perfect rest is not
-    frozen.
+    the vehicle, the reported speed moves it, or the position moves otherwise than the reported
+    velocity. So a simulated vehicle at perfect rest is not frozen. Each axis is judged alone.
     """
 
     def __init__(self) -> None:
@@ -51,7 +89,8 @@ class FrozenTelemetry:
 
     def begin(self, now: float) -> None:
         """Note that control begins at `now`, s of event-loop time: forget what was before."""
-        self._attitude, self._position = _Repetition(), _Repetition()
+        self._attitude = _Repetition()
+        self._axes = _Axis(), _Axis(), _Axis()
         self._turn, self._looked_at = 0.0, now
 
     def look(
@@ -82,11 +121,10 @@ class FrozenTelemetry:
                 )
         if position is None:
             return None
-        numbers = position.position_ned, position.velocity_ned
-        self._position.take(now, position.received, numbers)
-        time = now - self._position.since
-        if self._position.count < _MIN_REPETITIONS or time < _POSITION_TIME:
-            return None
-        if hypot(*position.velocity_ned) * time <= _MAX_WAY:
-            return None
-        return "LOCAL_POSITION_NED repeats one position, although it reports a speed"
+        for axis, place, speed in zip(
+            self._axes, position.position_ned, position.velocity_ned, strict=True
+        ):
+            found = axis.take(now, position.received, place, speed)
+            if found is not None:
+                return found
+        return None

@@ -163,7 +163,7 @@ def rare_foreign_setpoint(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def frozen(snapshot: Snapshot, _: bool) -> str | None:
-    """Attitude or position repeats one measurement under new time stamps."""
+    """Attitude, position or velocity repeats one measurement under new time stamps."""
     what = snapshot.health.frozen
     return None if what is None else f"frozen telemetry: {what}"
 

@@ -1,6 +1,6 @@
-"""Attitude or position repeats one measurement under new time stamps, as from a broken relay."""
+"""Attitude, position or velocity repeats itself under new time stamps, as from a broken relay."""
 
-from math import acos, degrees
+from math import acos, cos, degrees, sin
 from types import SimpleNamespace
 
 import pytest
@@ -12,6 +12,9 @@ from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
 ATTITUDE = ("ATTITUDE_QUATERNION", ("q1", "q2", "q3", "q4"))
+HORIZONTAL = ("LOCAL_POSITION_NED", ("x", "y"))
+HEIGHT = ("LOCAL_POSITION_NED", ("z",))
+VELOCITY = ("LOCAL_POSITION_NED", ("vx", "vy", "vz"))
 POSITION = ("LOCAL_POSITION_NED", ("x", "y", "z", "vx", "vy", "vz"))
 
 
@@ -43,6 +46,9 @@ class Frozen:
     [
         (*ATTITUDE, "repeats one attitude, although setpoints turn the vehicle"),
         (*POSITION, "repeats one position, although it reports a speed"),
+        (*HORIZONTAL, "repeats one position, although it reports a speed"),
+        (*HEIGHT, "repeats one position, although it reports a speed"),
+        (*VELOCITY, "repeats one velocity, although its position moves otherwise"),
     ],
 )
 def test_a_vehicle_is_not_flown_by_telemetry_that_stands_still(autopilot, name, fields, told):
@@ -78,14 +84,15 @@ def test_a_simulated_vehicle_at_perfect_rest_is_not_frozen(autopilot):
     assert summary.result == "ok", summary.events
 
 
-def looks(times, attitude=lambda t: 1.0, rate=0.0, place=lambda t: t, speed=1.0):
+def looks(times, attitude=lambda t: 1.0, rate=0.0, place=lambda t: t, speed=lambda t: 1.0, axis=0):
     """What is found frozen in looks at these times, each at new messages."""
     frozen = FrozenTelemetry()
     for t in times:
         sample = SimpleNamespace(received=t, q=(attitude(t), 0.0, 0.0, 0.0))
-        position = SimpleNamespace(
-            received=t, position_ned=(place(t), 0.0, 0.0), velocity_ned=(speed, 0.0, 0.0)
-        )
+        moving = [(0.0, 0.0), (0.0, 0.0), (0.0, 0.0)]
+        moving[axis] = place(t), speed(t)
+        position_ned, velocity_ned = zip(*moving, strict=True)
+        position = SimpleNamespace(received=t, position_ned=position_ned, velocity_ned=velocity_ned)
         found = frozen.look(t, sample, BodyRates(rate, 0.0, 0.0), position)
         if found:
             return found
@@ -97,11 +104,25 @@ TIMES = [0.02 * step for step in range(100)]
 
 def test_what_contradicts_itself_is_frozen():
     assert "attitude" in looks(TIMES, rate=0.1)
-    assert "position" in looks(TIMES, place=lambda t: 3.0)
+    assert "one position" in looks(TIMES, place=lambda t: 3.0)
+    hovers = looks(TIMES, place=lambda t: 3.0, speed=lambda t: 0.05 * sin(30.0 * t))
+    assert "one position" in hovers, "to and fro: each way changes the numbers of a true position"
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_each_axis_of_position_or_velocity_may_stand_still_alone(axis):
+    """Frozen x and y, z, or velocity alone were flown by: only all six numbers at once counted."""
+    place, speed = (lambda t: 0.1 * sin(3.0 * t)), (lambda t: 0.3 * cos(3.0 * t))
+    assert looks(TIMES, place=place, speed=speed, axis=axis) is None
+    assert "one position" in looks(TIMES, place=lambda t: 0.0, speed=speed, axis=axis)
+    assert "one velocity" in looks(TIMES, place=place, speed=lambda t: 0.3, axis=axis)
 
 
 def test_what_only_repeats_itself_is_not_frozen():
     assert looks(TIMES) is None, "no turn is commanded"
-    assert looks(TIMES, place=lambda t: 3.0, speed=0.0) is None, "it reports that it stands"
+    stands = looks(TIMES, place=lambda t: 3.0, speed=lambda t: 0.0)
+    assert stands is None, "it reports that it stands"
+    reset = looks(TIMES, place=lambda t: 3.0 if t < 1.0 else 3.5, speed=lambda t: 0.0)
+    assert reset is None, "a simulated vehicle at rest whose estimate jumps"
     at_5_hz = looks(TIMES, attitude=lambda t: t // 0.1, rate=0.4, place=lambda t: t // 0.2)
     assert at_5_hz is None, "estimates made at 5 and 10 Hz, sent at 50 Hz"
