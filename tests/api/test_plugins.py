@@ -255,8 +255,12 @@ def test_the_rest_of_a_planner_is_passed_on():
 
 @pytest.fixture
 def quick(monkeypatch):
-    """The vehicles of `check_guidance` boot, climb and land quickly."""
+    """The vehicles of `check_guidance` boot, climb and land quickly, and fly half a circle."""
+    short = {"hover": {"duration_s": 1.0}, "circle": {"laps": 0.5}, "link": QUICK_FLIGHT["link"]}
     monkeypatch.setattr(conformance, "MockVehicle", QuickVehicle)
+    monkeypatch.setattr(
+        conformance, "fly", lambda changes, vehicle: fly(merged(short, changes), vehicle)
+    )
 
 
 @pytest.mark.usefixtures("quick")
@@ -370,14 +374,15 @@ def test_thrust_that_the_vehicle_does_not_have_is_not_taken_for_motion():
     assert not vehicle.state()["crashed"]
 
 
-@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 @pytest.mark.parametrize(
-    ("kind", "raised", "line"),
+    ("autopilot", "kind", "raised", "line"),
     [
-        ("stumbling", "KeyError: 'north'", 'return {}["north"]'),
-        ("quitting", "SystemExit", "sys.exit()"),
-        ("vanishing", "TypeError: cannot unpack non-iterable NoneType object", ""),
+        ("px4", "stumbling", "KeyError: 'north'", 'return {}["north"]'),
+        ("ardupilot", "stumbling", "KeyError: 'north'", 'return {}["north"]'),
+        ("px4", "quitting", "SystemExit", "sys.exit()"),
+        ("px4", "vanishing", "TypeError: cannot unpack non-iterable NoneType object", ""),
         (
+            "px4",
             "unset",
             "TypeError: float() argument must be a string or a real number, not 'NoneType'",
             "",

@@ -56,17 +56,25 @@ def result_of(autopilot, made, own, does):
     return str(ended.value)
 
 
-@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-@pytest.mark.parametrize("slowed", [False, True], ids=["itself", "slowed"])
+ERRORS = {
+    ZeroDivisionError("division by zero"): "ZeroDivisionError: division by zero",
+    ValueError("of\ntwo lines"): "ValueError: of two lines",
+    SystemExit(): "SystemExit",
+    asyncio.CancelledError(): "CancelledError",
+}
+ONCE_SLOWED_AND_ONCE_NOT = [
+    ("ardupilot", number % 2 == 0, *each) for number, each in enumerate(ERRORS.items())
+]
+"""Only the hand-back depends on the autopilot."""
+
+
 @pytest.mark.parametrize(
-    ("error", "raised"),
+    ("autopilot", "slowed", "error", "raised"),
     [
-        (ZeroDivisionError("division by zero"), "ZeroDivisionError: division by zero"),
-        (ValueError("of\ntwo lines"), "ValueError: of two lines"),
-        (SystemExit(), "SystemExit"),
-        (asyncio.CancelledError(), "CancelledError"),
+        *(("px4", slowed, *each) for slowed in (False, True) for each in ERRORS.items()),
+        *ONCE_SLOWED_AND_ONCE_NOT,
     ],
-    ids=lambda value: type(value).__name__,
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else str(value),
 )
 def test_what_it_raises_is_its_own_error_and_the_vehicle_is_handed_back(
     autopilot, slowed, error, raised

@@ -17,12 +17,14 @@ from companion.cli.main import main
 from companion.config.files import load as load_config
 from companion.files.yaml_file import ConfigError
 from tests.campaign.test_campaign_file import CONFIGS, load
-from tests.flight.fly import QUICK_PARAMETERS
+from tests.flight.fly import LOOP_HZ, QUICK_PARAMETERS
 
 QUICK = {
     "flight.takeoff_height_m": 2.0,
     "flight.maneuvers": ["hover"],
     "hover.duration_s": 1.0,
+    "link.attitude_rate_hz": LOOP_HZ,
+    "mock.inner_loop_hz": LOOP_HZ,
     "mock.prearm_delay_s": 0.2,
     **{f"mock.parameters.{name}": value for name, value in QUICK_PARAMETERS["px4"].items()},
 }
@@ -31,7 +33,7 @@ QUICK = {
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     """Two flights of a circle, in a calm and in wind, and a batch of steps."""
-    circle = {**QUICK, "flight.maneuvers": ["circle"], "circle.speed_m_s": 3.0}
+    circle = {**QUICK, "flight.maneuvers": ["circle"], "circle.speed_m_s": 3.0, "circle.laps": 1}
     told = {"set": circle, "sweep": {"mock.wind.speed_m_s": [0.0, 5.0]}}
     return load(tmp_path_factory.mktemp("file"), **told)
 

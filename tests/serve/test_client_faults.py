@@ -464,6 +464,20 @@ CELLS = (
     other_system,
 )
 
+ONE_VEHICLE = (
+    flood,
+    reconnects_all_the_time,
+    not_finite,
+    contradictions,
+    no_place,
+    clock_jumps,
+    upside_down,
+    two_at_once,
+    wrong_ids,
+    damaged,
+)
+"""What is decided without the autopilot: PX4 alone flies them."""
+
 
 def documented():
     """State by fault, from the table of the page."""
@@ -488,17 +502,21 @@ def test_every_fault_of_a_client_ends_in_its_documented_state(autopilot):
     # The limits of these scenes were measured after the take-off of the shipped vehicle.
     config = CONFIGS / f"mock-{autopilot}.yaml"
     vehicle = testing.MockVehicle(lockstep=False, compiled=can_compile(), **slow_loop(config))
+    cells = [cell for cell in CELLS if autopilot == "px4" or cell not in ONE_VEHICLE]
     seen = {}
 
     async def whole():
         async with serving(vehicle, autopilot, hold_s=HOLD) as session:
             ground = await airborne(session, vehicle, autopilot)
             scene = Scene(vehicle, session, autopilot, ground, SetpointJudge(vehicle, autopilot))
-            for cell in CELLS:
+            for cell in cells:
                 await scene.recover()
                 seen[cell.__doc__] = await cell(scene)
             scene.judge.ended()
 
     testing.run(vehicle, whole())
-    assert seen == documented()
+    expected = documented()
+    if autopilot == "px4":
+        assert seen == expected
+    assert seen == {cell.__doc__: expected[cell.__doc__] for cell in cells}
     assert not vehicle.state()["crashed"]

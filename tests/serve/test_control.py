@@ -100,7 +100,7 @@ def test_a_streamed_circle_is_flown_as_it_is(autopilot):
             error = None if flight is None else flight.tracking_error
             errors.extend([error] if time > 4.0 else [])
 
-        await stream(12.0, send)
+        await stream(9.0, send)
         assert math.sqrt(sum(error**2 for error in errors) / len(errors)) < 0.10
         assert {each.name for each in script.of("NAMED_VALUE_FLOAT")} == {"trk_err_m", "answer_ms"}
 

@@ -53,10 +53,10 @@ def results(tmp_path_factory):
         patch.setattr(fig2, "FIGURE_2", replace(fig2.FIGURE_2, headings=EIGHT))
         patch.setattr(fig3, "FIGURE_2", replace(fig3.FIGURE_2, seconds=1.0))
         patch.setattr(fig4, "FIGURE_4", replace(fig4.FIGURE_4, headings=EIGHT))
-        step = replace(fig5_flights.STEP, headings=EIGHT[3:6:2], seconds=1.5)
+        step = replace(fig5_flights.STEP, headings=EIGHT[3:6:2], seconds=1.0)
         patch.setattr(fig5_flights, "STEP", step)
-        # Of the sweep only the cross-track is shown, which is largest in the first second.
-        patch.setattr(fig5_flights, "FIGURE_2", replace(fig5_flights.FIGURE_2, seconds=1.0))
+        # Of the sweep only the cross-track is shown, which is largest in the first half second.
+        patch.setattr(fig5_flights, "FIGURE_2", replace(fig5_flights.FIGURE_2, seconds=0.5))
         page, _ = runner.run("all", None, out, Console(quiet=True))
     return out, page, ticks
 

@@ -40,13 +40,13 @@ def setpoints(summary):
     ],
 )
 def test_the_same_setpoints_to_the_bit(tmp_path, autopilot, settings):
-    settings = {**settings, "autopilot": autopilot, "full_rate": True, "seed": 7}
+    settings = {**settings, "autopilot": autopilot, "seed": 7}
     with sockets.mock_vehicle(tmp_path, **settings) as mock:
         over_udp = sockets.fly(mock, tmp_path / "udp", **CIRCLE)
     with memory.mock_vehicle(in_lockstep=True, **settings) as vehicle:
         in_memory = memory.fly(vehicle, tmp_path / "memory", **CIRCLE)
     sent = setpoints(over_udp)
-    assert len(sent) > 1200
+    assert len(sent) > 400
     assert sent == setpoints(in_memory)
     logs = [(summary.log / "flight.tlog").read_bytes() for summary in (over_udp, in_memory)]
     assert logs[0] == logs[1]

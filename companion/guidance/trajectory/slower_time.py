@@ -72,12 +72,20 @@ class SlowerTime:
     coefficients: tuple[float, ...]
 
     @cached_property
+    def _pieces(self) -> list[_Piece]:
+        """The pieces; a flight asks for several times at each sample."""
+        c = self.coefficients
+        return list(itertools.starmap(_spline_piece, zip(c, c[1:], c[2:], c[3:], strict=False)))
+
+    @cached_property
+    def _integrals(self) -> list[float]:
+        """`_Piece.integral` over each whole piece."""
+        return [float(piece.integral(1.0)) for piece in self._pieces]
+
+    @cached_property
     def _ends(self) -> list[float]:
         """Stretched times at the ends of the pieces, beginning with 0, s."""
-        c = self.coefficients
-        pieces = itertools.starmap(_spline_piece, zip(c, c[1:], c[2:], c[3:], strict=False))
-        integrals = np.array([piece.integral(1.0) for piece in pieces])
-        ends: list[float] = np.cumsum(integrals * self._piece_duration).tolist()
+        ends: list[float] = np.cumsum(np.array(self._integrals) * self._piece_duration).tolist()
         return [0.0, *ends]
 
     @property
@@ -93,14 +101,14 @@ class SlowerTime:
     def at(self, time: float) -> Progress:
         """Original time at the stretched `time`, and its derivatives; limited to the duration."""
         if time <= 0.0:
-            return self._progress(_spline_piece(*self.coefficients[:4]), 0.0, 0.0)
+            return self._progress(self._pieces[0], 0.0, 0.0)
         last = len(self.coefficients) - 4
         if time >= self.duration:
-            return self._progress(_spline_piece(*self.coefficients[last:]), 1.0, last)
+            return self._progress(self._pieces[last], 1.0, last)
         index = min(bisect_right(self._ends, time) - 1, last)
-        piece = _spline_piece(*self.coefficients[index : index + 4])
+        piece = self._pieces[index]
         integral = (time - self._ends[index]) / self._piece_duration
-        u = integral / float(piece.integral(1.0))
+        u = integral / self._integrals[index]
         for _ in range(_MOST_NEWTON_STEPS):
             step = (float(piece.integral(u)) - integral) / float(piece.factor(u))
             u = min(max(u - step, 0.0), 1.0)
