@@ -5,7 +5,6 @@ from math import atan2
 
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import tilt_products
-from companion.control.measured_acceleration import MeasuredAcceleration
 from companion.drag import AxisDrag
 from companion.guidance import (
     GRAVITY,
@@ -42,8 +41,6 @@ class MotionEstimate:
     Attributes:
         vertical_thrust: upward part of the commanded specific thrust, m/s².
         drag: the drag estimate.
-        on_acceleration: called with the acceleration that each new position shows, while offboard
-            is active.
     """
 
     def __init__(
@@ -57,7 +54,6 @@ class MotionEstimate:
         self._observer = observer
         self._correction = correction
         self.drag = drag
-        self.on_acceleration: Callable[[MeasuredAcceleration], None] = lambda _: None
         self._offset = offset
         self._slopes = SlopeHistory()
         self._climb_bias = ClimbBias()
@@ -217,13 +213,12 @@ class MotionEstimate:
         north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
         # The measured acceleration gives the actual thrust, which differs from the commanded one.
         vertical_thrust = GRAVITY - down
-        thrust = vertical_thrust * slope[0], vertical_thrust * slope[1]
-        velocity = 0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1]), 0.5 * (old[2] + new[2])
-        self.on_acceleration(
-            MeasuredAcceleration(dt, thrust, (north, east), velocity[:2], self._heading_resets)
+        self.drag.observe(
+            dt,
+            (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1]), 0.5 * (old[2] + new[2])),
+            (north - vertical_thrust * slope[0], east - vertical_thrust * slope[1]),
+            self._heading,
         )
-        residual = north - thrust[0], east - thrust[1]
-        self.drag.observe(dt, velocity, residual, self._heading)
 
     def _modelled_acceleration(self, slope: NorthEast, motion: VehicleMotion) -> NorthEast:
         """Horizontal acceleration due to thrust and drag, m/s², without the disturbance."""

@@ -17,7 +17,6 @@ from companion.guidance import ManeuverSequence
 from companion.guidance.fence import FenceCentre
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import dialect
-from companion.mavlink.texts import status_texts
 from companion.safety.actions import Exit, FlightEnded
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.link import Link
@@ -83,11 +82,6 @@ class FlightContext:
     """Returns the name of a client in control that has just commanded another mode; else ""."""
     note: Callable[[str], None] = lambda _: None
     """Records and shows an event."""
-
-    def warn_pilot(self, text: str) -> None:
-        """Send a critical STATUSTEXT for the pilot's ground station; at most 50 ASCII letters."""
-        for message in status_texts(text, dialect.MAV_SEVERITY_CRITICAL, 1):
-            self.link.send(message)
 
     def release(self) -> None:
         """Stop answering samples; no setpoint is sent after this."""

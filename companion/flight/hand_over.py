@@ -14,6 +14,8 @@ from companion.flight.commands import (
 from companion.flight.context import FlightContext, cancel
 from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkError, LinkLost
+from companion.mavlink.messages import dialect
+from companion.mavlink.texts import status_texts
 from companion.safety.actions import FlightEnded, fault_message
 from companion.vehicle.autopilot import Role
 
@@ -110,7 +112,8 @@ class _Patience:
         allowed = context.config.flight.landing_timeout_s
         if now - self._warned_at >= _PILOT_WARNING_TIME:
             self._warned_at = now
-            context.warn_pilot(_PILOT_WARNING)
+            for text in status_texts(_PILOT_WARNING, dialect.MAV_SEVERITY_CRITICAL, 1):
+                context.link.send(text)
         if now - self._began < allowed:
             return
         if not _drifts_without_us(context):

@@ -219,8 +219,6 @@ class Watch:
             self._context.release()
         elif verdict.stream is StreamEffect.ENDS:
             self._context.end_stream()
-        if verdict.pilot_warning:
-            self._context.warn_pilot(verdict.pilot_warning)
         self._stopped_in_control |= verdict.stream is not StreamEffect.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 

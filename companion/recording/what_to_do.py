@@ -15,8 +15,6 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "battery": "charge the battery; the limit is limits.min_battery_percent",
     "gps": "wait for a better GPS fix, or fly where more of the sky is seen",
     "estimator": "let the autopilot's estimator settle; check its sensors and calibration",
-    "thrust direction": "check the compass, its rotation, and what reports heading and velocity; "
-    "until the cause is found, fly by hand in a mode without position",
     "reset": "check GPS and compass: the autopilot's estimate jumped",
     "resets": "check GPS and compass; the limits are safety.max_reset_m, max_reset_deg, max_resets",
     "tilt": "find what tilted the vehicle beyond limits.max_tilt_deg: wind, a collision, a motor; "

@@ -17,8 +17,6 @@ class Verdict(NamedTuple):
     """Description of the breach."""
     stream: StreamEffect = StreamEffect.CONTINUES
     """What becomes of the setpoints if `action` ends control."""
-    pilot_warning: str = ""
-    """Text for the pilot's ground station if `action` ends control, or ""."""
 
 
 class SafetyLadder:
@@ -99,4 +97,4 @@ def _severity(alarm: Alarm) -> int:
 
 def _verdict(alarm: Alarm, action: Action) -> Verdict:
     monitor = alarm.monitor
-    return Verdict(action, alarm.reason or "", monitor.stream, monitor.pilot_warning)
+    return Verdict(action, alarm.reason or "", monitor.stream)

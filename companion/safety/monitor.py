@@ -45,9 +45,6 @@ class Monitor:
     """Action that follows if a hold does not end the breach."""
     stream: StreamEffect = StreamEffect.CONTINUES
     """What becomes of the setpoints if the breach ends control."""
-    pilot_warning: str = ""
-    """Text for the pilot's ground station if the breach ends control (at most 50 bytes), or "".
-    """
 
 
 class Alarm:

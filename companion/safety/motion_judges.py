@@ -77,23 +77,6 @@ def tracking(limit: float) -> Judge:
     return judge
 
 
-def thrust_direction(limit: float) -> Judge:
-    """The vehicle accelerates more than `limit` (rad) away from where its thrust points."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        angle = snapshot.motion.thrust_angle
-        if angle is None or abs(angle) <= with_hysteresis(limit, raised):
-            return None
-        side = "right" if angle > 0.0 else "left"
-        return (
-            f"the reported velocity changes {degrees(abs(angle)):.0f}° to the {side} of where the "
-            "reported attitude points the thrust: heading or velocity is wrong, and so is every "
-            "mode that holds the position"
-        )
-
-    return judge
-
-
 def thrust(lowest: float, highest: float) -> Judge:
     """The sent thrust is at one of its limits (0..1), so the height may not be held any more."""
 

@@ -49,9 +49,6 @@ class Motion(NamedTuple):
     """Estimated horizontal acceleration, m/s², NED."""
     moves_to_hold: bool = False
     """Whether guidance still brakes, or moves, to the place that it then holds."""
-    thrust_angle: float | None = None
-    """Angle from the horizontal thrust to the acceleration that the reported velocity shows, rad,
-    clockwise from above (`ThrustDirection`); None: not known."""
 
 
 class Control(NamedTuple):

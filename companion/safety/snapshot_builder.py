@@ -20,7 +20,6 @@ from companion.safety.snapshot import (
     Resets,
     Snapshot,
 )
-from companion.safety.thrust_direction import ThrustDirection
 from companion.vehicle.link import Link
 
 _MAX_PLACE_AGE = 1.0
@@ -54,8 +53,6 @@ class SnapshotBuilder:
         self.echo = SetpointEcho(loop.record.sent_setpoints)
         self.counters = CounterWindow(link, loop.record, real_time=real_time)
         self._frozen = FrozenTelemetry()
-        self._thrust_direction = ThrustDirection()
-        guidance_loop.estimate.on_acceleration = self._thrust_direction.observe
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
@@ -88,7 +85,6 @@ class SnapshotBuilder:
         self.counters.clear()
         self.echo.begin(self._link.autopilot)
         self._frozen.begin(now)
-        self._thrust_direction.begin()
 
     @property
     def fence_centre(self) -> FenceCentre | None:
@@ -166,7 +162,6 @@ class SnapshotBuilder:
             self._fence_place,
             guidance_loop.acceleration,
             guidance_loop.remaining_braking_time > 0.0,
-            self._thrust_direction.angle,
         )
 
     def _health(self, now: float) -> Health:

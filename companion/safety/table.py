@@ -5,7 +5,6 @@ To add a monitor, write its judge beside the others (`*_judges.py`), its row her
 """
 
 from dataclasses import replace
-from math import radians
 
 from companion.config import Config
 from companion.guidance.fence import Fence
@@ -27,11 +26,6 @@ _MAX_FOREIGN = 2
 _ESTIMATE_DELAY = 0.08
 """Time by which the estimated horizontal motion is behind the vehicle, s. Measured on accelerating
 mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
-_LARGEST_THRUST_ANGLE = radians(50.0)
-"""Largest angle between thrust and acceleration, rad; docs/safety.md has the angles measured in
-good flights and in flights with a wrong heading."""
-_FLY_BY_HAND = "Companion: wrong heading or speed. Fly by hand!"
-"""Text for the pilot's ground station; it fits into one STATUSTEXT."""
 _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 
 
@@ -73,27 +67,17 @@ def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
 
 
 def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
-    """Monitors of battery, GPS, and of the estimator's flags, heading and resets."""
+    """Monitors of battery, GPS and estimator."""
     safety = config.safety
     resets = autopilot_judges.too_many_estimator_resets(
         safety.max_resets, safety.max_reset_m, safety.max_reset_angle
     )
     battery = autopilot_judges.battery(config.limits.min_battery)
-    direction = motion_judges.thrust_direction(_LARGEST_THRUST_ANGLE)
     position = Action(safety.position_action)
     return (
         Monitor("battery", battery, Action(safety.battery_action), lasts=_BACKLOG_TIME, calm=5.0),
         Monitor("gps", autopilot_judges.gps, position, lasts=_BACKLOG_TIME),
         Monitor("estimator", autopilot_judges.estimator_flags, position, lasts=0.5),
-        # The autopilot's own modes use the same heading, so only the pilot can do better.
-        Monitor(
-            "thrust direction",
-            direction,
-            position,
-            lasts=0.3,
-            stream=StreamEffect.ENDS,
-            pilot_warning=_FLY_BY_HAND,
-        ),
         Monitor("reset", autopilot_judges.any_estimator_reset, Action.WARN, lasts=0.1),
         Monitor("resets", resets, Action(safety.reset_action)),
     )

@@ -114,7 +114,6 @@ BREACHES = [
     ("estimator", autopilot(estimator=Estimator(NOW - 6.0, GOOD)), LAND, 0.5, "not reported"),
     ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x1)), LAND, 0.5, "valid attitude"),
     ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x18)), LAND, 0.5, "valid position"),
-    ("thrust direction", motion(thrust_angle=-0.9), LAND, 0.3, "52° to the left of where"),
     ("reset", FINE._replace(resets=Resets(1, 0.5, 0.3)), WARN, 0.1, "0.5 m and 17°"),
     ("resets", FINE._replace(resets=Resets(4)), LAND, 0.0, "reset 4 times"),
     ("resets", FINE._replace(resets=Resets(1, 1.1)), LAND, 0.0, "reset by 1.1 m"),
@@ -223,12 +222,9 @@ def test_what_the_rows_of_the_table_say_besides_action_and_time():
     ]
     assert [row.name for row in table if row.stream is StreamEffect.ENDS] == [
         "frozen",
-        "thrust direction",
         "late setpoints",
         "lost setpoints",
     ]
-    assert [row.name for row in table if row.pilot_warning] == ["thrust direction"]
-    assert all(len(row.pilot_warning.encode()) <= 50 for row in table)
     after_hold = {row.name: row.then for row in table if row.action is HOLD}
     assert after_hold == {"braking": HAND_BACK, "speed": LAND, "tracking": LAND, "thrust": LAND}
 

@@ -1,7 +1,7 @@
 """What the monitors are shown: every value is that of its source, since control began."""
 
 from collections import deque
-from math import inf, pi
+from math import inf
 from types import SimpleNamespace
 
 import pytest
@@ -9,7 +9,6 @@ import pytest
 from companion.attitude import BodyRates
 from companion.control.heading_frame import HeadingFrame
 from companion.control.loop_record import LoopRecord, Unanswered
-from companion.control.measured_acceleration import MeasuredAcceleration
 from companion.guidance.fence import Place
 from companion.safety.snapshot import AutopilotStatus, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
@@ -62,7 +61,6 @@ class Flight:
         self.guidance = SimpleNamespace(
             motion=Motions(self.course.position_ned, self.course.velocity),
             acceleration=(0.0, 0.0),
-            estimate=SimpleNamespace(),
             tracking_error=0.9,
             remaining_braking_time=0.0,
             command_not_finite=False,
@@ -125,18 +123,6 @@ def test_motion_is_seen_from_where_control_began(flight):
         acceleration=(0.3, -0.4),
         moves_to_hold=True,
     )
-
-
-def test_the_angle_of_the_thrust_is_that_since_control_began(flight):
-    for step in range(200):
-        east = 6.0 if step % 100 < 50 else -6.0
-        flight.guidance.estimate.on_acceleration(
-            MeasuredAcceleration(0.02, (0.0, east), (east, 0.0), (0.0, 0.0), 0.0)
-        )
-    assert flight.snapshot().motion.thrust_angle == pytest.approx(-0.5 * pi)
-    flight.builder.begin(10.0)
-    flight.listen(10.0)
-    assert flight.snapshot().motion.thrust_angle is None
 
 
 @pytest.mark.parametrize("command", [None, SimpleNamespace(idle=True)])
