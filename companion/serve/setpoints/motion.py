@@ -18,7 +18,7 @@ from companion.serve.setpoints.request import AxisDemand, MotionRequest
 _HORIZONTAL_JUMP_LIMITS = JumpLimits(0.3, 0.6)
 _VERTICAL_JUMP_LIMITS = JumpLimits(0.3, 0.4)
 _HEADING_JUMP_LIMITS = JumpLimits(0.2, 1.0)
-_VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
+VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
 """Largest vertical acceleration, m/s², and jerk, m/s³: thrust used for climbing is not available
 for tilt."""
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
@@ -35,7 +35,7 @@ class MotionLimits(NamedTuple):
     speed: float
     """Largest horizontal speed, m/s."""
     acceleration: float
-    """Largest acceleration, m/s²; vertically at most `_VERTICAL_ACCELERATION`."""
+    """Largest acceleration, m/s²; vertically at most `VERTICAL_ACCELERATION`."""
     jerk: float
     """Largest jerk, m/s³; vertically at most `_VERTICAL_JERK`."""
     climb: float
@@ -57,7 +57,7 @@ class CommandedMotion:
         vertical = AxisLimits(  # positive down
             limits.descent,
             limits.climb,
-            min(limits.acceleration, _VERTICAL_ACCELERATION),
+            min(limits.acceleration, VERTICAL_ACCELERATION),
             min(limits.jerk, _VERTICAL_JERK),
         )
         yaw = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
@@ -119,7 +119,7 @@ class CommandedMotion:
         """Limit a vertical demand that has no position.
 
         The velocity is limited to the climb and descent limits, and the acceleration to
-        `_VERTICAL_ACCELERATION`. An acceleration that would lead beyond a speed limit becomes a
+        `VERTICAL_ACCELERATION`. An acceleration that would lead beyond a speed limit becomes a
         demand for this speed.
 
         Args:
@@ -133,7 +133,7 @@ class CommandedMotion:
             vertical = vertical._replace(velocity=(min(max(speed, -self._climb), self._descent),))
         if vertical.acceleration is None:
             return vertical
-        acceleration = clamp(vertical.acceleration[0], _VERTICAL_ACCELERATION)
+        acceleration = clamp(vertical.acceleration[0], VERTICAL_ACCELERATION)
         limit = self._descent if acceleration > 0.0 else -self._climb
         # The speed changes further while the acceleration is reduced to zero.
         change = 0.5 * acceleration * abs(acceleration) / _VERTICAL_JERK
