@@ -1,11 +1,12 @@
 """The reference that follows from a client's requests."""
 
 from copy import copy
+from math import inf
 from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import clamp
-from companion.guidance.reference import Reference, Vector, VehicleMotion
+from companion.guidance.reference import Reference, Vector, VehicleMotion, clamp_length
 from companion.serve.setpoints.approach import (
     AxisLimits,
     AxisMotion,
@@ -44,6 +45,8 @@ class MotionLimits(NamedTuple):
     timeout: float
     """Time for which a request repeated unchanged is extrapolated, s. After this time a commanded
     position stands still, and a commanded velocity stays constant."""
+    commanded_speed: float = inf
+    """Largest horizontal speed of a commanded velocity without a position, m/s."""
 
 
 class CommandedMotion:
@@ -66,6 +69,7 @@ class CommandedMotion:
         )
         self._vertical = CommandFollower((vertical,), _VERTICAL_JUMP_LIMITS, limits.timeout)
         self._heading = CommandFollower((yaw,), _HEADING_JUMP_LIMITS, limits.timeout)
+        self._commanded_speed = limits.commanded_speed
         self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
         self._newest_yaw: tuple[float, float, float] | None = None  # request, heading demand, time
@@ -92,7 +96,7 @@ class CommandedMotion:
         )
         horizontal, vertical = _by_axes(actual)
         try:
-            self._horizontal.command(request.horizontal, now, horizontal)
+            self._horizontal.command(self._slowed(request.horizontal), now, horizontal)
             (speed,), (reference_speed,) = vertical.velocity, self._vertical.at(now).velocity
             demand = self._clamped(request.vertical, speed, reference_speed)
             self._vertical.command(demand, now, vertical)
@@ -114,6 +118,16 @@ class CommandedMotion:
         (z,), (w,), (c,) = self._vertical.at(time)
         (heading,), (rate,), _ = self._heading.at(time)
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
+
+    def _slowed(self, horizontal: AxisDemand) -> AxisDemand:
+        """Shorten a commanded velocity to its limit; its direction stays.
+
+        With a position, a shorter velocity would contradict it.
+        """
+        if horizontal.position is not None or horizontal.velocity is None:
+            return horizontal
+        north, east = horizontal.velocity
+        return horizontal._replace(velocity=clamp_length(north, east, self._commanded_speed))
 
     def _clamped(self, vertical: AxisDemand, *speeds: float) -> AxisDemand:
         """Limit a vertical demand that has no position.
