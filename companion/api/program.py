@@ -159,6 +159,13 @@ class ProgramPlan:
             await self._new_request.wait()
 
 
+def unless_disarmed(
+    phases: Callable[[], Sequence[Phase]],
+) -> Callable[[FlightContext], Sequence[Phase]]:
+    """The phases for a vehicle that is not disarmed; for a disarmed one none: its mode stays."""
+    return lambda context: () if context.link.state.armed is False else phases()
+
+
 def flight_ended(result: str) -> FlightEnded:
     """The exception for calls after the end of a flight whose summary has this `result`."""
     return FlightEnded("the flight is over" if result == "ok" else result)

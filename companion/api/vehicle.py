@@ -10,6 +10,7 @@ from pathlib import Path
 
 from companion.api.control import Control, program_control
 from companion.api.flight_loop import call_in_thread
+from companion.api.program import unless_disarmed
 from companion.api.state import ConnectedFlight, State
 from companion.config import Config, trajectory_file
 from companion.flight.context import FlightContext
@@ -189,12 +190,15 @@ class Vehicle:
             yield control
 
     async def land(self) -> None:
-        """Let the autopilot land where the vehicle is; after touchdown the flight ends."""
-        await self._request(lambda _: landing_phases(), ends_flight=True)
+        """Let the autopilot land where the vehicle is; after touchdown the flight ends.
+
+        A disarmed vehicle is left as it is: a program may land in its `finally`.
+        """
+        await self._request(unless_disarmed(landing_phases), ends_flight=True)
 
     async def hand_back(self) -> None:
-        """Let the autopilot hold the vehicle; the flight ends."""
-        await self._request(lambda _: (hand_back_phase(),), ends_flight=True)
+        """Let the autopilot hold the vehicle, unless it is disarmed; the flight ends."""
+        await self._request(unless_disarmed(lambda: (hand_back_phase(),)), ends_flight=True)
 
     def _request(
         self, phases: Callable[[FlightContext], Sequence[Phase]], *, ends_flight: bool = False

@@ -86,6 +86,12 @@ class SnapshotBuilder:
         self.echo.begin(self._link.autopilot)
         self._frozen.begin(now)
 
+    def flown_fence_centre(self) -> FenceCentre | None:
+        """Centre of the fence in the frame without estimator resets; None as `fence_centre`."""
+        if self.fence_centre_ned is None:
+            return None
+        return FenceCentre(self.fence_centre_ned, self._fence_place)
+
     @property
     def fence_centre(self) -> FenceCentre | None:
         """Centre of the fence in the autopilot's frame; None before control or without position."""

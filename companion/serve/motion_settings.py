@@ -1,6 +1,6 @@
 """The limits of clients' motions, and the changes that are refused while a client is in control."""
 
-from math import atan2, degrees
+from math import atan2, degrees, sqrt
 
 from companion.config import Config
 from companion.config.in_flight import differences
@@ -11,6 +11,19 @@ _MOTION_LIMITS = frozenset(
     {"limits.max_climb_m_s", "limits.max_descent_m_s", "limits.max_yaw_rate_deg_s"}
 )
 """Configuration keys of the limits that `CommandedMotion` is given once, when control begins."""
+
+_SPEED_SHARE = 0.9
+"""Share of safety.max_speed_m_s that a commanded velocity may reach; the rest is for overshoot."""
+
+
+def _commanded_speed(config: Config) -> float:
+    """Largest horizontal speed of a commanded velocity, m/s.
+
+    The monitor `speed`, which ends a client's control, counts the vertical speed, too.
+    """
+    largest = _SPEED_SHARE * config.safety.max_speed_m_s
+    vertical = max(config.limits.max_climb_m_s, config.limits.max_descent_m_s)
+    return max(sqrt(max(largest**2 - vertical**2, 0.0)), 0.5 * largest)
 
 
 def commanded_motion(config: Config) -> CommandedMotion:
@@ -25,6 +38,7 @@ def commanded_motion(config: Config) -> CommandedMotion:
             limits.max_descent_m_s,
             limits.max_yaw_rate,
             serve.setpoint_timeout,
+            _commanded_speed(config),
         )
     )
 

@@ -17,6 +17,7 @@ from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 from companion.recording.measurements.summary import Summary
 from companion.serve.component import WARNING, Component
+from companion.serve.fence_guard import FenceGuard
 from companion.serve.flight_records import FlightRecords
 from companion.serve.motion_settings import change_refusal, commanded_motion
 from companion.serve.network.addresses import Address
@@ -100,6 +101,13 @@ class ServedFlight:
             changes,
         )
         self._source.resets = self._assembled.context.loop.resets
+        context = self._assembled.context
+        self._source.fence_guard = FenceGuard(
+            changes.wanted_config,
+            context.snapshot_builder.flown_fence_centre,
+            lambda: link.state.height,
+            self._tell_alarm,
+        )
         self._assembled.context.fence_centre = fence_centre
         self._assembled.context.released_by = self._released_by
         ladder = self._assembled.ladder

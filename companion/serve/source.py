@@ -13,6 +13,7 @@ from companion.guidance.reference import (
     TiltCommand,
     VehicleMotion,
 )
+from companion.serve.fence_guard import FenceGuard
 from companion.serve.ownership import ControlState, Ownership
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.motion import CommandedMotion
@@ -36,6 +37,7 @@ class ServedSource:
         name: shown to the user.
         start_pose: pose of the vehicle when control began; None before.
         resets: jumps of the autopilot's estimate, which are removed from requests.
+        fence_guard: stops motions in front of the fence; None: nothing does.
         failure: always None; a silent client does not count as a failure.
     """
 
@@ -51,10 +53,13 @@ class ServedSource:
         self.name = name
         self.start_pose: Pose | None = None
         self.resets = EstimatorResets()
+        self.fence_guard: FenceGuard | None = None
         self._motion, self._ownership, self._heading_now = motion, ownership, heading_now
         self._vehicle_motion = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._open_loop_reference: Reference | None = None  # a commanded attitude or body rates
         self._waiting_request: Request | None = None
+        self._motion_request: MotionRequest | None = None  # flown, as far as the fence allows
+        self._commanded: MotionRequest | None = None
         self._is_stopped = False
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -80,12 +85,15 @@ class ServedSource:
         if isinstance(request, MotionRequest):
             before = self._open_loop_reference
             self._end_open_loop(now)
+            wanted = self._without_jumps(request)
             try:
-                self._motion.command(self._without_jumps(request), now, self._vehicle_motion)
+                self._command(wanted, now)
             except UnplannableError:
                 self._open_loop_reference = before
                 raise
+            self._motion_request = wanted
         else:
+            self._motion_request = None
             self._open_loop_reference = self._make_open_loop_reference(request)
         self._is_stopped = False
 
@@ -95,13 +103,33 @@ class ServedSource:
         if self._ownership.state(now) is not ControlState.LIVE and not self._is_stopped:
             self._end_open_loop(now)
             self._motion.stop(now, motion)
-            self._is_stopped = True
+            self._is_stopped, self._motion_request = True, None
+        self._keep_inside_fence(now)
         reference = self._open_loop_reference
         return self._motion.reference if reference is None else lambda _: reference
 
     def finished(self, now: float) -> bool:
         """Whether no client is in control any more: it released control, or was silent too long."""
         return self._ownership.state(now) not in _FLOWN_STATES
+
+    def _command(self, wanted: MotionRequest, now: float) -> None:
+        """Command what is wanted, as far as the fence allows."""
+        allowed = self._inside_fence(wanted, now)
+        self._motion.command(allowed, now, self._vehicle_motion)
+        self._commanded = allowed
+
+    def _keep_inside_fence(self, now: float) -> None:
+        """Stop in front of the fence, or go on if the request leads back."""
+        wanted = self._motion_request
+        if wanted is not None and self._inside_fence(wanted, now) != self._commanded:
+            with suppress(UnplannableError):  # the motion before stays in force
+                self._command(wanted, now)
+
+    def _inside_fence(self, wanted: MotionRequest, now: float) -> MotionRequest:
+        if self.fence_guard is None:
+            return wanted
+        reference = self._motion.reference(now)
+        return self.fence_guard.inside(wanted, reference, self._vehicle_motion, now)
 
     def _end_open_loop(self, now: float) -> None:
         """If an attitude or rates were flown, begin the commanded motion where the vehicle is."""

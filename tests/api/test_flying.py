@@ -351,6 +351,20 @@ def test_before_take_off_nothing_flies(tmp_path):
     assert summary.result == "ok"
 
 
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize("end", ["land", "hand_back"])
+def test_to_land_a_vehicle_that_never_took_off_leaves_it_as_it_is(end, autopilot):
+    modes = []
+
+    async def program(vehicle):
+        modes.append(mock.state()["mode"])
+        await getattr(vehicle, end)()
+
+    mock = QuickVehicle(autopilot)
+    summary, _ = flown(program, mock)
+    assert (summary.result, mock.state()["mode"]) == ("ok", modes[0])
+
+
 def test_after_the_flight_each_call_says_why_it_ended():
     told = []
 

@@ -6,7 +6,10 @@ import random
 import numpy as np
 import pytest
 
+from companion.config import Config
+from companion.config.files import changed
 from companion.guidance.reference import VehicleMotion
+from companion.serve.motion_settings import commanded_motion
 from companion.serve.setpoints.approach import UnplannableError
 from companion.serve.setpoints.motion import CommandedMotion, MotionLimits
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
@@ -326,3 +329,13 @@ def test_any_sequence_of_requests_gives_finite_references():
         reference = motion.reference(now + rng.random())
         values = (*reference.position_ned, *reference.velocity_ned, *reference.acceleration_ned)
         assert all(map(math.isfinite, (*values, reference.heading, reference.heading_rate)))
+
+
+def test_a_commanded_velocity_beyond_the_monitor_s_limit_is_slowed_and_keeps_its_direction():
+    config = changed(Config(), {"safety": {"max_speed_m_s": 10.0}}, "the test")
+    motion = commanded_motion(config)
+    motion.begin(ORIGIN, ORIGIN, 0.0, 0.0)
+    motion.command(request(velocity=(24.0, 18.0, -9.0)), 0.0, STILL)
+    north, east, down = motion.reference(60.0).velocity_ned
+    assert math.hypot(north, east, down) == pytest.approx(9.0, abs=0.05)
+    assert math.atan2(east, north) == pytest.approx(math.atan2(18.0, 24.0))

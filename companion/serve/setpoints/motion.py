@@ -1,11 +1,12 @@
 """The reference that follows from a client's requests."""
 
 from copy import copy
+from math import inf
 from typing import NamedTuple
 
 from companion.attitude.representation import wrap_angle
 from companion.attitude.rotation import clamp
-from companion.guidance.reference import Reference, Vector, VehicleMotion
+from companion.guidance.reference import Reference, Vector, VehicleMotion, clamp_length
 from companion.serve.setpoints.approach import (
     AxisLimits,
     AxisMotion,
@@ -18,7 +19,7 @@ from companion.serve.setpoints.request import AxisDemand, MotionRequest
 _HORIZONTAL_JUMP_LIMITS = JumpLimits(0.3, 0.6)
 _VERTICAL_JUMP_LIMITS = JumpLimits(0.3, 0.4)
 _HEADING_JUMP_LIMITS = JumpLimits(0.2, 1.0)
-_VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
+VERTICAL_ACCELERATION, _VERTICAL_JERK = 2.0, 6.0
 """Largest vertical acceleration, m/s², and jerk, m/s³: thrust used for climbing is not available
 for tilt."""
 _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
@@ -35,7 +36,7 @@ class MotionLimits(NamedTuple):
     speed: float
     """Largest horizontal speed, m/s."""
     acceleration: float
-    """Largest acceleration, m/s²; vertically at most `_VERTICAL_ACCELERATION`."""
+    """Largest acceleration, m/s²; vertically at most `VERTICAL_ACCELERATION`."""
     jerk: float
     """Largest jerk, m/s³; vertically at most `_VERTICAL_JERK`."""
     climb: float
@@ -44,6 +45,8 @@ class MotionLimits(NamedTuple):
     timeout: float
     """Time for which a request repeated unchanged is extrapolated, s. After this time a commanded
     position stands still, and a commanded velocity stays constant."""
+    commanded_speed: float = inf
+    """Largest horizontal speed of a commanded velocity without a position, m/s."""
 
 
 class CommandedMotion:
@@ -57,7 +60,7 @@ class CommandedMotion:
         vertical = AxisLimits(  # positive down
             limits.descent,
             limits.climb,
-            min(limits.acceleration, _VERTICAL_ACCELERATION),
+            min(limits.acceleration, VERTICAL_ACCELERATION),
             min(limits.jerk, _VERTICAL_JERK),
         )
         yaw = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
@@ -66,6 +69,7 @@ class CommandedMotion:
         )
         self._vertical = CommandFollower((vertical,), _VERTICAL_JUMP_LIMITS, limits.timeout)
         self._heading = CommandFollower((yaw,), _HEADING_JUMP_LIMITS, limits.timeout)
+        self._commanded_speed = limits.commanded_speed
         self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
         self._newest_yaw: tuple[float, float, float] | None = None  # request, heading demand, time
@@ -92,7 +96,7 @@ class CommandedMotion:
         )
         horizontal, vertical = _by_axes(actual)
         try:
-            self._horizontal.command(request.horizontal, now, horizontal)
+            self._horizontal.command(self._slowed(request.horizontal), now, horizontal)
             (speed,), (reference_speed,) = vertical.velocity, self._vertical.at(now).velocity
             demand = self._clamped(request.vertical, speed, reference_speed)
             self._vertical.command(demand, now, vertical)
@@ -115,11 +119,21 @@ class CommandedMotion:
         (heading,), (rate,), _ = self._heading.at(time)
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
+    def _slowed(self, horizontal: AxisDemand) -> AxisDemand:
+        """Shorten a commanded velocity to its limit; its direction stays.
+
+        With a position, a shorter velocity would contradict it.
+        """
+        if horizontal.position is not None or horizontal.velocity is None:
+            return horizontal
+        north, east = horizontal.velocity
+        return horizontal._replace(velocity=clamp_length(north, east, self._commanded_speed))
+
     def _clamped(self, vertical: AxisDemand, *speeds: float) -> AxisDemand:
         """Limit a vertical demand that has no position.
 
         The velocity is limited to the climb and descent limits, and the acceleration to
-        `_VERTICAL_ACCELERATION`. An acceleration that would lead beyond a speed limit becomes a
+        `VERTICAL_ACCELERATION`. An acceleration that would lead beyond a speed limit becomes a
         demand for this speed.
 
         Args:
@@ -133,7 +147,7 @@ class CommandedMotion:
             vertical = vertical._replace(velocity=(min(max(speed, -self._climb), self._descent),))
         if vertical.acceleration is None:
             return vertical
-        acceleration = clamp(vertical.acceleration[0], _VERTICAL_ACCELERATION)
+        acceleration = clamp(vertical.acceleration[0], VERTICAL_ACCELERATION)
         limit = self._descent if acceleration > 0.0 else -self._climb
         # The speed changes further while the acceleration is reduced to zero.
         change = 0.5 * acceleration * abs(acceleration) / _VERTICAL_JERK

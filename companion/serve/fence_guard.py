@@ -1,0 +1,224 @@
+"""Stops a client's motion in front of the fence, before a safety monitor has to.
+
+The monitor `braking` ends the control of a client, and the vehicle lands where it is. A client that
+commands a place just inside the fence, or a velocity towards it, needs no such end.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import hypot, inf
+from typing import NamedTuple
+
+from companion.config import Config
+from companion.guidance.fence import Breach, Fence, FenceCentre
+from companion.guidance.reference import Reference, Vector, VehicleMotion, minus
+from companion.safety.table import fence_of
+from companion.serve.setpoints.motion import VERTICAL_ACCELERATION
+from companion.serve.setpoints.request import AxisDemand, MotionRequest
+
+_MARGIN = 0.5
+"""How far inside the fence the vehicle stops, m. It covers the tracking error at rest."""
+_EARLIER = 0.6
+"""How much earlier than for the monitor the vehicle brakes, s. Meanwhile the deceleration builds
+up: its jerk is limited, and the vehicle follows late."""
+_REST = 0.2
+"""Speed below which a stop is complete, m/s. A stop that leads outward is completed first: taking
+turns with the command, it would come too late for a vehicle that follows late."""
+_BRAKING_SHARE = 0.8
+"""Share of the largest acceleration of a client's motions that counts as their deceleration."""
+_LOOKAHEAD = 10.0
+"""Time for which a commanded velocity shows where it leads, s."""
+_STEP = 0.1
+"""Length of the step that shows whether a command leads out or back, m."""
+_PAUSE = 3.0
+"""Time without a stop after which the next stop is told, s."""
+
+_HORIZONTAL_STOP = AxisDemand(None, (0.0, 0.0), None)
+_VERTICAL_STOP = AxisDemand(None, (0.0,), None)
+
+
+class FenceGuard:
+    """Replaces the part of a request that would lead beyond the fence by a stop.
+
+    Each step of guidance asks again. So the vehicle comes to rest in front of the fence, and goes
+    on as soon as a request leads back. Horizontal and vertical motions are stopped independently.
+
+    Args:
+        config: limits of the fence, and of clients' motions.
+        centre: returns the centre of the fence in the frame without estimator resets; None: unknown
+            yet.
+        height: returns the height above home, m; None: unknown.
+        tell: called with a sentence when the vehicle is stopped.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        centre: Callable[[], FenceCentre | None],
+        height: Callable[[], float | None],
+        tell: Callable[[str], None],
+    ) -> None:
+        fence, acceleration = fence_of(config), config.serve.max_acceleration_m_s2
+        wall = replace(fence, ceiling=inf, floor=-inf)
+        levels = replace(fence, radius=inf, polygon=(), places=())
+        self._wall = _Side(wall, acceleration)
+        self._levels = _Side(levels, min(acceleration, VERTICAL_ACCELERATION))
+        self._centre, self._height, self._tell = centre, height, tell
+        self._stopped_at = -inf
+
+    def inside(
+        self, request: MotionRequest, reference: Reference, actual: VehicleMotion, now: float
+    ) -> MotionRequest:
+        """The request, with a stop in place of what would lead beyond the fence.
+
+        Args:
+            request: command of the client.
+            reference: state that is flown now.
+            actual: motion of the vehicle.
+            now: event-loop time, s.
+        """
+        centre, height = self._centre(), self._height()
+        if centre is None:
+            return request
+        home_down = None if height is None else actual.position_ned[2] + height
+        frame = _FenceFrame(centre, home_down)
+        north, east, _ = reference.acceleration_ned
+        flown = _State(reference.position_ned, reference.velocity_ned, (north, east))
+        states = flown, _State(*actual, (0.0, 0.0))
+        wall = self._wall.breach(
+            [each.horizontal() for each in states],
+            _destination(request, flown, (True, False)),
+            frame,
+        )
+        level = self._levels.breach(
+            [each.vertical() for each in states], _destination(request, flown, (False, True)), frame
+        )
+        breach = wall or level
+        if breach is None:
+            return request
+        if now - self._stopped_at > _PAUSE:
+            self._tell(f"stopped in front of the fence: the setpoints lead to {breach}")
+        self._stopped_at = now
+        return request._replace(
+            horizontal=request.horizontal if wall is None else _HORIZONTAL_STOP,
+            vertical=request.vertical if level is None else _VERTICAL_STOP,
+        )
+
+
+class _FenceFrame(NamedTuple):
+    """Where the fence lies."""
+
+    centre: FenceCentre
+    home_down: float | None
+    """Coordinate down of home, m; None: unknown."""
+
+    def breach(self, fence: Fence, position: Vector, margin: float) -> Breach | None:
+        """The breach of a place, NED in the frame of `centre`."""
+        return fence.breach(*self._arguments(position), self.centre.place, margin)
+
+    def breach_of_stop(self, fence: Fence, state: "_State", margin: float) -> Breach | None:
+        """The breach where the vehicle would stop from a state."""
+        offset, height = self._arguments(state.position)
+        return fence.breach_at_stopping_point(
+            offset, state.velocity, height, self.centre.place, margin, state.acceleration
+        )
+
+    def _arguments(self, position: Vector) -> tuple[Vector, float | None]:
+        height = None if self.home_down is None else self.home_down - position[2]
+        return minus(position, self.centre.position_ned), height
+
+
+class _State(NamedTuple):
+    """Position, velocity (NED) and horizontal acceleration; SI units."""
+
+    position: Vector
+    velocity: Vector
+    acceleration: tuple[float, float]
+
+    def horizontal(self) -> "_State":
+        """The state without its vertical motion."""
+        north, east, _ = self.velocity
+        return self._replace(velocity=(north, east, 0.0))
+
+    def vertical(self) -> "_State":
+        """The state without its horizontal motion."""
+        return _State(self.position, (0.0, 0.0, self.velocity[2]), (0.0, 0.0))
+
+
+class _Destination(NamedTuple):
+    """Where a request leads."""
+
+    position: Vector
+    is_commanded: bool
+    """Whether the request names the position; else it lies in the commanded direction."""
+
+
+class _Side:
+    """One side of the fence: its wall, or its floor and ceiling.
+
+    Args:
+        fence: the fence with the limits of this side alone.
+        acceleration: largest acceleration of clients' motions across this side, m/s².
+    """
+
+    def __init__(self, fence: Fence, acceleration: float) -> None:
+        self._fence = replace(
+            fence,
+            deceleration=min(fence.deceleration, _BRAKING_SHARE * acceleration),
+            reaction=fence.reaction + _EARLIER,
+        )
+        self._stopped_for: Breach | None = None
+
+    def breach(
+        self, states: Sequence[_State], destination: _Destination, frame: _FenceFrame
+    ) -> Breach | None:
+        """The breach to which a request leads, if the vehicle must stop now.
+
+        Args:
+            states: the state that is flown, and that of the vehicle.
+            destination: where the request leads.
+            frame: where the fence lies.
+        """
+        fence = self._fence
+        leads_inside = frame.breach(fence, destination.position, 0.0) is None
+        margin = 0.0 if destination.is_commanded and leads_inside else _MARGIN
+        is_moving = hypot(*states[0].velocity) > _REST
+        if self._stopped_for is not None and is_moving and not leads_inside:
+            return self._stopped_for
+        breach = None
+        for state in states:
+            if frame.breach(fence, state.position, margin) is None:
+                found = frame.breach_of_stop(fence, state, margin)
+            else:  # such as low after a take-off
+                found = _farther_out(frame, fence, state.position, destination.position)
+            breach = breach or found
+        self._stopped_for = breach
+        return breach
+
+
+def _farther_out(
+    frame: _FenceFrame, fence: Fence, position: Vector, destination: Vector
+) -> Breach | None:
+    """The breach that a step towards the destination makes worse; None: none."""
+    way = minus(destination, position)
+    share = _STEP / max(hypot(*way), _STEP)
+    north, east, down = (a + share * b for a, b in zip(position, way, strict=True))
+    here = frame.breach(fence, position, _MARGIN)
+    ahead = frame.breach(fence, (north, east, down), _MARGIN)
+    if here is None or ahead is None or ahead.distance_outside <= here.distance_outside:
+        return None
+    return ahead
+
+
+def _destination(request: MotionRequest, flown: _State, axes: tuple[bool, bool]) -> _Destination:
+    """Where a request leads, along the (horizontal, vertical) axes that are true."""
+    place, is_commanded = list(flown.position), False
+    for demand, begin, is_used in zip(request[:2], (0, 2), axes, strict=True):
+        if not is_used:
+            continue
+        if demand.position is not None:
+            place[begin : begin + len(demand.position)], is_commanded = demand.position, True
+            continue
+        for axis, value in enumerate(demand.velocity or demand.acceleration or ()):
+            place[begin + axis] += _LOOKAHEAD * value
+    return _Destination((place[0], place[1], place[2]), is_commanded)
