@@ -41,6 +41,8 @@ class FlightLog:
     """Measured rates: (time, roll, pitch, yaw rate in rad/s)."""
     specific_thrust: list[Row]
     """The accelerometer's −z axis (body FRD): (time, m/s²)."""
+    damage: str | None = None
+    """A sentence if damaged records of the log were left out; else None."""
 
 
 def read_flight_log(path: Path | str) -> FlightLog:
@@ -51,11 +53,12 @@ def read_flight_log(path: Path | str) -> FlightLog:
     if the heartbeats before and after it say that the vehicle is armed and obeys rates.
 
     Raises:
-        LogError: the file cannot be read, is damaged, is not a `.tlog`, or has no heartbeat of a
-            supported autopilot, or no setpoint that the autopilot obeyed.
+        LogError: the file cannot be read, is not a `.tlog`, or has no heartbeat of a supported
+            autopilot, or no setpoint that the autopilot obeyed.
     """
     path, reader = Path(path), _Reader()
-    for frame, message in messages(path, _MESSAGE_NAMES):
+    damage: list[str] = []
+    for frame, message in messages(path, _MESSAGE_NAMES, damage.append):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None:
         raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
@@ -69,6 +72,7 @@ def read_flight_log(path: Path | str) -> FlightLog:
         reader.obeyed_setpoints,
         max(reader.rates_with_quaternion, reader.rates_with_euler, key=len),
         reader.specific_thrust,
+        damage[0] if damage else None,
     )
 
 
