@@ -100,6 +100,8 @@ class _RecordReader:
         """Where the frame of the first record begins, which may stand after damaged ones."""
         if self._frame_length(_STAMP_BYTES):
             return _STAMP_BYTES
+        if not self._data.strip(b"\0"):  # what a crash leaves of a file just begun
+            raise LogError(f"{self._path} is empty: its flight ended before anything was recorded")
         other = next((words for begin, words in _OTHER_LOGS.items() if self._begins(begin)), None)
         if other is not None:
             raise LogError(

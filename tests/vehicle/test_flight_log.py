@@ -163,9 +163,9 @@ def test_a_log_that_breaks_off_is_read_to_its_last_whole_record(tmp_path):
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"", "not a .tlog"),
+        (b"", "is empty: its flight ended before"),
         (b"time,roll,pitch\n0.0,1.0,2.0\n", "not a .tlog"),
-        (b"\0\0", "not a .tlog"),
+        (b"\0\0", "is empty: its flight ended before"),
     ],
     ids=["empty", "a table", "zeros"],
 )
@@ -289,7 +289,7 @@ def test_frames_of_other_dialects_are_no_damage(tmp_path):
     [
         (b"ULog\x01\x12\x35\x01", "this is a ULog of PX4; give the .tlog"),
         (b"\xa3\x95\x80\x80\x59FMT", "this is a DataFlash log of ArduPilot; give the .tlog"),
-        (b"", "not a .tlog; expected MAVLink frames, each after 8 bytes"),
+        (b"PK", "not a .tlog; expected MAVLink frames, each after 8 bytes"),
     ],
 )
 def test_other_files_are_refused(tmp_path, begin, words):
