@@ -113,6 +113,9 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
     with suppress(OSError):
         console.print("fitting…")
     rows = read_flight_log(log)
+    if rows.damage is not None:
+        with suppress(OSError):
+            console.print(rows.damage, style="bold yellow", soft_wrap=True)
     vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
     configured_axes = _configured_axes(log)
     try:

@@ -1,8 +1,10 @@
 """Trajectories as files: one shape in YAML, or a CSV table of samples."""
 
+from math import tau
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from companion.config.file_kinds import FileKind, require_kind
@@ -38,6 +40,8 @@ _SMALLEST_NOTED_DETOUR = 0.05
 """Smallest distance of a curve from the lines between its points that a note reports, m."""
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
+_MOST_TURNED = 13.0
+"""Largest change of yaw that no note reports, rad: two turns."""
 _MOST_ROWS_COMPARED = 2000
 """Tables with more rows are not compared with the path, because their rows are dense."""
 
@@ -127,6 +131,11 @@ def _table_notes(
     if table.unused_columns:
         names = ", ".join(table.unused_columns[:_MOST_COLUMNS_SHOWN])
         notes.append(f"{path.name}: these columns are not used: {names}")
+    if table.yaw is not None and (turned := float(np.ptp(table.yaw))) > _MOST_TURNED:
+        notes.append(
+            f"{path.name}: its yaw turns by {turned:.4g} rad, {turned / tau:.1f} turns; if the "
+            "column is in degrees, convert it to rad"
+        )
     table_duration = float(table.times[-1])
     if trajectory.duration > table_duration + _SHORTEST_RAMP:
         notes.append(

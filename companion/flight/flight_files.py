@@ -17,6 +17,7 @@ from companion.flight.flight_facts import advice, facts_of, loop_counts, predict
 from companion.flight.observer import EventRecorder, Observer
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.texts import TextFrames
+from companion.recording.folder import space_warning
 from companion.recording.measurements.summary import Summary
 from companion.recording.recorder import FlightRecorder
 from companion.recording.tlog import TlogWriter
@@ -65,6 +66,8 @@ class FlightFiles:
         self.mcap: FlightRecorder | None = None
         if folder is not None:
             flown_config.record(config, folder, flies_maneuvers=flies_maneuvers)
+            if (warning := space_warning(folder)) is not None:
+                note(warning)
             self._reserved_space = ReservedSpace(folder, _SUMMARY_RESERVE)
             loop = asyncio.get_running_loop()
             in_vehicle_time = config.link.lockstep or not environment.realtime

@@ -4,7 +4,8 @@ A record is the time in microseconds since 1970 (8 bytes, big endian) and then o
 sent.
 """
 
-from collections.abc import Iterator, Set
+import re
+from collections.abc import Callable, Iterator, Set
 from pathlib import Path
 
 from companion.mavlink.errors import LogError
@@ -16,48 +17,146 @@ from companion.mavlink.framing import (
     Frame,
     FrameScanner,
 )
-from companion.mavlink.messages import MESSAGE_IDS, Message, decode
+from companion.mavlink.messages import CRC_EXTRA, MESSAGE_IDS, Message, decode
 
 _STAMP_BYTES = 8
+_SHORTEST_HEADER = 6
 _V1_OVERHEAD, _V2_OVERHEAD = 8, 12  # bytes of header and checksum
+_LONGEST_DAMAGED_BEGINNING = 1 << 16
+"""A file whose first frame begins later than this is no `.tlog`, bytes."""
+_OTHER_LOGS = {
+    b"ULog\x01\x12\x35": "a ULog of PX4",
+    b"\xa3\x95\x80": "a DataFlash log of ArduPilot",
+}
+"""How the logs begin that autopilots record themselves."""
+_MAGIC = re.compile(rb"[\xfd\xfe]")
 
 
-def messages(path: Path, names: Set[str]) -> Iterator[tuple[Frame, Message]]:
+def messages(
+    path: Path, names: Set[str], on_damage: Callable[[str], object] | None = None
+) -> Iterator[tuple[Frame, Message]]:
     """The intact frames of the messages with these names, each with its message, in order.
 
-    An incomplete record at the end is left out.
+    An incomplete record at the end is left out. So are damaged records: a card that loses power
+    leaves some, and some programs also record bytes of the radio that are no frame.
+
+    Args:
+        path: the log.
+        names: names of the messages.
+        on_damage: called at the end with a sentence if damaged records were left out.
 
     Raises:
-        LogError: the file cannot be read, is damaged, or is not a `.tlog`.
+        LogError: the file cannot be read, or is not a `.tlog`.
     """
-    wanted = {MESSAGE_IDS[name] for name in names}
-    scanner = FrameScanner()
-    for raw in _records(path):
-        for frame in scanner.feed(raw):
-            if frame.message_id in wanted:
-                yield frame, decode(frame.message_id, frame.payload)
-
-
-def _records(path: Path) -> Iterator[bytes]:
-    """The frames as bytes, without their time stamps."""
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise LogError(f"{path}: cannot read the log: {error.strerror}") from error
-    start = _STAMP_BYTES
-    while start + 3 <= len(data):
-        magic, size, flags = data[start : start + 3]
-        if magic == V2_MAGIC:
-            end = start + _V2_OVERHEAD + size + (SIGNATURE_LENGTH if flags & SIGNED_FLAG else 0)
-        elif magic == V1_MAGIC:
-            end = start + _V1_OVERHEAD + size
-        elif start == _STAMP_BYTES:
-            break
-        else:
-            raise LogError(f"{path}: damaged after {start} bytes: no MAVLink frame begins there")
-        yield data[start:end]
-        start = end + _STAMP_BYTES
-    if start == _STAMP_BYTES:
-        raise LogError(
-            f"{path}: not a .tlog; expected MAVLink frames, each after 8 bytes with its time"
+    reader = _RecordReader(path, {MESSAGE_IDS[name] for name in names})
+    for frame in reader.frames():
+        yield frame, decode(frame.message_id, frame.payload)
+    if reader.damaged_at and on_damage is not None:
+        count = len(reader.damaged_at)
+        on_damage(
+            f"{path}: damaged at {count} {'place' if count == 1 else 'places'}, the first after "
+            f"{reader.damaged_at[0]} bytes; what stood there is missing, all the rest was read"
         )
+
+
+class _RecordReader:
+    """Reads the records of a log; after a damaged one it goes on with the next intact frame.
+
+    Attributes:
+        damaged_at: where damaged records begin, bytes after the beginning of the file.
+    """
+
+    def __init__(self, path: Path, wanted: Set[int]) -> None:
+        self.damaged_at: list[int] = []
+        self._path, self._wanted = path, wanted
+        try:
+            self._data = path.read_bytes()
+        except OSError as error:
+            raise LogError(f"{path}: cannot read the log: {error.strerror}") from error
+        self._scanner = FrameScanner()
+
+    def frames(self) -> Iterator[Frame]:
+        """The intact frames of the wanted messages, in order.
+
+        Raises:
+            LogError: no record is near the beginning of the file.
+        """
+        start, end_of_data = self._first_record(), len(self._data)
+        while start + _SHORTEST_HEADER <= end_of_data:
+            frame, end = self._intact_frame(start), start + self._frame_length(start)
+            if frame is not None:
+                if frame.message_id in self._wanted:
+                    yield frame
+                start = end + _STAMP_BYTES
+            elif self._may_skip(start, end):
+                start = end + _STAMP_BYTES
+            else:
+                following = self._next_intact(start + 1)
+                if following is not None or end <= end_of_data:  # else the end is incomplete
+                    self.damaged_at.append(start)
+                start = end_of_data if following is None else following
+
+    def _first_record(self) -> int:
+        """Where the frame of the first record begins, which may stand after damaged ones."""
+        if self._frame_length(_STAMP_BYTES):
+            return _STAMP_BYTES
+        if not self._data.strip(b"\0"):  # what a crash leaves of a file just begun
+            raise LogError(f"{self._path} is empty: its flight ended before anything was recorded")
+        other = next((words for begin, words in _OTHER_LOGS.items() if self._begins(begin)), None)
+        if other is not None:
+            raise LogError(
+                f"{self._path}: this is {other}; give the .tlog that a ground station or this "
+                "program recorded"
+            )
+        first = None
+        if self._intact_frame(0) is None:  # else the records have no time
+            first = self._next_intact(_STAMP_BYTES, _LONGEST_DAMAGED_BEGINNING)
+        if first is None:
+            raise LogError(
+                f"{self._path}: not a .tlog; expected MAVLink frames, each after 8 bytes with its "
+                "time"
+            )
+        self.damaged_at.append(0)
+        return first
+
+    def _begins(self, begin: bytes) -> bool:
+        return self._data.startswith(begin)
+
+    def _may_skip(self, start: int, end: int) -> bool:
+        """Whether `start`..`end` may be a frame of a message that is unknown or not wanted.
+
+        Its checksum says nothing: other dialects have other messages with the same number.
+        """
+        if end == start or self._message_id(start) in self._wanted:
+            return False
+        following = end + _STAMP_BYTES
+        return end <= len(self._data) <= following or bool(self._frame_length(following))
+
+    def _next_intact(self, begin: int, end: int | None = None) -> int | None:
+        """Where the next intact frame of a known message begins, or None."""
+        found = _MAGIC.finditer(self._data, begin, len(self._data) if end is None else end)
+        return next((each.start() for each in found if self._intact_frame(each.start())), None)
+
+    def _intact_frame(self, start: int) -> Frame | None:
+        """The intact frame of a known message that begins at `start`, or None."""
+        raw = self._data[start : start + self._frame_length(start)]
+        if not raw or self._message_id(start) not in CRC_EXTRA:
+            return None
+        frames = self._scanner.feed(raw)
+        return frames[0] if frames and frames[0].raw == raw else None
+
+    def _frame_length(self, start: int) -> int:
+        """Length of the frame that begins at `start` by its header; 0 if none begins there."""
+        header = self._data[start : start + _SHORTEST_HEADER]
+        if len(header) < _SHORTEST_HEADER:
+            return 0
+        magic, size, flags = header[:3]
+        if magic == V2_MAGIC:
+            return _V2_OVERHEAD + size + (SIGNATURE_LENGTH if flags & SIGNED_FLAG else 0)
+        return _V1_OVERHEAD + size if magic == V1_MAGIC else 0
+
+    def _message_id(self, start: int) -> int:
+        """The message number in the header of the frame that begins at `start`."""
+        if self._data[start] == V1_MAGIC:
+            return self._data[start + 5]
+        return int.from_bytes(self._data[start + 7 : start + 10], "little")

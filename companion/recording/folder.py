@@ -1,9 +1,15 @@
-"""Makes the folder of a flight."""
+"""Makes the folder of a flight, and says before the flight if the disk is nearly full."""
 
+import shutil
 from datetime import UTC, datetime
 from pathlib import Path
 
 from companion.files.yaml_file import ConfigError
+
+_BYTES_PER_S = 160_000
+"""What a flight with 250 attitude samples a second records, measured."""
+_SHORTEST_RECORDING = 600.0
+"""With room for a longer recording there is no warning, s."""
 
 
 def flight_folder(directory: Path) -> Path:
@@ -25,3 +31,22 @@ def flight_folder(directory: Path) -> Path:
             ) from error
         return folder
     raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
+
+
+def space_warning(folder: Path) -> str | None:
+    """A sentence if the disk of `folder` has room for only a few minutes of recording, else None.
+
+    None also if the file system does not say how much room it has.
+    """
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError:
+        return None
+    duration = free / _BYTES_PER_S
+    if duration >= _SHORTEST_RECORDING:
+        return None
+    return (
+        f"{folder}: the disk has {free / 1e6:.0f} MB left, enough to record about "
+        f"{duration:.0f} s; then the recording stops, and the flight goes on. Make room there "
+        "before take-off, or set recording.directory to another disk"
+    )

@@ -32,13 +32,15 @@ def logged_flight(path: Path) -> FlightData:
         LogError: the file cannot be read, is not a `.tlog`, or has no telemetry of an autopilot.
     """
     reader = _TelemetryReader()
-    for frame, message in messages(path, _MESSAGE_NAMES):
+    damage: list[str] = []
+    for frame, message in messages(path, _MESSAGE_NAMES, damage.append):
         reader.take((frame.system, frame.component), message)
     if reader.vehicle is None or reader.began is None:
         raise LogError(f"{path}: has no telemetry of PX4 or ArduPilot")
     curves = {**reader.curves(), **_rates_and_thrust(path, reader.began)}
     return FlightData(
         name=path.name,
+        fault=damage[0] if damage else None,
         curves={name: curve for name, curve in curves.items() if len(curve.time)},
         modes=reader.modes(),
         events=tuple(reader.events),

@@ -43,6 +43,8 @@ class FlightLog:
     """The accelerometer's −z axis (body FRD): (time, m/s²)."""
     autopilot: str
     """Name of the autopilot, such as `PX4`."""
+    damage: str | None = None
+    """A sentence if damaged records of the log were left out; else None."""
 
 
 def read_flight_log(path: Path | str) -> FlightLog:
@@ -53,11 +55,12 @@ def read_flight_log(path: Path | str) -> FlightLog:
     if the heartbeats before and after it say that the vehicle is armed and obeys rates.
 
     Raises:
-        LogError: the file cannot be read, is damaged, is not a `.tlog`, or has no heartbeat of a
-            supported autopilot, or no setpoint that the autopilot obeyed.
+        LogError: the file cannot be read, is not a `.tlog`, or has no heartbeat of a supported
+            autopilot, or no setpoint that the autopilot obeyed.
     """
     path, reader = Path(path), _Reader()
-    for frame, message in messages(path, _MESSAGE_NAMES):
+    damage: list[str] = []
+    for frame, message in messages(path, _MESSAGE_NAMES, damage.append):
         reader.take((frame.system, frame.component), message)
     if reader.autopilot is None:
         raise LogError(f"{path}: holds no heartbeat of {AUTOPILOT_NAMES}")
@@ -72,6 +75,7 @@ def read_flight_log(path: Path | str) -> FlightLog:
         max(reader.rates_with_quaternion, reader.rates_with_euler, key=len),
         reader.specific_thrust,
         reader.autopilot.name,
+        damage[0] if damage else None,
     )
 
 

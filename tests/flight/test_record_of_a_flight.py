@@ -1,6 +1,9 @@
 """What a flight leaves behind besides its figures: events in the log, motion, phases, its end."""
 
+import errno
 import json
+import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +12,7 @@ from pymavlink import mavutil
 from companion.flight.observer import SilentObserver
 from companion.recording.closing_words import closing_words
 from companion.recording.flight_record import read_flight
+from companion.recording.folder import space_warning
 from companion.testing import fly
 from tests.flight.fly import QUICK_FLIGHT, QuickVehicle, merged
 
@@ -207,3 +211,25 @@ def test_height_and_speed_are_unknown_when_no_position_comes():
     assert last.speed is None
     assert last.tilt is not None
     assert np.isnan(summary.trace.motion.rows()[-1, 2:4]).all()
+
+
+def test_a_nearly_full_disk_is_told_before_take_off(tmp_path, monkeypatch):
+    def told(free):
+        monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
+        config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 0.5}})
+        summary = fly(config, QuickVehicle(), tmp_path / str(free))
+        assert summary.result == "ok"
+        arming = next(at for at, text in summary.events if text == "armed")
+        return [text for at, text in summary.events if "MB left" in text and at < arming]
+
+    assert told(100_000_000_000) == []
+    (warning,) = told(8_000_000)
+    assert "the disk has 8 MB left, enough to record about 50 s; then the recording" in warning
+
+
+def test_a_disk_that_does_not_say_how_full_it_is_is_no_error(tmp_path, monkeypatch):
+    def unknown(_):
+        raise OSError(errno.ENOSYS, "Function not implemented")
+
+    monkeypatch.setattr(shutil, "disk_usage", unknown)
+    assert space_warning(tmp_path) is None

@@ -177,3 +177,16 @@ def test_a_time_axis_covers_the_longest_flight():
     empty = FlightData("b", {})
     assert time_axis([short, long, empty])["xaxis"]["range"] == [0.0, 9.0]
     assert "range" not in time_axis([empty])["xaxis"]
+
+
+def test_a_damaged_record_is_a_fault_of_the_page(tmp_path):
+    path = written(tmp_path / "a.tlog", heartbeat(), *(position(1000 * k) for k in range(1, 6)))
+    assert logged_flight(path).fault is None
+    data = bytearray(path.read_bytes())
+    fourth = data.index((4000).to_bytes(4, "little"))
+    data[fourth] ^= 0xFF
+    path.write_bytes(data)
+    flight = logged_flight(path)
+    assert flight.fault is not None
+    assert f"{path}: damaged at 1 place" in flight.fault
+    assert flight.curves["position"].time.tolist() == [0.0, 1.0, 2.0, 4.0]

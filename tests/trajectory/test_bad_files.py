@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from companion.config.trajectory_file import load
+from companion.config.trajectory_file import read as read_trajectory
 from companion.drag import Drag
 from companion.files import bounded_file
 from companion.files.bounded_file import FileRefusedError, read_text
@@ -113,6 +114,23 @@ def test_a_yaw_in_degrees_is_refused_and_one_that_wraps_is_not():
     degrees = [f"{row},{90 * (k % 2)}" for k, row in enumerate(rows())]
     with pytest.raises(TrajectoryError, match=r"yaw changes by 90 rad .* in degrees"):
         parse_csv(["t,x,y,z,yaw", *degrees], "given")
+
+
+@pytest.mark.parametrize("yaw", [90.0, -90.0, 7.0])
+def test_a_yaw_in_degrees_that_stays_the_same_is_refused(yaw):
+    """Flown in rad, 90 would face 117° away from where the file says."""
+    for values in (f"{yaw}", f"{yaw:.0f}"):
+        lines = ["t,x,y,z,yaw", *(f"{row},{values}" for row in rows())]
+        with pytest.raises(TrajectoryError, match=rf"yaw begins at {yaw:g} rad, .* in degrees"):
+            parse_csv(lines, "given")
+
+
+def test_a_yaw_of_many_turns_is_told_and_one_of_two_is_not(tmp_path):
+    for end, told in ((90.0, True), (12.0, False)):
+        lines = [f"{row},{end * k / 49}" for k, row in enumerate(rows())]
+        loaded = read_trajectory(csv_of(tmp_path, lines, "t,x,y,z,yaw"))
+        notes = [note for note in loaded.notes if "its yaw turns by 90 rad, 14.3 turns" in note]
+        assert bool(notes) == told
 
 
 def test_a_column_that_is_named_twice_is_refused():

@@ -19,6 +19,7 @@ import numpy as np
 
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.guidance.trajectory.csv_header import columns_of, excerpt, rows_of, without_unit
+from companion.guidance.trajectory.csv_yaw import yaw_of
 from companion.guidance.trajectory.sample import LARGEST_COORDINATE, LARGEST_SPEED, TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 
@@ -39,16 +40,13 @@ _SHORTEST_DURATION = 0.1
 
 _LARGEST_VALUES = {
     "time": (1e10, "s"),
-    "position": (LARGEST_COORDINATE, "m from where it begins"),
+    "position": (LARGEST_COORDINATE, "m from where it begins; write positions in m"),
     "velocity": (LARGEST_SPEED, "m/s"),
     "acceleration": (1000.0, "m/s²"),
     "yaw": (1e4, "rad"),
     "quaternion": (2.0, "for a component"),
 }
 """Largest magnitude of each quantity, and its unit in messages."""
-
-_LARGEST_YAW_STEP = 6.5
-"""Largest change of yaw between two rows, rad: a bit more than the jump by 2π where it wraps."""
 
 _LENGTH_ERROR = 0.1
 """Largest error of a quaternion's length. Files hold rounded numbers."""
@@ -81,8 +79,8 @@ def read_csv(path: Path) -> Table:
     Raises:
         TrajectoryError: the file cannot be read or is too large, its header lacks a column, names
             one twice or names another unit, a row has too many values, a value is not a number or
-            is out of range, a quaternion does not have length 1, or the duration, a time step or
-            the number of samples is out of range.
+            is out of range, a yaw seems to be in degrees, a quaternion does not have length 1, or
+            the duration, a time step or the number of samples is out of range.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -131,7 +129,7 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
         times - times[0],
         data["position"],
         tuple(derivatives),
-        _yaw(data, name),
+        yaw_of(data, name),
         frames[0] if frames else None,
         tuple(column for column in header if column and column not in used),
     )
@@ -227,24 +225,3 @@ def _require_range(
                 f"{name}, line {line_numbers[int(wrong[0])]}: the quaternion has the length "
                 f"{lengths[wrong[0]]:.3g}, not 1; give unit quaternions, or leave their columns out"
             )
-
-
-def _yaw(data: dict[str, Floats], name: str) -> Floats | None:
-    """Tilt-yaw heading (m,), rad, from the yaw column, else from the quaternion.
-
-    Raises:
-        TrajectoryError: the yaw jumps by more than a turn between two rows.
-    """
-    if "yaw" in data:
-        yaw = data["yaw"][:, 0]
-        largest_step = float(np.abs(np.diff(yaw)).max())
-        if largest_step > _LARGEST_YAW_STEP:
-            raise TrajectoryError(
-                f"{name}: yaw changes by {largest_step:.4g} rad between two rows; if the column "
-                "is in degrees, convert it to rad"
-            )
-        return np.unwrap(yaw)
-    if "quaternion" in data:
-        q = data["quaternion"]
-        return np.unwrap(2.0 * np.arctan2(q[:, 3], q[:, 0]))
-    return None

@@ -103,7 +103,9 @@ def _require_header(with_units: list[str], name: str) -> None:
     columns = excerpt(",".join(with_units))
     if len(with_units) == 1 and (found := re.search("[;\t]", with_units[0])):
         separator = "semicolons" if found[0] == ";" else "tabs"
-        raise TrajectoryError(f"{name}: its columns are separated by {separator}; use commas")
+        raise TrajectoryError(
+            f"{name}: its columns are separated by {separator}; use commas, and points for decimals"
+        )
     if all(_is_number(column) for column in with_units):
         raise TrajectoryError(
             f"{name}: its first line must name the columns, such as t,x,y,z; found {columns}"
