@@ -110,7 +110,7 @@ def ready_to_fly(options: Namespace) -> None:
     if path in (None, Path()):
         path = shipped("mock-px4.yaml")
     if bundled:
-        options.endpoint, options.arm = "udpin://127.0.0.1:14540", True
+        options.endpoint, options.arm, options.take_over = "udpin://127.0.0.1:14540", True, False
     planner = None
     if options.run.startswith("identify"):
         options.maneuvers, planner = ("identify",), "first-order"

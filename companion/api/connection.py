@@ -17,7 +17,8 @@ from companion.config.files import changed, load
 from companion.flight.context import FlightContext
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, SilentObserver, decline_landing
-from companion.flight.phases import Phase, hand_back_phase
+from companion.flight.phase import Phase
+from companion.flight.phases import hand_back_phase
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
 from companion.recording.folder import flight_folder

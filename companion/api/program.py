@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from math import inf
 
 from companion.flight.context import FlightContext
-from companion.flight.phases import Phase, ground_phases, program_phase
+from companion.flight.phase import Phase
+from companion.flight.phases import opening_phases, program_phase
 from companion.guidance import ManeuverSequence
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import FlightEnded
@@ -67,10 +68,10 @@ class ProgramPlan:
         self.finished = asyncio.Event()
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
-        """The phases on the ground, then the requested ones, until the last request is done."""
+        """The opening phases, then the requested ones, until the last request is done."""
         if self._running_request is not None:  # the checks are repeated, and then this request
             self._waiting_requests.appendleft(self._running_request)
-        for phase in ground_phases(context.config.flight):
+        for phase in opening_phases(context.config.flight):
             yield phase
         if not self.connected.done():
             self.connected.set_result(context)

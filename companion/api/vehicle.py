@@ -3,16 +3,16 @@
 import asyncio
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
-from dataclasses import replace
 from functools import partial
-from math import hypot, tau
+from math import hypot
 from pathlib import Path
 
 from companion.api.control import Control, program_control
 from companion.api.flight_loop import call_in_thread
 from companion.api.program import unless_disarmed
 from companion.api.state import ConnectedFlight, State
-from companion.config import Config, trajectory_file
+from companion.api.straight_path import straight_path
+from companion.config import trajectory_file
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded, fly_maneuvers
 from companion.flight.maneuver_checks import (
@@ -20,9 +20,10 @@ from companion.flight.maneuver_checks import (
     require_followable,
     slowed_from,
 )
+from companion.flight.phase import Phase
 from companion.flight.phases import (
-    Phase,
     hand_back_phase,
+    handover_phases,
     landing_phases,
     program_phase,
     takeoff_phases,
@@ -32,17 +33,14 @@ from companion.guidance.finite import finite_number, finite_vector
 from companion.guidance.follow import Follow, HeldHeadingManeuver, hover
 from companion.guidance.reference import Vector, minus
 from companion.guidance.source import CommandedSource
-from companion.guidance.trajectory import Hover, Trajectory, line
+from companion.guidance.trajectory import Trajectory
 from companion.guidance.trajectory.own_trajectory import checked_trajectory
 from companion.guidance.trajectory.sample import SMALLEST_DISTANCE
-from companion.guidance.trajectory.timed_curve import FixedHeading
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import Exit, FlightEnded
 
 _START_TIMEOUT = 1.0
 """Longest time from the beginning of control to the first command, s."""
-_USUAL_SPEED = 2.0
-"""Speed of `go_to` if the program gives none, m/s."""
 
 
 class Vehicle:
@@ -86,6 +84,21 @@ class Vehicle:
             lambda context: takeoff_phases(context.config.flight, context.link.autopilot)
         )
 
+    async def take_over(self) -> None:
+        """Wait until the pilot hands over in the air; check the vehicle, and take over.
+
+        The pilot, or a program that ended before, left it in hold (GUIDED on ArduPilot), at
+        `flight.takeoff_height_m` or higher. The wait is limited by `flight.arming_timeout_s`.
+
+        Raises:
+            FlightEnded: the flight has ended early, or the vehicle is under the program's control;
+                it flies on.
+        """
+        self._flight.program.require_flight()
+        if self._flight.context.loop.offboard_active:
+            raise FlightEnded("the vehicle is under our control already", Exit.LEAVE)
+        await self._request(lambda context: handover_phases(context.config.flight))
+
     async def hold(self, seconds: float) -> None:
         """Hold the position and the heading for a time, s.
 
@@ -125,20 +138,12 @@ class Vehicle:
             ValueError: an argument is not finite, or the heading exceeds two turns.
         """
         to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
-        if speed is None:
-            speed = _usual_speed(to, self._flight.context.config)
-        names = "speed", "acceleration", "jerk"
-        speed, acceleration, jerk = map(finite_number, names, (speed, acceleration, jerk))
-        new_heading = None if heading is None else finite_number("heading", heading)
-        if new_heading is not None and abs(new_heading) > 2.0 * tau:
-            raise ValueError(f"heading is in rad, and {new_heading:g} rad are more than two turns")
-        if hypot(*to) < SMALLEST_DISTANCE:
-            await self.follow(Hover(0.0, heading=new_heading))
-        elif new_heading is None:
-            await self._fly(HeldHeadingManeuver(line(to, speed, acceleration, jerk)))
+        config = self._flight.context.config
+        path = straight_path(config, to, heading, speed, acceleration, jerk)
+        if heading is None and hypot(*to) >= SMALLEST_DISTANCE:
+            await self._fly(HeldHeadingManeuver(path))
         else:
-            path = line(to, speed, acceleration, jerk)
-            await self.follow(replace(path, heading=FixedHeading(new_heading)))
+            await self.follow(path)
 
     async def follow(self, trajectory: Trajectory | Path | str, *, slow_down: bool = False) -> None:
         """Follow a trajectory from the present position.
@@ -235,14 +240,7 @@ class Vehicle:
         self._flight.program.require_flight()
         pose = self._flight.context.guidance_loop.flown_source.pose
         if pose is None or not self._flight.context.loop.offboard_active:
-            raise FlightEnded("the vehicle is not under our control: take off first", Exit.LEAVE)
+            raise FlightEnded(
+                "the vehicle is not under our control: take off first, or take over", Exit.LEAVE
+            )
         return pose
-
-
-def _usual_speed(to: Vector, config: Config) -> float:
-    """Speed of a line to `to` (m NED from its start), m/s: at most `_USUAL_SPEED`."""
-    speed = min(_USUAL_SPEED, config.safety.max_speed_m_s)
-    if to[2] == 0.0:
-        return speed
-    vertical = config.limits.max_climb_m_s if to[2] < 0.0 else config.limits.max_descent_m_s
-    return min(speed, vertical * hypot(*to) / abs(to[2]))

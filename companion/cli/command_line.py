@@ -174,6 +174,11 @@ def _add_identify(commands: Commands) -> None:
 def _add_link_options(command: argparse.ArgumentParser) -> None:
     add_endpoint(command)
     add_flag(command, "--arm", "let the program arm the vehicle, like flight.arm: true")
+    add_flag(
+        command,
+        "--take-over",
+        "take over a vehicle that its pilot has flown up and holds, like flight.take_over: true",
+    )
 
 
 def _add_flight_options(command: argparse.ArgumentParser) -> None:

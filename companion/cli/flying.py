@@ -48,6 +48,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
             "trajectory": options.trajectory,
             "slow_down": options.slow_down,
             "arm": options.arm,
+            "take_over": options.take_over,
         },
         "planner": {"name": planner},
     }
@@ -162,7 +163,7 @@ def fly_bundled(
     path = path or shipped("mock-px4.yaml")
     config = config_as_read = load(path)
     with demo.wire_like(config.link.endpoint) as wire:
-        options.endpoint, options.arm = wire.endpoint, True
+        options.endpoint, options.arm, options.take_over = wire.endpoint, True, False
         config = with_options(config, options, planner)
         demo.check_mock(path)
         folder = flight_folder(config.recording.directory)

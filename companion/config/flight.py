@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from companion.config.units import Si
 from companion.files.yaml_file import PathKey, Section
@@ -40,6 +40,10 @@ class FlightConfig(Section):
     arm: bool = False
     """true, or the option --arm: the program arms the vehicle. false: the program waits until the
     pilot arms it."""
+    take_over: bool = False
+    """true, or the option --take-over: the pilot flies the vehicle up to takeoff_height_m or higher
+    and hands over by switching to hold (GUIDED on ArduPilot); at the end it holds for the pilot.
+    false: the autopilot takes off and lands."""
     accept: Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=100)] = ()
     """Names of unsafe findings of `companion doctor` that do not prevent a flight, such as
     COM_OF_LOSS_T. The flight's events list them."""
@@ -48,12 +52,21 @@ class FlightConfig(Section):
     ready_timeout_s: Seconds = 60.0
     """Time allowed for the autopilot's estimator and pre-arm checks."""
     arming_timeout_s: Seconds = 60.0
-    """Time allowed for arming."""
+    """Time allowed for arming; with take_over, until the pilot hands over."""
     takeoff_timeout_s: Seconds = 40.0
     """Time allowed to reach takeoff_height_m."""
     landing_timeout_s: Seconds = 90.0
     """Time allowed to begin the landing, and again to report that it landed. ArduPilot, which would
     drift without setpoints, is held until it lands or a pilot takes over."""
+
+    @model_validator(mode="after")
+    def _check_who_arms(self) -> "FlightConfig":
+        if self.arm and self.take_over:
+            raise ValueError(
+                "flight.take_over and flight.arm (--arm) exclude each other: a pilot who hands "
+                "over in the air has armed the vehicle"
+            )
+        return self
 
 
 class HoverConfig(Section):

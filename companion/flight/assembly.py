@@ -19,12 +19,13 @@ from companion.flight.flight import AskLanding, Flight
 from companion.flight.flown_config import description, flattened
 from companion.flight.maneuvers import fresh_copy
 from companion.flight.observer import EventRecorder
-from companion.flight.phases import Phase
+from companion.flight.phase import Phase
 from companion.flight.plan import Plan
 from companion.flight.preflight_checks import PreflightChecks
+from companion.flight.rate_requester import RateRequester
 from companion.flight.status import StatusReporter
 from companion.flight.vehicle_identity import DragMemory, ReplacementDetector
-from companion.flight.watch import RateRequester, Watch
+from companion.flight.watch import Watch
 from companion.guidance.follow import Follow
 from companion.recording.trace import FlightTrace
 from companion.safety import SafetyLadder, monitors

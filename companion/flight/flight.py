@@ -8,7 +8,8 @@ from typing import Any
 
 from companion.flight.context import FlightContext, cancel
 from companion.flight.observer import Observer
-from companion.flight.phases import Phase, exit_phases, ground_phases
+from companion.flight.phase import Phase
+from companion.flight.phases import exit_phases, ground_phases
 from companion.flight.plan import Plan
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.flight.watch import Watch

@@ -1,14 +1,12 @@
 """The table of phases: order, timeouts, allowed modes, and the exit if a phase fails."""
 
-from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
+from dataclasses import replace
 from math import inf
-from typing import Any
 
 from companion.config.flight import FlightConfig
 from companion.flight import control_phases, listening, preflight_phases, takeoff, takeover
-from companion.flight.context import FlightContext
 from companion.flight.hand_over import ROLES_BEFORE_LANDING
+from companion.flight.phase import Phase, Work
 from companion.safety.actions import Exit
 from companion.vehicle.autopilot import Autopilot, ControlEntry, Role
 
@@ -22,38 +20,6 @@ _COMMAND_TIMEOUT = 10.0
 _TAKEOVER_TIMEOUT = 15.0
 """Timeout for the takeover with its preflight checks, s; a lossy link delays their parameters."""
 
-Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
-
-
-@dataclass(frozen=True, slots=True)
-class Phase:
-    """One phase of a flight."""
-
-    name: str
-    """Name, shown to the user."""
-    waits_for: str
-    """The condition that ends the phase, shown to the user."""
-    work: Work
-    """The coroutine of the phase."""
-    timeout: float
-    """Time after which the phase has failed, s; may be infinite."""
-    on_failure: Exit = Exit.LEAVE
-    """The exit if the phase fails."""
-    on_failure_on_ground: Exit | None = None
-    """The exit if the phase fails while the vehicle is on the ground; None: `on_failure`."""
-    allowed_roles: frozenset[Role] = frozenset()
-    """Roles of the allowed modes; any other or unknown mode counts as a takeover by the pilot.
-    Empty: any mode is allowed."""
-    monitored: bool = False
-    """Whether the safety monitors may end the phase. The phases of an exit are not monitored: the
-    breach that caused the exit would end them, too."""
-
-    def exit_on_failure(self, *, standing: bool) -> Exit:
-        """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""
-        if self.on_failure_on_ground is not None and standing:
-            return self.on_failure_on_ground
-        return self.on_failure
-
 
 def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases before arming, in order: they connect, request telemetry and check.
@@ -65,6 +31,12 @@ def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
         Phase("connect", "a heartbeat", preflight_phases.connect, config.connect_timeout_s + 1.0),
         Phase("checks", "the vehicle to be ready", preflight_phases.checks, config.ready_timeout_s),
     )
+
+
+def opening_phases(config: FlightConfig) -> tuple[Phase, ...]:
+    """As `ground_phases`, but a vehicle that flies is not checked yet; `handover_phases` do it."""
+    connect, checks = ground_phases(config)
+    return connect, replace(checks, work=takeover.check_unless_flying)
 
 
 def flight_phases(
@@ -80,6 +52,9 @@ def flight_phases(
         allowed_roles=_OFFBOARD_ROLES,
         monitored=True,
     )
+    if config.take_over:
+        held = replace(maneuvers, on_failure=Exit.HOLD)
+        return (*handover_phases(config), held, hand_back_phase())
     return (*takeoff_phases(config, autopilot), maneuvers, *landing_phases())
 
 
@@ -100,6 +75,17 @@ def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases that take over a vehicle which its autopilot holds in the air."""
     checks = _checks(config, "to be taken over", takeover.check_airborne, _TAKEOFF_ROLES)
     return checks, _takeover(Exit.HOLD)
+
+
+def handover_phases(config: FlightConfig) -> tuple[Phase, ...]:
+    """The phases that wait until the pilot hands over in the air, and take the vehicle over."""
+    hand_over = Phase(
+        "hand over",
+        "the pilot to hand over in the air",
+        takeover.wait_for_handover,
+        config.arming_timeout_s,
+    )
+    return hand_over, *takeover_phases(config)
 
 
 def takeoff_for_client_phases(config: FlightConfig) -> tuple[Phase, ...]:

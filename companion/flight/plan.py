@@ -9,11 +9,12 @@ from companion.config.known_drag import before_connecting
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded
 from companion.flight.maneuvers import configured_maneuvers
+from companion.flight.phase import Phase
 from companion.flight.phases import (
-    Phase,
     flight_phases,
     ground_phases,
     hand_back_phase,
+    opening_phases,
     program_phase,
     takeoff_for_client_phases,
     takeover_phases,
@@ -36,7 +37,7 @@ class Plan(Protocol):
 
 
 class ConfiguredPlan:
-    """The plan of `companion fly`: from the ground through `flight.maneuvers` and back.
+    """The plan of `companion fly`: through `flight.maneuvers`, from the ground or from the pilot.
 
     Args:
         config: configuration of the flight.
@@ -54,11 +55,10 @@ class ConfiguredPlan:
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """All phases in order; those after the ground phases depend on the autopilot."""
-        for phase in ground_phases(context.config.flight):
+        config = context.config.flight
+        for phase in opening_phases(config) if config.take_over else ground_phases(config):
             yield phase
-        for phase in flight_phases(
-            context.config.flight, self.maneuvers.duration, context.link.autopilot
-        ):
+        for phase in flight_phases(config, self.maneuvers.duration, context.link.autopilot):
             yield phase
 
 

@@ -44,7 +44,7 @@ async def checks(context: FlightContext) -> None:
     if warning is not None:
         context.note(warning)
     context.known_drag = evidence.known_drag
-    _require_flyable_by_vehicle(context)
+    require_flyable_by_vehicle(context)
     report_offboard_loss(context, evidence.survey.values)
     context.mode_at_checks = context.link.state.mode
 
@@ -157,7 +157,7 @@ def _require_untouched(context: FlightContext) -> None:
         )
 
 
-def _require_flyable_by_vehicle(context: FlightContext) -> None:
+def require_flyable_by_vehicle(context: FlightContext) -> None:
     """Check the maneuvers again, with this vehicle's drag and its latitude and longitude.
 
     Raises:

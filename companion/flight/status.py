@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
 from companion.flight.context import FlightContext
-from companion.flight.phases import Phase
+from companion.flight.phase import Phase
 from companion.flight.status_rows import StatusRows
 from companion.flight.view import view
 from companion.recording.trace import FlightTrace

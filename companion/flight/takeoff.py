@@ -8,7 +8,7 @@ from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
-_MAX_UNDERSHOOT = 0.5
+MAX_UNDERSHOOT = 0.5
 """A climb may end this far below the commanded height, m."""
 
 _MAX_OVERSHOOT = 3.0
@@ -72,7 +72,7 @@ class _Climb:
                 f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
             )
-        is_near_height = height > self._height - _MAX_UNDERSHOOT
+        is_near_height = height > self._height - MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
             raise self._early_end(height)
         if is_near_height and state.landed:
@@ -106,7 +106,7 @@ class _Climb:
         motion = self._context.guidance_loop.motion
         if motion is not None and self._start_down is not None:
             climbed = self._start_down - motion.position_ned[2]  # without jumps of home or estimate
-            if climbed > self._height - _MAX_UNDERSHOOT:
+            if climbed > self._height - MAX_UNDERSHOOT:
                 return FlightEnded(
                     f"after a climb of {climbed:.1f} m the height above home is {height:.1f} m: "
                     "home or the height estimate has jumped",

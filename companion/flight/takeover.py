@@ -9,11 +9,14 @@ from companion.attitude.kinematics import tilt_angle
 from companion.flight.commands import change_mode, in_role, require_role, requiring_roles
 from companion.flight.context import FlightContext
 from companion.flight.preflight_phases import (
+    checks,
     judge_vehicle,
     report_offboard_loss,
     request_telemetry,
+    require_flyable_by_vehicle,
     stream,
 )
+from companion.flight.takeoff import MAX_UNDERSHOOT
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
@@ -24,6 +27,9 @@ _ARMED_REPORT_TIMEOUT = 1.5
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""
 
+_LARGEST_CLIMB = 0.3
+"""Largest vertical speed of a vehicle that the pilot has handed over, m/s."""
+
 _BRAKING_TIME = 5.0
 """Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
 
@@ -32,6 +38,49 @@ _HOVER_LEARNING_TIME = 3.0
 
 _SETTLE_TIME = 1.0
 """Time of holding in offboard before the maneuvers begin, s: the takeover must not disturb them."""
+
+
+async def check_unless_flying(context: FlightContext) -> None:
+    """Run the checks on the ground; from a vehicle that flies only request telemetry.
+
+    Raises:
+        FlightEnded: the vehicle is armed on the ground, or a finding blocks the flight.
+    """
+    if context.armed():
+        context.replacement_detector.begin()
+        await request_telemetry(context)
+        await _landed_or_flying(context)
+        if context.link.state.flying:
+            return
+    await checks(context)
+
+
+async def wait_for_handover(context: FlightContext) -> None:
+    """Wait until the vehicle flies high enough, and its pilot lets the autopilot hold it.
+
+    A vehicle that still takes off or climbs is not held yet.
+    """
+    state, ready = context.link.state, context.link.autopilot.ready_mode
+    lowest = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
+
+    def handed_over() -> bool:
+        if not context.armed() or not state.flying:
+            context.detail = "the pilot to take off"
+            return False
+        context.ground.note_flying()
+        if state.height is None or state.height < lowest:
+            height = "unknown" if state.height is None else f"{state.height:.1f} m"
+            context.detail = f"a height of {lowest:.1f} m (flight.takeoff_height_m), now {height}"
+            return False
+        if state.mode != ready:
+            context.detail = f"the pilot to switch to {ready}, now {state.mode}"
+            return False
+        context.detail = "the vehicle to keep its height"
+        position = context.fresh_position()
+        is_level = position is not None and abs(position.velocity_ned[2]) < _LARGEST_CLIMB
+        return is_level and not state.taking_off
+
+    await context.until(handed_over)
 
 
 async def check_airborne(context: FlightContext) -> None:
@@ -66,15 +115,21 @@ async def _check_stage(
     context.replacement_detector.begin()
     context.replacement_detector.commit()
     await request_telemetry(context)
+    await _landed_or_flying(context)
+    require(context)
+    await context.until(lambda: context.fresh_position() is not None, "a fresh position")
+    evidence = await judge_vehicle(context, stage)
+    context.known_drag = evidence.known_drag
+    require_flyable_by_vehicle(context)
+    report_offboard_loss(context, evidence.survey.values)
+    require(context)
+
+
+async def _landed_or_flying(context: FlightContext) -> None:
     state = context.link.state
     await context.until(
         lambda: state.landed or state.flying, "the vehicle to report landed or flying"
     )
-    require(context)
-    await context.until(lambda: context.fresh_position() is not None, "a fresh position")
-    evidence = await judge_vehicle(context, stage)
-    report_offboard_loss(context, evidence.survey.values)
-    require(context)
 
 
 def _require_flying(context: FlightContext) -> None:

@@ -4,106 +4,22 @@ import asyncio
 from collections.abc import Callable
 from math import inf
 
-from companion.config.computer import LinkConfig
 from companion.flight.commands import require_role, roles_of
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.hand_over import stop_moving
 from companion.flight.hold_inside import give_up_inside
-from companion.flight.phases import Phase
-from companion.mavlink.errors import LinkError
+from companion.flight.phase import Phase
+from companion.flight.rate_requester import RateRequester
 from companion.safety import SafetyLadder
 from companion.safety.actions import EXIT_OF_ACTION, Action, Exit, FlightEnded, StreamEffect
-from companion.safety.snapshot import Health
 from companion.vehicle.autopilot import Role
-from companion.vehicle.link import Link
-from companion.vehicle.records import MAX_TELEMETRY_AGE, is_outdated
+from companion.vehicle.records import is_outdated
 
 _CURRENT_MODE_PERIOD = 0.45
 """A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
 PX4 sends one every 0.5 s."""
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
-_REQUEST_SHARE = 0.5
-"""A status is requested again at this share of the age from which it counts as unknown."""
-_REQUEST_PERIOD = 5.0
-"""Shortest time between two requests for one message, s; a rate that stays low ends the flight
-sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
-_HEARD_AGE = 0.2
-"""A status is requested only while positions are newer than this, s: a silent link lacks all."""
-_COUNTING_TIME = 0.1
-"""Time over which `set_rates` counts messages, s; the counts are not used."""
-
-
-class RateRequester:
-    """Requests a message again if its rate has become too low: another station may have changed it.
-
-    It sends SET_MESSAGE_INTERVAL, at most every `_REQUEST_PERIOD` a message, and does not block.
-
-    Attributes:
-        note: called with messages about requests and their errors.
-
-    Args:
-        link: link to the vehicle.
-        link_config: section `link` with the wanted and the smallest rates.
-    """
-
-    def __init__(self, link: Link, link_config: LinkConfig) -> None:
-        self.note: Callable[[str], None] = lambda _: None
-        self._link = link
-        self._link_config = link_config
-        self._tasks: dict[str, asyncio.Task[None]] = {}
-        self._requested_at: dict[str, float] = {}
-        self._silent_at = -inf
-
-    def check(self, now: float, health: Health) -> None:
-        """Request each message whose rate is too low at `now`, our clock, s."""
-        wanted = self._link_config
-        answers, positions = health.answer_rate, health.position_rate
-        # One later gap may be any other disturbance; a lowered rate makes a second one at once.
-        accepted_gaps = 1 if "ATTITUDE_QUATERNION" in self._tasks else 0
-        is_slow = answers is not None and answers < wanted.min_attitude_rate_hz
-        if is_slow or health.gaps > accepted_gaps:
-            self._request(now, "ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
-        if positions is not None and positions < wanted.min_position_rate_hz:
-            self._request(now, "LOCAL_POSITION_NED", wanted.position_rate_hz)
-
-    def _request(self, now: float, message: str, rate: float) -> None:
-        if now - self._requested_at.get(message, -inf) < _REQUEST_PERIOD:
-            return
-        self._requested_at[message] = now
-        self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
-        self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
-
-    def check_statuses(self, now: float, heartbeat_limit: float) -> None:
-        """Request each status that has come before, is overdue at `now`, and has a requested rate.
-
-        Args:
-            now: our clock, s.
-            heartbeat_limit: age from which the mode counts as unknown, s.
-        """
-        state, wanted = self._link.state, self._link.autopilot.wanted_rates
-        if state.position is None or now - state.position.received > _HEARD_AGE:
-            self._silent_at = now
-            return
-        statuses = (
-            ("HEARTBEAT", state.heartbeat, heartbeat_limit),
-            ("GPS_RAW_INT", state.gps, MAX_TELEMETRY_AGE),
-            ("SYS_STATUS", state.battery, MAX_TELEMETRY_AGE),
-            ("EXTENDED_SYS_STATE", state.landed_state, MAX_TELEMETRY_AGE),
-            ("ESTIMATOR_STATUS", state.estimator, MAX_TELEMETRY_AGE),
-            ("EKF_STATUS_REPORT", state.estimator, MAX_TELEMETRY_AGE),
-        )
-        for message, status, unknown_from in statuses:
-            if message not in wanted or status is None:
-                continue
-            if now - max(status.received, self._silent_at) > _REQUEST_SHARE * unknown_from:
-                self._request(now, message, wanted[message])
-
-    async def _request_rate(self, message: str, rate: float) -> None:
-        try:
-            await self._link.set_rates({message: rate}, window_s=_COUNTING_TIME)
-        except LinkError as error:
-            self.note(str(error))
 
 
 class Watch:

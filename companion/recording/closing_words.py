@@ -19,7 +19,7 @@ from companion.recording.measurements.verdict import (
 )
 from companion.recording.what_to_do import what_to_do
 
-_PHASES_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm")
+_PHASES_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm", "hand over")
 _SHARED_OPTIONS = ("--endpoint", "--set")
 _SLOW_COMPUTER_MONITORS = ("deadlines", "starvation")
 LEFT_BY_USER = "left at once by the user"

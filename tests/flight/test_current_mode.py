@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.config import Config
-from companion.flight.phases import Phase
+from companion.flight.phase import Phase
 from companion.flight.watch import Watch
 from companion.vehicle.autopilot import Role
 from tests.flight.fly import fly, mock_vehicle

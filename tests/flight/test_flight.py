@@ -8,7 +8,7 @@ import pytest
 from companion.flight.context import cancel
 from companion.flight.flight import Flight
 from companion.flight.observer import SilentObserver, decline_landing
-from companion.flight.phases import Phase
+from companion.flight.phase import Phase
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.safety.actions import Exit
 

@@ -17,30 +17,10 @@ from companion.guidance import Reference
 from companion.guidance.source import CommandedSource
 from companion.testing import environment, open_wire, run
 from companion.vehicle.link import Link
+from tests.flight.airborne import CUSTOM_MODE, GUIDED, HEIGHT, SET_MODE, in_the_air
 from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, QuickVehicle, merged
 
-ARM, TAKEOFF, SET_MODE = 400, 22, 176
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-CUSTOM_MODE = 1
-GUIDED = 4
-HEIGHT = 4.0
-
-
-def in_the_air(autopilot):
-    """A mock that a ground station armed and let take off."""
-    mock = QuickVehicle(autopilot)
-    mock.run(4.0)
-    if autopilot == "ardupilot":
-        mock.command(SET_MODE, CUSTOM_MODE, GUIDED)
-        mock.run(0.2)
-    mock.command(ARM, 1.0)
-    mock.run(1.5)
-    above_home = HEIGHT if autopilot == "ardupilot" else HEIGHT + mock.settings.home.altitude_m
-    mock.command(TAKEOFF, 0, 0, 0, float("nan"), float("nan"), float("nan"), above_home)
-    mock.until(lambda state: state["position"][2] < -HEIGHT + 0.3, 30.0)
-    mock.run(3.0)
-    assert (mock.state()["armed"], mock.state()["crashed"]) == (True, False)
-    return mock
 
 
 def taken_over(mock, source, program=None):

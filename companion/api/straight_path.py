@@ -1,0 +1,59 @@
+"""The straight path of `Vehicle.go_to`."""
+
+from dataclasses import replace
+from math import hypot, tau
+
+from companion.config import Config
+from companion.guidance.finite import finite_number
+from companion.guidance.reference import Vector
+from companion.guidance.trajectory import Hover, Trajectory, line
+from companion.guidance.trajectory.sample import SMALLEST_DISTANCE
+from companion.guidance.trajectory.timed_curve import FixedHeading
+
+_USUAL_SPEED = 2.0
+"""Speed if the program gives none, m/s."""
+
+
+def straight_path(
+    config: Config,
+    to: Vector,
+    heading: float | None,
+    speed: float | None,
+    acceleration: float,
+    jerk: float,
+) -> Trajectory:
+    """A straight line, from rest to rest; for a distance of nearly 0, a hover.
+
+    Args:
+        config: its limits bound the usual speed.
+        to: the end, from the beginning, m NED.
+        heading: rad; None: the line tells none.
+        speed: largest speed, m/s; None: the usual one.
+        acceleration: largest acceleration, m/s².
+        jerk: largest jerk, m/s³.
+
+    Raises:
+        TrajectoryError: a limit is not positive.
+        ValueError: an argument is not finite, or the heading exceeds two turns.
+    """
+    if speed is None:
+        speed = _usual_speed(to, config)
+    names = "speed", "acceleration", "jerk"
+    speed, acceleration, jerk = map(finite_number, names, (speed, acceleration, jerk))
+    if heading is not None:
+        heading = finite_number("heading", heading)
+        if abs(heading) > 2.0 * tau:
+            raise ValueError(f"heading is in rad, and {heading:g} rad are more than two turns")
+    if hypot(*to) < SMALLEST_DISTANCE:
+        return Hover(0.0, heading=heading)
+    path = line(to, speed, acceleration, jerk)
+    return path if heading is None else replace(path, heading=FixedHeading(heading))
+
+
+def _usual_speed(to: Vector, config: Config) -> float:
+    """Speed of a line to `to` (m NED from its start), m/s: at most `_USUAL_SPEED`."""
+    speed = min(_USUAL_SPEED, config.safety.max_speed_m_s)
+    if to[2] == 0.0:
+        return speed
+    vertical = config.limits.max_climb_m_s if to[2] < 0.0 else config.limits.max_descent_m_s
+    return min(speed, vertical * hypot(*to) / abs(to[2]))

@@ -1,0 +1,41 @@
+"""One phase of a flight: its work, its timeout, and what its failure leads to."""
+
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Any
+
+from companion.flight.context import FlightContext
+from companion.safety.actions import Exit
+from companion.vehicle.autopilot import Role
+
+Work = Callable[[FlightContext], Coroutine[Any, Any, None]]
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """One phase of a flight."""
+
+    name: str
+    """Name, shown to the user."""
+    waits_for: str
+    """The condition that ends the phase, shown to the user."""
+    work: Work
+    """The coroutine of the phase."""
+    timeout: float
+    """Time after which the phase has failed, s; may be infinite."""
+    on_failure: Exit = Exit.LEAVE
+    """The exit if the phase fails."""
+    on_failure_on_ground: Exit | None = None
+    """The exit if the phase fails while the vehicle is on the ground; None: `on_failure`."""
+    allowed_roles: frozenset[Role] = frozenset()
+    """Roles of the allowed modes; any other or unknown mode counts as a takeover by the pilot.
+    Empty: any mode is allowed."""
+    monitored: bool = False
+    """Whether the safety monitors may end the phase. The phases of an exit are not monitored: the
+    breach that caused the exit would end them, too."""
+
+    def exit_on_failure(self, *, standing: bool) -> Exit:
+        """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""
+        if self.on_failure_on_ground is not None and standing:
+            return self.on_failure_on_ground
+        return self.on_failure
