@@ -25,8 +25,8 @@ _V1_OVERHEAD, _V2_OVERHEAD = 8, 12  # bytes of header and checksum
 _LONGEST_DAMAGED_BEGINNING = 1 << 16
 """A file whose first frame begins later than this is no `.tlog`, bytes."""
 _OTHER_LOGS = {
-    b"ULog\x01\x12\x35": "a ULog of PX4",
-    b"\xa3\x95\x80": "a DataFlash log of ArduPilot",
+    b"ULog\x01\x12\x35": "a ULog",
+    b"\xa3\x95\x80": "a DataFlash log",
 }
 """How the logs begin that autopilots record themselves."""
 _MAGIC = re.compile(rb"[\xfd\xfe]")

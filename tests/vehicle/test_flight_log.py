@@ -287,8 +287,8 @@ def test_frames_of_other_dialects_are_no_damage(tmp_path):
 @pytest.mark.parametrize(
     ("begin", "words"),
     [
-        (b"ULog\x01\x12\x35\x01", "this is a ULog of PX4; give the .tlog"),
-        (b"\xa3\x95\x80\x80\x59FMT", "this is a DataFlash log of ArduPilot; give the .tlog"),
+        (b"ULog\x01\x12\x35\x01", "this is a ULog; give the .tlog"),
+        (b"\xa3\x95\x80\x80\x59FMT", "this is a DataFlash log; give the .tlog"),
         (b"PK", "not a .tlog; expected MAVLink frames, each after 8 bytes"),
     ],
 )
