@@ -45,8 +45,7 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
     "checks": "fix what the message names; `companion doctor` explains each check",
     "stream": "check the link: the autopilot sent too little telemetry to answer",
     "arm": "fix what the autopilot names in the events; --arm lets the program arm",
-    "hand over": "take off, and switch to hold (PX4) or GUIDED (ArduPilot) at "
-    "flight.takeoff_height_m or higher",
+    "hand over": "fly at flight.takeoff_height_m or higher, and switch to the mode that holds",
     "takeoff": "read the autopilot's messages in the events; the pilot may have taken over",
     "offboard": "fix what the message names; the autopilot must accept our setpoints",
     "maneuvers": "read the events before the end; if the pilot took over, nothing needs fixing",
