@@ -14,6 +14,8 @@ _WATCHED_S = 12.0
 _BATTERY = {"px4": 75.0, "ardupilot": 96.0}
 """Below this limit a simulated battery comes within a minute, %."""
 _LANDED_S = 120.0
+_HANDED_OVER_M = 6.0
+"""Height at which a pilot hands over, m."""
 _RIVAL_THRUST = {"px4": 0.7, "ardupilot": 0.35}
 """About what a hover needs."""
 
@@ -50,6 +52,39 @@ def rival(vehicle: Vehicle, folder: Path) -> dict:
     return {"result": flight.finish()["result"]} | _watched(vehicle, event)
 
 
+def handover(vehicle: Vehicle, folder: Path) -> dict:
+    """A pilot flies up and lets the autopilot hold; the program takes over, and gives it back."""
+    station = vehicle.station
+    _fly_up(vehicle)
+    changes = {"arm": False, "take_over": True, "takeoff_height_m": _HANDED_OVER_M - 1.0}
+    flight = begun(vehicle, folder, {"flight": changes, "hover": {"duration_s": 5.0}})
+    result = flight.finish()
+    ended = time.monotonic()
+    return {"result": result.get("result"), "began_after_s": flight.obeyed_at - flight.began} | (
+        _watched(vehicle, ended) | {"held_in": station.mode, "armed": station.armed}
+    )
+
+
+def _fly_up(vehicle: Vehicle) -> None:
+    """Arm and take off as a ground station does, and wait until the vehicle stands in the air."""
+    station = vehicle.station
+    deadline = time.monotonic() + 120.0
+    while not station.armed:  # refused until the autopilot is ready
+        assert time.monotonic() < deadline, "the autopilot does not arm"
+        station.set_mode("LOITER" if vehicle.autopilot == "px4" else "GUIDED")
+        time.sleep(0.5)
+        station.command(400, 1.0)
+        time.sleep(1.5)
+    nan = float("nan")
+    if vehicle.autopilot == "px4":
+        vehicle.parameter("MIS_TAKEOFF_ALT", _HANDED_OVER_M)
+        station.command(22, nan, 0, 0, nan, nan, nan, nan)
+    else:
+        station.command(22, 0, 0, 0, 0, 0, 0, _HANDED_OVER_M)
+    station.until(lambda: station.up > _HANDED_OVER_M - 0.5, 60.0, "take-off")
+    time.sleep(4.0)
+
+
 def ladder(vehicle: Vehicle, folder: Path) -> dict:
     """The program lands the vehicle itself, for its battery is below the limit."""
     if vehicle.autopilot == "px4":
@@ -71,7 +106,8 @@ def calm(vehicle: Vehicle, folder: Path) -> dict:
 
 
 INCIDENTS = {
-    "kill": kill, "takeover": takeover, "ladder": ladder, "calm": calm, "rival": rival
+    "kill": kill, "takeover": takeover, "ladder": ladder, "calm": calm, "rival": rival,
+    "handover": handover,
 }  # fmt: skip
 TEN = (
     "kill", "takeover", "ladder", "kill", "takeover", "ladder", "calm", "takeover", "calm", "calm"
