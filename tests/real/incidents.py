@@ -75,10 +75,9 @@ def _fly_up(vehicle: Vehicle) -> None:
         time.sleep(0.5)
         station.command(400, 1.0)
         time.sleep(1.5)
-    nan = float("nan")
     if vehicle.autopilot == "px4":
         vehicle.parameter("MIS_TAKEOFF_ALT", _HANDED_OVER_M)
-        station.command(22, nan, 0, 0, nan, nan, nan, nan)
+        station.set_mode("TAKEOFF")
     else:
         station.command(22, 0, 0, 0, 0, 0, 0, _HANDED_OVER_M)
     station.until(lambda: station.up > _HANDED_OVER_M - 0.5, 60.0, "take-off")
