@@ -68,6 +68,8 @@ def handover(vehicle: Vehicle, folder: Path) -> dict:
 def _fly_up(vehicle: Vehicle) -> None:
     """Arm and take off as a ground station does, and wait until the vehicle stands in the air."""
     station = vehicle.station
+    if vehicle.autopilot == "px4":
+        vehicle.parameter("MIS_TAKEOFF_ALT", _HANDED_OVER_M)
     deadline = time.monotonic() + 120.0
     while not station.armed:  # refused until the autopilot is ready
         assert time.monotonic() < deadline, "the autopilot does not arm"
@@ -76,7 +78,6 @@ def _fly_up(vehicle: Vehicle) -> None:
         station.command(400, 1.0)
         time.sleep(1.5)
     if vehicle.autopilot == "px4":
-        vehicle.parameter("MIS_TAKEOFF_ALT", _HANDED_OVER_M)
         station.set_mode("TAKEOFF")
     else:
         station.command(22, 0, 0, 0, 0, 0, 0, _HANDED_OVER_M)
