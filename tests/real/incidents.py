@@ -79,9 +79,11 @@ def _fly_up(vehicle: Vehicle) -> None:
         time.sleep(1.5)
     if vehicle.autopilot == "px4":
         station.set_mode("TAKEOFF")
+        station.until(lambda: station.mode == "TAKEOFF", 5.0, "take-off")
+        station.until(lambda: station.mode == "LOITER", 60.0, "hold after the take-off")
     else:
         station.command(22, 0, 0, 0, 0, 0, 0, _HANDED_OVER_M)
-    station.until(lambda: station.up > _HANDED_OVER_M - 0.5, 60.0, "take-off")
+        station.until(lambda: station.up > _HANDED_OVER_M - 0.5, 60.0, "take-off")
     time.sleep(4.0)
 
 
