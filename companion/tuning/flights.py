@@ -10,6 +10,7 @@ import numpy as np
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.drag import NO_DRAG
+from companion.recording.measurements.maneuver_figures import in_maneuvers
 from companion.testing import MockVehicle, fly
 from companion.tuning.expectation import Floats
 
@@ -21,8 +22,8 @@ _LARGEST_RESERVE = 0.8
 """Largest reserve for feedback and wind, as a share of the acceleration at the tilt limit."""
 _MAX_THRUST = 0.95
 _FENCE_SIZE = 50.0  # m
-_REFERENCE_JUMP = 20.0
-"""Speed of the reference, m/s, above which its movement counts as a jump to the vehicle."""
+_LEAST_SPEED = 0.05
+"""Speed of the reference from which it moves, m/s."""
 _DATAGRAM_DELAY_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
 _STEPS_PER_TRUTH_ROW = 5
@@ -128,7 +129,9 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
         summary = fly(flown_config, vehicle)
     if summary.result != "ok":
         return TrialResult(summary.result)
-    result = _tracking_figures(summary.trace.tracking.rows(), np.array(rows), vehicle, flown_config)
+    tracking = summary.trace.tracking.rows()
+    course = tracking[in_maneuvers(tracking[:, 0], summary.trace.maneuvers)]
+    result = _tracking_figures(course, np.array(rows), vehicle, flown_config)
     return replace(result, wind=trial.wind.get("speed_m_s", 0.0))
 
 
@@ -138,14 +141,14 @@ def _tracking_figures(
     """The tracking figures of a flight, over the time in which its reference moved.
 
     Args:
-        tracking: rows of `FlightTrace.tracking`.
+        tracking: rows of `FlightTrace.tracking` in the trial's maneuver.
         truth: rows of `_recorded_truth`.
         vehicle: vehicle after the flight.
         flown_config: configuration of the flight.
     """
     time, reference = tracking[:, 0], tracking[:, 1:3]
     speed = np.hypot(*np.gradient(reference, time, axis=0).T)
-    moving_indices = np.flatnonzero((speed > 0.05) & (speed < _REFERENCE_JUMP))
+    moving_indices = np.flatnonzero(speed > _LEAST_SPEED)
     moving_rows = slice(moving_indices[0], moving_indices[-1] + 1)
     true_position = np.column_stack(
         [np.interp(time, truth[:, 0], column) for column in truth[:, 1:].T]

@@ -107,12 +107,11 @@ def test_a_configuration_without_drag_leaves_the_tilt_that_the_mock_vehicles_dra
     flight = fly_trial(config, CIRCLE, "px4")
     assert flight.ok, flight
     assert flight.reported < 0.1
-    # With other seeds the reference jumps a little where the circle begins: that counts as speed.
-    in_gusts = fly_trial(config, CIRCLE_IN_GUSTS, "px4", seed=8)
+    in_gusts = fly_trial(config, CIRCLE_IN_GUSTS, "px4", seed=3)
     assert in_gusts.ok, in_gusts
     assert 1.5 < in_gusts.wind < 3.0  # 25 degrees do not hold against gusts of 5 m/s
     assert in_gusts.reported < 0.3
-    assert in_gusts.speed < 5.1
+    assert in_gusts.speed < 1.5  # slowed down; where it begins, the reference jumps by centimetres
 
 
 def test_the_mock_vehicle_is_like_the_identified_one():
