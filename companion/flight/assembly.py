@@ -79,7 +79,7 @@ def assemble(
     context.loop.ask_mode = watch.ask_mode
     flight = Flight(context, plan, watch, recorder, ask_landing)
     ladder.note = context.note = context.preflight.note = flight.note
-    context.guidance_loop.recorder.note = rate_requester.note = flight.note
+    context.guidance_loop.recorder.note = rate_requester.note = recorder.note = flight.note
     memory = _drag_memory(context, folder, flight.note, changes)
     _prepare_trajectories(context, flight.note, real_time=real_time)
     if record is not None:

@@ -89,6 +89,7 @@ class EventRecorder:
     Attributes:
         phases: (begin in s on our clock, name) of each phase.
         write, file: as the arguments.
+        note: called once if the other observer fails, to make it an event of the flight.
 
     Args:
         observer: the other observer.
@@ -105,7 +106,7 @@ class EventRecorder:
         file: FlightRecorder | None = None,
     ) -> None:
         self.phases: list[tuple[float, str]] = []
-        self.write = write
+        self.write = self.note = write
         self.file = file
         self._observer = observer
         self._clock = clock
@@ -141,4 +142,4 @@ class EventRecorder:
             tell(self._observer)
         except Exception as error:
             self._observer = SilentObserver()
-            self.write(f"the observer of this flight failed and gets no more messages: {error!r}")
+            self.note(f"the observer of this flight failed and gets no more messages: {error!r}")

@@ -445,7 +445,10 @@ def test_an_observer_that_raises_costs_nothing():
         return vehicle.summary
 
     mock = QuickVehicle()
-    assert run(mock, main()).result == "ok"
+    summary = run(mock, main())
+    assert summary.result == "ok"
+    told = [text for _, text in summary.events if "the observer of this flight failed" in text]
+    assert len(told) == 1
     assert not mock.state()["armed"]
 
 
