@@ -44,7 +44,9 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
         f"attitude is {1e3 * sample_age:.1f} ms old when it arrives"
         + (f", more than deadman.telemetry_stale_ms = {1e3 * stale_after:g}" if is_stale else ""),
         "such samples would not be answered" if is_stale else "",
-        "find what delays the messages: a router, a full queue, a slow link" if is_stale else "",
+        "find what delays the messages: a busy computer, a router, a full queue, a slow link"
+        if is_stale
+        else "",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
     )
 
