@@ -4,8 +4,10 @@ import pytest
 
 import companion
 from companion import testing
+from companion.cli.command_line import parse
+from companion.cli.flying import with_options
 from companion.config import Config
-from companion.config.files import changed
+from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
 from companion.testing import connect, run
 from tests.flight.airborne import ARM, CUSTOM_MODE, GUIDED, HEIGHT, SET_MODE, TAKEOFF, in_the_air
@@ -112,6 +114,17 @@ def test_a_vehicle_that_stands_armed_is_refused():
 def test_the_program_does_not_arm_what_the_pilot_hands_over():
     with pytest.raises(ConfigError, match=r"flight\.take_over and flight\.arm \(--arm\) exclude"):
         changed(Config(), {"flight": {"arm": True, "take_over": True}}, "test")
+
+
+@pytest.mark.parametrize("option", ["--arm", "--take-over"])
+def test_an_option_replaces_the_other_one_of_the_file(option, tmp_path):
+    """The shipped configuration of the mock vehicle arms."""
+    file = tmp_path / "own.yaml"
+    file.write_text(f"flight: {{take_over: {str(option == '--arm').lower()}}}\n", "utf-8")
+    options = parse(["fly", "--config", str(file), option])
+    path = shipped("mock-px4.yaml") if option == "--take-over" else file
+    flown = with_options(load(path), options).flight
+    assert (flown.arm, flown.take_over) == (option == "--arm", option == "--take-over")
 
 
 @BOTH
