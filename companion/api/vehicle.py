@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import AsyncGenerator, Callable, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
-from math import hypot
 from pathlib import Path
 
 from companion.api.control import Control, program_control
@@ -33,9 +32,8 @@ from companion.guidance.finite import finite_number, finite_vector
 from companion.guidance.follow import Follow, HeldHeadingManeuver, hover
 from companion.guidance.reference import Vector, minus
 from companion.guidance.source import CommandedSource
-from companion.guidance.trajectory import Trajectory
+from companion.guidance.trajectory import Hover, Trajectory
 from companion.guidance.trajectory.own_trajectory import checked_trajectory
-from companion.guidance.trajectory.sample import SMALLEST_DISTANCE
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import Exit, FlightEnded
 
@@ -140,10 +138,10 @@ class Vehicle:
         to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
         config = self._flight.context.config
         path = straight_path(config, to, heading, speed, acceleration, jerk)
-        if heading is None and hypot(*to) >= SMALLEST_DISTANCE:
-            await self._fly(HeldHeadingManeuver(path))
-        else:
+        if heading is not None or isinstance(path, Hover):
             await self.follow(path)
+        else:
+            await self._fly(HeldHeadingManeuver(path))
 
     async def follow(self, trajectory: Trajectory | Path | str, *, slow_down: bool = False) -> None:
         """Follow a trajectory from the present position.

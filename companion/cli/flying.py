@@ -47,8 +47,6 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
             "maneuvers": ("trajectory",) if options.trajectory else options.maneuvers,
             "trajectory": options.trajectory,
             "slow_down": options.slow_down,
-            "arm": options.arm,
-            "take_over": options.take_over,
         },
         "planner": {"name": planner},
     }
@@ -56,7 +54,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
         section: {key: value for key, value in values.items() if value}  # else it is not given
         for section, values in keys.items()
     }
-    if options.arm != options.take_over:  # each replaces the other one of the file
+    if options.arm or options.take_over:  # each replaces the other one of the file
         changes["flight"] |= {"arm": options.arm, "take_over": options.take_over}
     flown_config = with_assignments(config, options.set)
     flown_config = changed(flown_config, changes, "the command line")

@@ -178,32 +178,34 @@ class MotionEstimate:
 
     def mismatch_warning(self) -> str | None:
         """Advice to change the drag keys if the learned drag differs from them; else None."""
-        if not self._drag_differs:
+        if (mismatch := self._drag_mismatch()) is None:
             return None
-        assumed, learned, speed = self.drag.prior_drag, self.drag.drag, self.drag.top_speed
+        drag, (speed, learned, assumed) = self.drag.drag, mismatch
         return (
-            f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s, but "
-            f"{assumed.per_velocity(speed):.2f} was assumed; set guidance.drag_per_s to "
-            f"{learned.linear:.2f} and guidance.quadratic_drag_per_m to {learned.quadratic:.3f}"
+            f"the vehicle's drag at {speed:.1f} m/s is {learned:.2f} 1/s, but "
+            f"{assumed:.2f} was assumed; set guidance.drag_per_s to "
+            f"{drag.linear:.2f} and guidance.quadratic_drag_per_m to {drag.quadratic:.3f}"
         )
 
     def learned_note(self) -> str | None:
         """For a drag kept for the next flight: how it differs from the assumed one; else None."""
-        if not self._drag_differs:
+        if (mismatch := self._drag_mismatch()) is None:
             return None
-        assumed, learned, speed = self.drag.prior_drag, self.drag.drag, self.drag.top_speed
+        speed, learned, assumed = mismatch
         return (
-            f"the vehicle's drag at {speed:.1f} m/s is {learned.per_velocity(speed):.2f} 1/s; this "
-            f"flight began with {assumed.per_velocity(speed):.2f} and learned it, and the "
+            f"the vehicle's drag at {speed:.1f} m/s is {learned:.2f} 1/s; this "
+            f"flight began with {assumed:.2f} and learned it, and the "
             "vehicle's next flight begins with it"
         )
 
-    @property
-    def _drag_differs(self) -> bool:
-        """Whether the learned drag is certain and far from the assumed one."""
-        assumed, learned, speed = self.drag.prior_drag, self.drag.drag, self.drag.top_speed
-        error = learned.per_velocity(speed) - assumed.per_velocity(speed)
-        return self.drag.certain and abs(error) > _DRAG_MISMATCH
+    def _drag_mismatch(self) -> tuple[float, float, float] | None:
+        """Largest speed, m/s, and learned and assumed drag there, 1/s; None: they are near."""
+        speed = self.drag.top_speed
+        learned = self.drag.drag.per_velocity(speed)
+        assumed = self.drag.prior_drag.per_velocity(speed)
+        if not self.drag.certain or abs(learned - assumed) <= _DRAG_MISMATCH:
+            return None
+        return speed, learned, assumed
 
     def _learn_drag(self, before: LocalPosition, now: LocalPosition, slope: NorthEast) -> None:
         dt = now.vehicle_time - before.vehicle_time

@@ -1,13 +1,9 @@
 """A hold near the fence, from which the autopilot's landing does not drift out of it."""
 
-from dataclasses import replace
-from math import inf
-
 from companion.flight.context import FlightContext
 from companion.guidance.braking import drift
 from companion.guidance.fence import Fence, Place
 from companion.guidance.reference import NorthEast, Vector, minus
-from companion.safety.snapshot import Motion
 from companion.safety.table import fence_of
 
 _MARGIN = 0.3
@@ -15,22 +11,18 @@ _MARGIN = 0.3
 position and wind have errors."""
 
 
-def give_up_inside(context: FlightContext, motion: Motion) -> None:
+def give_up_inside(context: FlightContext) -> None:
     """Give up what is flown, brake and hold; upwind, if the landing would drift out of the fence.
 
     PX4 begins its own modes level, so a vehicle that leans against the wind drifts downwind first.
-
-    Args:
-        context: context of the flight.
-        motion: motion of the vehicle now; only its `origin` is used.
     """
     guidance = context.guidance_loop
     guidance.give_up()
-    centre, pose = context.snapshot_builder.fence_centre_ned, guidance.flown_source.pose
+    centre, pose = context.snapshot_builder.flown_fence_centre(), guidance.flown_source.pose
     if not context.link.autopilot.forgets_lean or centre is None or pose is None:
         return
-    stop, wind = minus(pose.position_ned, centre), guidance.estimate.disturbance
-    if upwind_is_inside(fence_of(context.config), motion.origin, stop, wind):
+    stop, wind = minus(pose.position_ned, centre.position_ned), guidance.estimate.disturbance
+    if upwind_is_inside(fence_of(context.config), centre.place, stop, wind):
         guidance.move_upwind()
 
 
@@ -43,7 +35,7 @@ def upwind_is_inside(fence: Fence, origin: Place | None, stop: Vector, wind: Nor
         stop: where the vehicle stops, from the fence's centre, m NED.
         wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
     """
-    walls = replace(fence, ceiling=inf, floor=-inf)
+    walls = fence.walls
     (north, east, down), (drift_north, drift_east) = stop, drift(wind)
     downwind = (north + drift_north, east + drift_east, down)
     upwind = (north - drift_north, east - drift_east, down)

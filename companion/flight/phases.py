@@ -43,19 +43,13 @@ def flight_phases(
     config: FlightConfig, maneuver_duration: float, autopilot: Autopilot
 ) -> tuple[Phase, ...]:
     """The phases after the ground phases, in the autopilot's order; `maneuver_duration` in s."""
-    maneuvers = Phase(
-        "maneuvers",
-        "the maneuver to end",
-        control_phases.maneuvers,
-        maneuver_duration + _MANEUVER_GRACE,
-        Exit.LAND,
-        allowed_roles=_OFFBOARD_ROLES,
-        monitored=True,
+    maneuvers = program_phase(
+        "maneuvers", "the maneuver to end", control_phases.maneuvers, maneuver_duration
     )
     if config.take_over:
-        held = replace(maneuvers, on_failure=Exit.HOLD)
-        return (*handover_phases(config), held, hand_back_phase())
-    return (*takeoff_phases(config, autopilot), maneuvers, *landing_phases())
+        return (*handover_phases(config), maneuvers, hand_back_phase())
+    landed = replace(maneuvers, on_failure=Exit.LAND)
+    return (*takeoff_phases(config, autopilot), landed, *landing_phases())
 
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:

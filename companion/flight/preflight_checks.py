@@ -7,6 +7,7 @@ from math import inf
 
 from companion.config import Config
 from companion.config.known_drag import KnownDrag
+from companion.flight.rate_requester import too_rare
 from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
 from companion.preflight.all_checks import blocking_findings, run_checks, unsafe_findings
@@ -14,6 +15,7 @@ from companion.preflight.evidence import Evidence, Identity, Stage
 from companion.preflight.finding import Finding
 from companion.preflight.parameters import parameters
 from companion.preflight.session import gather, wanted_rates
+from companion.preflight.stream_checks import minimum_rates
 from companion.safety.actions import FlightEnded
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
@@ -114,19 +116,14 @@ class PreflightChecks:
 
         A ground station that connects after the telemetry was requested lowers its rates.
         """
-        link = self._config.link
-        minimum_rates = {
-            "ATTITUDE_QUATERNION": link.min_attitude_rate_hz,
-            "LOCAL_POSITION_NED": link.min_position_rate_hz,
-        }
         streams = evidence.streams
         lowered = [
             name
-            for name, minimum in minimum_rates.items()
+            for name, (_, minimum) in minimum_rates(self._config.link).items()
             if name in streams and streams[name].achieved < minimum
         ]
         for name in lowered:
-            self.note(f"{name} comes too rarely: requesting {streams[name].requested:g} Hz again")
+            self.note(too_rare(name, streams[name].requested))
         return bool(lowered)
 
     def on_parameter(self, name: str, value: float) -> None:

@@ -43,9 +43,7 @@ async def checks(context: FlightContext) -> None:
     warning = gain_warning(context.config)
     if warning is not None:
         context.note(warning)
-    context.known_drag = evidence.known_drag
-    require_flyable_by_vehicle(context)
-    report_offboard_loss(context, evidence.survey.values)
+    use_evidence(context, evidence)
     context.mode_at_checks = context.link.state.mode
 
 
@@ -65,6 +63,17 @@ async def judge_vehicle(context: FlightContext, stage: Stage) -> Evidence:
         limit = max(_SHORTEST_HEARTBEAT_LIMIT, _HEARTBEATS_MISSED / heartbeats.achieved)
         context.heartbeat_limit = limit
     return evidence
+
+
+def use_evidence(context: FlightContext, evidence: Evidence) -> None:
+    """Check the maneuvers with the vehicle's drag and place, and report its offboard-loss failsafe.
+
+    Raises:
+        FlightEnded: a maneuver leaves the fence or exceeds a limit.
+    """
+    context.known_drag = evidence.known_drag
+    _require_flyable_by_vehicle(context)
+    _report_offboard_loss(context, evidence.survey.values)
 
 
 async def stream(context: FlightContext) -> None:
@@ -157,7 +166,7 @@ def _require_untouched(context: FlightContext) -> None:
         )
 
 
-def require_flyable_by_vehicle(context: FlightContext) -> None:
+def _require_flyable_by_vehicle(context: FlightContext) -> None:
     """Check the maneuvers again, with this vehicle's drag and its latitude and longitude.
 
     Raises:
@@ -189,7 +198,7 @@ def _refuse_unsafe(finding: Finding) -> None:
         raise FlightEnded(finding.sentence())
 
 
-def report_offboard_loss(context: FlightContext, values: Values) -> None:
+def _report_offboard_loss(context: FlightContext, values: Values) -> None:
     """Report the autopilot's reaction to the loss of our setpoints."""
     autopilot = context.link.autopilot
     failsafe = autopilot.offboard_loss_failsafe

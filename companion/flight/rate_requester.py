@@ -21,6 +21,11 @@ _COUNTING_TIME = 0.1
 """Time over which `set_rates` counts messages, s; the counts are not used."""
 
 
+def too_rare(message: str, rate: float) -> str:
+    """Says that a message comes too rarely, and that `rate` (Hz) is requested again."""
+    return f"{message} comes too rarely: requesting {rate:g} Hz again"
+
+
 class RateRequester:
     """Requests a message again if its rate has become too low: another station may have changed it.
 
@@ -58,7 +63,7 @@ class RateRequester:
         if now - self._requested_at.get(message, -inf) < _REQUEST_PERIOD:
             return
         self._requested_at[message] = now
-        self.note(f"{message} comes too rarely: requesting {rate:g} Hz again")
+        self.note(too_rare(message, rate))
         self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
 
     def check_statuses(self, now: float, heartbeat_limit: float) -> None:

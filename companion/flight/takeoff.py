@@ -8,6 +8,9 @@ from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
+_LARGEST_CLIMB = 0.3
+"""Largest vertical speed of a vehicle that keeps its height, m/s."""
+
 MAX_UNDERSHOOT = 0.5
 """A climb may end this far below the commanded height, m."""
 
@@ -20,6 +23,16 @@ _ARRIVAL_TIME = 2.0
 _GROUND_FLAG_TIME = 5.0
 """Longest time for which a vehicle at its height may be reported on the ground, s. Its motors may
 need some seconds to spool up, and the height may read 1.5 m on the ground."""
+
+
+def keeps_height(context: FlightContext) -> bool:
+    """Whether the vehicle has ended its take-off or climb, by a fresh position."""
+    position = context.fresh_position()
+    return (
+        position is not None
+        and abs(position.velocity_ned[2]) < _LARGEST_CLIMB
+        and not context.link.state.taking_off
+    )
 
 
 async def takeoff(context: FlightContext) -> None:
@@ -78,7 +91,7 @@ class _Climb:
         if is_near_height and state.landed:
             self._require_leaving_ground(height)
             return False  # a vehicle that stands must not be taken over: the thrust would lift it
-        return is_near_height and abs(position.velocity_ned[2]) < 0.3 and not state.taking_off
+        return is_near_height and keeps_height(context)
 
     def _was_stopped(self) -> bool:
         """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIME` ago."""

@@ -11,12 +11,11 @@ from companion.flight.context import FlightContext
 from companion.flight.preflight_phases import (
     checks,
     judge_vehicle,
-    report_offboard_loss,
     request_telemetry,
-    require_flyable_by_vehicle,
     stream,
+    use_evidence,
 )
-from companion.flight.takeoff import MAX_UNDERSHOOT
+from companion.flight.takeoff import MAX_UNDERSHOOT, keeps_height
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
@@ -26,9 +25,6 @@ _ARMED_REPORT_TIMEOUT = 1.5
 
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""
-
-_LARGEST_CLIMB = 0.3
-"""Largest vertical speed of a vehicle that the pilot has handed over, m/s."""
 
 _BRAKING_TIME = 5.0
 """Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
@@ -76,9 +72,7 @@ async def wait_for_handover(context: FlightContext) -> None:
             context.detail = f"the pilot to switch to {ready}, now {state.mode}"
             return False
         context.detail = "the vehicle to keep its height"
-        position = context.fresh_position()
-        is_level = position is not None and abs(position.velocity_ned[2]) < _LARGEST_CLIMB
-        return is_level and not state.taking_off
+        return keeps_height(context)
 
     await context.until(handed_over)
 
@@ -119,9 +113,7 @@ async def _check_stage(
     require(context)
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     evidence = await judge_vehicle(context, stage)
-    context.known_drag = evidence.known_drag
-    require_flyable_by_vehicle(context)
-    report_offboard_loss(context, evidence.survey.values)
+    use_evidence(context, evidence)
     require(context)
 
 

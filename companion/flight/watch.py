@@ -129,7 +129,7 @@ class Watch:
         if verdict is None:
             return
         if verdict.action is Action.HOLD:
-            give_up_inside(self._context, snapshot.motion)
+            give_up_inside(self._context)
             return
         if verdict.stream is StreamEffect.STOPS:
             self._context.release()

@@ -1,7 +1,7 @@
 """The fence: where the vehicle may fly, about the place where offboard control began."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import cos, hypot, inf, pi, radians, remainder, sin
 from typing import Any, NamedTuple
@@ -85,6 +85,16 @@ class Fence:
     deceleration: float
     reaction: float
     estimate_delay: float = 0.0
+
+    @property
+    def walls(self) -> "Fence":
+        """The fence without ceiling and floor."""
+        return replace(self, ceiling=inf, floor=-inf)
+
+    @property
+    def levels(self) -> "Fence":
+        """Ceiling and floor alone."""
+        return replace(self, radius=inf, polygon=(), places=())
 
     def breach(
         self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0

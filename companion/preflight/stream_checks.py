@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from companion.config import Config
+from companion.config.computer import LinkConfig
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
 from companion.vehicle.parameter_rules import CheckResult
@@ -25,21 +26,25 @@ _RATE_KEYS = {
 }
 
 
-def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the requested telemetry arrives at the requested rates."""
-    link = config.link
-    minimum_rates = {
+def minimum_rates(link: LinkConfig) -> dict[str, tuple[str, float]]:
+    """Key of `link` and smallest rate, Hz, of each message that has one."""
+    return {
         "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
         "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
     }
+
+
+def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
+    """Whether the requested telemetry arrives at the requested rates."""
+    smallest_rates = minimum_rates(config.link)
     good_rates = []
     for name, rate in evidence.streams.items():
         fault = _rate_fault(name, rate, evidence)
         if name in evidence.awaited_messages and rate.granted >= _MIN_RATE_SHARE * rate.requested:
             continue  # `readiness` reports it
         effective = _effective_rate(name, rate, evidence)
-        if name in minimum_rates and effective < minimum_rates[name][1]:
-            key, limit = minimum_rates[name]
+        if name in smallest_rates and effective < smallest_rates[name][1]:
+            key, limit = smallest_rates[name]
             uneven = effective < _MIN_RATE_SHARE * rate.achieved
             arrives = f"arrives at {effective:.0f} Hz"
             if uneven:

@@ -59,10 +59,8 @@ class FenceGuard:
         tell: Callable[[str], None],
     ) -> None:
         fence, acceleration = fence_of(config), config.serve.max_acceleration_m_s2
-        wall = replace(fence, ceiling=inf, floor=-inf)
-        levels = replace(fence, radius=inf, polygon=(), places=())
-        self._wall = _Side(wall, acceleration)
-        self._levels = _Side(levels, min(acceleration, VERTICAL_ACCELERATION))
+        self._wall = _Side(fence.walls, acceleration)
+        self._levels = _Side(fence.levels, min(acceleration, VERTICAL_ACCELERATION))
         self._centre, self._height, self._tell = centre, height, tell
         self._stopped_at = -inf
 

@@ -87,7 +87,7 @@ class ServedSource:
             self._end_open_loop(now)
             wanted = self._without_jumps(request)
             try:
-                self._command(wanted, now)
+                self._command(self._inside_fence(wanted, now), now)
             except UnplannableError:
                 self._open_loop_reference = before
                 raise
@@ -112,18 +112,19 @@ class ServedSource:
         """Whether no client is in control any more: it released control, or was silent too long."""
         return self._ownership.state(now) not in _FLOWN_STATES
 
-    def _command(self, wanted: MotionRequest, now: float) -> None:
-        """Command what is wanted, as far as the fence allows."""
-        allowed = self._inside_fence(wanted, now)
+    def _command(self, allowed: MotionRequest, now: float) -> None:
+        """Command what the fence allows."""
         self._motion.command(allowed, now, self._vehicle_motion)
         self._commanded = allowed
 
     def _keep_inside_fence(self, now: float) -> None:
         """Stop in front of the fence, or go on if the request leads back."""
-        wanted = self._motion_request
-        if wanted is not None and self._inside_fence(wanted, now) != self._commanded:
+        if self._motion_request is None:
+            return
+        allowed = self._inside_fence(self._motion_request, now)
+        if allowed != self._commanded:
             with suppress(UnplannableError):  # the motion before stays in force
-                self._command(wanted, now)
+                self._command(allowed, now)
 
     def _inside_fence(self, wanted: MotionRequest, now: float) -> MotionRequest:
         if self.fence_guard is None:

@@ -17,8 +17,8 @@ from companion.guidance import Reference
 from companion.guidance.source import CommandedSource
 from companion.testing import environment, open_wire, run
 from companion.vehicle.link import Link
-from tests.flight.airborne import CUSTOM_MODE, GUIDED, HEIGHT, SET_MODE, in_the_air
-from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, QuickVehicle, merged
+from tests.flight.airborne import HEIGHT, in_the_air, ready_to_arm
+from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, merged
 
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 
@@ -95,11 +95,7 @@ def test_a_source_that_falls_silent_is_held_and_handed_back(autopilot):
 
 @BOTH
 def test_a_vehicle_on_the_ground_is_not_taken_over(autopilot):
-    mock = QuickVehicle(autopilot)
-    mock.run(4.0)
-    if autopilot == "ardupilot":
-        mock.command(SET_MODE, CUSTOM_MODE, GUIDED)
-        mock.run(0.2)
+    mock = ready_to_arm(autopilot)
     before = mock.state()["mode"]
     result, _ = taken_over(mock, CommandedSource("a client", 0.5, 1.0))
     assert result in ("the vehicle does not fly: take off first",)
