@@ -97,9 +97,9 @@ def _add_tune(kinds: Commands) -> None:
         "tune",
         help="search limits, gains and weights over the flights of a campaign",
         description="Search the keys in `tune.search` of the campaign's file for the smallest true "
-        "error under its constraint, compare the result with the start on flights that the search "
-        "has not seen, and write the result as YAML with its reasons. The command continues a "
-        "search that was stopped.",
+        "error that keeps tune.inside_share. Compare the result with the configuration before the "
+        "search, on flights that the search has not seen. Write the result as YAML, with its "
+        "reasons. A search that was stopped is continued.",
     )
     add_path(tune, "file", "a campaign's file with `tune:`")
     add_path(tune, "--out", "folder for the search (runs/campaigns/NAME-tune)", "FOLDER")

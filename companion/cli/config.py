@@ -26,7 +26,10 @@ from companion.guidance.follow import Follow
 def show(options: argparse.Namespace) -> int:
     """Print the configuration or some keys as YAML, or the tables or schema of all keys."""
     if options.file and (options.schema or options.markdown or options.diff):
-        raise ConfigError("--diff, --schema and --markdown take no further FILE")
+        raise ConfigError(
+            f"leave out {options.file}: --diff has a FILE of its own, and --schema and --markdown "
+            "have none"
+        )
     if options.schema:
         text = json_schema()
     elif options.markdown:

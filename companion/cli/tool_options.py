@@ -28,8 +28,8 @@ def add_serve(commands: Commands) -> None:
         "serve",
         help="let other programs use the link: ground stations, MAVSDK, scripts",
         description="Forward messages between the autopilot and the clients at serve.clients, "
-        "until Ctrl-C. Our control law flies the setpoints of one client at a time: "
-        "in OFFBOARD, when the client requests it (PX4), or in GUIDED (ArduPilot).",
+        "until Ctrl-C. When a client sends setpoints and commands OFFBOARD (PX4) or GUIDED "
+        "(ArduPilot), our control law flies its setpoints. Only one client is in control.",
     )
     add_required_config(serve)
     add_endpoint(serve)
@@ -129,7 +129,7 @@ def add_study(commands: Commands) -> None:
     study.add_argument(
         "name", choices=registry.study_names(), metavar="NAME", help="a study, see below"
     )
-    case_help = f"case for {registry.names_with_case()}, such as configs/study-case.yaml"
+    case_help = f"the step that {registry.names_with_case()} flies (configs/study-case.yaml)"
     add_path(study, "--case", case_help)
     out_help = "folder for the results (default: study)"
     add_path(study, "--out", out_help, "DIR", default=Path("study"))

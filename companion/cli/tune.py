@@ -74,8 +74,8 @@ def _next_step(output: Path, keys: Sequence[str], own: Path | None) -> str:
     """What to do with `output`; `own` is the user's configuration if `output` includes it."""
     if own is not None:
         return (
-            f"Written to {output}. It includes {own}, which therefore must not include it: name "
-            f"{output} instead of {own} with --config."
+            f"Written to {output}, which includes {own}. Fly it with --config {output}; do not "
+            f"include it in {own}."
         )
     return (
         f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "

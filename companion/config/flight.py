@@ -56,8 +56,9 @@ class FlightConfig(Section):
     takeoff_timeout_s: Seconds = 40.0
     """Time allowed to reach takeoff_height_m."""
     landing_timeout_s: Seconds = 90.0
-    """Time allowed to begin the landing, and again to report that it landed. ArduPilot, which would
-    drift without setpoints, is held until it lands or a pilot takes over."""
+    """Time allowed to begin the landing, and as long again until the autopilot reports that it has
+    landed. Without setpoints ArduPilot would drift, so it is held until it lands or a pilot takes
+    over."""
 
     @model_validator(mode="after")
     def _check_who_arms(self) -> "FlightConfig":

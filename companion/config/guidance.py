@@ -70,12 +70,12 @@ class GuidanceConfig(Section):
     """LQR weight of the horizontal position error relative to acceleration; a larger weight makes a
     stiffer position hold. null: k/T⁴.
 
-    T, at least 0.275 s, is the delay of the attitude behind its target plus half a guidance period.
+    T is the delay of the attitude behind its target plus half a guidance period, at least 0.275 s.
     The delay follows from planner.gain_per_s and `vehicle`; an unknown rate loop counts as 0.12 s.
 
-    k is 2 for a quick rate loop, and 1 for a slow or unknown one. The sum dead time + lag/2 + half
-    the time to slew to limits.max_tilt_rate_deg_s is at most 65 ms for a quick one, and at least
-    80 ms for a slow one; k is interpolated in between. Without a slew limit that time is 0.
+    k is 2 up to a rate loop delay of 65 ms, 1 from 80 ms on or if the delay is unknown, and
+    interpolated in between. This delay is dead time + lag/2 + half the time to slew to
+    limits.max_tilt_rate_deg_s; that time is 0 without a slew limit.
     """
     velocity_weight_per_s2: Annotated[float, Field(ge=0.0, le=10000.0)] | None = Field(
         default=None, json_schema_extra=TUNABLE

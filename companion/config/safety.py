@@ -33,9 +33,9 @@ class SafetyConfig(Section):
     """Actions of all safety monitors, and those limits that are not in `limits` or `deadman`."""
 
     hold_s: Annotated[float, Field(gt=0.0, le=60.0)] = 3.0
-    """Longest hold after a breach. The vehicle lands once the breach has ended and the vehicle
-    rests, or after this time; if it is then still within braking distance of the fence,
-    fence_action follows."""
+    """Longest hold after a breach. The vehicle lands when the breach has ended and the vehicle is
+    at rest, at the latest after this time. If it is still within braking distance of the fence
+    then, fence_action follows instead."""
     fence_polygon_m: Annotated[
         tuple[tuple[Metres, Metres], ...], Field(max_length=MOST_CORNERS)
     ] = ()

@@ -85,9 +85,9 @@ class VehicleConfig(Section):
     yaw_acceleration_limit_deg_s2: AccelerationLimit | None = None
     """As acceleration_limit_deg_s2, for yaw. null: as roll."""
     yaw_frame_lead_ms: Milliseconds | None = None
-    """Time by which the axes of the commanded rates lead the body in yaw. ArduPilot applies rates
-    along its attitude target, which leads the body. Used only while ATTITUDE_TARGET is missing.
-    null: derived from the keys above if there is a slew limit (ArduPilot), else 0 (PX4)."""
+    """ArduPilot applies body rates about the axes of its attitude target. In yaw the target leads
+    the body by this time. Used only while ATTITUDE_TARGET is missing. null: derived from the keys
+    above if there is a slew limit (ArduPilot), else 0 (PX4)."""
 
     @property
     def response_known(self) -> bool:

@@ -52,7 +52,11 @@ class ExpectedResponse:
         return self.largest_gain is not None and self.gain > self.largest_gain
 
     def clauses(self) -> list[str]:
-        """The parts of `sentence`: time constant, its causes by their effect, the shortest one."""
+        """The parts of `sentence`.
+
+        They give the time constant, its causes in the order of their effect, and the shortest
+        possible time constant.
+        """
         changes = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
             for name, time in sorted(self.time_constants_without.items(), key=lambda item: item[1])
@@ -66,7 +70,7 @@ class ExpectedResponse:
         ]
         shortest = self.shortest_time_constant
         if shortest is not None:
-            told.append(f"the largest sensible gain without rate limit would give {shortest:.2f} s")
+            told.append(f"with the largest sensible gain and no rate limit: {shortest:.2f} s")
         return told
 
     def sentence(self) -> str:
@@ -161,7 +165,7 @@ def hold_sentence(config: Config) -> str:
     gains, weights, delay = hold_gains(config), hold_weights(config), attitude_delay(config)
     return (
         f"the hold has gains of {gains.position:.1f} 1/s² on position, {gains.velocity:.1f} 1/s on "
-        f"velocity and {gains.acceleration:.2f} on acceleration, from the weights "
-        f"{weights.position:.4g} 1/s⁴ and {weights.velocity:.3g} 1/s² (the attitude is "
-        f"{delay:.2f} s late)"
+        f"velocity and {gains.acceleration:.2f} on acceleration; they follow from the weights "
+        f"{weights.position:.4g} 1/s⁴ and {weights.velocity:.3g} 1/s² and the attitude's delay, "
+        f"{delay:.2f} s"
     )

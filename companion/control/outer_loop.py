@@ -93,8 +93,8 @@ def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float])
         ) from error
     if not finite:
         raise ConfigError(
-            f"guidance.kind: {kind} cannot be flown: at rest it returned {command} and acts after "
-            f"{guidance.acts_after} s"
+            f"guidance.kind: {kind} cannot be flown: at rest its command must be finite, and it is "
+            f"{command} with acts_after {guidance.acts_after} s"
         )
 
 

@@ -190,7 +190,8 @@ async def disarm(context: FlightContext) -> None:
             await context.until(disarmed)
     except TimeoutError:
         await context.until(
-            lambda: disarmed() or context.ground.touched_down, "touchdown: it reports that it flies"
+            lambda: disarmed() or context.ground.touched_down,
+            "the vehicle to touch down: it still reports that it flies",
         )
         if context.armed():
             context.detail = "the autopilot to accept disarming"

@@ -51,7 +51,8 @@ async def _hold_if_ours(context: FlightContext) -> None:
         context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
         return
     if context.landing_requested:
-        raise FlightEnded(f"the vehicle is heard again, still in {mode}: it was to land", Exit.LAND)
+        reason = f"the vehicle is heard again, still in {mode}: its landing was requested before"
+        raise FlightEnded(reason, Exit.LAND)
     context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
     context.detail = "its report that it holds"
     while True:

@@ -116,7 +116,7 @@ class SecondOrderFit:
         return (
             f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
             f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
-            f"{self.explained:.1%}"
+            f"{self.explained:.1%} of the variance"
         )
 
 

@@ -195,6 +195,6 @@ def _fit_comment(name: str, response: RateResponse, kept: Mapping[str, AxisValue
     return (
         f"# {name}, first order: lag {1e3 * response.lag:.1f} ± {1e3 * fit.lag_error:.1f} ms, dead "
         f"time {1e3 * response.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f} ms, gain "
-        f"{response.gain:.2f}{slew}, explains {fit.explained:.1%}, misfit {fit.misfit:.0%}, "
-        f"{fit.excited_samples} samples{second_text}"
+        f"{response.gain:.2f}{slew}, explains {fit.explained:.1%} of the variance, misfit "
+        f"{fit.misfit:.0%}, {fit.excited_samples} samples show the response{second_text}"
     )

@@ -85,8 +85,8 @@ class RateResponse:
             ),
             (
                 fit.misfit > needs.misfit,
-                f"poor fit: the model's error is {fit.misfit:.0%} of the movement, more than "
-                f"{needs.misfit:.0%}",
+                f"poor fit: the model's error is {fit.misfit:.0%} of the rates' standard "
+                f"deviation, more than {needs.misfit:.0%}",
             ),
             (
                 not lowest_gain <= self.gain <= highest_gain,

@@ -76,13 +76,14 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
 
 def _model_line(name: str, response: RateResponse, second_order: SecondOrderFit | None) -> str:
     """A line that says which model the row of an axis shows, and why."""
-    first_order, better = f"explains {response.fit.explained:.1%}", response.second_order
+    share, better = f"{response.fit.explained:.1%}", response.second_order
+    explains = f"explains {share} of the variance"
     if second_order is not None:
-        explained = f"explains {second_order.explained:.1%}"
-        return f"{name}: second order, which {explained}; first order {first_order}"
+        explained = f"explains {second_order.explained:.1%} of the variance"
+        return f"{name}: second order, which {explained}; first order explains {share}"
     if better is None:
-        return f"{name}: a lag of first order {first_order}; second order is not clearly better"
-    return f"{name}: written as first order, which {first_order}; a better fit: {better.described}"
+        return f"{name}: a lag of first order {explains}; second order is not clearly better"
+    return f"{name}: written as first order, which {explains}; a better fit: {better.described}"
 
 
 def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:

@@ -62,7 +62,7 @@ class ThrustMap:
         return (
             f"T/m = {self.slope:.2f}·u {self.offset:+.2f} m/s² for u in 0..1, lag "
             f"{1e3 * self.lag:.0f} ms, dead time {1e3 * self.dead_time:.0f} ms, explains "
-            f"{self.explained:.1%}"
+            f"{self.explained:.1%} of the variance"
         )
 
 

@@ -57,7 +57,7 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
     axes = {name: AxisDeadTime(measured.get(name), value) for name, value in configured.items()}
     warning = DeadTimes(axes).warning()
     if warning is None:
-        found = f"the dead time of {folder.name} was as configured"
+        found = f"in {folder.name} the dead time was as configured"
         yield Finding(Key.DEAD_TIME, SAFE, found, source=str(folder))
         return
     found, _semicolon, fix = warning.partition("; ")
@@ -87,7 +87,7 @@ def identified_autopilot(config: Config, evidence: Evidence) -> Iterator[Finding
             INEFFECTIVE,
             f"`vehicle` was identified on {known}, and this vehicle flies {flown}",
             "the planner predicts another vehicle's response: steps bend, and the hold may swing",
-            "include the file that `companion identify` wrote for this vehicle, or fly it anew",
+            "run `companion identify` on this vehicle, and include the file that it writes",
             "vehicle.autopilot",
         )
 

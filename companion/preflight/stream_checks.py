@@ -116,7 +116,7 @@ def _expected_rate(name: str, rate: StreamRate) -> float:
 def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
     """A rate without a fault, in words; if it is below the requested rate, why it suffices."""
     if name in _SENT_ON_CHANGE:
-        return f"{name} on change, and at {_SENT_ON_CHANGE[name]:g} Hz between"
+        return f"{name} on change, otherwise at {_SENT_ON_CHANGE[name]:g} Hz"
     if not _is_countable(name, rate, evidence):
         return f"{name} (asked for {rate.requested:g}, too seldom to be counted here)"
     share = f"{name} {rate.achieved:.0f} of {rate.requested:g}"

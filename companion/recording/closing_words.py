@@ -22,7 +22,7 @@ from companion.recording.what_to_do import what_to_do
 _PHASES_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm", "hand over")
 _SHARED_OPTIONS = ("--endpoint", "--set")
 _SLOW_COMPUTER_MONITORS = ("deadlines", "starvation")
-LEFT_BY_USER = "left at once by the user"
+LEFT_BY_USER = "stopped at once by the user"
 """Result of a flight that was cancelled, for example by Ctrl-C in a user's program."""
 _INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
 
@@ -155,7 +155,7 @@ def _when_ended(end: dict[str, Any]) -> str:
     if end["since_takeoff_s"] is None:
         # In later phases it may fly although it was not heard to.
         is_on_ground = end["phase"] in _PHASES_BEFORE_TAKEOFF
-        words += ", before take-off" if is_on_ground else ", before a lift-off was heard"
+        words += ", before take-off" if is_on_ground else ", before any report of lift-off"
     if end["maneuver"] is not None:
         words += f", {end['into_maneuver_s']:.1f} s into {end['maneuver']}"
     return words

@@ -33,8 +33,8 @@ def result_lines(
     lines = []
     if follows_record:
         lines.append(
-            "The commands of guidance are those of the record, because another program commanded"
-            " the flight or predictive control flew; only the control loop is replayed."
+            "Only the control loop is replayed, with the recorded commands of guidance, because"
+            " another program or predictive control commanded the flight."
         )
     if not different:
         lines.append(

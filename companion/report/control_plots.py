@@ -67,7 +67,7 @@ def _step_response(flight: FlightData) -> Plot:
         traces.append(line(ideal, time, first_order(run, 1.0 / flight.gain) @ along, IDEAL_COLOUR))
     note = (
         "The first doublet along its direction. The response is linear if it follows the nearest "
-        "model; that model is slower than the ideal by the vehicle's own rate loop."
+        "model. The vehicle's own rate loop makes that model slower than the ideal."
     )
     return Plot("Step response", note, traces, axes(x="time, s", y="acceleration / thrust"))
 

@@ -44,7 +44,7 @@ class Exit(Enum):
     LAND = "handing back: asking the autopilot to land"
     LISTEN = (
         "releasing control, and listening: if the vehicle is heard again while it still obeys us, "
-        "it is asked to hold, or to land if it was to land"
+        "it is asked to hold, or to land if its landing was requested before"
     )
     RELEASE = "releasing control: the vehicle is left to its pilot and its autopilot"
 

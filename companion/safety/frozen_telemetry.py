@@ -71,7 +71,7 @@ class _Axis:
         time = now - self._velocity.since
         drift = abs(position - self._start - velocity * time)
         if self._velocity.is_long(time) and drift > _MAX_DRIFT:
-            return "LOCAL_POSITION_NED repeats one velocity, although its position moves otherwise"
+            return "LOCAL_POSITION_NED repeats one velocity, but its positions show another one"
         return None
 
 

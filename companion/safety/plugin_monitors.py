@@ -56,7 +56,7 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
     guarded_judge.judge(Snapshot(0.0), False)
     if guarded_judge.fault is not None:
         raise ConfigError(
-            f"{setting} cannot be used where a value is not known: {guarded_judge.fault}"
+            f"{setting} must accept a snapshot whose values are None: {guarded_judge.fault}"
         )
     guarded_monitor = replace(
         monitor, name=name, judge=guarded_judge.judge, stream=StreamEffect.CONTINUES

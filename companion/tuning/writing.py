@@ -105,9 +105,9 @@ def worse_flights_warning(flights: Flights) -> str | None:
 def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
     old, new = before.errors, after.errors
     return [
-        f"margins at the body rate: {before.margins_at_rate.sentence()} -> "
+        f"margins, loop opened at the body rate: {before.margins_at_rate.sentence()} -> "
         f"{after.margins_at_rate.sentence()}",
-        f"margins at the acceleration: {before.margins_at_acceleration.sentence()} -> "
+        f"margins, loop opened at the acceleration: {before.margins_at_acceleration.sentence()} -> "
         f"{after.margins_at_acceleration.sentence()}",
         f"position error by gusts {old.gusts:.3f} -> {new.gusts:.3f} m, on a path at 5 m/s "
         f"{old.path:.3f} -> {new.path:.3f} m, by noise {old.noise:.3f} -> {new.noise:.3f} m",

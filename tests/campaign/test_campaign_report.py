@@ -94,7 +94,7 @@ def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, cap
     assert "<td>mock.wind.gust_m_s</td><td>0.3</td><td>0.0</td><td>m/s</td>" in flown_with
     assert "planner.name" not in flown_with
     assert "mass_kg" not in flown_with
-    assert "its own report measures by the autopilot" in body
+    assert "its own report shows what is estimated_rms_m here" in body
     influence = re.search(r"Share of the variance.*?</table>", body, re.S)[0]
     shares = dict(re.findall(r"<td>(\S+)</td><td>(-?\d+)%", influence))
     assert int(shares["planner.name"]) > int(shares["mock.wind.speed_m_s"]) > 5

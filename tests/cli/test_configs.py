@@ -123,7 +123,7 @@ def test_one_key_of_a_file_is_printed(tmp_path, capsys):
     assert main(["config", str(own), "--get", "limits.max_tilt_deg"]) == 0
     assert "max_tilt_deg: 21.0" in capsys.readouterr().out
     assert main(["config", str(own), "--schema"]) == 2
-    assert "take no further FILE" in capsys.readouterr().err
+    assert "--schema and --markdown have none" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,7 @@ def test_the_largest_sensible_gain_and_a_warning_above_it():
     unlimited = expected_response(configured("model-following", found.largest_gain, 1000.0))
     shortest = found.shortest_time_constant
     assert shortest == pytest.approx(unlimited.time_constant, abs=0.002)
-    assert found.sentence().endswith(f"without rate limit would give {shortest:.2f} s")
+    assert found.sentence().endswith(f"and no rate limit: {shortest:.2f} s")
     quick = expected_response(configured("first-order", 6.0))
     assert quick.gain_is_too_high
     assert "6, and 5.2 is the largest sensible one (0.45 / (lag + dead time)); lower it" in (

@@ -162,7 +162,7 @@ def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path, ways):
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         result = finish(process, 1)
-        assert result["result"] == "left at once by the user"
+        assert result["result"] == "stopped at once by the user"
         assert [event["text"] for event in result["events"]].count(HOW_TO_LEAVE) == 1
         mock.until(ways.left)
 

@@ -48,7 +48,7 @@ class Frozen:
         (*POSITION, "repeats one position, although it reports a speed"),
         (*HORIZONTAL, "repeats one position, although it reports a speed"),
         (*HEIGHT, "repeats one position, although it reports a speed"),
-        (*VELOCITY, "repeats one velocity, although its position moves otherwise"),
+        (*VELOCITY, "repeats one velocity, but its positions show another one"),
     ],
 )
 def test_a_vehicle_is_not_flown_by_telemetry_that_stands_still(autopilot, name, fields, told):

@@ -78,7 +78,7 @@ def carried(autopilot, speed, held, after):
         observer = When("maneuvers", leave)
         changes = flight(autopilot, speed)
         session = session_for(mock, None, observer, **changes)
-        assert run(mock, session.fly()).result == "left at once by the user"
+        assert run(mock, session.fly()).result == "stopped at once by the user"
         state = mock.state()
         ways, ended = [state["position"]], state["last_setpoint"]
         while state["time"] < ended + held + SETTLED[autopilot]:

@@ -41,7 +41,7 @@ def test_who_leaves_in_a_turn_leaves_a_vehicle_that_turns_no_further(tmp_path, a
         left = mock.state()
         mock.run(1.0)  # less than the autopilot keeps the last setpoint
         state = mock.state()
-    assert summary.result == "left at once by the user"
+    assert summary.result == "stopped at once by the user"
     assert state["last_setpoint"] == left["last_setpoint"]
     assert turning(left) > 0.8
     assert turning(state) < 0.02
@@ -61,7 +61,7 @@ def test_without_a_sample_to_answer_nothing_is_sent_in_leaving():
         began = mock.state()["time"]
         summary = run(mock, session.fly())
         state = mock.state()
-    assert summary.result == "left at once by the user"
+    assert summary.result == "stopped at once by the user"
     assert state["time"] - state["last_setpoint"] == pytest.approx(0.15, abs=0.03)
     assert state["last_setpoint"] > began
 

@@ -125,7 +125,7 @@ def test_leaving_keeps_the_record_and_is_done_once(tmp_path):
         observer = When("maneuvers", lambda: (session.leave(), session.leave()), after=1.0)
         session = session_for(mock, tmp_path / "log", observer)
         summary = lockstep.run(session.fly())
-    assert (summary.result, summary.phase) == ("left at once by the user", "maneuvers")
+    assert (summary.result, summary.phase) == ("stopped at once by the user", "maneuvers")
     assert len(read_flight(tmp_path / "log").rows("setpoint")) > 100
 
 

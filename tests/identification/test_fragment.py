@@ -176,7 +176,7 @@ def test_an_axis_with_a_bad_fit_keeps_what_the_configuration_knows_and_says_so()
     assert axes["roll"][:2] == (47.5, 41.0)
     assert (
         "# yaw: kept from the configuration: lag 60.0 ms, dead time 158.0 ms, slew 270 °/s²; "
-        "the fit is bad: poor fit: the model's error is 40% of the movement, more than 30%"
+        "the fit is bad: poor fit: the model's error is 40% of the rates' standard deviation"
     ) in vehicle_fragment(vehicle, GRAVITY, IN_FORCE)
     axes = configured(replace(VEHICLE, pitch=bad(PITCH)), IN_FORCE).vehicle.axes
     assert axes["pitch"] == (17.0, 19.0, 1000.0, None)
@@ -198,7 +198,7 @@ def test_each_axis_says_how_good_it_is():
     )
     assert (
         "# roll, first order: lag 46.0 ± 2.0 ms, dead time 40.0 ± 1.0 ms, gain 1.05, "
-        "explains 99.0%, misfit 8%"
+        "explains 99.0% of the variance, misfit 8%"
     ) in text
     assert "slew 19.2 rad/s²" in text
     assert (
@@ -240,7 +240,7 @@ def test_the_table_tells_every_axis_within_80_columns():
     ]
     assert " 270 " in rows["yaw"]
     flat = " ".join(text.split())
-    assert "roll: a lag of first order explains 99.0%; second order is not clearly better" in flat
+    assert "roll: a lag of first order explains 99.0% of the variance; second order is not" in flat
     assert "yaw: written as first order" in flat
     assert "a better fit: second order, natural frequency 5.6 rad/s" in flat
     assert "T/m = 19.55·u +0.22" in text

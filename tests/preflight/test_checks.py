@@ -232,7 +232,7 @@ def test_a_rate_below_the_requested_one_that_is_safe_says_why():
     assert finding.found == (
         "telemetry arrives, Hz: ATTITUDE_QUATERNION 197 of 250 (70 % suffices), "
         "LOCAL_POSITION_NED 50 of 50, HOME_POSITION (asked for 1, too seldom to be counted here), "
-        "CURRENT_MODE on change, and at 2 Hz between"
+        "CURRENT_MODE on change, otherwise at 2 Hz"
     )
 
 

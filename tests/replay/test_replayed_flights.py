@@ -331,7 +331,7 @@ def test_answers_that_only_one_of_both_gave_are_told_by_their_reasons():
         "1 samples: answered in the flight, not in control in the replay.",
     ]
     same = result_lines(samples[1:], 1.5, follows_record=True)
-    assert same[0].startswith("The commands of guidance are those of the record")
+    assert same[0].startswith("Only the control loop is replayed, with the recorded commands")
     assert same[1] == (
         "identical: 0 setpoints to the bit, 1 unanswered samples with the same reasons"
     )

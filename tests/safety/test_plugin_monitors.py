@@ -130,7 +130,7 @@ def test_the_rangefinder_of_the_page_lands_the_vehicle_and_the_words_name_it():
     assert (summary.result, summary.phase) == ("an obstacle is 1.2 m away", "maneuvers")
     assert vehicle.state()["armed"] is False
     told = closing_words(summary.as_dict(), None)
-    assert "  what to do: remove what your own monitor `rangefinder` told" in "\n".join(told.lines)
+    assert "  what to do: fix what your own monitor `rangefinder` reported" in "\n".join(told.lines)
 
 
 def test_the_monitor_of_the_page_flies_and_raises_its_alarm():
@@ -225,7 +225,7 @@ def test_it_can_only_choose_among_the_actions():
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("raising", "cannot be used where a value is not known: .* raised TypeError: unsupported"),
+        ("raising", "accept a snapshot whose values are None: .* raised TypeError: unsupported"),
         ("counting", "it returned 5, which is neither a text nor None"),
         ("wordless", "it returned '', which is neither a text nor None"),
         ("releasing", "its action must be WARN, HOLD, HAND_BACK or LAND"),

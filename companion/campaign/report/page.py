@@ -161,9 +161,8 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     yield from _influence_sentences(results, by_outcome)
     if results.error_outcome == TRUE_ERROR:
         yield (
-            "Errors are distances of the true vehicle from the reference. A flight does not know "
-            "its true position: its own report measures by the autopilot's estimate, which is "
-            "estimated_rms_m here."
+            "Errors are distances of the true vehicle from the reference. A flight knows only the "
+            "autopilot's estimate, so its own report shows what is estimated_rms_m here."
         )
 
 

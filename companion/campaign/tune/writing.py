@@ -82,8 +82,8 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
         f"reference, and {estimate_before:.3f} -> {estimate_after:.3f} m from the true one."
     )
     yield (
-        "Gains and weights hardly change the last distance, the error of the position estimate; "
-        "if the estimate is late, guidance.position_lateness_ms reduces it."
+        "The distance from the true position is the estimate's own error. Gains and weights hardly "
+        "change it; if the estimate is late, set guidance.position_lateness_ms."
     )
     if comparison.ratio.high >= 1.0:
         yield "The interval contains 1, so the result may not be better: fly more samples."

@@ -178,7 +178,7 @@ def _require_short(table: Table, cutoff: float) -> None:
         longest = _MOST_PIECES / (2.0 * cutoff)
         raise TrajectoryError(
             f"it lasts {duration:.4g} s, and {longest:.4g} s is the longest with cutoff_hz "
-            f"{cutoff:g}; lower that, or fly a part of it"
+            f"{cutoff:g}; lower cutoff_hz, or fly a part of it"
         )
 
 

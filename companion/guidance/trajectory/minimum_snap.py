@@ -168,7 +168,7 @@ def _solve_block_tridiagonal(diagonal: Floats, upper: Floats, right: Floats) -> 
         pivot = diagonal[k + 1] - upper[k].T @ reduced[k]
         right[k + 1] -= upper[k].T @ right[k]
     if np.linalg.eigvalsh(pivot)[0] < _SMALLEST_EIGENVALUE:
-        raise np.linalg.LinAlgError("too little is fixed and observed to determine the spline")
+        raise np.linalg.LinAlgError("too few values are fixed or observed to determine the spline")
     right[-1] = np.linalg.solve(pivot, right[-1])
     for k in range(len(upper) - 1, -1, -1):
         right[k] -= reduced[k] @ right[k + 1]

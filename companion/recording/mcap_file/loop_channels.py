@@ -91,7 +91,7 @@ SAMPLE = Channel(
         CodeField(
             "age_known", "Whether `age_s` is absolute; else relative to the quickest sample."
         ),
-        CodeField("on", "Whether samples are answered at all."),
+        CodeField("on", "Whether control is on; while it is off, no sample is answered."),
         CodeField("taking_over", "Whether offboard was requested."),
         CodeField("offboard_active", "Whether the autopilot obeys the setpoints."),
         CodeField("awaiting_mode", "Whether the mode must be confirmed after a gap."),
@@ -146,11 +146,11 @@ GUIDANCE = Channel(
         Field("quadratic_drag_per_m", "Quadratic drag per mass, as learned so far, 1/m."),
     ),
     (
-        CodeField("holds_position", "Whether the vehicle should be at the horizontal reference."),
-        CodeField("holds_height", "Whether the vehicle should be at the height of the reference."),
+        CodeField("holds_position", "Whether guidance holds the reference horizontally."),
+        CodeField("holds_height", "Whether guidance holds the height of the reference."),
         CodeField(
             "height_steady",
-            "Whether the thrust is steady: no doublet, no rates or thrust of a program.",
+            "Whether the thrust is steady: no climb doublet, no rates or thrust from a program.",
         ),
         CodeField("offboard_active", "Whether the autopilot obeys the setpoints."),
     ),
@@ -217,8 +217,8 @@ ACTION = Channel(
     (
         Field("time_s", "Time on our clock, s."),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
-        Field("drag_per_s", "Linear drag of an earlier flight, 1/s; of `drag_prior`."),
-        Field("quadratic_drag_per_m", "Quadratic drag of an earlier flight, 1/m; of `drag_prior`."),
+        Field("drag_per_s", "For `drag_prior`: linear drag of an earlier flight, 1/s."),
+        Field("quadratic_drag_per_m", "For `drag_prior`: its quadratic drag, 1/m."),
     ),
     (CodeField("action", "The name of the call.", ACTIONS),),
 )

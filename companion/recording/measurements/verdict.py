@@ -157,7 +157,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
         "linearity of the steps",
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
         deviation <= deviation_limit,
-        "first let the steps keep limits.max_tilt_deg: a step cut by it distorts the response"
+        "first keep the steps within limits.max_tilt_deg, because a cut step distorts the response"
         if cut
         else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
@@ -189,7 +189,7 @@ def cut_steps(figures: Figures) -> list[Check]:
 
 def _straightness_remedy(planner: str, *, cut: bool) -> str:
     if cut:
-        return "first let the steps keep limits.max_tilt_deg: a step cut by it bends the line"
+        return "first keep the steps within limits.max_tilt_deg, because a cut step leaves its line"
     if planner == MODEL_FOLLOWING:
         return (
             "measure vehicle.lag_ms and vehicle.dead_time_ms anew with `companion identify`, lower "

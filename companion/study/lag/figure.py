@@ -31,12 +31,12 @@ from companion.study.step import FIGURE_2, Response
 CAPTION = (
     "First row: paths and distance from the line in the example, at 100 Hz. Second row: cross-track"
     " by dead time (lag 25 ms) and by lag (dead time 40 ms); the upper edge of the shaded area is"
-    " model-following with the worst error of its assumed lag and dead time. Third row: cross-track"
-    " of model-following with the worst error, divided by that of the best other method, at three"
-    " sample rates; above 1 the other method is the straighter, and the cell is red. Fourth row:"
-    " model-following by the error of its assumed lag and dead time, in the example and with the"
-    " complete inner loop. Last row: paths with the complete inner loop, and cross-track there by"
-    " sample rate."
+    " model-following with the worst error of its assumed lag and dead time. Third row, at three"
+    " sample rates: the cross-track of model-following with this worst error, divided by the"
+    " cross-track of the best other method. Red: above 1, where the other method is straighter."
+    " Fourth row: model-following by the error of its assumed lag and dead time, in the example and"
+    " with the complete inner loop. Last row: paths with the complete inner loop, and cross-track"
+    " there by sample rate."
 )
 
 _CROSS_TRACK_LABEL = "largest distance from the line"

@@ -95,8 +95,8 @@ def _grid_finding(grid: Grid) -> Finding:
         "ours",
         "With the true lag and dead time model-following is the straightest over the whole grid.",
         ratio(closest) < 1.0,
-        f"Cross-track at most {largest:.2g}, and at most {ratio(closest):.2g} of the best other"
-        f" method's, at {closest}.",
+        f"Its cross-track is at most {largest:.2g}. Compared with the best other method it is"
+        f" largest at {closest}: {ratio(closest):.2g} times as much.",
     )
 
 
@@ -139,10 +139,10 @@ def _long_or_short_delays_finding(grid: Grid, complete: CompleteLoopFlights) -> 
         "ours",
         "A lag and dead time 50 % too long are better than both 50 % too short.",
         worst_long < worst_short and loop_scores[long].cross_track < loop_scores[short].cross_track,
-        f"Largest cross-track {worst_long:.2g} against {worst_short:.2g}, with the complete inner"
-        f" loop {loop_scores[long].cross_track:.2g} against {loop_scores[short].cross_track:.2g}."
-        f" Too long is the straighter in {straighter_count} of the {len(pairs)} cells with a dead"
-        " time.",
+        f"Largest cross-track: too long {worst_long:.2g}, too short {worst_short:.2g}; with the"
+        f" complete inner loop {loop_scores[long].cross_track:.2g} and"
+        f" {loop_scores[short].cross_track:.2g}. Too long is straighter in {straighter_count} of"
+        f" the {len(pairs)} cells with a dead time.",
     )
 
 

@@ -53,8 +53,8 @@ def _solve_time_finding(
         for iterations in (1, MAX_ITERATIONS)
     }
     medians = "; ".join(
-        f"{STYLES[model].label} takes {ratios[model, 1]:.2f} × its time with one iteration,"
-        f" {ratios[model, MAX_ITERATIONS]:.2f} × to the end"
+        f"{STYLES[model].label} takes {ratios[model, 1]:.2f} times as long for one iteration,"
+        f" {ratios[model, MAX_ITERATIONS]:.2f} times to the end"
         for model in others
     )
     names = " and ".join(STYLES[model].label for model in others)

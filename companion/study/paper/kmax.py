@@ -71,7 +71,7 @@ def run(tick: Tick) -> Outcome:
         name="kmax",
         title="Appendix A: the scaling factor K over the tilt disc",
         conditions=(
-            "K = (ω_x² + ω_y²)/|ċ|² of the flying planner's kinematics, tilts to 60°, 72 directions"
+            "K = (ω_x² + ω_y²)/|ċ|² by the planner's kinematics, tilts to 60°, 72 directions"
             " of ċ. Equation 33 uses the largest K of all tilts and directions."
         ),
         figure=_figure(by_tilt),
