@@ -64,7 +64,7 @@ class Exchange:
         """Pass datagrams of a link to the autopilot; the companion's go through the link faults."""
         simulation = self._simulation
         faults = simulation.faults.link_faults
-        if link is self._companion_link and not self._pipe_in.is_clear(faults):
+        if link is self._companion_link and not self._pipe_in.is_transparent(faults):
             datagrams = [datagram for datagram, _ in arrived]
             passed_datagrams = self._pipe_in.push(datagrams, faults, simulation.time_us)
             arrived = [(datagram, decode(datagram)) for datagram in passed_datagrams]
@@ -82,13 +82,13 @@ class Exchange:
         """
         frames = link.take_frames()
         faults = self._simulation.faults.link_faults
-        if link is self._companion_link and not self._pipe_out.is_clear(faults):
+        if link is self._companion_link and not self._pipe_out.is_transparent(faults):
             frames = self._pipe_out.push(frames, faults, self._simulation.time_us)
         if beacon is not None:
             frames.append(link.sign(beacon))
         return bundles(frames) if self._bundle else frames
 
-    def is_answer(self, messages: list[Message]) -> bool:
+    def answers_beacon(self, messages: list[Message]) -> bool:
         """Whether one of these messages answers the latest lockstep beacon."""
         now_ms = self._simulation.time_us // 1000
         return any(
@@ -96,7 +96,7 @@ class Exchange:
             for message in messages
         )
 
-    def is_repeated_answer(self, messages: list[Message]) -> bool:
+    def repeats_answer(self, messages: list[Message]) -> bool:
         """Whether a datagram is only a second answer to an earlier beacon, which was sent twice.
 
         The number of beacons depends on the wall clock. The link faults draw a random number for

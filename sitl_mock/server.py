@@ -165,10 +165,10 @@ class Server:
                 return
             datagram, from_partner = received
             messages = decode(datagram)
-            if from_partner and self._exchange.is_repeated_answer(messages):
+            if from_partner and self._exchange.repeats_answer(messages):
                 continue
             self._collected_datagrams.append((datagram, messages))
-            if from_partner and self._exchange.is_answer(messages):
+            if from_partner and self._exchange.answers_beacon(messages):
                 self._beacon_answered = True
 
     # Real time
@@ -188,7 +188,7 @@ class Server:
 
         The server does not make up a lag above `MAX_LAG_S`, or the time of a ``slip_clock`` fault.
         """
-        self._origin_wall_s += self._simulation.effects.take_slip()
+        self._origin_wall_s += self._simulation.effects.take_clock_slip()
         speed = self._settings.speed
         elapsed_s = (self._simulation.next_us - self._origin_us) / speed / 1e6
         due_s = self._origin_wall_s + burst_time(elapsed_s, self._settings.burst_ms * 1e-3 / speed)
@@ -209,7 +209,7 @@ class Server:
             messages = decode(datagram)
             self._connections.deliver([(datagram, messages)], endpoint)
             in_lockstep = self._settings.lockstep.enabled and endpoint is self._companion
-            if in_lockstep and from_partner and self._exchange.is_answer(messages):
+            if in_lockstep and from_partner and self._exchange.answers_beacon(messages):
                 # The latest beacon is answered: lockstep resumes.
                 self._beacon_answered = self._in_lockstep = True
         self._connections.flush()

@@ -67,7 +67,7 @@ class Simulation:
         self.state.mode = self.state.intended_mode = personality.boot_mode
         lockstep = settings.lockstep
         self._slot_us = (
-            lockstep.period_ms * 1000 if lockstep.enabled else personality.slot_us(settings)
+            lockstep.period_ms * 1000 if lockstep.enabled else personality.slot_period_us(settings)
         )
         self._slot_count = 0
         self._physics_rate_hz = settings.airframe.physics_rate_hz
@@ -155,9 +155,11 @@ class Simulation:
     def _update_state(self) -> None:
         state, vehicle, behaviour = self.state, self.vehicle, self._behaviour
         behaviour.land_detector.step(contact=vehicle.on_ground)
-        if behaviour.commander.under_setpoints and self.effects.offboard_us is None:
-            self.effects.offboard_us = state.time_us
-        begun_faults, ended_faults = self.faults.update(state.time_us, self.effects.offboard_us)
+        if behaviour.commander.under_setpoints and self.effects.offboard_since_us is None:
+            self.effects.offboard_since_us = state.time_us
+        begun_faults, ended_faults = self.faults.update(
+            state.time_us, self.effects.offboard_since_us
+        )
         if begun_faults or ended_faults:
             self.effects.apply(begun_faults, ended_faults)
         if state.time_us >= self._next_commander_us:

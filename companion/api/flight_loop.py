@@ -124,7 +124,7 @@ class OwnThreadLoop:
     def _run(self) -> None:
         try:
             with (
-                quick_switches(),
+                fast_thread_switching(),
                 asyncio.Runner(loop_factory=lambda: self._loop) as runner,
             ):
                 runner.run(self._until_closed())
@@ -153,7 +153,7 @@ the value from before the first flight is restored."""
 
 
 @contextmanager
-def quick_switches() -> Iterator[None]:
+def fast_thread_switching() -> Iterator[None]:
     """Let Python switch threads after `SWITCH_INTERVAL` while any flight runs."""
     with _switch_interval_lock:
         _switch_intervals_before.append(sys.getswitchinterval())

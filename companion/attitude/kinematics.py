@@ -7,7 +7,7 @@ therefore no square root and no division.
 
 from math import acos, atan, sqrt
 
-from companion.attitude.rotation import first_is_negative
+from companion.attitude.rotation import first_nonzero_is_negative
 
 SMALLEST_A = 1e-12
 """Smallest value used for a = cos(tilt/2); below it the vehicle counts as exactly inverted."""
@@ -130,7 +130,7 @@ def levelling_rates(
     give the same axis.
     """
     if a <= SMALLEST_A:
-        scale = 2.0 * gain if first_is_negative(x, y, 0.0) else -2.0 * gain
+        scale = 2.0 * gain if first_nonzero_is_negative(x, y, 0.0) else -2.0 * gain
         return scale * x, scale * y
     scale = -2.0 * gain * a * inverse_a_squared
     return scale * (w * x + z * y), scale * (w * y - z * x)

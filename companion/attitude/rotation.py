@@ -33,12 +33,12 @@ def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
     x_e = w * x_d - x * w_d - y * z_d + z * y_d
     y_e = w * y_d - y * w_d - z * x_d + x * z_d
     z_e = w * z_d - z * w_d - x * y_d + y * x_d
-    if w_e < 0.0 or (w_e == 0.0 and first_is_negative(x_e, y_e, z_e)):
+    if w_e < 0.0 or (w_e == 0.0 and first_nonzero_is_negative(x_e, y_e, z_e)):
         return -w_e, -x_e, -y_e, -z_e
     return w_e, x_e, y_e, z_e
 
 
-def first_is_negative(x: float, y: float, z: float) -> bool:
+def first_nonzero_is_negative(x: float, y: float, z: float) -> bool:
     """Whether the first nonzero component is negative: true for one of v and −v, unless v is 0."""
     return x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0)))
 

@@ -13,7 +13,7 @@ from companion.campaign.case import Case
 from companion.campaign.cluster import ClusterError, EndedUnit, number_of_workers, run_tasks
 from companion.campaign.flight import INTERNAL_ERROR
 from companion.campaign.folder import Description
-from companion.campaign.unit import Row, fly_cases, fly_planned_cases, size_of_units, unit_ranges
+from companion.campaign.unit import Row, cases_per_unit, fly_cases, fly_planned_cases, unit_ranges
 from companion.campaign.versions import versions
 
 if TYPE_CHECKING:
@@ -101,7 +101,7 @@ def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: f
         ConfigError: a worker refuses a case.
         VersionError: a worker that joined later has other versions.
     """
-    unit_size = size_of_units(len(cases), case_s, number_of_workers(client))
+    unit_size = cases_per_unit(len(cases), case_s, number_of_workers(client))
     units = unit_ranges(len(cases), unit_size)
     tasks = {
         number: (fly_cases, kind, [cases[index] for index in unit], versions())

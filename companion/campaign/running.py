@@ -34,7 +34,7 @@ from companion.campaign.design import few_samples_warning
 from companion.campaign.folder import Description
 from companion.campaign.loading import load
 from companion.campaign.report.results import Results
-from companion.campaign.unit import check_cases, size_of_units, unit_ranges
+from companion.campaign.unit import cases_per_unit, check_cases, unit_ranges
 from companion.campaign.versions import VersionError
 from companion.child_process import usable_cores
 from companion.files.yaml_file import ConfigError
@@ -138,7 +138,7 @@ class _Run:
         if folder.holds_campaign(self._folder):
             return folder.resume(self._folder, self._campaign)
         cases = self._campaign.number_of_cases
-        unit_size = 1 if case_s is None else size_of_units(cases, case_s, workers)
+        unit_size = 1 if case_s is None else cases_per_unit(cases, case_s, workers)
         description = folder.describe(self._campaign, unit_size, case_s)
         folder.make(self._folder, self._campaign, description)
         size = f"{cases} {self._noun}"

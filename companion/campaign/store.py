@@ -101,14 +101,14 @@ def write_unit(
     """
     import pyarrow.parquet as pq  # noqa: PLC0415  an extra
 
-    path = unit_path(folder, number)
+    path = unit_file(folder, number)
     write_whole(path.with_suffix(".json"), json.dumps(timing) + "\n")
     parquet = BytesIO()
     pq.write_table(table(file, rows), parquet)
     write_whole(path, parquet.getvalue())
 
 
-def unit_path(folder: Path, number: int) -> Path:
+def unit_file(folder: Path, number: int) -> Path:
     """The Parquet file of a unit."""
     return folder / RESULTS_FOLDER / f"unit-{number:05d}.parquet"
 
@@ -149,7 +149,7 @@ def read_unit(folder: Path, number: int) -> "pa.Table":
     import pyarrow as pa  # noqa: PLC0415  an extra
     import pyarrow.parquet as pq  # noqa: PLC0415  an extra
 
-    path = unit_path(folder, number)
+    path = unit_file(folder, number)
     try:
         return pq.read_table(path)
     except (pa.ArrowException, OSError) as error:

@@ -96,7 +96,7 @@ def _worker_address() -> str:
         return "this process"
 
 
-def size_of_units(cases: int, case_s: float, workers: int) -> int:
+def cases_per_unit(cases: int, case_s: float, workers: int) -> int:
     """The number of cases in a unit of work, if a case takes `case_s` s of wall time.
 
     `workers` is 0 while the first worker is awaited, and then counts as 1.

@@ -9,7 +9,7 @@ _CAMPAIGN, _RUN = "campaign", "run"
 _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
 
 
-def with_campaign_command(arguments: Sequence[str]) -> list[str]:
+def with_campaign_run(arguments: Sequence[str]) -> list[str]:
     """The arguments, with `campaign FILE` expanded to `campaign run FILE`."""
     words = list(arguments)
     position = next((n for n, word in enumerate(words) if not word.startswith("-")), len(words))

@@ -7,7 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from companion.cli import tool_options
-from companion.cli.campaign_options import add_campaign, with_campaign_command
+from companion.cli.campaign_options import add_campaign, with_campaign_run
 from companion.cli.options import (
     Commands,
     add_endpoint,
@@ -32,7 +32,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         The options; their attribute `typed` holds the arguments as typed.
     """
     typed = sys.argv[1:] if arguments is None else list(arguments)
-    options = _parser().parse_args(with_campaign_command(typed))
+    options = _parser().parse_args(with_campaign_run(typed))
     options.typed = typed
     return options
 

@@ -202,7 +202,7 @@ def _config_error(
     details = essential_details(error.errors(include_url=False))
     faults, previous_place = [], Place("")
     for detail in details[:_MOST_FAULTS_SHOWN]:
-        place = place_of(detail["loc"], places, name)
+        place = nearest_place(detail["loc"], places, name)
         where = f"{place}: "
         if place == previous_place:
             where = ""
@@ -214,7 +214,7 @@ def _config_error(
     return ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else ""))
 
 
-def place_of(where: KeyPath, places: Mapping[KeyPath, Place], name: str) -> Place:
+def nearest_place(where: KeyPath, places: Mapping[KeyPath, Place], name: str) -> Place:
     """The place of a key, else of the innermost section or list around it that has a place.
 
     If none has one: the file `name` without a line.

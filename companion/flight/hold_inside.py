@@ -11,7 +11,7 @@ _MARGIN = 0.3
 position and wind have errors."""
 
 
-def give_up_inside(context: FlightContext) -> None:
+def brake_inside_fence(context: FlightContext) -> None:
     """Give up what is flown, brake and hold; upwind, if the landing would drift out of the fence.
 
     PX4 begins its own modes level, so a vehicle that leans against the wind drifts downwind first.
@@ -22,11 +22,13 @@ def give_up_inside(context: FlightContext) -> None:
     if not context.link.autopilot.forgets_lean or centre is None or pose is None:
         return
     stop, wind = minus(pose.position_ned, centre.position_ned), guidance.estimate.disturbance
-    if upwind_is_inside(fence_of(context.config), centre.place, stop, wind):
+    if only_upwind_is_inside(fence_of(context.config), centre.place, stop, wind):
         guidance.move_upwind()
 
 
-def upwind_is_inside(fence: Fence, origin: Place | None, stop: Vector, wind: NorthEast) -> bool:
+def only_upwind_is_inside(
+    fence: Fence, origin: Place | None, stop: Vector, wind: NorthEast
+) -> bool:
     """Whether the drift would leave the fence from where the vehicle stops, but not from upwind.
 
     Args:

@@ -151,7 +151,7 @@ async def _arm(context: FlightContext) -> None:
         require_role(context.link, {Role.READY})
         context.must_disarm = True  # only now: a vehicle that somebody else armed is not disarmed
 
-    context.replacement_detector.commit()
+    context.replacement_detector.note_arming()
     await command_if_ours(context, command, require_ours, armed)
     await context.until(armed, "the vehicle to be armed")
 

@@ -25,7 +25,7 @@ _GROUND_FLAG_TIME = 5.0
 need some seconds to spool up, and the height may read 1.5 m on the ground."""
 
 
-def keeps_height(context: FlightContext) -> bool:
+def climb_has_ended(context: FlightContext) -> bool:
     """Whether the vehicle has ended its take-off or climb, by a fresh position."""
     position = context.fresh_position()
     return (
@@ -38,7 +38,7 @@ def keeps_height(context: FlightContext) -> bool:
 async def takeoff(context: FlightContext) -> None:
     """Let the autopilot take off, and wait for the height."""
     state = context.link.state
-    context.replacement_detector.commit()
+    context.replacement_detector.note_arming()
     await context.until(lambda: context.fresh_position() is not None, "a fresh position")
     await context.preflight.require(Stage.ARMED)
     await context.fresh_heartbeat()
@@ -91,7 +91,7 @@ class _Climb:
         if is_near_height and state.landed:
             self._require_leaving_ground(height)
             return False  # a vehicle that stands must not be taken over: the thrust would lift it
-        return is_near_height and keeps_height(context)
+        return is_near_height and climb_has_ended(context)
 
     def _was_stopped(self) -> bool:
         """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIME` ago."""

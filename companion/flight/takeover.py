@@ -15,7 +15,7 @@ from companion.flight.preflight_phases import (
     stream,
     use_evidence,
 )
-from companion.flight.takeoff import MAX_UNDERSHOOT, keeps_height
+from companion.flight.takeoff import MAX_UNDERSHOOT, climb_has_ended
 from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
@@ -72,7 +72,7 @@ async def wait_for_handover(context: FlightContext) -> None:
             context.detail = f"the pilot to switch to {ready}, now {state.mode}"
             return False
         context.detail = "the vehicle to keep its height"
-        return keeps_height(context)
+        return climb_has_ended(context)
 
     await context.until(handed_over)
 
@@ -107,7 +107,7 @@ async def _check_stage(
 ) -> None:
     """Run the checks of a stage; before and after them, `require` raises if the state is wrong."""
     context.replacement_detector.begin()
-    context.replacement_detector.commit()
+    context.replacement_detector.note_arming()
     await request_telemetry(context)
     await _landed_or_flying(context)
     require(context)

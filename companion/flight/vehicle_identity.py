@@ -54,7 +54,7 @@ class ReplacementDetector:
         self._frames, self._updated_at = self._link.stats.frames, self._clock()
         self._silence = self._long_silence = 0.0
 
-    def commit(self) -> None:
+    def note_arming(self) -> None:
         """Note that the vehicle is being armed: from now on a replacement ends the flight.
 
         From then on, only the watch and the safety monitors judge silence.

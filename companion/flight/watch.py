@@ -7,7 +7,7 @@ from math import inf
 from companion.flight.commands import require_role, roles_of
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.hand_over import stop_moving
-from companion.flight.hold_inside import give_up_inside
+from companion.flight.hold_inside import brake_inside_fence
 from companion.flight.phase import Phase
 from companion.flight.rate_requester import RateRequester
 from companion.safety import SafetyLadder
@@ -129,7 +129,7 @@ class Watch:
         if verdict is None:
             return
         if verdict.action is Action.HOLD:
-            give_up_inside(self._context)
+            brake_inside_fence(self._context)
             return
         if verdict.stream is StreamEffect.STOPS:
             self._context.release()

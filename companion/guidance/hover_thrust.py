@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from companion.attitude import BodyRates, Quaternion
 from companion.attitude.kinematics import cos_tilt
 from companion.guidance.reference import GRAVITY
-from companion.guidance.thrust import BatterySag, ThrustCurve, cos_tilt_ahead, specific_thrust
+from companion.guidance.thrust import BatterySag, ThrustCurve, predicted_cos_tilt, specific_thrust
 from companion.guidance.thrust_filter import SHORTEST_WINDOW, ThrustFilter
 
 _LONGEST_WINDOW = 0.5
@@ -121,7 +121,7 @@ class HoverThrust:
             body_rates: measured body rates, rad/s.
         """
         settings = self._settings
-        cosine = cos_tilt_ahead(q, body_rates, settings.lag)
+        cosine = predicted_cos_tilt(q, body_rates, settings.lag)
         thrust = specific_thrust(acceleration_down, 1.0 if settings.tilt_compensated else cosine)
         return self.within_limits(self._to_normalised(thrust))
 

@@ -25,7 +25,7 @@ def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
     return wanted / cos_tilt
 
 
-def cos_tilt_ahead(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
+def predicted_cos_tilt(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
     """Cosine of the tilt in `ahead` seconds, if the vehicle keeps rotating at `body_rates` (rad/s).
 
     Thrust for this tilt instead of the present one compensates the lag of the rotors while the

@@ -18,7 +18,7 @@ from companion.identification.delayed_model import (
     SecondOrderFit,
     frequency_damping,
 )
-from companion.identification.record import Stretch, most_excited
+from companion.identification.record import Stretch, most_excited_windows
 from companion.identification.residual_analysis import analyse_residual
 from companion.least_squares import Floats, Solution
 
@@ -102,7 +102,7 @@ def fit_lag(
         gain: given gain, for which lag and dead time are fitted; None: the gain is fitted too.
         search_slew_limit: whether to search for a slew limit.
     """
-    record = most_excited(record)
+    record = most_excited_windows(record)
     count = sum(stretch.measured.size for stretch in record)
     if count < _FEWEST_SAMPLES or all(np.ptp(stretch.commanded) == 0.0 for stretch in record):
         return None

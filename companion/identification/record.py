@@ -64,7 +64,7 @@ def stretches(
     return found
 
 
-def most_excited(record: list[Stretch]) -> list[Stretch]:
+def most_excited_windows(record: list[Stretch]) -> list[Stretch]:
     """The record or, if it is long, only the windows in which the commands varied most.
 
     Half an hour of flight contains hardly more information on the response than its most excited

@@ -63,7 +63,7 @@ class FrameFilter:
                 self.notify_once(_KEY_MISSING_NOTICE)
             return True
         result = self._signing.check(frame)
-        self.tell_remarks()
+        self.report_stamp_remarks()
         if result is SignatureResult.GOOD:
             return True
         self._stats.bad_signature += 1
@@ -71,7 +71,7 @@ class FrameFilter:
             self.notify_once(_REFUSED_NOTICES[result])
         return False
 
-    def tell_remarks(self) -> None:
+    def report_stamp_remarks(self) -> None:
         """Pass the remarks about the time stamps of signatures to the user."""
         while self._signing is not None and self._signing.remarks:
             self.notify_once(self._signing.remarks.pop(0))

@@ -115,7 +115,7 @@ class PeerRule:
         self._claimed_at = clock()
         self._peer: str | None = None
 
-    def is_peer_claim(self, frame: Frame) -> bool:
+    def makes_sender_peer(self, frame: Frame) -> bool:
         """Whether an accepted frame makes its sender the peer."""
         if self._every_frame_claims:
             return True
@@ -131,7 +131,7 @@ class PeerRule:
         """Note that the peer has repeated its claim."""
         self._claimed_at = self._clock()
 
-    def claim_lapsed(self) -> bool:
+    def may_replace_peer(self) -> bool:
         """Whether another sender may become the peer although the present one still sends."""
         if self._every_frame_claims:
             return False

@@ -93,7 +93,7 @@ class FrozenTelemetry:
         self._axes = _Axis(), _Axis(), _Axis()
         self._turn, self._looked_at = 0.0, now
 
-    def look(
+    def find_frozen(
         self,
         now: float,
         sample: AttitudeSample | None,

@@ -187,7 +187,7 @@ class SnapshotBuilder:
         if not sent:
             return None
         sample, position = self._loop.resets.newest_attitude, self._link.state.position
-        return self._frozen.look(now, sample, sent[-1][0], position)
+        return self._frozen.find_frozen(now, sample, sent[-1][0], position)
 
     def _resets(self, now: float) -> Resets:
         resets = self._loop.resets

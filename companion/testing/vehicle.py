@@ -230,9 +230,9 @@ class MockVehicle:
             callback()
         return self._relayed(datagrams)
 
-    def take_slip(self) -> float:
+    def take_clock_slip(self) -> float:
         """Time that `slip_clock` faults took from the vehicle's clock since the last call, s."""
-        return self._simulation.effects.take_slip()
+        return self._simulation.effects.take_clock_slip()
 
     def _relayed(self, datagrams: list[bytes]) -> list[bytes]:
         relay = self.to_companion

@@ -59,7 +59,7 @@ class MemoryTransport:
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
         silent, self._heard_in_period = not self._heard_in_period, False
-        if silent or self._receiver.claim_lapsed():
+        if silent or self._receiver.may_replace_peer():
             self._connected = False
 
 
@@ -133,7 +133,7 @@ class FreeWire(Wire):
             if clock.now >= step_at:
                 self._send(self._vehicle.begin())
                 self._send(self._vehicle.step())
-                self._behind_clock += self._vehicle.take_slip()
+                self._behind_clock += self._vehicle.take_clock_slip()
                 step_at = self._next_step_at()
                 received = self.deliver_due() or received
             if received or clock.now >= until:

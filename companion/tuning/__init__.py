@@ -20,7 +20,7 @@ A proposal
 
 The analysis
     expectation    margins, errors, rates and settling of a configuration: an `Expectation`
-    stability      the margins only, also with errors of lag and dead time: `ModelError`
+    stability      the margins only, also with errors of lag and dead time: `ModelMismatch`
     Disturbances   what disturbs the vehicle
     control_loop   frequency responses of the whole loop: a `Loop`
 """
@@ -31,7 +31,7 @@ from companion.tuning.expectation import Expectation as Expectation
 from companion.tuning.expectation import expectation as expectation
 from companion.tuning.expectation import stability as stability
 from companion.tuning.loop import Loop as Loop
-from companion.tuning.loop import ModelError as ModelError
+from companion.tuning.loop import ModelMismatch as ModelMismatch
 from companion.tuning.loop import control_loop as control_loop
 from companion.tuning.margins import Margins as Margins
 from companion.tuning.proposal import Proposal as Proposal

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from companion.config import Config
 from companion.tuning.feedback import Complex
-from companion.tuning.loop import EXACT, Loop, ModelError, control_loop
+from companion.tuning.loop import EXACT, Loop, ModelMismatch, control_loop
 from companion.tuning.margins import Margins, frequencies, margins, smaller_margins
 
 Floats = NDArray[np.float64]
@@ -88,7 +88,7 @@ class Expectation:
         return smaller_margins(self.margins_at_rate, self.margins_at_acceleration)
 
 
-def stability(config: Config, error: ModelError = EXACT) -> Margins:
+def stability(config: Config, error: ModelMismatch = EXACT) -> Margins:
     """Stability margins of a configuration.
 
     The loop is opened at the commanded body rate and at the commanded acceleration; of each margin

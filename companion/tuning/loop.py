@@ -29,7 +29,7 @@ _USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class ModelError:
+class ModelMismatch:
     """Difference between the real rate loop and the configured one."""
 
     time_factor: float = 1.0
@@ -40,7 +40,7 @@ class ModelError:
     """Factor on the body rates: real rate / commanded rate."""
 
 
-EXACT = ModelError()
+EXACT = ModelMismatch()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class Loop:
         return -self.command_response * subtracted / (1.0 + self.gain_at_rate)
 
 
-def control_loop(config: Config, s: Complex, error: ModelError = EXACT) -> Loop:
+def control_loop(config: Config, s: Complex, error: ModelMismatch = EXACT) -> Loop:
     """The frequency responses of a configuration's control loop.
 
     Args:

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.tuning.expectation import Disturbances, Expectation, expectation, stability
-from companion.tuning.loop import ModelError
+from companion.tuning.loop import ModelMismatch
 from companion.tuning.margins import Margins
-from companion.tuning.search import Aims, Design, errors_to_tolerate, search
+from companion.tuning.search import Aims, Design, search, tolerated_mismatches
 
 _ANALYSED_MANEUVERS = ("hover",)
 """Maneuvers that the analysis assumes; the maneuver `identify` would be flown with lower gains."""
@@ -27,7 +27,7 @@ class Proposal:
     """Expected behaviour of `untuned`."""
     after: Expectation
     """Expected behaviour of `tuned`."""
-    margins_with_errors: tuple[tuple[ModelError, Margins], ...]
+    margins_with_errors: tuple[tuple[ModelMismatch, Margins], ...]
     """Errors of lag and dead time, and the margins of `tuned` with each of these errors."""
     disturbances: Disturbances
     """Disturbances of the vehicle."""
@@ -96,6 +96,6 @@ def propose(
             "vehicle; check vehicle.lag_ms and vehicle.dead_time_ms"
         )
     margins_with_errors = tuple(
-        (error, stability(tuned, error)) for error in errors_to_tolerate(tuned, aims)
+        (error, stability(tuned, error)) for error in tolerated_mismatches(tuned, aims)
     )
     return Proposal(untuned, tuned, design, before, after, margins_with_errors, disturbances, aims)

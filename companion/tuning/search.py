@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.control.hold_settings import attitude_delay, slewing_delay
 from companion.control.inner_loop import sensible_gain, with_gain
 from companion.tuning.expectation import Disturbances, expected_errors, loop_margins
-from companion.tuning.loop import ModelError, control_loop
+from companion.tuning.loop import ModelMismatch, control_loop
 from companion.tuning.margins import Margins, frequencies, margins
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
@@ -178,7 +178,7 @@ def _cost(
         3.0 * expected_error.commanded_rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0,
     )
     cost = log(expected_error.position) + _COST_OF_MISSED_AIM * shortfall
-    for error in errors_to_tolerate(candidate, aims):
+    for error in tolerated_mismatches(candidate, aims):
         if cost >= stop_at:
             break
         loop = control_loop(candidate, s, error)
@@ -188,11 +188,11 @@ def _cost(
     return cost
 
 
-def errors_to_tolerate(config: Config, aims: Aims) -> list[ModelError]:
+def tolerated_mismatches(config: Config, aims: Aims) -> list[ModelMismatch]:
     """Model errors with which margins must remain: `Aims.mismatch`, and the delay by slewing."""
-    errors = [ModelError(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
+    errors = [ModelMismatch(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
-    return [*errors, ModelError(delay=delay)] if delay > 0.0 else errors
+    return [*errors, ModelMismatch(delay=delay)] if delay > 0.0 else errors
 
 
 def _shortfall(actual: Margins, gain_db: float, phase_deg: float) -> float:

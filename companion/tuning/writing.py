@@ -10,7 +10,7 @@ from companion.control.inner_loop import LARGEST_GAIN_TIMES_DELAY, sensible_gain
 from companion.files import bounded_yaml
 from companion.tuning.expectation import Expectation
 from companion.tuning.flights import TrialResult
-from companion.tuning.loop import ModelError
+from companion.tuning.loop import ModelMismatch
 from companion.tuning.proposal import Proposal
 from companion.tuning.search import largest_gain
 
@@ -116,7 +116,7 @@ def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
     ]
 
 
-def _error_text(error: ModelError) -> str:
+def _error_text(error: ModelMismatch) -> str:
     if error.delay:
         return f"with {1e3 * error.delay:.0f} ms of added delay, as while the rate loop slews"
     percent = round(100.0 * abs(error.time_factor - 1.0))

@@ -112,7 +112,7 @@ class Inbox:
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._is_admitted(frame)]
-        if not any(map(self._peer_rule.is_peer_claim, admitted)):
+        if not any(map(self._peer_rule.makes_sender_peer, admitted)):
             self._stats.unclaimed += len(admitted)
             return False
         self._candidate = None
@@ -134,17 +134,17 @@ class Inbox:
         self._candidate = sender
         return True
 
-    def claim_lapsed(self) -> bool:
+    def may_replace_peer(self) -> bool:
         """Whether another sender may become the peer although the present one still sends."""
-        return self._peer_rule.claim_lapsed()
+        return self._peer_rule.may_replace_peer()
 
     def note_stranger(self, sender: str) -> None:
         """Tell the user that `sender` was ignored, because the endpoint names only other peers."""
         self._peer_rule.report_ignored(sender)
 
-    def tell_remarks(self) -> None:
+    def report_stamp_remarks(self) -> None:
         """Pass the remarks about the time stamps of signatures to the user."""
-        self._filter.tell_remarks()
+        self._filter.report_stamp_remarks()
 
     def _is_admitted(self, frame: Frame) -> bool:
         if self._filter.admits_source(frame):
@@ -154,7 +154,7 @@ class Inbox:
         return False
 
     def _accept(self, frame: Frame, received_ns: int) -> None:
-        if frame.message_id == HEARTBEAT and self._peer_rule.is_peer_claim(frame):
+        if frame.message_id == HEARTBEAT and self._peer_rule.makes_sender_peer(frame):
             self._peer_rule.renew()
         self._pass_on(frame, received_ns)
 

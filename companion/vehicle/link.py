@@ -90,7 +90,7 @@ class Link(VehicleClient, LinkCallbacks):
             raise
         if self._stamp_writer is not None:
             self._stamp_writer.start()
-        self._inbox.tell_remarks()
+        self._inbox.report_stamp_remarks()
         self._start(self._send_heartbeats())
         self._start(self.timesync.run())
         return self
@@ -106,7 +106,7 @@ class Link(VehicleClient, LinkCallbacks):
         await self._connection.close()
         if self._stamp_writer is not None:
             self._stamp_writer.stop()
-        self._inbox.tell_remarks()
+        self._inbox.report_stamp_remarks()
 
     async def wait_connected(self, timeout_s: float) -> Heartbeat:
         """Wait for the autopilot's first heartbeat; return the newest heartbeat.

@@ -57,7 +57,7 @@ class ArduPilot:
         flight_custom_version=tuple(b"12f6aa4e"),
     )
 
-    def slot_us(self, settings: VehicleSettings) -> int:
+    def slot_period_us(self, settings: VehicleSettings) -> int:
         """Return the period of the main loop, us."""
         return round(1e6 / settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ))
 
@@ -66,7 +66,7 @@ class ArduPilot:
         booting_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,
-            loop_us=self.slot_us(settings),
+            loop_us=self.slot_period_us(settings),
             booting_until_us=booting_s * 1e6,
         )
 

@@ -62,13 +62,13 @@ class FaultSchedule:
         return active_faults
 
     def update(
-        self, now_us: int, offboard_us: int | None
+        self, now_us: int, offboard_since_us: int | None
     ) -> tuple[list[VehicleFault], list[VehicleFault]]:
         """Advance to a time; return the vehicle faults that began and those that ended.
 
         Args:
             now_us: vehicle time.
-            offboard_us: vehicle time when setpoints first controlled the vehicle; None: not yet.
+            offboard_since_us: vehicle time when setpoints first had control; None: not yet.
         """
         if not self._entries:
             return [], []
@@ -76,7 +76,7 @@ class FaultSchedule:
         ended_faults: list[VehicleFault] = []
         any_changed = False
         for entry in self._entries:
-            is_active = self._is_active(entry, now_us, offboard_us)
+            is_active = self._is_active(entry, now_us, offboard_since_us)
             if is_active == entry.active:
                 continue
             any_changed = True
@@ -92,12 +92,12 @@ class FaultSchedule:
         return begun_faults, ended_faults
 
     @staticmethod
-    def _is_active(entry: _ScheduledFault, now_us: int, offboard_us: int | None) -> bool:
+    def _is_active(entry: _ScheduledFault, now_us: int, offboard_since_us: int | None) -> bool:
         fault = entry.fault
         if fault.after_offboard_s is not None:
-            if offboard_us is None:
+            if offboard_since_us is None:
                 return False
-            start_us = max(offboard_us + fault.after_offboard_s * 1e6, entry.injected_us)
+            start_us = max(offboard_since_us + fault.after_offboard_s * 1e6, entry.injected_us)
         elif fault.at_s is not None:
             start_us = max(fault.at_s * 1e6, entry.injected_us)
         else:
@@ -125,7 +125,7 @@ class FaultEffects:
         control: ModeControl,
         links: list[Link],
     ) -> None:
-        self.offboard_us: int | None = None
+        self.offboard_since_us: int | None = None
         """Vehicle time when setpoints first controlled the vehicle, us; None: not yet."""
         self.clock_frozen = False
         self._state = state
@@ -145,7 +145,7 @@ class FaultEffects:
         for fault in ended_faults:
             self._end(fault)
 
-    def take_slip(self) -> float:
+    def take_clock_slip(self) -> float:
         """Return the wall time lost to `SlipClock` faults since the last call, s."""
         slip_s, self._slip_s = self._slip_s, 0.0
         return slip_s

@@ -83,7 +83,7 @@ class Personality(Protocol):
     def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:
         """Return the ``mock:`` section, completed by the defaults of this autopilot."""
 
-    def slot_us(self, settings: VehicleSettings) -> int:
+    def slot_period_us(self, settings: VehicleSettings) -> int:
         """Return the period of the slots in which telemetry is sent without lockstep, us."""
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sitl_mock.autopilot.setpoints import PositionSetpoint
 from sitl_mock.autopilot.state import NAN_VECTOR
-from sitl_mock.physics.quaternion import Quaternion, Vector, along_heading, normalise
+from sitl_mock.physics.quaternion import Quaternion, Vector, heading_to_ned, normalise
 from sitl_mock.physics.rigid_body import GRAVITY
 
 _LARGEST_TILT = radians(80.0)
@@ -48,7 +48,7 @@ def setpoint_demand(
         yaw += setpoint.yaw_rate * dt
     velocity, acceleration = setpoint.velocity, setpoint.acceleration
     if setpoint.in_body_heading:
-        velocity, acceleration = along_heading(q, velocity), along_heading(q, acceleration)
+        velocity, acceleration = heading_to_ned(q, velocity), heading_to_ned(q, acceleration)
     return PositionDemand(setpoint.position, velocity, acceleration, yaw, *speed_limits)
 
 

@@ -16,7 +16,7 @@ import numba
 import numpy as np
 from numba.extending import intrinsic, register_jitable
 
-from sitl_mock.physics.multirotor_step import Conditions, Rings, empty_rings
+from sitl_mock.physics.multirotor_step import Conditions, DelayRings, empty_rings
 from sitl_mock.physics.navigation_error import TruthRow
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
@@ -137,7 +137,7 @@ def _advance(
 ) -> Outcome:
     state = advance(
         _load_law(law_memory),
-        Rings(before_shaping, before_rate_loop),
+        DelayRings(before_shaping, before_rate_loop),
         history,
         _load_state(state_memory),
         ActuatorCommand(armed, roll, pitch, yaw, thrust),

@@ -67,14 +67,14 @@ def ground_law(airframe: AirframeConfig, dt: float) -> GroundLaw:
     )
 
 
-def survives(law: GroundLaw, q: Quaternion, sink_speed: float) -> bool:
+def survives_touchdown(law: GroundLaw, q: Quaternion, sink_speed: float) -> bool:
     """Whether a touchdown at this attitude and sink speed (m/s) is not a crash."""
     _, x, y, _ = q
     is_upright = 1.0 - 2.0 * (x * x + y * y) >= law.crash_cosine
     return is_upright and sink_speed <= law.crash_speed
 
 
-def levelled(law: GroundLaw, q: Quaternion) -> Quaternion:
+def levelled_on_ground(law: GroundLaw, q: Quaternion) -> Quaternion:
     """Return the attitude on the ground after one step of levelling; the heading is kept."""
     w, x, y, z = q
     return normalise((w, x * law.levelling, y * law.levelling, z))

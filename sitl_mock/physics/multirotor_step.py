@@ -63,7 +63,7 @@ Actuation = tuple[Mix, FourFloats, AxisStates, ShapingState]
 shaping."""
 
 
-class Rings(NamedTuple):
+class DelayRings(NamedTuple):
     """Ring buffers that delay setpoints; without shaping only `before_rate_loop` is used."""
 
     before_shaping: Ring
@@ -112,9 +112,9 @@ def initial_actuation(law: MultirotorLaw, throttle: float) -> Actuation:
     return mixed, (thrust, thrust, thrust, thrust), ZERO_STATE, INACTIVE_SHAPING
 
 
-def empty_rings(law: MultirotorLaw) -> Rings:
+def empty_rings(law: MultirotorLaw) -> DelayRings:
     """Return ring buffers of zero setpoints, longer than the delays."""
-    return Rings([ZERO] * (1 + max(law.shaping.delays)), [ZERO] * (1 + max(law.rates.delays)))
+    return DelayRings([ZERO] * (1 + max(law.shaping.delays)), [ZERO] * (1 + max(law.rates.delays)))
 
 
 def at_rest(q: Quaternion) -> Kinematics:
@@ -125,7 +125,7 @@ def at_rest(q: Quaternion) -> Kinematics:
 
 def drive(
     law: MultirotorLaw,
-    rings: Rings,
+    rings: DelayRings,
     actuation: Actuation,
     body: Kinematics,
     step: int,
@@ -177,7 +177,7 @@ def drive(
 
 def _shape_setpoint(
     law: MultirotorLaw,
-    rings: Rings,
+    rings: DelayRings,
     state: ShapingState,
     q: Quaternion,
     step: int,

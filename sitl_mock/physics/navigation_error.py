@@ -74,7 +74,7 @@ def extrapolated_errors(errors: Errors, elapsed: float) -> Errors:
     )
 
 
-def pending_share(predictor_ms: float, state: FilterState, now: float) -> float:
+def pending_correction_share(predictor_ms: float, state: FilterState, now: float) -> float:
     """Return the share of the latest corrections that the output does not yet contain at ``now``.
 
     ``predictor_ms`` is the time constant with which the output follows a correction.
@@ -122,8 +122,8 @@ def propagated_vertical_errors(
 def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> ErrorVectors:
     """Return the error of the estimate at time ``now`` (s); ``truth`` is the true motion (pure)."""
     elapsed = now - state.fused_at
-    pending_part = pending_share(law.predictor_ms, state, now)
-    yaw_pending_part = pending_share(law.heading_predictor_ms, state, now)
+    pending_part = pending_correction_share(law.predictor_ms, state, now)
+    yaw_pending_part = pending_correction_share(law.heading_predictor_ms, state, now)
     position, velocity, acceleration = propagated_horizontal_errors(law, state, truth, elapsed)
     pending = state.horizontal.pending
     position += law.lead_time * complex(truth[0], truth[1]) - pending_part * pending[0]

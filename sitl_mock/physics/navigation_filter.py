@@ -15,7 +15,7 @@ from sitl_mock.physics.navigation_error import (
     ErrorState,
     FilterState,
     TruthRow,
-    pending_share,
+    pending_correction_share,
     propagated_horizontal_errors,
     propagated_vertical_errors,
 )
@@ -116,7 +116,7 @@ class NavigationFilter:
         vertical = self._corrected_state(errors, noise, noise, share * tilt_noise)
         noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
         yaw = self._next_yaw_noise() + noiseless_yaw
-        pending_yaw_part = pending_share(law.heading_predictor_ms, state, now)
+        pending_yaw_part = pending_correction_share(law.heading_predictor_ms, state, now)
         pending_yaw = pending_yaw_part * state.pending_yaw + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         down_error, sink_error = self._next_slow_errors(abs(acceleration), height_noise, elapsed)
@@ -140,7 +140,7 @@ class NavigationFilter:
         """Return the corrected state with pending corrections that keep the output as it was."""
         law, state, now = self.law, self.state, corrected.corrected_at
         since_last_fix, since_this_fix = now - state.fused_at, now - corrected.fused_at
-        pending_part = pending_share(law.predictor_ms, state, now)
+        pending_part = pending_correction_share(law.predictor_ms, state, now)
         horizontal = _with_pending(
             state.horizontal,
             corrected.horizontal,

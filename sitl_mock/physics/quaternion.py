@@ -57,7 +57,7 @@ def yaw(q: Quaternion) -> float:
     return atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def along_heading(q: Quaternion, vector: Vector) -> Vector:
+def heading_to_ned(q: Quaternion, vector: Vector) -> Vector:
     """Return a vector (forward, right, down), level along the yaw of ``q``, in world axes (NED).
 
     A NaN in one horizontal component makes both NaN; a NaN vertical component stays NaN.

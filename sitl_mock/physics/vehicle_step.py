@@ -6,13 +6,13 @@
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from sitl_mock.physics.environment import GroundLaw, levelled, survives
+from sitl_mock.physics.environment import GroundLaw, levelled_on_ground, survives_touchdown
 from sitl_mock.physics.multirotor_step import (
     Actuation,
     Conditions,
+    DelayRings,
     Kinematics,
     MultirotorLaw,
-    Rings,
     at_rest,
     does_not_rise,
     drive,
@@ -71,7 +71,7 @@ def truth_row(body: Kinematics, position: Vector) -> TruthRow:
 
 def advance(
     law: VehicleLaw,
-    rings: Rings,
+    rings: DelayRings,
     history: TruthHistory,
     state: VehicleState,
     command: ActuatorCommand,
@@ -125,14 +125,14 @@ def _move_or_rest(
     if crashed:
         return at_rest((w, x, y, z)), position, on_ground, crashed, touchdown_speed
     if on_ground and does_not_rise(multirotor, body, load):
-        body = at_rest(levelled(ground, (w, x, y, z)))
+        body = at_rest(levelled_on_ground(ground, (w, x, y, z)))
         return body, position, on_ground, crashed, touchdown_speed
     body, displacement = move(multirotor, body, load)
     north, east, down = position
     position = (north + displacement[0], east + displacement[1], down + displacement[2])
     _, _, sink_speed, w, x, y, z, _, _, _ = body[0]
     if position[2] >= 0.0 and sink_speed > 0.0:
-        crashed = not survives(ground, (w, x, y, z), sink_speed)
+        crashed = not survives_touchdown(ground, (w, x, y, z), sink_speed)
         body, position = at_rest((w, x, y, z)), (position[0], position[1], 0.0)
         return body, position, True, crashed, sink_speed
     return body, position, False, crashed, touchdown_speed

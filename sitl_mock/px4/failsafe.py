@@ -133,7 +133,7 @@ class Failsafe:
         if self._pilot_lost_us is None:
             self._pilot_lost_us = state.time_us
         if self._pilot_lost_us != _ACTED_ALREADY or state.mode in PILOTED_MODES:
-            self._actions.act_on_link(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
+            self._actions.act_on_link_loss(Cause.PILOT_LOST, "NAV_RCL_ACT", self._pilot_lost_us)
 
     def _watch_offboard(self, *, alive: bool) -> None:
         state = self._state
@@ -171,7 +171,7 @@ class Failsafe:
             self._announce(EventKind.GCS_LOST, "")
         loss_ignored = state.intended_mode is Mode.LAND or self._is_exempt("COM_DLL_EXCEPT")
         if state.armed and not loss_ignored and self._gcs_lost_us != _ACTED_ALREADY:
-            self._actions.act_on_link(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
+            self._actions.act_on_link_loss(Cause.GCS_LOST, "NAV_DLL_ACT", self._gcs_lost_us)
 
     def _watch_companion(self) -> None:
         if self._companion_heartbeat_us is None:

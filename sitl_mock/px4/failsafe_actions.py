@@ -154,15 +154,15 @@ class FailsafeActions:
             arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, 0)
             self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
 
-    def act_on_link(self, cause: Cause, parameter: str, lost_us: int) -> None:
+    def act_on_link_loss(self, cause: Cause, parameter: str, lost_at_us: int) -> None:
         """Execute the action that a parameter selects; before RTL or LAND, hold for COM_FAIL_ACT_T.
 
-        ``lost_us`` is the vehicle time of the loss.
+        ``lost_at_us`` is the vehicle time of the loss.
         """
         action = LINK_ACTIONS.get(int(self._parameters[parameter]))
         if action is None:
             return
-        delay_over = self._state.time_us - lost_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6
+        delay_over = self._state.time_us - lost_at_us >= self._parameters["COM_FAIL_ACT_T"] * 1e6
         if delay_over or action in (HOLD, DISARM, TERMINATE):
             self.act(cause, action)
         else:

@@ -97,7 +97,7 @@ class Px4:
         """Return the ``mock:`` section as it is: the general defaults are PX4's."""
         return section
 
-    def slot_us(self, settings: VehicleSettings) -> int:
+    def slot_period_us(self, settings: VehicleSettings) -> int:
         """Return the slot period at the configured inner loop rate, us."""
         return SLOT_US[settings.inner_loop_hz]
 

@@ -21,7 +21,7 @@ from companion.attitude.kinematics import (
     tilt_angle,
     tilt_products,
 )
-from companion.attitude.rotation import clamp, first_is_negative, limit_rates
+from companion.attitude.rotation import clamp, first_nonzero_is_negative, limit_rates
 from tests.attitude.independent import coefficients_of, headings_of, held, wrapped
 
 DT = 1e-5
@@ -133,7 +133,7 @@ def test_inverted_it_levels_as_fast_about_any_axis_and_the_same_for_both_signs(s
 def test_one_of_two_opposite_vectors_counts_as_negative():
     for v in product((-1.0, 0.0, 1.0), repeat=3):
         first = next((value for value in v if value != 0.0), 0.0)
-        assert first_is_negative(*v) is (first < 0.0)
+        assert first_nonzero_is_negative(*v) is (first < 0.0)
 
 
 @given(st.floats(-9.0, 9.0), st.floats(0.0, 5.0))

@@ -140,7 +140,7 @@ def test_a_page_that_cannot_be_written_is_wrong_usage(begun, tmp_path, capsys):
 
 def test_results_that_cannot_be_read_are_named(begun, capsys):
     campaign, out = begun
-    path = store.unit_path(out, 1)
+    path = store.unit_file(out, 1)
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
     assert main(["campaign", "report", str(out)]) == 2
@@ -157,7 +157,7 @@ def test_results_that_cannot_be_read_are_named(begun, capsys):
     with pytest.raises(ConfigError, match="are not of one campaign"):
         store.read(out)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)
-    store.unit_path(out, 0).unlink()
+    store.unit_file(out, 0).unlink()
     with pytest.raises(ConfigError, match="are not of one campaign"):
         Results.read(out)
     path.unlink()

@@ -10,7 +10,7 @@ from distributed import Client, LocalCluster
 from companion.campaign import flight, folder, outcomes, running, store, unit
 from companion.campaign.case import Fault
 from companion.campaign.cluster import ClusterError
-from companion.campaign.unit import size_of_units, unit_ranges
+from companion.campaign.unit import cases_per_unit, unit_ranges
 from companion.campaign.versions import VersionError, difference, require_equal, versions
 from companion.cli import campaign as commands
 from companion.cli.main import main
@@ -158,7 +158,7 @@ def test_a_campaign_is_run_resumed_and_one_case_is_flown_again(quick, threads, c
     assert described.cases == 3
     assert described.versions == versions()
     whole = {path.name: path.read_bytes() for path in (out / "results").glob("*.parquet")}
-    lost = store.unit_path(out, 1)
+    lost = store.unit_file(out, 1)
     lost.unlink()
     (out / "results" / ".unit-00001.parquet.99").write_bytes(b"torn")
     written = []
@@ -235,10 +235,10 @@ def quick_row(case):
 
 
 def test_units_take_seconds_and_leave_work_for_all():
-    assert size_of_units(500, 1.25, 2) == 2
-    assert size_of_units(500, 60.0, 2) == 1
-    assert size_of_units(20, 0.1, 2) == 3
-    assert size_of_units(20, 0.1, 0) == size_of_units(20, 0.1, 1) == 5
+    assert cases_per_unit(500, 1.25, 2) == 2
+    assert cases_per_unit(500, 60.0, 2) == 1
+    assert cases_per_unit(20, 0.1, 2) == 3
+    assert cases_per_unit(20, 0.1, 0) == cases_per_unit(20, 0.1, 1) == 5
     assert [list(each) for each in unit_ranges(5, 2)] == [[0, 1], [2, 3], [4]]
 
 

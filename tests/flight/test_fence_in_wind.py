@@ -8,7 +8,7 @@ import pytest
 from companion import testing
 from companion.api import FlightEnded
 from companion.config import Config
-from companion.flight.hold_inside import upwind_is_inside
+from companion.flight.hold_inside import only_upwind_is_inside
 from companion.safety.table import fence_of
 from tests.flight.fly import QuickVehicle, quick_flight
 
@@ -60,10 +60,10 @@ def test_the_landing_does_not_drift_out_of_the_fence(autopilot):
 )
 def test_a_hold_ends_upwind_only_if_that_keeps_the_landing_inside(stop, wind, moves):
     fence = replace(fence_of(Config()), radius=RADIUS)
-    assert upwind_is_inside(fence, None, stop, wind) is moves
+    assert only_upwind_is_inside(fence, None, stop, wind) is moves
 
 
 def test_between_two_walls_that_both_are_near_the_hold_stays_where_it_is():
     narrow = ((-50.0, -0.5), (-50.0, 0.5), (50.0, 0.5), (50.0, -0.5))
     fence = replace(fence_of(Config()), polygon=narrow)
-    assert not upwind_is_inside(fence, None, (0.0, 0.0, -2.0), (0.0, 3.0))
+    assert not only_upwind_is_inside(fence, None, (0.0, 0.0, -2.0), (0.0, 3.0))

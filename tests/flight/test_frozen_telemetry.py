@@ -93,7 +93,7 @@ def looks(times, attitude=lambda t: 1.0, rate=0.0, place=lambda t: t, speed=lamb
         moving[axis] = place(t), speed(t)
         position_ned, velocity_ned = zip(*moving, strict=True)
         position = SimpleNamespace(received=t, position_ned=position_ned, velocity_ned=velocity_ned)
-        found = frozen.look(t, sample, BodyRates(rate, 0.0, 0.0), position)
+        found = frozen.find_frozen(t, sample, BodyRates(rate, 0.0, 0.0), position)
         if found:
             return found
     return None

@@ -77,7 +77,7 @@ def test_before_arming_it_voids_the_checks_which_can_be_made_anew(change):
 @pytest.mark.parametrize("change", [another_peer, a_restart, another_id])
 def test_once_armed_it_ends_the_flight(change):
     link, vehicle = checked()
-    vehicle.commit()
+    vehicle.note_arming()
     change(link)
     with pytest.raises(FlightEnded, match=CHANGES[change]) as ended:
         vehicle.require()
@@ -87,7 +87,7 @@ def test_once_armed_it_ends_the_flight(change):
 
 def test_once_armed_silence_is_the_watchs_matter():
     link, vehicle = checked()
-    vehicle.commit()
+    vehicle.note_arming()
     a_silence(link)
     vehicle.require()
     assert vehicle.is_same_vehicle

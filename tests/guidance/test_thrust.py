@@ -13,7 +13,7 @@ from companion.guidance import GRAVITY
 from companion.guidance.thrust import (
     TILT_THRUST_SHARE,
     acceleration_within_thrust,
-    cos_tilt_ahead,
+    predicted_cos_tilt,
     specific_thrust,
 )
 
@@ -45,22 +45,22 @@ def test_the_tilt_ahead_is_that_of_a_vehicle_which_rotates_on(start, body_rates)
     now = Rotation.from_rotvec(start)
     ahead = 1e-4
     later = now * Rotation.from_rotvec(ahead * np.array(body_rates))
-    found = cos_tilt_ahead(turned(now), BodyRates(*body_rates), ahead)
+    found = predicted_cos_tilt(turned(now), BodyRates(*body_rates), ahead)
     assert found == pytest.approx(cosine(later), abs=1e-6)
 
 
 def test_the_tilt_ahead_stays_a_cosine():
     q = turned(Rotation.from_rotvec((0.5, 0.0, 0.0)))
-    assert cos_tilt_ahead(q, BodyRates(-100.0, 0.0, 0.0), 0.1) == 1.0
+    assert predicted_cos_tilt(q, BodyRates(-100.0, 0.0, 0.0), 0.1) == 1.0
     fallen = turned(Rotation.from_rotvec((1.1, 0.0, 0.0)))
-    assert cos_tilt_ahead(fallen, BodyRates(100.0, 0.0, 0.0), 0.1) == -1.0
+    assert predicted_cos_tilt(fallen, BodyRates(100.0, 0.0, 0.0), 0.1) == -1.0
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 20.0), st.floats(0.0, 1.0))
 def test_a_quick_rotation_never_reduces_the_thrust_of_a_vehicle_that_tilts(tilt, rate, lag):
     """With a long lag it seemed to fall over, and was let fall."""
     q = turned(Rotation.from_rotvec((0.0, -tilt, 0.0)))
-    thrust = specific_thrust(0.0, cos_tilt_ahead(q, BodyRates(0.0, -rate, 0.0), lag))
+    thrust = specific_thrust(0.0, predicted_cos_tilt(q, BodyRates(0.0, -rate, 0.0), lag))
     assert thrust >= specific_thrust(0.0, math.cos(tilt)) - 1e-9
     assert thrust <= 2.0 * GRAVITY
 
@@ -74,7 +74,7 @@ def lift_lost_while_tilting(known_lag):
         tilt = Rotation.from_rotvec((0.7 * math.cos(phase), 0.0, 0.0))
         roll_rate = -0.7 * 3.0 * math.pi * math.sin(phase)
         asked = specific_thrust(
-            0.0, cos_tilt_ahead(turned(tilt), BodyRates(roll_rate, 0.0, 0.0), known_lag)
+            0.0, predicted_cos_tilt(turned(tilt), BodyRates(roll_rate, 0.0, 0.0), known_lag)
         )
         thrust = asked if thrust is None else thrust + step / lag * (asked - thrust)
         if k > 300:

@@ -126,9 +126,9 @@ def test_a_claim_lapses_on_the_ground_and_not_in_control():
         (107.1, 105.0, True),
     ):
         at.update(now=now, setpoint=setpoint)
-        assert rule.claim_lapsed() is lapsed
+        assert rule.may_replace_peer() is lapsed
     rule.renew()
-    assert not rule.claim_lapsed()
+    assert not rule.may_replace_peer()
 
 
 def test_a_peer_whose_claim_lapsed_gives_way_although_it_still_sends(run):
@@ -137,7 +137,7 @@ def test_a_peer_whose_claim_lapsed_gives_way_although_it_still_sends(run):
             second = await FakeVehicle(link.local_address).open_udp()
             transport = link._outbox.transport
             for lapsed in (False, True):
-                link._inbox.claim_lapsed = lambda lapsed=lapsed: lapsed
+                link._inbox.may_replace_peer = lambda lapsed=lapsed: lapsed
                 frames = link.stats.frames
                 first.send(attitude(4))
                 await until(lambda frames=frames: link.stats.frames > frames)

@@ -69,9 +69,9 @@ def test_direction_and_seed():
 def test_late_datagrams_still_come_out_when_the_fault_is_over():
     pipe = DatagramPipe("to_companion", 1)
     assert pipe.push([b"a"], (fault("delay", delay_ms=50),), 0) == []
-    assert not pipe.is_clear(())
+    assert not pipe.is_transparent(())
     assert pipe.push([b"b"], (), 60_000) == [b"a", b"b"]
-    assert pipe.is_clear(())
+    assert pipe.is_transparent(())
 
 
 def test_schedule_by_time_and_duration():
@@ -256,6 +256,6 @@ def test_a_clock_that_slips_loses_its_time_once():
         fault("slip_clock", slip_ms=14.0, duration_s=1.0), rig.simulation.time_us
     )
     rig.run(0.1)
-    assert rig.simulation.effects.take_slip() == pytest.approx(0.014)
+    assert rig.simulation.effects.take_clock_slip() == pytest.approx(0.014)
     rig.run(2.0)
-    assert rig.simulation.effects.take_slip() == 0.0
+    assert rig.simulation.effects.take_clock_slip() == 0.0

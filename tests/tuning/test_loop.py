@@ -13,7 +13,7 @@ from companion.control.inner_loop import planner, tilt_lag_and_dead_time
 from companion.control.outer_loop import make_guidance, motion_estimate
 from companion.guidance import GRAVITY, Reference
 from companion.tuning import loop as loop_module
-from companion.tuning.loop import ModelError, control_loop
+from companion.tuning.loop import ModelMismatch, control_loop
 from companion.tuning.margins import frequencies, margins
 from companion.vehicle.records import AttitudeSample, LocalPosition
 from tests.control.one_axis import DT, Airframe, hold
@@ -116,6 +116,6 @@ def test_beyond_the_margins_the_model_is_unstable(name):
     found = margins(s, control_loop(config, s).gain_at_rate)
     for share, stable in ((0.95, True), (1.05, False)):
         gain = 10 ** (share * found.gain_db / 20.0)
-        errors = ModelError(gain=gain), ModelError(delay=share * found.delay)
+        errors = ModelMismatch(gain=gain), ModelMismatch(delay=share * found.delay)
         for error in errors:
             assert margins(s, control_loop(config, s, error).gain_at_rate).stable == stable

@@ -9,7 +9,7 @@ import yaml
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
-from companion.tuning import ModelError, propose, stability
+from companion.tuning import ModelMismatch, propose, stability
 from companion.tuning.flights import TrialResult
 from companion.tuning.margins import Margins
 from companion.tuning.search import largest_gain
@@ -46,7 +46,7 @@ def test_it_keeps_the_margins_and_expects_a_smaller_error_where_they_were_kept(n
         assert proposal.after.errors.position < proposal.before.errors.position
     assert proposal.design.gain <= 1.01 * largest_gain(VEHICLES[name])
     for slower in (0.7, 1.3):
-        left = stability(proposal.tuned, ModelError(time_factor=slower))
+        left = stability(proposal.tuned, ModelMismatch(time_factor=slower))
         assert left.stable
         assert left.gain_db >= 2.5
     written = changed(VEHICLES[name], proposal.changes, "test")
@@ -59,7 +59,7 @@ def test_the_margins_are_those_of_a_rate_loop_of_second_order():
     proposal = propose(changed(VEHICLES["px4"], {"vehicle": nearer}, "test"))
     assert proposal.after.margins.gain_db >= 6.0
     assert proposal.after.margins.phase_deg >= 30.0
-    assert stability(proposal.tuned, ModelError(time_factor=1.3)).stable
+    assert stability(proposal.tuned, ModelMismatch(time_factor=1.3)).stable
     text = proposal_text(proposal, {"vehicle": nearer}, {}, "a flight")
     assert f"{largest_gain(proposal.tuned):.2f}" in text
     assert yaml.safe_load(text)["vehicle"] == nearer
@@ -131,9 +131,9 @@ def test_the_reason_of_a_gain_names_what_limits_it():
 
 
 def test_each_error_of_the_model_has_its_words():
-    assert _error_text(ModelError(delay=0.02)).startswith("with 20 ms of added delay, as while ")
-    assert _error_text(ModelError(time_factor=1.3)) == "with lag and dead time 30 % larger"
-    assert _error_text(ModelError(time_factor=0.7)) == "with lag and dead time 30 % smaller"
+    assert _error_text(ModelMismatch(delay=0.02)).startswith("with 20 ms of added delay, as while ")
+    assert _error_text(ModelMismatch(time_factor=1.3)) == "with lag and dead time 30 % larger"
+    assert _error_text(ModelMismatch(time_factor=0.7)) == "with lag and dead time 30 % smaller"
 
 
 FLOWN = TrialResult("ok", true=0.134, reported=0.1, speed=5.0)

@@ -37,7 +37,7 @@ class Receiver(Protocol):
         frame that is accepted then makes `sender` the peer.
         """
 
-    def claim_lapsed(self) -> bool:
+    def may_replace_peer(self) -> bool:
         """Whether the peer's claim is so old that another sender may become the peer."""
 
     def note_stranger(self, sender: str) -> None:

@@ -124,7 +124,7 @@ class TcpTransport:
 
     def _may_be_replaced(self) -> bool:
         if self._claimed:
-            return self._receiver.claim_lapsed()
+            return self._receiver.may_replace_peer()
         return self._loop.time() - self._connected_at > CLAIM_DURATION_S
 
     def take_data(self, connection: asyncio.Transport, data: bytes) -> None:

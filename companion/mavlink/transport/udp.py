@@ -151,7 +151,7 @@ class UdpTransport:
         if not self._named_peers.admits(address):
             self._receiver.note_stranger(sender)
             return False
-        if address == self._peer and not self._receiver.claim_lapsed():
+        if address == self._peer and not self._receiver.may_replace_peer():
             accepted = self._receiver.receive(data, received_ns)  # the peer was only silent
         else:
             accepted = self._receiver.claim(data, received_ns, sender)
@@ -162,7 +162,7 @@ class UdpTransport:
         silent, self._heard_in_period = not self._heard_in_period, False
         if not self._connected or isinstance(self._endpoint, UdpOut):
             return
-        if silent or self._receiver.claim_lapsed():
+        if silent or self._receiver.may_replace_peer():
             # Python cannot disconnect a UDP socket, so a new one is bound.
             self._release()
             try:

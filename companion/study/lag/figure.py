@@ -18,7 +18,7 @@ from companion.study.lag.flights import (
     SHOWN_RATE_HZ,
     Comparison,
     CompleteLoopFlights,
-    DelayError,
+    DelayMismatch,
     Example,
     Grid,
     GridCell,
@@ -171,11 +171,13 @@ def _draw_ratios(axes: Axes, grid: Grid, rate_hz: float) -> None:
     )
 
 
-def _draw_errors(axes: Axes, scores: dict[DelayError, Score]) -> None:
+def _draw_errors(axes: Axes, scores: dict[DelayMismatch, Score]) -> None:
     """Draw the cross-track error over the error of the dead time, a line for each lag error."""
     errors = [100.0 * error for error in FINE_ERRORS]
     for lag, style in _LAG_ERROR_STYLES.items():
-        cross_tracks = [scores[DelayError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS]
+        cross_tracks = [
+            scores[DelayMismatch(lag, dead_time)].cross_track for dead_time in FINE_ERRORS
+        ]
         line = {"color": MODEL_FOLLOWING_METHOD.colour, "linewidth": 1.3, **style}
         axes.plot(errors, cross_tracks, label=f"lag {in_percent(lag)}", **line)
     axes.set(

@@ -5,7 +5,7 @@ from companion.study.lag.flights import (
     NO_ERROR,
     SHOWN_RATE_HZ,
     CompleteLoopFlights,
-    DelayError,
+    DelayMismatch,
     Example,
     Grid,
     GridCell,
@@ -123,7 +123,7 @@ def _wrong_delays_finding(grid: Grid) -> Finding:
 
 
 def _long_or_short_delays_finding(grid: Grid, complete: CompleteLoopFlights) -> Finding:
-    short, long = DelayError(-0.5, -0.5), DelayError(0.5, 0.5)
+    short, long = DelayMismatch(-0.5, -0.5), DelayMismatch(0.5, 0.5)
     pairs = [
         (comparison.model_following_scores[long], comparison.model_following_scores[short])
         for cell, comparison in grid.items()

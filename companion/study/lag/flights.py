@@ -31,7 +31,7 @@ SHOWN_RATE_HZ = 250.0
 """Sample rate of the flights with the complete inner loop that the figure shows, Hz."""
 
 
-class DelayError(NamedTuple):
+class DelayMismatch(NamedTuple):
     """Relative errors of the assumed lag and dead time; 0.5: 50 % longer than the true value."""
 
     lag: float
@@ -41,7 +41,7 @@ class DelayError(NamedTuple):
         return f"lag {in_percent(self.lag)} and dead time {in_percent(self.dead_time)}"
 
 
-NO_ERROR = DelayError(0.0, 0.0)
+NO_ERROR = DelayMismatch(0.0, 0.0)
 GRID_ERRORS = (-0.5, 0.0, 0.5)
 FINE_ERRORS = (-0.5, -0.3, 0.0, 0.3, 0.5)
 """Relative errors of lag and dead time, in the example and with the complete inner loop."""
@@ -55,7 +55,7 @@ class RateLoopDelays(NamedTuple):
     yaw_lag: float
     yaw_dead_time: float
 
-    def with_error(self, error: DelayError) -> "RateLoopDelays":
+    def with_error(self, error: DelayMismatch) -> "RateLoopDelays":
         """These lags and dead times, wrong by the relative errors `error`."""
         lag, dead_time = 1.0 + error.lag, 1.0 + error.dead_time
         return RateLoopDelays(
@@ -89,7 +89,7 @@ class Comparison(NamedTuple):
 
     other_scores: dict[Method, Score]
     """Score of each method of `LAW_METHODS`."""
-    model_following_scores: dict[DelayError, Score]
+    model_following_scores: dict[DelayMismatch, Score]
     """Score of model-following for each error of its assumed lag and dead time, `NO_ERROR`
     included."""
 
@@ -104,7 +104,7 @@ class Comparison(NamedTuple):
         return min(self.other_scores, key=lambda method: self.other_scores[method].cross_track)
 
     @property
-    def worst_error(self) -> DelayError:
+    def worst_error(self) -> DelayMismatch:
         """The error of lag and dead time with the largest cross-track error of model-following."""
         errors = [error for error in self.model_following_scores if error != NO_ERROR]
         return max(errors, key=lambda error: self.model_following_scores[error].cross_track)
@@ -146,7 +146,7 @@ class Example(NamedTuple):
     """Responses of every method by sample rate (Hz), without limits."""
     rate_limited_responses: dict[float, Response]
     """Responses of model-following with the limit `MAX_TILT_RATE`, by sample rate (Hz)."""
-    model_following_scores: dict[DelayError, Score]
+    model_following_scores: dict[DelayMismatch, Score]
     """Score of model-following for each error of its assumed lag and dead time, at the sample rate
     `EXAMPLE_ERRORS_HZ`."""
 
@@ -210,9 +210,9 @@ def fly_complete(tick: Tick) -> CompleteLoopFlights:
     return CompleteLoopFlights(by_rate, responses[SHOWN_RATE_HZ])
 
 
-def _error_pairs(errors: tuple[float, ...]) -> list[DelayError]:
+def _error_pairs(errors: tuple[float, ...]) -> list[DelayMismatch]:
     """Every pair of an error of the lag and an error of the dead time."""
-    return [DelayError(*pair) for pair in product(errors, repeat=2)]
+    return [DelayMismatch(*pair) for pair in product(errors, repeat=2)]
 
 
 def _delays_of(loop: LagLoop) -> RateLoopDelays:
@@ -222,8 +222,8 @@ def _delays_of(loop: LagLoop) -> RateLoopDelays:
 
 
 def _scores_with_errors(
-    errors: list[DelayError], delays: RateLoopDelays, loop: Loop, rate_hz: float
-) -> dict[DelayError, Score]:
+    errors: list[DelayMismatch], delays: RateLoopDelays, loop: Loop, rate_hz: float
+) -> dict[DelayMismatch, Score]:
     return {
         error: score(_fly(MODEL_FOLLOWING_METHOD, delays.with_error(error), loop, rate_hz))
         for error in errors

@@ -16,7 +16,7 @@ from companion.study.lag.flights import (
     RATES_HZ,
     SHOWN_RATE_HZ,
     CompleteLoopFlights,
-    DelayError,
+    DelayMismatch,
     Example,
     Grid,
     GridCell,
@@ -127,7 +127,7 @@ def _example_table(example: Example) -> Table:
     )
 
 
-def _errors_table(name: str, caption: str, scores: dict[DelayError, Score]) -> Table:
+def _errors_table(name: str, caption: str, scores: dict[DelayMismatch, Score]) -> Table:
     """Cross-track error by the error of the lag (rows) and of the dead time (columns)."""
     return Table(
         name,
@@ -136,7 +136,7 @@ def _errors_table(name: str, caption: str, scores: dict[DelayError, Score]) -> T
         tuple(
             (
                 in_percent(lag),
-                *(scores[DelayError(lag, dead_time)].cross_track for dead_time in FINE_ERRORS),
+                *(scores[DelayMismatch(lag, dead_time)].cross_track for dead_time in FINE_ERRORS),
             )
             for lag in FINE_ERRORS
         ),
