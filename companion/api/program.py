@@ -163,7 +163,7 @@ class ProgramPlan:
 def unless_disarmed(
     phases: Callable[[], Sequence[Phase]],
 ) -> Callable[[FlightContext], Sequence[Phase]]:
-    """The phases for a vehicle that is not disarmed; for a disarmed one none: its mode stays."""
+    """The given phases, but none for a disarmed vehicle, whose mode then stays."""
     return lambda context: () if context.link.state.armed is False else phases()
 
 
@@ -173,7 +173,7 @@ def flight_ended(result: str) -> FlightEnded:
 
 
 def failure_words(name: str, error: BaseException) -> str:
-    """Says that what is called `name` was cancelled, or which error it raised."""
+    """Say that the program or task `name` was cancelled, or which error it raised."""
     if isinstance(error, asyncio.CancelledError):
         return f"{name} was cancelled"
     return f"{name} raised {error!r}"

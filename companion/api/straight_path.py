@@ -27,7 +27,7 @@ def straight_path(
     Args:
         config: its limits bound the usual speed.
         to: the end, from the beginning, m NED.
-        heading: rad; None: the line tells none.
+        heading: rad; None: the vehicle keeps its heading.
         speed: largest speed, m/s; None: the usual one.
         acceleration: largest acceleration, m/s².
         jerk: largest jerk, m/s³.

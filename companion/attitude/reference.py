@@ -155,12 +155,12 @@ class Lag:
     def after(
         self, rate: float, slope: float, command: float, dt: float
     ) -> tuple[float, float, float]:
-        """The integral of r over `dt`, and r and ṙ at the end.
+        """One step with a constant command; return the integral of r over it, and r and ṙ after it.
 
         Args:
             rate: r at the start, in any unit.
             slope: ṙ at the start, per second; has no effect in first order.
-            command: constant input during `dt`, in the unit of `rate`.
+            command: the command, in the unit of `rate`.
             dt: length of the step, s.
         """
         if self._model is None:

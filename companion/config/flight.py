@@ -89,7 +89,7 @@ class StepsConfig(Section):
 
 
 class CornersConfig(Section):
-    """Maneuver `corners`: acceleration steps that never pass level, to compare planners."""
+    """Maneuver `corners`: acceleration steps round a rectangle, to compare planners."""
 
     north_coefficient: Annotated[float, Field(gt=0.0, le=0.8)] = 0.35
     """Magnitude of each corner's north coefficient: acceleration per specific thrust. The sine of

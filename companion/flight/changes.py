@@ -65,8 +65,8 @@ class Changes:
             contains it.
         note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted_config` after each change.
-        on_drag: called with what is known of the vehicle's drag, once the vehicle is identified;
-            some checks of a change need it.
+        on_drag: called with the known drag of the vehicle, once its hardware id was read; some
+            checks of a change need it.
 
     Args:
         start_config: the configuration before the first change.

@@ -34,7 +34,7 @@ def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 
 def opening_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """As `ground_phases`, but a vehicle that flies is not checked yet; `handover_phases` do it."""
+    """As `ground_phases`, but a vehicle in the air is checked later, by `handover_phases`."""
     connect, checks = ground_phases(config)
     return connect, replace(checks, work=takeover.check_unless_flying)
 

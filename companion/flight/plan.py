@@ -37,7 +37,7 @@ class Plan(Protocol):
 
 
 class ConfiguredPlan:
-    """The plan of `companion fly`: through `flight.maneuvers`, from the ground or from the pilot.
+    """The plan of `companion fly`: take off, or take over from the pilot; fly the maneuvers; end.
 
     Args:
         config: configuration of the flight.

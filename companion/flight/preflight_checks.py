@@ -127,7 +127,7 @@ class PreflightChecks:
         return bool(lowered)
 
     def on_parameter(self, name: str, value: float) -> None:
-        """Warn if a station has changed a checked parameter, of an armed vehicle, to an unsafe one.
+        """Warn if a station sets a checked parameter of the armed vehicle to an unsafe value.
 
         The flight goes on: to end it would need the failsafes that the change may have worsened.
         """

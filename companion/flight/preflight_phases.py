@@ -102,7 +102,7 @@ async def arm(context: FlightContext) -> None:
 
 
 async def undo_arming(context: FlightContext) -> None:
-    """Disarm if we armed or commanded the take-off; else a vehicle that is armed is left alone.
+    """Disarm if we armed the vehicle or commanded the take-off; otherwise leave it as it is.
 
     After our take-off command, a vehicle that the pilot armed is disarmed, too: it may still climb.
     """

@@ -158,7 +158,9 @@ class BrakingUpwind(NamedTuple):
 
 
 def drift(wind: NorthEast) -> NorthEast:
-    """How far an autopilot that forgets the lean drifts when it takes over, m north and east.
+    """How far the vehicle drifts downwind after the autopilot takes over, m north and east.
+
+    Its modes begin level, without the tilt that balances the wind (`Autopilot.forgets_lean`).
 
     Args:
         wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
@@ -167,7 +169,7 @@ def drift(wind: NorthEast) -> NorthEast:
 
 
 def brake_upwind(now: float, braking: Braking, wind: NorthEast) -> BrakingUpwind | Braking:
-    """The same braking, with a move that begins now and that the drift will take back.
+    """The same braking, and from now on a move upwind by the `drift` to expect.
 
     Args:
         now: event-loop time, s.

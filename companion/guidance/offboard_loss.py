@@ -81,7 +81,7 @@ class Reach(NamedTuple):
 
     @property
     def largest_distance(self) -> float:
-        """The largest horizontal distance of the stop, m."""
+        """Largest horizontal distance from where the setpoints ended to the stop, m."""
         return hypot(*self.place) + self.spread
 
 

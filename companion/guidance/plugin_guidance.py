@@ -18,7 +18,7 @@ class PluginGuidance:
 
     @property
     def acts_after(self) -> float:
-        """See `Guidance.acts_after`; raises as `command`."""
+        """Delay until feedback takes effect, s; see `Guidance.acts_after`. Raises as `command`."""
         with naming_user_code("guidance", self.guidance):
             return float(self.guidance.acts_after)
 

@@ -35,7 +35,7 @@ class Source(Protocol):
         ...
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Start at `now` from `pose`: where the vehicle holds, or where it would stop."""
+        """Start at `now` from `pose`, which the vehicle holds or at which it is about to stop."""
         ...
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:

@@ -75,7 +75,7 @@ class ThrustFilter:
 
     @property
     def gain(self) -> float:
-        """The specific thrust at full thrust, m/s², within the limit of learning."""
+        """The specific thrust at full thrust, m/s²: `measured_gain`, clamped by `limit`."""
         return min(max(self.measured_gain, self._bounds[0]), self._bounds[1])
 
     def learn(

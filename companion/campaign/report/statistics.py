@@ -71,9 +71,9 @@ class Group(NamedTuple):
 def levels(column: Column) -> list[Group]:
     """The cases grouped by the levels of a factor, which are its values or ranges of them.
 
-    Up to `_MOST_LEVELS` different values are a level each. More numbers are divided into
-    `_RANGE_COUNT` ranges with about equally many cases, with null as a level of its own. Of more
-    texts, the first `_MOST_LEVELS` − 1 are a level each and the others one level together.
+    With at most `_MOST_LEVELS` different values, each value is a level. Otherwise numbers are
+    divided into `_RANGE_COUNT` ranges with about equally many cases, and null is a level of its
+    own. Of texts, the first `_MOST_LEVELS` − 1 are levels, and all others form the last level.
     """
     distinct = sorted({_sort_key(value) for value in column})
     if column.dtype != float or len(distinct) <= _MOST_LEVELS:

@@ -51,7 +51,7 @@ def proposed(settings: Settings) -> Model:
 
 
 def euler(settings: Settings) -> Model:
-    """Equation 37: state (position, velocity, Euler angles Z-Y-X); control (body rates, thrust).
+    """The paper's equation 37: position, velocity, Euler angles; control: body rates and thrust.
 
     The rates of the angles are M(φ, θ)⁻¹·ω, with the matrix M of section 4.2.
     """
@@ -87,7 +87,7 @@ def euler(settings: Settings) -> Model:
 
 
 def euler_reduced(settings: Settings) -> Model:
-    """Equation 37 without its matrix and with constant yaw, for a fair comparison.
+    """The paper's equation 37 without its matrix and with constant yaw, for a fair comparison.
 
     The controls are φ̇, θ̇ and the specific thrust; ω = M·(φ̇, θ̇, ψ̇) can be computed afterwards.
     """

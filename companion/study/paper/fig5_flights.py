@@ -50,7 +50,7 @@ class LoopFlights(NamedTuple):
         return second_order_path(step, self.fits[method], step.time)
 
     def deviation_from_second_order(self, method: Method) -> float:
-        """Largest deviation of a method from its fitted model, at the heading of the fit."""
+        """Largest distance of a method's coefficients from its model, at the heading of the fit."""
         model = self.fitted_path(method)
         return float(largest_deviation(self.responses[method], model)[self.worst_heading(method)])
 
