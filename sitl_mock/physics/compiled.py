@@ -19,12 +19,12 @@ from numba.extending import intrinsic, register_jitable
 from sitl_mock.physics.multirotor_step import Conditions, DelayRings, empty_rings
 from sitl_mock.physics.navigation_error import TruthRow
 from sitl_mock.physics.quaternion import Vector
-from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
+from sitl_mock.physics.sensors import Estimate, SensorConstants, SensorState, estimate, white_noise
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
     Outcome,
-    VehicleLaw,
+    VehicleConstants,
     VehicleState,
     advance,
     outcome,
@@ -101,15 +101,17 @@ def _load_and_store(numba_type: Any) -> tuple[Any, Any]:
 
 
 _EXAMPLE = Vehicle(seed=0)  # its attributes have the types to compile for
-_EXAMPLE_SENSORS = _EXAMPLE.estimator.law, _EXAMPLE.estimator.state
-_load_law, _store_law = _load_and_store(numba.typeof(_EXAMPLE.plant.law))
+_EXAMPLE_SENSORS = _EXAMPLE.estimator.constants, _EXAMPLE.estimator.state
+_load_law, _store_law = _load_and_store(numba.typeof(_EXAMPLE.plant.constants))
 _load_state, _store_state = _load_and_store(numba.typeof(_EXAMPLE.plant.state))
 _load_sensors, _store_sensors = _load_and_store(numba.typeof(_EXAMPLE_SENSORS))
 
 
 @_compiled
-def _store_start(law_memory: Any, law: VehicleLaw, state_memory: Any, state: VehicleState) -> None:
-    _store_law(law_memory, law)
+def _store_start(
+    law_memory: Any, constants: VehicleConstants, state_memory: Any, state: VehicleState
+) -> None:
+    _store_law(law_memory, constants)
     _store_state(state_memory, state)
 
 
@@ -149,14 +151,14 @@ def _advance(
 
 
 @_compiled
-def _write_sensors(memory: Any, sensors: tuple[SensorLaw, SensorState]) -> None:
+def _write_sensors(memory: Any, sensors: tuple[SensorConstants, SensorState]) -> None:
     _store_sensors(memory, sensors)
 
 
 @_compiled
 def _estimate(memory: Any, history: Any, steps: int, time: float, noise: Any) -> Any:
-    law, state = _load_sensors(memory)
-    return estimate(law, state, history, steps, time, noise)
+    constants, state = _load_sensors(memory)
+    return estimate(constants, state, history, steps, time, noise)
 
 
 _white_noise = _compiled(white_noise)
@@ -165,11 +167,17 @@ _white_noise = _compiled(white_noise)
 class CompiledPlant:
     """A vehicle whose steps and estimates are compiled; `Plant` explains the arguments."""
 
-    def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None:
-        self.law, self._law_memory, self._state_memory = law, _memory_for(law), _memory_for(state)
-        _store_start(self._law_memory, law, self._state_memory, state)
+    def __init__(
+        self, constants: VehicleConstants, state: VehicleState, history_length: int
+    ) -> None:
+        self.constants, self._law_memory, self._state_memory = (
+            constants,
+            _memory_for(constants),
+            _memory_for(state),
+        )
+        _store_start(self._law_memory, constants, self._state_memory, state)
         self._before_shaping, self._before_rate_loop = (
-            np.array(ring) for ring in empty_rings(law.multirotor)
+            np.array(ring) for ring in empty_rings(constants.multirotor)
         )
         self._history = np.array([truth_row(state.body, state.position)] * history_length)
         self._state: VehicleState | None = state
@@ -205,12 +213,12 @@ class CompiledPlant:
         return row
 
     def estimate(
-        self, law: SensorLaw, state: SensorState, time: float, noise: Any
+        self, constants: SensorConstants, state: SensorState, time: float, noise: Any
     ) -> tuple[Estimate, Vector]:
         """The present estimate of the autopilot: see `sensors.estimate`."""
         if state is not self._sensor_state:
             self._sensor_state = state
-            _write_sensors(self._sensor_memory, (law, state))
+            _write_sensors(self._sensor_memory, (constants, state))
         estimated: tuple[Estimate, Vector] = _estimate(
             self._sensor_memory, self._history, self._steps, time, noise
         )

@@ -47,7 +47,7 @@ class Wind:
         self.velocity = self._mean_with_gust()
 
 
-class GroundLaw(NamedTuple):
+class GroundConstants(NamedTuple):
     """Constants of the contact with the ground: no penetration, no sliding.
 
     The vehicle levels while it stands on the ground, unless it has crashed.
@@ -58,23 +58,23 @@ class GroundLaw(NamedTuple):
     levelling: float  # factor on the tilt in one step on the ground
 
 
-def ground_law(airframe: AirframeConfig, dt: float) -> GroundLaw:
+def ground_constants(airframe: AirframeConfig, dt: float) -> GroundConstants:
     """Return the constants of the contact with the ground for steps of `dt` seconds."""
-    return GroundLaw(
+    return GroundConstants(
         cos(radians(airframe.crash_tilt_deg)),
         airframe.crash_speed_m_s,
         exp(-dt * 1e3 / airframe.ground_levelling_ms),
     )
 
 
-def survives_touchdown(law: GroundLaw, q: Quaternion, sink_speed: float) -> bool:
+def survives_touchdown(constants: GroundConstants, q: Quaternion, sink_speed: float) -> bool:
     """Whether a touchdown at this attitude and sink speed (m/s) is not a crash."""
     _, x, y, _ = q
-    is_upright = 1.0 - 2.0 * (x * x + y * y) >= law.crash_cosine
-    return is_upright and sink_speed <= law.crash_speed
+    is_upright = 1.0 - 2.0 * (x * x + y * y) >= constants.crash_cosine
+    return is_upright and sink_speed <= constants.crash_speed
 
 
-def levelled_on_ground(law: GroundLaw, q: Quaternion) -> Quaternion:
+def levelled_on_ground(constants: GroundConstants, q: Quaternion) -> Quaternion:
     """Return the attitude on the ground after one step of levelling; the heading is kept."""
     w, x, y, z = q
-    return normalise((w, x * law.levelling, y * law.levelling, z))
+    return normalise((w, x * constants.levelling, y * constants.levelling, z))

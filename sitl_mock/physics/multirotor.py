@@ -10,7 +10,7 @@ from sitl_mock.physics.multirotor_step import (
     empty_rings,
     initial_actuation,
     move,
-    multirotor_law,
+    multirotor_constants,
     steady_throttle,
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector
@@ -42,16 +42,16 @@ class Multirotor:
         q: Quaternion,
         specific_thrust: float = 0.0,
     ) -> None:
-        self.law = multirotor_law(airframe, rate_loop)
+        self.constants = multirotor_constants(airframe, rate_loop)
         self.body = at_rest(q)
-        self.actuation = initial_actuation(self.law, self.throttle(specific_thrust))
-        self._rings = empty_rings(self.law)
+        self.actuation = initial_actuation(self.constants, self.throttle(specific_thrust))
+        self._rings = empty_rings(self.constants)
         self._steps = 0
 
     @property
     def dt(self) -> float:
         """Length of a step, s."""
-        return self.law.rates.dt
+        return self.constants.rates.dt
 
     @property
     def q(self) -> Quaternion:
@@ -65,7 +65,7 @@ class Multirotor:
 
     def throttle(self, specific_thrust: float) -> float:
         """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
-        return steady_throttle(self.law, specific_thrust)
+        return steady_throttle(self.constants, specific_thrust)
 
     def drive(self, setpoint: Vector, throttle: float, *, controlled: bool = True) -> Load:
         """Run controller, allocation and rotors for one step in still air; return the load.
@@ -73,7 +73,7 @@ class Multirotor:
         The arguments are those of `multirotor_step.drive`.
         """
         load, self.actuation = drive(
-            self.law,
+            self.constants,
             self._rings,
             self.actuation,
             self.body,
@@ -88,5 +88,5 @@ class Multirotor:
 
     def move(self, load: Load) -> Vector:
         """Integrate one step under this load; return the displacement, NED, m."""
-        self.body, displacement = move(self.law, self.body, load)
+        self.body, displacement = move(self.constants, self.body, load)
         return displacement

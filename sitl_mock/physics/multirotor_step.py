@@ -12,27 +12,27 @@ from sitl_mock.physics.quaternion import Quaternion, Vector, rotated_slightly
 from sitl_mock.physics.rate_loop import (
     ZERO_STATE,
     AxisStates,
-    RateLaw,
+    RateConstants,
     Ring,
     delay_setpoint,
-    rate_law,
+    rate_constants,
     rate_step,
 )
 from sitl_mock.physics.rate_shaping import (
     INACTIVE_SHAPING,
-    ShapingLaw,
+    ShapingConstants,
     ShapingState,
     shape,
-    shaping_law,
+    shaping_constants,
 )
 from sitl_mock.physics.rigid_body import Body, Load, Motion, advance, body_of, derivative
 from sitl_mock.physics.rotors import (
     STOPPED_MIX,
     FourFloats,
     Mix,
-    RotorLaw,
+    RotorConstants,
     mix,
-    rotor_law,
+    rotor_constants,
     rotor_step,
     steady_thrust,
     throttle_of,
@@ -41,7 +41,7 @@ from sitl_mock.physics.rotors import (
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 
-class MultirotorLaw(NamedTuple):
+class MultirotorConstants(NamedTuple):
     """Constants of a multirotor under rate control."""
 
     rate_hz: float  # steps per second
@@ -49,10 +49,10 @@ class MultirotorLaw(NamedTuple):
     tilt_torque: float  # N m per throttle difference, about x and y
     yaw_torque: float  # N m per throttle difference, about z
     body: Body
-    rotors: RotorLaw
-    rates: RateLaw
-    is_shaping: bool  # whether setpoints are shaped, by the law `shaping`
-    shaping: ShapingLaw
+    rotors: RotorConstants
+    rates: RateConstants
+    is_shaping: bool  # whether setpoints are shaped, by `shaping`
+    shaping: ShapingConstants
 
 
 Kinematics = tuple[Motion, Vector, Vector]
@@ -83,38 +83,42 @@ class Conditions(NamedTuple):
     """Small rotation from the true to the estimated attitude, rad, NED."""
 
 
-def multirotor_law(airframe: AirframeConfig, rate_loop: RateLoopConfig) -> MultirotorLaw:
+def multirotor_constants(
+    airframe: AirframeConfig, rate_loop: RateLoopConfig
+) -> MultirotorConstants:
     """Return the constants of an airframe with its rate controller."""
     dt = 1.0 / airframe.physics_rate_hz
     per_throttle = airframe.mass_kg * airframe.thrust_slope_m_s2
-    return MultirotorLaw(
+    return MultirotorConstants(
         float(airframe.physics_rate_hz),
         airframe.mass_kg,
         airframe.rotor_arm_m * per_throttle,
         airframe.rotor_drag_ratio_m * per_throttle,
         body_of(airframe),
-        rotor_law(airframe, dt),
-        rate_law(rate_loop, dt),
+        rotor_constants(airframe, dt),
+        rate_constants(rate_loop, dt),
         rate_loop.shaping is not None,
-        shaping_law(rate_loop.shaping, dt),
+        shaping_constants(rate_loop.shaping, dt),
     )
 
 
-def steady_throttle(law: MultirotorLaw, specific_thrust: float) -> float:
+def steady_throttle(constants: MultirotorConstants, specific_thrust: float) -> float:
     """Return the collective throttle for a steady specific thrust (m/s^2), at most 1."""
-    return throttle_of(law.rotors, 0.25 * law.mass * specific_thrust)
+    return throttle_of(constants.rotors, 0.25 * constants.mass * specific_thrust)
 
 
-def initial_actuation(law: MultirotorLaw, throttle: float) -> Actuation:
+def initial_actuation(constants: MultirotorConstants, throttle: float) -> Actuation:
     """Return the state of controller and rotors at the start, with rotors at a steady speed."""
-    thrust = steady_thrust(law.rotors, throttle)
+    thrust = steady_thrust(constants.rotors, throttle)
     mixed = mix(throttle, 0.0, 0.0, 0.0)
     return mixed, (thrust, thrust, thrust, thrust), ZERO_STATE, INACTIVE_SHAPING
 
 
-def empty_rings(law: MultirotorLaw) -> DelayRings:
+def empty_rings(constants: MultirotorConstants) -> DelayRings:
     """Return ring buffers of zero setpoints, longer than the delays."""
-    return DelayRings([ZERO] * (1 + max(law.shaping.delays)), [ZERO] * (1 + max(law.rates.delays)))
+    return DelayRings(
+        [ZERO] * (1 + max(constants.shaping.delays)), [ZERO] * (1 + max(constants.rates.delays))
+    )
 
 
 def at_rest(q: Quaternion) -> Kinematics:
@@ -124,7 +128,7 @@ def at_rest(q: Quaternion) -> Kinematics:
 
 
 def drive(
-    law: MultirotorLaw,
+    constants: MultirotorConstants,
     rings: DelayRings,
     actuation: Actuation,
     body: Kinematics,
@@ -137,7 +141,7 @@ def drive(
     """Run controller, allocation and rotors for one step; return the load and the new actuation.
 
     Args:
-        law: constants.
+        constants: constants of the multirotor.
         rings: ring buffers of the latest setpoints; changed in place.
         actuation: state of controller and rotors before the step.
         body: motion before the step.
@@ -151,16 +155,16 @@ def drive(
     mixed, thrusts, axes, shaping = actuation
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
-    if law.is_shaping:
+    if constants.is_shaping:
         estimated_q = rotated_slightly(conditions.attitude_error, (w, x, y, z))
         setpoint, shaping = _shape_setpoint(
-            law, rings, shaping, estimated_q, step, setpoint, controlled
+            constants, rings, shaping, estimated_q, step, setpoint, controlled
         )
-    setpoint = delay_setpoint(rings.before_rate_loop, law.rates.delays, step, setpoint)
+    setpoint = delay_setpoint(rings.before_rate_loop, constants.rates.delays, step, setpoint)
     if controlled:
         _, tilt_saturated, yaw_saturated = mixed
         axes = rate_step(
-            law.rates,
+            constants.rates,
             axes,
             setpoint,
             (p, q, r),
@@ -170,13 +174,13 @@ def drive(
         )
     else:
         axes = ZERO_STATE
-    mixed = _allocate(law, axes, throttle)
-    thrusts, wrench = rotor_step(law.rotors, thrusts, mixed[0], conditions.thrust_factor)
-    return _load(law, wrench, conditions.wind), (mixed, thrusts, axes, shaping)
+    mixed = _allocate(constants, axes, throttle)
+    thrusts, wrench = rotor_step(constants.rotors, thrusts, mixed[0], conditions.thrust_factor)
+    return _load(constants, wrench, conditions.wind), (mixed, thrusts, axes, shaping)
 
 
 def _shape_setpoint(
-    law: MultirotorLaw,
+    constants: MultirotorConstants,
     rings: DelayRings,
     state: ShapingState,
     q: Quaternion,
@@ -188,41 +192,45 @@ def _shape_setpoint(
 
     If the rate loop does not run, the setpoint is returned unchanged.
     """
-    delayed_setpoint = delay_setpoint(rings.before_shaping, law.shaping.delays, step, setpoint)
+    delayed_setpoint = delay_setpoint(
+        rings.before_shaping, constants.shaping.delays, step, setpoint
+    )
     if controlled:
-        return shape(law.shaping, state, delayed_setpoint, q)
+        return shape(constants.shaping, state, delayed_setpoint, q)
     return setpoint, INACTIVE_SHAPING
 
 
-def _allocate(law: MultirotorLaw, axes: AxisStates, throttle: float) -> Mix:
+def _allocate(constants: MultirotorConstants, axes: AxisStates, throttle: float) -> Mix:
     """Allocate torques and throttle to the rotors."""
     # A NaN throttle fails this comparison, which stops the rotors.
     if throttle > 0.0:
         roll, pitch, yaw = axes
-        tilt_torque = law.tilt_torque
-        return mix(throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / law.yaw_torque)
+        tilt_torque = constants.tilt_torque
+        return mix(
+            throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / constants.yaw_torque
+        )
     return STOPPED_MIX
 
 
-def _load(law: MultirotorLaw, wrench: FourFloats, wind: Vector) -> Load:
+def _load(constants: MultirotorConstants, wrench: FourFloats, wind: Vector) -> Load:
     """Return the load on the body from thrust (N) and torques x, y, z (N m), with the wind."""
     thrust, torque_x, torque_y, torque_z = wrench
     wind_n, wind_e, wind_d = wind
-    return thrust / law.mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d
+    return thrust / constants.mass, torque_x, torque_y, torque_z, wind_n, wind_e, wind_d
 
 
-def move(law: MultirotorLaw, body: Kinematics, load: Load) -> tuple[Kinematics, Vector]:
+def move(constants: MultirotorConstants, body: Kinematics, load: Load) -> tuple[Kinematics, Vector]:
     """Integrate one step under this load; return also the displacement, NED, m."""
-    rate_hz = law.rate_hz
+    rate_hz = constants.rate_hz
     old_motion = body[0]
     vn, ve, vd, _, _, _, _, p, q, r = old_motion
-    motion, displacement = advance(old_motion, load, law.body, law.rates.dt)
+    motion, displacement = advance(old_motion, load, constants.body, constants.rates.dt)
     new_vn, new_ve, new_vd, _, _, _, _, new_p, new_q, new_r = motion
     acceleration = ((new_vn - vn) * rate_hz, (new_ve - ve) * rate_hz, (new_vd - vd) * rate_hz)
     angular_acceleration = ((new_p - p) * rate_hz, (new_q - q) * rate_hz, (new_r - r) * rate_hz)
     return (motion, acceleration, angular_acceleration), displacement
 
 
-def does_not_rise(law: MultirotorLaw, body: Kinematics, load: Load) -> bool:
+def does_not_rise(constants: MultirotorConstants, body: Kinematics, load: Load) -> bool:
     """Whether the body does not accelerate upward under this load."""
-    return derivative(body[0], load, law.body)[2] >= 0.0
+    return derivative(body[0], load, constants.body)[2] >= 0.0

@@ -53,7 +53,7 @@ class FilterState(NamedTuple):
     velocity: complex  # true velocity at the fusion time, m/s
 
 
-class ErrorLaw(NamedTuple):
+class ErrorConstants(NamedTuple):
     """Constants of the errors between two fixes."""
 
     lead_time: float  # position error per velocity, and velocity error per acceleration, s
@@ -83,7 +83,7 @@ def pending_correction_share(predictor_ms: float, state: FilterState, now: float
 
 
 def propagated_horizontal_errors(
-    law: ErrorLaw, state: FilterState, truth: TruthRow, elapsed: float
+    constants: ErrorConstants, state: FilterState, truth: TruthRow, elapsed: float
 ) -> Errors:
     """Return the horizontal errors ``elapsed`` s after the fix.
 
@@ -91,7 +91,7 @@ def propagated_horizontal_errors(
     relative error of the acceleration.
     """
     position, velocity, acceleration = extrapolated_errors(state.horizontal.errors, elapsed)
-    relative_error = complex(law.acceleration_error, state.yaw)
+    relative_error = complex(constants.acceleration_error, state.yaw)
     fused_velocity = state.velocity
     displacement = complex(truth[10], truth[11]) - state.position
     return (
@@ -102,7 +102,7 @@ def propagated_horizontal_errors(
 
 
 def propagated_vertical_errors(
-    law: ErrorLaw, state: FilterState, truth: TruthRow, elapsed: float
+    constants: ErrorConstants, state: FilterState, truth: TruthRow, elapsed: float
 ) -> Errors:
     """Return the vertical errors (down) ``elapsed`` s after the fix; only the real parts count.
 
@@ -110,7 +110,7 @@ def propagated_vertical_errors(
     vertical to the filter.
     """
     down, sink_rate, acceleration = extrapolated_errors(state.vertical.errors, elapsed)
-    tilt_factor, fused_velocity = law.tilt_bias.conjugate(), state.velocity
+    tilt_factor, fused_velocity = constants.tilt_bias.conjugate(), state.velocity
     displacement = complex(truth[10], truth[11]) - state.position
     return (
         down + (tilt_factor * (displacement - elapsed * fused_velocity)).imag,
@@ -119,18 +119,22 @@ def propagated_vertical_errors(
     )
 
 
-def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> ErrorVectors:
+def error_at(
+    constants: ErrorConstants, state: FilterState, truth: TruthRow, now: float
+) -> ErrorVectors:
     """Return the error of the estimate at time ``now`` (s); ``truth`` is the true motion (pure)."""
     elapsed = now - state.fused_at
-    pending_part = pending_correction_share(law.predictor_ms, state, now)
-    yaw_pending_part = pending_correction_share(law.heading_predictor_ms, state, now)
-    position, velocity, acceleration = propagated_horizontal_errors(law, state, truth, elapsed)
+    pending_part = pending_correction_share(constants.predictor_ms, state, now)
+    yaw_pending_part = pending_correction_share(constants.heading_predictor_ms, state, now)
+    position, velocity, acceleration = propagated_horizontal_errors(
+        constants, state, truth, elapsed
+    )
     pending = state.horizontal.pending
-    position += law.lead_time * complex(truth[0], truth[1]) - pending_part * pending[0]
-    velocity += law.lead_time * complex(truth[13], truth[14]) - pending_part * pending[1]
-    down, sink_rate, _ = propagated_vertical_errors(law, state, truth, elapsed)
+    position += constants.lead_time * complex(truth[0], truth[1]) - pending_part * pending[0]
+    velocity += constants.lead_time * complex(truth[13], truth[14]) - pending_part * pending[1]
+    down, sink_rate, _ = propagated_vertical_errors(constants, state, truth, elapsed)
     pending = state.vertical.pending
-    down += law.height_offset + state.down_error - pending_part * pending[0]
+    down += constants.height_offset + state.down_error - pending_part * pending[0]
     return ErrorVectors(
         (position.real, position.imag, down.real),
         (
@@ -140,8 +144,8 @@ def error_at(law: ErrorLaw, state: FilterState, truth: TruthRow, now: float) -> 
         ),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (
-            acceleration.imag / GRAVITY + law.tilt_bias.real,
-            -acceleration.real / GRAVITY + law.tilt_bias.imag,
+            acceleration.imag / GRAVITY + constants.tilt_bias.real,
+            -acceleration.real / GRAVITY + constants.tilt_bias.imag,
             state.yaw - yaw_pending_part * state.pending_yaw,
         ),
     )

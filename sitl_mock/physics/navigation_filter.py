@@ -10,7 +10,7 @@ from random import Random
 
 from sitl_mock.config.sensors import EkfConfig
 from sitl_mock.physics.navigation_error import (
-    ErrorLaw,
+    ErrorConstants,
     Errors,
     ErrorState,
     FilterState,
@@ -44,7 +44,7 @@ class NavigationFilter:
         start: the true motion at time 0.
 
     Attributes:
-        law: constants of the errors between two fixes.
+        constants: constants of the errors between two fixes.
         state: errors after the latest fix.
     """
 
@@ -54,7 +54,7 @@ class NavigationFilter:
         self._gains = (config.position_gains, config.velocity_gains, config.acceleration_gains)
         self._decay = exp(-self._period / config.noise_time_s)
         self._yaw_decay = exp(-self._period / config.yaw_time_s)
-        self.law = ErrorLaw(
+        self.constants = ErrorConstants(
             config.acceleration_lead_ms * 1e-3,
             config.acceleration_scale,
             complex(*map(radians, config.tilt_bias_deg)),
@@ -97,26 +97,27 @@ class NavigationFilter:
             present: the true motion now.
             now: the present time, s.
         """
-        config, law, state = self._config, self.law, self.state
+        config, constants, state = self._config, self.constants, self.state
         elapsed = at - state.fused_at
         velocity = complex(delayed[0], delayed[1])
         acceleration = complex(delayed[13], delayed[14])
-        errors = propagated_horizontal_errors(law, state, delayed, elapsed)
+        errors = propagated_horizontal_errors(constants, state, delayed, elapsed)
         noise = self._next_noise(state.horizontal.noise, 1.0)
         slip = config.fix_slip_ms * (0.5 - (at / config.fix_slip_time_s + self._slip_phase) % 1.0)
         fix_errors = (
-            noise[0] - ((config.position_late_ms + slip) * 1e-3 + law.lead_time) * velocity,
-            noise[1] - ((config.velocity_late_ms + slip) * 1e-3 + law.lead_time) * acceleration,
+            noise[0] - ((config.position_late_ms + slip) * 1e-3 + constants.lead_time) * velocity,
+            noise[1]
+            - ((config.velocity_late_ms + slip) * 1e-3 + constants.lead_time) * acceleration,
         )
         tilt_noise = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
         horizontal = self._corrected_state(errors, fix_errors, noise, tilt_noise)
         share = config.vertical_share
         noise = self._next_noise(state.vertical.noise, share)
-        errors = propagated_vertical_errors(law, state, delayed, elapsed)
+        errors = propagated_vertical_errors(constants, state, delayed, elapsed)
         vertical = self._corrected_state(errors, noise, noise, share * tilt_noise)
         noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
         yaw = self._next_yaw_noise() + noiseless_yaw
-        pending_yaw_part = pending_correction_share(law.heading_predictor_ms, state, now)
+        pending_yaw_part = pending_correction_share(constants.heading_predictor_ms, state, now)
         pending_yaw = pending_yaw_part * state.pending_yaw + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         down_error, sink_error = self._next_slow_errors(abs(acceleration), height_noise, elapsed)
@@ -138,21 +139,21 @@ class NavigationFilter:
 
     def _without_jump(self, corrected: FilterState, present: TruthRow) -> FilterState:
         """Return the corrected state with pending corrections that keep the output as it was."""
-        law, state, now = self.law, self.state, corrected.corrected_at
+        constants, state, now = self.constants, self.state, corrected.corrected_at
         since_last_fix, since_this_fix = now - state.fused_at, now - corrected.fused_at
-        pending_part = pending_correction_share(law.predictor_ms, state, now)
+        pending_part = pending_correction_share(constants.predictor_ms, state, now)
         horizontal = _with_pending(
             state.horizontal,
             corrected.horizontal,
-            propagated_horizontal_errors(law, state, present, since_last_fix),
-            propagated_horizontal_errors(law, corrected, present, since_this_fix),
+            propagated_horizontal_errors(constants, state, present, since_last_fix),
+            propagated_horizontal_errors(constants, corrected, present, since_this_fix),
             pending_part,
         )
         vertical = _with_pending(
             state.vertical,
             corrected.vertical,
-            propagated_vertical_errors(law, state, present, since_last_fix),
-            propagated_vertical_errors(law, corrected, present, since_this_fix),
+            propagated_vertical_errors(constants, state, present, since_last_fix),
+            propagated_vertical_errors(constants, corrected, present, since_this_fix),
             pending_part,
         )
         return corrected._replace(horizontal=horizontal, vertical=vertical)

@@ -21,8 +21,8 @@ Ring = list[Vector]
 """The latest setpoints in a ring buffer; an array if the steps are compiled."""
 
 
-class AxisLaw(NamedTuple):
-    """Constants of the control law of one axis."""
+class AxisConstants(NamedTuple):
+    """Constants of the rate controller of one axis."""
 
     proportional: float  # N m per rad/s
     integral: float  # N m per rad
@@ -32,10 +32,10 @@ class AxisLaw(NamedTuple):
     filter_decay: float  # of the torque filter per step, 0 = no filter
 
 
-def axis_law(gains: AxisGains, dt: float) -> AxisLaw:
-    """Return the control law of one axis for steps of `dt` seconds."""
+def axis_constants(gains: AxisGains, dt: float) -> AxisConstants:
+    """Return the constants of one axis's rate controller for steps of `dt` seconds."""
     filter_s = gains.torque_filter_ms * 1e-3
-    return AxisLaw(
+    return AxisConstants(
         gains.proportional_n_m_s,
         gains.integral_n_m,
         gains.feed_forward_n_m_s,
@@ -46,7 +46,7 @@ def axis_law(gains: AxisGains, dt: float) -> AxisLaw:
 
 
 def axis_step(
-    law: AxisLaw,
+    constants: AxisConstants,
     state: AxisState,
     setpoint: float,
     rate: float,
@@ -57,7 +57,7 @@ def axis_step(
     """Return the state of one axis after a step (pure).
 
     Args:
-        law: the axis's constants.
+        constants: constants of the axis.
         state: state before the step.
         setpoint: setpoint of the body rate, rad/s.
         rate: present body rate, rad/s.
@@ -66,7 +66,7 @@ def axis_step(
             grow further in the direction of that torque.
         dt: step, s.
     """
-    proportional, integral_gain, feed_forward, damping, limit, filter_decay = law
+    proportional, integral_gain, feed_forward, damping, limit, filter_decay = constants
     integral, torque = state
     error = setpoint - rate
     if not (saturated and error * torque > 0.0):
@@ -78,31 +78,31 @@ def axis_step(
     return integral, unfiltered_torque + filter_decay * (torque - unfiltered_torque)
 
 
-class RateLaw(NamedTuple):
+class RateConstants(NamedTuple):
     """Constants of the rate controller."""
 
-    roll: AxisLaw
-    pitch: AxisLaw
-    yaw: AxisLaw
+    roll: AxisConstants
+    pitch: AxisConstants
+    yaw: AxisConstants
     delays: Delays
     dt: float  # step, s
 
 
-def rate_law(config: RateLoopConfig, dt: float) -> RateLaw:
+def rate_constants(config: RateLoopConfig, dt: float) -> RateConstants:
     """Return the rate controller for steps of `dt` seconds."""
     roll, pitch, yaw = config.roll, config.pitch, config.yaw
     delays_ms = (roll.setpoint_delay_ms, pitch.setpoint_delay_ms, yaw.setpoint_delay_ms)
-    return RateLaw(
-        axis_law(roll, dt),
-        axis_law(pitch, dt),
-        axis_law(yaw, dt),
+    return RateConstants(
+        axis_constants(roll, dt),
+        axis_constants(pitch, dt),
+        axis_constants(yaw, dt),
         delay_steps(delays_ms, dt),
         dt,
     )
 
 
 def rate_step(
-    law: RateLaw,
+    constants: RateConstants,
     axes: AxisStates,
     setpoint: Vector,
     rates: Vector,
@@ -116,7 +116,7 @@ def rate_step(
     rolling vehicle continues to roll. Setpoints are not limited.
 
     Args:
-        law: constants.
+        constants: constants of the three axes.
         axes: states of the axes before the step.
         setpoint: body rates, rad/s, FRD, already delayed.
         rates: present body rates, rad/s.
@@ -128,11 +128,11 @@ def rate_step(
     p, q, r = rates
     p_dot, q_dot, r_dot = accelerations
     x, y, z = axes
-    x_law, y_law, z_law, _, dt = law
+    x_constants, y_constants, z_constants, _, dt = constants
     return (
-        axis_step(x_law, x, roll if isfinite(roll) else p, p, p_dot, tilt_saturated, dt),
-        axis_step(y_law, y, pitch if isfinite(pitch) else q, q, q_dot, tilt_saturated, dt),
-        axis_step(z_law, z, yaw if isfinite(yaw) else r, r, r_dot, yaw_saturated, dt),
+        axis_step(x_constants, x, roll if isfinite(roll) else p, p, p_dot, tilt_saturated, dt),
+        axis_step(y_constants, y, pitch if isfinite(pitch) else q, q, q_dot, tilt_saturated, dt),
+        axis_step(z_constants, z, yaw if isfinite(yaw) else r, r, r_dot, yaw_saturated, dt),
     )
 
 

@@ -74,7 +74,7 @@ def sqrt_controller(angle: float, gain: float, acceleration: float) -> float:
     return copysign(sqrt(2.0 * acceleration * (abs(angle) - 0.5 * linear_range)), angle)
 
 
-class ShapingLaw(NamedTuple):
+class ShapingConstants(NamedTuple):
     """Constants of the shaping."""
 
     max_change: Vector
@@ -85,20 +85,24 @@ class ShapingLaw(NamedTuple):
     dt: float  # step, s
 
 
-def shaping_law(axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: float) -> ShapingLaw:
+def shaping_constants(
+    axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: float
+) -> ShapingConstants:
     """Return the shaping of roll, pitch and yaw for steps of `dt` seconds.
 
-    For None return an unused law, because the compiler needs a value of this type.
+    For None return an unused constants, because the compiler needs a value of this type.
     """
     if axes is None:
-        return ShapingLaw((0.0, 0.0, 0.0), ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), (0, 0, 0), dt)
+        return ShapingConstants(
+            (0.0, 0.0, 0.0), ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0)), (0, 0, 0), dt
+        )
     roll, pitch, yaw = axes
     limits = (
         roll.acceleration_limit_rad_s2,
         pitch.acceleration_limit_rad_s2,
         yaw.acceleration_limit_rad_s2,
     )
-    return ShapingLaw(
+    return ShapingConstants(
         (limits[0] * dt, limits[1] * dt, limits[2] * dt),
         (
             (roll.attitude_gain_1_s, 0.5 * limits[0]),
@@ -111,12 +115,12 @@ def shaping_law(axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: f
 
 
 def shape(
-    law: ShapingLaw, state: ShapingState, goals: Vector, q: Quaternion
+    constants: ShapingConstants, state: ShapingState, goals: Vector, q: Quaternion
 ) -> tuple[Vector, ShapingState]:
     """Shape the rates of the three axes, which share one attitude target, for one step (pure).
 
     Args:
-        law: constants.
+        constants: constants of the shaping.
         state: state before the step; if it is not active, the attitude target starts at `q`.
         goals: body rates, rad/s, already delayed. NaN holds the shaped rate; with infinity it grows
             without limit.
@@ -125,19 +129,19 @@ def shape(
     Returns:
         The setpoint of the rate loop, rad/s, FRD, and the state after the step.
     """
-    max_change = law.max_change
+    max_change = constants.max_change
     old_rates = state.rates
     rates = (
         slew(goals[0], old_rates[0], max_change[0]),
         slew(goals[1], old_rates[1], max_change[1]),
         slew(goals[2], old_rates[2], max_change[2]),
     )
-    target = rotated(state.target if state.active else q, rates, law.dt)
+    target = rotated(state.target if state.active else q, rates, constants.dt)
     w, x, y, z = target
     body_in_target = multiply((w, -x, -y, -z), q)  # attitude of the body in the frame of the target
     angle_x, angle_y, angle_z = rotation_vector(body_in_target)
     roll, pitch, yaw = to_body(body_in_target, rates)
-    roll_gains, pitch_gains, yaw_gains = law.sqrt_gains
+    roll_gains, pitch_gains, yaw_gains = constants.sqrt_gains
     setpoint = (
         roll - sqrt_controller(angle_x, roll_gains[0], roll_gains[1]),
         pitch - sqrt_controller(angle_y, pitch_gains[0], pitch_gains[1]),

@@ -68,7 +68,7 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
     )
 
 
-class RotorLaw(NamedTuple):
+class RotorConstants(NamedTuple):
     """Constants of the rotors. A rotor's thrust follows its throttle with a first-order lag."""
 
     slope: float  # N of one rotor per throttle, from `linear_from` on
@@ -80,12 +80,12 @@ class RotorLaw(NamedTuple):
     drag_ratio: float  # torque about body z per thrust, m
 
 
-def rotor_law(airframe: AirframeConfig, dt: float) -> RotorLaw:
+def rotor_constants(airframe: AirframeConfig, dt: float) -> RotorConstants:
     """Return the rotors of an airframe for steps of `dt` seconds."""
     per_rotor = airframe.mass_kg / 4.0
     slope = airframe.thrust_slope_m_s2 * per_rotor
     offset = airframe.thrust_offset_m_s2 * per_rotor
-    return RotorLaw(
+    return RotorConstants(
         slope,
         offset,
         slope + offset / airframe.thrust_linear_from,
@@ -96,22 +96,22 @@ def rotor_law(airframe: AirframeConfig, dt: float) -> RotorLaw:
     )
 
 
-def steady_thrust(law: RotorLaw, throttle: float) -> float:
+def steady_thrust(constants: RotorConstants, throttle: float) -> float:
     """Return the steady thrust of one rotor in N, with a full battery."""
-    if throttle >= law.linear_from:
-        return law.slope * throttle + law.offset
-    return law.low_slope * throttle
+    if throttle >= constants.linear_from:
+        return constants.slope * throttle + constants.offset
+    return constants.low_slope * throttle
 
 
-def throttle_of(law: RotorLaw, thrust: float) -> float:
+def throttle_of(constants: RotorConstants, thrust: float) -> float:
     """Return the throttle for a steady thrust (N) of one rotor, at most 1."""
-    if thrust >= steady_thrust(law, law.linear_from):
-        return min((thrust - law.offset) / law.slope, 1.0)
-    return thrust / law.low_slope
+    if thrust >= steady_thrust(constants, constants.linear_from):
+        return min((thrust - constants.offset) / constants.slope, 1.0)
+    return thrust / constants.low_slope
 
 
 def rotor_step(
-    law: RotorLaw, thrusts: FourFloats, throttles: FourFloats, thrust_factor: float
+    constants: RotorConstants, thrusts: FourFloats, throttles: FourFloats, thrust_factor: float
 ) -> tuple[FourFloats, FourFloats]:
     """Advance the rotors by one step towards the throttles.
 
@@ -119,7 +119,7 @@ def rotor_step(
     thrusts before and after the step is accurate to second order.
 
     Args:
-        law: the rotors.
+        constants: the rotors.
         thrusts: thrust of each rotor before the step, N.
         throttles: throttle of each rotor, 0..1.
         thrust_factor: factor of the battery voltage on the thrust of every rotor.
@@ -130,14 +130,14 @@ def rotor_step(
     """
     t0, t1, t2, t3 = throttles
     old0, old1, old2, old3 = thrusts
-    decay = law.decay
-    steady = thrust_factor * steady_thrust(law, t0)
+    decay = constants.decay
+    steady = thrust_factor * steady_thrust(constants, t0)
     new0 = steady + decay * (old0 - steady)
-    steady = thrust_factor * steady_thrust(law, t1)
+    steady = thrust_factor * steady_thrust(constants, t1)
     new1 = steady + decay * (old1 - steady)
-    steady = thrust_factor * steady_thrust(law, t2)
+    steady = thrust_factor * steady_thrust(constants, t2)
     new2 = steady + decay * (old2 - steady)
-    steady = thrust_factor * steady_thrust(law, t3)
+    steady = thrust_factor * steady_thrust(constants, t3)
     new3 = steady + decay * (old3 - steady)
     f0 = 0.5 * (old0 + new0)
     f1 = 0.5 * (old1 + new1)
@@ -145,8 +145,8 @@ def rotor_step(
     f3 = 0.5 * (old3 + new3)
     wrench = (
         f0 + f1 + f2 + f3,
-        law.arm * (f1 + f2 - f0 - f3),
-        law.arm * (f0 + f2 - f1 - f3),
-        law.drag_ratio * (f0 + f1 - f2 - f3),
+        constants.arm * (f1 + f2 - f0 - f3),
+        constants.arm * (f0 + f2 - f1 - f3),
+        constants.drag_ratio * (f0 + f1 - f2 - f3),
     )
     return (new0, new1, new2, new3), wrench

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.navigation_error import (
-    ErrorLaw,
+    ErrorConstants,
     ErrorState,
     ErrorVectors,
     FilterState,
@@ -45,7 +45,7 @@ class Estimate(NamedTuple):
     specific_force_frd: Vector  # m/s^2, what an accelerometer measures
 
 
-class SensorLaw(NamedTuple):
+class SensorConstants(NamedTuple):
     """Constants of the simulated estimator: its delays and errors, without the white noise."""
 
     gravity: float  # m/s^2
@@ -53,8 +53,8 @@ class SensorLaw(NamedTuple):
     rate_delay: int  # steps
     position_delay: int  # steps
     dt: float  # length of a step, s
-    has_filter: bool  # whether there is a navigation filter, with the law `filter_law`
-    filter_law: ErrorLaw
+    has_filter: bool  # whether there is a navigation filter, with the constants `filter_constants`
+    filter_constants: ErrorConstants
     yaw_rate_bias: float  # rad/s
 
 
@@ -82,7 +82,7 @@ def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
 
 
 def estimate(
-    law: SensorLaw,
+    constants: SensorConstants,
     state: SensorState,
     history: TruthHistory,
     steps: int,
@@ -94,19 +94,24 @@ def estimate(
     `history` is the true motion of the latest steps, `time` the present time, s. `noise` has three
     numbers each for attitude, rates, position, velocity and force.
     """
-    attitude_row = history[(steps - law.attitude_delay) % len(history)]
-    position_row = history[(steps - law.position_delay) % len(history)]
-    if law.has_filter:
+    attitude_row = history[(steps - constants.attitude_delay) % len(history)]
+    position_row = history[(steps - constants.position_delay) % len(history)]
+    if constants.has_filter:
         error = error_at(
-            law.filter_law, state.filter, position_row, time - law.position_delay * law.dt
+            constants.filter_constants,
+            state.filter,
+            position_row,
+            time - constants.position_delay * constants.dt,
         )
     else:
         error = NO_ERRORS
     q = (attitude_row[3], attitude_row[4], attitude_row[5], attitude_row[6])
-    fx, fy, fz = to_body(q, (attitude_row[13], attitude_row[14], attitude_row[15] - law.gravity))
+    fx, fy, fz = to_body(
+        q, (attitude_row[13], attitude_row[14], attitude_row[15] - constants.gravity)
+    )
     attitude_estimate = multiply(state.yaw, rotated_slightly(error.rotation, q))
-    rate_row = history[(steps - law.rate_delay) % len(history)]
-    yaw_rate = rate_row[9] + law.yaw_rate_bias + noise[5]
+    rate_row = history[(steps - constants.rate_delay) % len(history)]
+    yaw_rate = rate_row[9] + constants.yaw_rate_bias + noise[5]
     position, velocity, offset = error.position, error.velocity, state.offset
     new_estimate = Estimate(
         normalise(multiply(attitude_estimate, (1.0, noise[0], noise[1], noise[2]))),
@@ -140,7 +145,7 @@ class Estimator:
         make_noise: like `white_noise`, but it may return the numbers in another container.
 
     Attributes:
-        law: constants of `estimate`.
+        constants: constants of `estimate`.
         state: errors after the latest fix, and all resets.
         rotation: small rotation of the attitude by the filter's error at the latest estimate, rad,
             NED.
@@ -170,19 +175,19 @@ class Estimator:
             for _ in range(3)
         )
         filter_ = None if config.ekf is None else NavigationFilter(config.ekf, start, seed)
-        self.law = SensorLaw(
+        self.constants = SensorConstants(
             gravity,
             round(config.attitude_delay_ms * 1e-3 / dt),
             round((config.attitude_delay_ms + config.rate_lag_ms) * 1e-3 / dt),
             round(config.position_delay_ms * 1e-3 / dt),
             dt,
             filter_ is not None,
-            ErrorLaw(0.0, 0.0, 0j, 0.0, 0.0, 0.0) if filter_ is None else filter_.law,
+            ErrorConstants(0.0, 0.0, 0j, 0.0, 0.0, 0.0) if filter_ is None else filter_.constants,
             0.0 if config.ekf is None else radians(config.ekf.yaw_rate_bias_deg_s),
         )
         fix_delay = 0 if config.ekf is None else round(config.ekf.fix_delay_ms * 1e-3 / dt)
-        self._fusion_delay = max(fix_delay, self.law.position_delay)
-        self.history_length = 1 + max(self.law.rate_delay, self._fusion_delay)
+        self._fusion_delay = max(fix_delay, self.constants.position_delay)
+        self.history_length = 1 + max(self.constants.rate_delay, self._fusion_delay)
         self._filter = filter_
         filter_state = _NO_FILTER if filter_ is None else filter_.state
         self.state = SensorState(filter_state, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -209,7 +214,7 @@ class Estimator:
             time: present time, s.
             row_before: returns the true motion k steps ago, for k below `history_length`.
         """
-        fusion_time = time - self._fusion_delay * self.law.dt
+        fusion_time = time - self._fusion_delay * self.constants.dt
         if self._filter is not None and self._filter.is_due(fusion_time):
             self._filter.advance(row_before(self._fusion_delay), fusion_time, row_before(0), time)
             self.state = self.state._replace(filter=self._filter.state)

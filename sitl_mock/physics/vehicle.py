@@ -7,13 +7,13 @@ from sitl_mock.config.airframe import AirframeConfig, BatteryConfig, WindConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.battery import Battery, BatteryState
-from sitl_mock.physics.environment import Wind, ground_law
+from sitl_mock.physics.environment import Wind, ground_constants
 from sitl_mock.physics.multirotor_step import (
     ZERO,
     Conditions,
     at_rest,
     initial_actuation,
-    multirotor_law,
+    multirotor_constants,
     steady_throttle,
 )
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, multiply
@@ -25,7 +25,7 @@ from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
     Plant,
     PythonPlant,
-    VehicleLaw,
+    VehicleConstants,
     VehicleState,
     truth_row,
 )
@@ -95,7 +95,7 @@ class Vehicle:
         self.on_ground, self.crashed = True, False
         self._thrust = 0.0  # of all rotors, N
         self._rate_hz = airframe.physics_rate_hz
-        self._multirotor = multirotor_law(airframe, rate_loop or RateLoopConfig())
+        self._multirotor = multirotor_constants(airframe, rate_loop or RateLoopConfig())
         dt = self._multirotor.rates.dt
         self._slow_steps = round(SLOW_STEP_S * self._rate_hz)
         self._slow_dt = self._slow_steps * dt
@@ -111,7 +111,7 @@ class Vehicle:
             make_noise=plant.make_noise,
         )
         self.plant = plant(
-            VehicleLaw(self._multirotor, ground_law(airframe, dt)),
+            VehicleConstants(self._multirotor, ground_constants(airframe, dt)),
             VehicleState(0, body, stopped, ZERO, True, False, nan),
             self.estimator.history_length,
         )
@@ -160,7 +160,7 @@ class Vehicle:
         estimator, time = self.estimator, self.time
         estimator.correct(time, self.plant.row_before)
         estimate, estimator.rotation = self.plant.estimate(
-            estimator.law, estimator.state, time, estimator.draw_noise()
+            estimator.constants, estimator.state, time, estimator.draw_noise()
         )
         return estimate
 

@@ -6,13 +6,13 @@
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from sitl_mock.physics.environment import GroundLaw, levelled_on_ground, survives_touchdown
+from sitl_mock.physics.environment import GroundConstants, levelled_on_ground, survives_touchdown
 from sitl_mock.physics.multirotor_step import (
     Actuation,
     Conditions,
     DelayRings,
     Kinematics,
-    MultirotorLaw,
+    MultirotorConstants,
     at_rest,
     does_not_rise,
     drive,
@@ -22,7 +22,7 @@ from sitl_mock.physics.multirotor_step import (
 from sitl_mock.physics.navigation_error import TruthHistory, TruthRow
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.physics.rigid_body import Load
-from sitl_mock.physics.sensors import Estimate, SensorLaw, SensorState, estimate, white_noise
+from sitl_mock.physics.sensors import Estimate, SensorConstants, SensorState, estimate, white_noise
 
 
 class ActuatorCommand(NamedTuple):
@@ -56,11 +56,11 @@ class VehicleState(NamedTuple):
     touchdown_speed: float  # m/s down at the latest touchdown, NaN before the first
 
 
-class VehicleLaw(NamedTuple):
+class VehicleConstants(NamedTuple):
     """Constants of the vehicle."""
 
-    multirotor: MultirotorLaw
-    ground: GroundLaw
+    multirotor: MultirotorConstants
+    ground: GroundConstants
 
 
 def truth_row(body: Kinematics, position: Vector) -> TruthRow:
@@ -70,7 +70,7 @@ def truth_row(body: Kinematics, position: Vector) -> TruthRow:
 
 
 def advance(
-    law: VehicleLaw,
+    constants: VehicleConstants,
     rings: DelayRings,
     history: TruthHistory,
     state: VehicleState,
@@ -88,7 +88,7 @@ def advance(
     length = len(history)
     for _ in range(count):
         load, actuation = drive(
-            law.multirotor,
+            constants.multirotor,
             rings,
             actuation,
             body,
@@ -100,14 +100,14 @@ def advance(
         )
         steps += 1
         body, position, on_ground, crashed, touchdown_speed = _move_or_rest(
-            law, body, position, on_ground, crashed, touchdown_speed, load
+            constants, body, position, on_ground, crashed, touchdown_speed, load
         )
         history[steps % length] = truth_row(body, position)
     return VehicleState(steps, body, actuation, position, on_ground, crashed, touchdown_speed)
 
 
 def _move_or_rest(
-    law: VehicleLaw,
+    constants: VehicleConstants,
     body: Kinematics,
     position: Vector,
     on_ground: bool,
@@ -120,7 +120,7 @@ def _move_or_rest(
     The state is: motion; position, m, NED; whether the vehicle is on the ground; whether it has
     crashed; sink speed of the latest touchdown, m/s.
     """
-    multirotor, ground = law
+    multirotor, ground = constants
     _, _, _, w, x, y, z, _, _, _ = body[0]
     if crashed:
         return at_rest((w, x, y, z)), position, on_ground, crashed, touchdown_speed
@@ -156,9 +156,11 @@ class Plant(Protocol):
         history_length: number of the latest steps whose motion is kept.
     """
 
-    law: VehicleLaw
+    constants: VehicleConstants
 
-    def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None: ...
+    def __init__(
+        self, constants: VehicleConstants, state: VehicleState, history_length: int
+    ) -> None: ...
 
     @property
     def state(self) -> VehicleState:
@@ -174,7 +176,7 @@ class Plant(Protocol):
         ...
 
     def estimate(
-        self, law: SensorLaw, state: SensorState, time: float, noise: Sequence[float]
+        self, constants: SensorConstants, state: SensorState, time: float, noise: Sequence[float]
     ) -> tuple[Estimate, Vector]:
         """The present estimate of the autopilot: see `sensors.estimate`."""
         ...
@@ -188,16 +190,18 @@ class Plant(Protocol):
 class PythonPlant:
     """A vehicle whose steps and estimates are computed in Python; for the arguments see `Plant`."""
 
-    def __init__(self, law: VehicleLaw, state: VehicleState, history_length: int) -> None:
+    def __init__(
+        self, constants: VehicleConstants, state: VehicleState, history_length: int
+    ) -> None:
         self.state = state
-        self.law = law
-        self._rings = empty_rings(law.multirotor)
+        self.constants = constants
+        self._rings = empty_rings(constants.multirotor)
         self._history = [truth_row(state.body, state.position)] * history_length
 
     def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
         """Advance by `count` steps under one command."""
         self.state = advance(
-            self.law, self._rings, self._history, self.state, command, conditions, count
+            self.constants, self._rings, self._history, self.state, command, conditions, count
         )
         return outcome(self.state)
 
@@ -206,10 +210,10 @@ class PythonPlant:
         return self._history[(self.state.steps - steps) % len(self._history)]
 
     def estimate(
-        self, law: SensorLaw, state: SensorState, time: float, noise: Sequence[float]
+        self, constants: SensorConstants, state: SensorState, time: float, noise: Sequence[float]
     ) -> tuple[Estimate, Vector]:
         """The present estimate of the autopilot: see `sensors.estimate`."""
-        return estimate(law, state, self._history, self.state.steps, time, noise)
+        return estimate(constants, state, self._history, self.state.steps, time, noise)
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:

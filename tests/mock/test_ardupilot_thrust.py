@@ -15,7 +15,7 @@ from sitl_mock.ardupilot.thrust import (
 )
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.physics.rigid_body import GRAVITY, advance, body_of
-from sitl_mock.physics.rotors import rotor_law, throttle_of
+from sitl_mock.physics.rotors import rotor_constants, throttle_of
 
 CLIMBS = {0.2: 0.57, 0.3: 0.82, 0.36: 0.99, 0.4: 1.09, 0.5: 1.33, 0.6: 1.58, 0.8: 2.03, 1.0: 2.30}
 """Normalised thrust -> measured upward acceleration from a hover, plus gravity, in g."""
@@ -40,7 +40,7 @@ def test_more_thrust_always_gives_more_and_0_364_hovers():
 
 
 def test_the_airframe_can_give_all_of_it():
-    rotors = rotor_law(AirframeConfig(**AIRFRAME), 1e-3)
+    rotors = rotor_constants(AirframeConfig(**AIRFRAME), 1e-3)
     share = throttle_of(rotors, 0.25 * specific_thrust(1.0))
     assert share == pytest.approx(1.0)
     assert throttle_of(rotors, 0.25 * specific_thrust(0.8)) < 0.95

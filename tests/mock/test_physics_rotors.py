@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.rotors import mix, rotor_law, rotor_step, steady_thrust, throttle_of
+from sitl_mock.physics.rotors import mix, rotor_constants, rotor_step, steady_thrust, throttle_of
 
 AIRFRAME = AirframeConfig()
-ROTORS = rotor_law(AIRFRAME, 1e-3)
+ROTORS = rotor_constants(AIRFRAME, 1e-3)
 STILL = (0.0, 0.0, 0.0, 0.0)
 difference = st.floats(-0.6, 0.6)
 SIGNS = ((-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, -1, -1))
@@ -94,7 +94,7 @@ def test_the_throttle_for_a_thrust_settles_at_that_thrust(throttle):
 
 def test_lag_is_first_order_whatever_the_step():
     for dt in (1e-3, 1e-4):
-        rotors, thrusts = rotor_law(AIRFRAME, dt), STILL
+        rotors, thrusts = rotor_constants(AIRFRAME, dt), STILL
         for _ in range(round(0.05 / dt)):
             thrusts, _ = rotor_step(rotors, thrusts, (0.5,) * 4, 0.9)
         expected = 0.9 * steady_thrust(rotors, 0.5) * (1.0 - exp(-1.0))

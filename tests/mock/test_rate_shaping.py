@@ -23,10 +23,15 @@ from sitl_mock.physics.multirotor_step import (
     empty_rings,
     initial_actuation,
     move,
-    multirotor_law,
+    multirotor_constants,
     steady_throttle,
 )
-from sitl_mock.physics.rate_shaping import INACTIVE_SHAPING, shape, shaping_law, sqrt_controller
+from sitl_mock.physics.rate_shaping import (
+    INACTIVE_SHAPING,
+    shape,
+    shaping_constants,
+    sqrt_controller,
+)
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 from sitl_mock.settings import MockSettings, load_settings
 
@@ -137,13 +142,15 @@ def test_a_step_back_answers_as_the_step_did():
 @pytest.mark.parametrize("axis", [ROLL, PITCH, YAW])
 def test_the_shaped_rate_never_changes_faster_than_the_limit(axis):
     axes = RateLoopConfig.ardupilot().shaping
-    law = shaping_law(tuple(a.model_copy(update={"attitude_gain_1_s": 0.0}) for a in axes), DT)
+    constants = shaping_constants(
+        tuple(a.model_copy(update={"attitude_gain_1_s": 0.0}) for a in axes), DT
+    )
     rng = np.random.default_rng(4)
     shaped, state = [0.0], INACTIVE_SHAPING
     for _ in range(100):
         goals = vector(axis, rng.uniform(-4.0, 4.0))
         for _ in range(rng.integers(1, 300)):
-            setpoint, state = shape(law, state, goals, LEVEL)
+            setpoint, state = shape(constants, state, goals, LEVEL)
             shaped.append(setpoint[axis])
     fastest = max(abs(np.diff(shaped))) / DT
     assert fastest == pytest.approx(radians(YAW_LIMIT if axis == YAW else TILT_LIMIT), rel=1e-6)
@@ -162,13 +169,13 @@ def test_the_angle_reached_is_the_integral_of_the_command(axis, rate):
 def test_the_attitude_target_and_what_it_asks_of_the_body_about_all_axes():
     """Against SciPy: the setpoints integrated, and seen from a body that does not move."""
     axis = AxisShaping(acceleration_limit_rad_s2=1e6)  # so that angles are closed in proportion
-    law, state = shaping_law((axis, axis, axis), DT), INACTIVE_SHAPING
+    constants, state = shaping_constants((axis, axis, axis), DT), INACTIVE_SHAPING
     body = Rotation.from_euler("ZYX", [0.7, -0.3, 0.2])
     x, y, z, w = body.as_quat()
     target = body
     for setpoint in np.random.default_rng(7).uniform(-2.0, 2.0, (20, 3)):
         for _ in range(50):
-            rates, state = shape(law, state, tuple(setpoint), (w, x, y, z))
+            rates, state = shape(constants, state, tuple(setpoint), (w, x, y, z))
             target = target * Rotation.from_rotvec(setpoint * DT)
         ahead = body.inv() * target
         expected = ahead.apply(setpoint) + axis.attitude_gain_1_s * ahead.as_rotvec()
@@ -177,15 +184,17 @@ def test_the_attitude_target_and_what_it_asks_of_the_body_about_all_axes():
 
 def test_the_body_follows_a_correction_of_the_estimated_attitude():
     """The attitude target stays in the frame of the estimate, as recorded on ArduPilot."""
-    law = multirotor_law(AirframeConfig(), RateLoopConfig.ardupilot())
-    throttle = steady_throttle(law, GRAVITY)
-    rings, body = empty_rings(law), at_rest(LEVEL)
-    actuation = initial_actuation(law, throttle)
+    constants = multirotor_constants(AirframeConfig(), RateLoopConfig.ardupilot())
+    throttle = steady_throttle(constants, GRAVITY)
+    rings, body = empty_rings(constants), at_rest(LEVEL)
+    actuation = initial_actuation(constants, throttle)
     for step in range(4000):
         error = (0.0, 0.0, 0.0) if step < 1000 else (0.004, -0.003, 0.02)
         conditions = Conditions(1.0, REST, error)
-        load, actuation = drive(law, rings, actuation, body, step, REST, throttle, True, conditions)
-        body, _ = move(law, body, load)
+        load, actuation = drive(
+            constants, rings, actuation, body, step, REST, throttle, True, conditions
+        )
+        body, _ = move(constants, body, load)
     w, x, y, z = body[0][3:7]
     turn = Rotation.from_quat([x, y, z, w]).as_rotvec()
     assert turn == pytest.approx([-0.004, 0.003, -0.02], abs=1e-4)

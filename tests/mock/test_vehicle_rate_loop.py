@@ -10,7 +10,7 @@ from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import AxisGains, RateLoopConfig
 from sitl_mock.config.sensors import SensorConfig
 from sitl_mock.physics.multirotor import Multirotor
-from sitl_mock.physics.rate_loop import axis_law, axis_step
+from sitl_mock.physics.rate_loop import axis_constants, axis_step
 from sitl_mock.physics.vehicle import ActuatorCommand, Vehicle
 
 NOISELESS = SensorConfig(
@@ -187,11 +187,11 @@ def test_no_torque_is_stored_up_while_standing_or_disarmed(armed):
 
 
 def test_the_integral_shrinks_but_does_not_grow_while_saturated():
-    law = axis_law(AxisGains(proportional_n_m_s=0.1, integral_n_m=1.0), 1e-3)
-    wound = axis_step(law, (0.0, 0.0), 1.0, 0.0, 0.0, False, 1e-3)
+    constants = axis_constants(AxisGains(proportional_n_m_s=0.1, integral_n_m=1.0), 1e-3)
+    wound = axis_step(constants, (0.0, 0.0), 1.0, 0.0, 0.0, False, 1e-3)
     assert wound[0] == pytest.approx(1e-3)
-    assert axis_step(law, wound, 1.0, 0.0, 0.0, True, 1e-3)[0] == wound[0]
-    assert axis_step(law, wound, -1.0, 0.0, 0.0, True, 1e-3)[0] < wound[0]
+    assert axis_step(constants, wound, 1.0, 0.0, 0.0, True, 1e-3)[0] == wound[0]
+    assert axis_step(constants, wound, -1.0, 0.0, 0.0, True, 1e-3)[0] < wound[0]
 
 
 def test_a_fall_without_thrust_stores_no_torque():
@@ -209,11 +209,11 @@ def test_a_fall_without_thrust_stores_no_torque():
 
 
 def test_the_integral_has_a_limit():
-    law = axis_law(
+    constants = axis_constants(
         AxisGains(proportional_n_m_s=0.0, integral_n_m=10.0, integral_limit_n_m=0.2), 1e-3
     )
     for sign in (1.0, -1.0):
         state = (0.0, 0.0)
         for _ in range(1000):
-            state = axis_step(law, state, sign, 0.0, 0.0, False, 1e-3)
+            state = axis_step(constants, state, sign, 0.0, 0.0, False, 1e-3)
         assert state[0] == sign * 0.2
