@@ -9,7 +9,7 @@ lockstep they pass the datagrams that arrived since the last slot to `step`; in 
 from collections.abc import Callable
 from math import ceil
 
-from sitl_mock.link.endpoint import bundles
+from sitl_mock.link.endpoint import joined_datagrams
 from sitl_mock.link.framing import Message, decode
 from sitl_mock.link.link import Link
 from sitl_mock.link.pipe import DatagramPipe
@@ -86,7 +86,7 @@ class Exchange:
             frames = self._pipe_out.push(frames, faults, self._simulation.time_us)
         if beacon is not None:
             frames.append(link.sign(beacon))
-        return bundles(frames) if self._bundle else frames
+        return joined_datagrams(frames) if self._bundle else frames
 
     def answers_beacon(self, messages: list[Message]) -> bool:
         """Whether one of these messages answers the latest lockstep beacon."""

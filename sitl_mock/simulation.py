@@ -173,7 +173,7 @@ class Simulation:
     def _send_due(self, slot_us: int) -> None:
         builders, is_stopped = self._behaviour.builders, self.effects.is_stopped
         for link in self.links:
-            for message_id in link.streams.due(slot_us, self.state.status_us):
+            for message_id in link.streams.due(slot_us, self.state.status_at_us):
                 builder = builders.get(message_id)
                 if builder is None or is_stopped(message_id):
                     continue

@@ -132,7 +132,7 @@ class Control:
         self._posted = False
         if self._command is not None:
             self._source.give(*self._command)
-            self._flight.context.guidance_loop.step_soon()
+            self._flight.context.guidance_loop.step_at_once()
 
     def tilt(self, north: float, east: float, heading: float | None = None) -> None:
         """Command acceleration coefficients, and hold the height at which control began.

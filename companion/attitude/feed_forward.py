@@ -4,10 +4,10 @@ from math import cos, sin, sqrt
 
 from companion.attitude.history import PlanHistory, PlannedTilt, PlannedYaw
 from companion.attitude.kinematics import (
+    half_tilt_products,
     heading_of,
     rates_to_speed,
     rotate_to_heading,
-    tilt_products,
 )
 from companion.attitude.limits import Constants
 from companion.attitude.rate_response import AxisResponse, RateLoopResponse
@@ -139,7 +139,7 @@ class FeedForward:
         `body_rates`: rates at the start of the plan, rad/s; None: at rest.
         """
         w, x, y, z = q
-        a_squared, ax, ay = tilt_products(w, x, y, z)
+        a_squared, ax, ay = half_tilt_products(w, x, y, z)
         north = east = turn_rate = yaw_rate = 0.0
         if body_rates is not None:
             yaw_rate = body_rates[2]

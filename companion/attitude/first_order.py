@@ -4,11 +4,11 @@ from math import sqrt
 
 from companion.attitude.kinematics import (
     SMALLEST_A,
+    half_tilt_products,
     heading_of,
     law_weight,
     levelling_rates,
     speed_to_rates,
-    tilt_products,
 )
 from companion.attitude.limits import Constants
 from companion.attitude.rotation import clamp, wrap_difference
@@ -30,7 +30,7 @@ def first_order(
     )
     w, x, y, z = q
     north, east, heading, heading_rate = target
-    a_squared, ax, ay = tilt_products(w, x, y, z)
+    a_squared, ax, ay = half_tilt_products(w, x, y, z)
     cosine = 2.0 * a_squared - 1.0
     weight = 1.0
     if cosine < cos_recovery:

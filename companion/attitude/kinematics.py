@@ -13,7 +13,7 @@ SMALLEST_A = 1e-12
 """Smallest value used for a = cos(tilt/2); below it the vehicle counts as exactly inverted."""
 
 
-def tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+def half_tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """(a², a·x, a·y) of `split`; cos(tilt) = 2a² − 1, coefficients (−2ay, +2ax) (equation 10)."""
     return w * w + z * z, w * x - z * y, z * x + w * y
 
@@ -27,7 +27,7 @@ def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, 
     a = sqrt(w * w + z * z)
     if a < SMALLEST_A:
         return 0.0, 1.0, x, y, 0.0
-    _, ax, ay = tilt_products(w, x, y, z)
+    _, ax, ay = half_tilt_products(w, x, y, z)
     return a, w / a, ax / a, ay / a, z / a
 
 
@@ -90,7 +90,7 @@ def rates_to_speed(
     """
     north = 2.0 * (x * y - w * z) * roll_rate - (1.0 - 2.0 * (y * y + z * z)) * pitch_rate
     east = (1.0 - 2.0 * (x * x + z * z)) * roll_rate - 2.0 * (x * y + w * z) * pitch_rate
-    a_squared, ax, ay = tilt_products(w, x, y, z)
+    a_squared, ax, ay = half_tilt_products(w, x, y, z)
     inverse_a_squared = 1.0 / a_squared
     _, _, still_rate = speed_to_rates(
         w, z, ax, ay, inverse_a_squared, 1.0 / (2.0 * a_squared - 1.0), east, -north

@@ -6,10 +6,10 @@ from companion.attitude.feed_forward import FeedForward
 from companion.attitude.first_order import first_order
 from companion.attitude.history import PlannedTilt, PlannedYaw, SampleHold
 from companion.attitude.kinematics import (
+    half_tilt_products,
     heading_of,
     rotate_to_heading,
     speed_to_rates,
-    tilt_products,
 )
 from companion.attitude.limits import Constants
 from companion.attitude.rate_response import RateLoopResponse, feedback_gain
@@ -77,7 +77,7 @@ class ModelFollowingPlanner:
             InvalidBodyRatesError: `body_rates` are not three numbers.
         """
         w, x, y, z = q = normalised(q)
-        a_squared, _, _ = tilt_products(w, x, y, z)
+        a_squared, _, _ = half_tilt_products(w, x, y, z)
         plausible = plausible_rates(body_rates)
         self._started = 2.0 * a_squared - 1.0 >= self._constants.cos_recovery
         if self._started:
@@ -99,7 +99,7 @@ class ModelFollowingPlanner:
         if not (self._started and is_unit(q)):
             return
         w, x, y, z = normalised(q)
-        a_squared, _, _ = tilt_products(w, x, y, z)
+        a_squared, _, _ = half_tilt_products(w, x, y, z)
         if 2.0 * a_squared - 1.0 >= self._constants.cos_recovery:
             self._feed_forward.target_frame.note_heading(heading_of(sqrt(a_squared), w, z), age)
 
@@ -121,7 +121,7 @@ class ModelFollowingPlanner:
         constants, forward = self._constants, self._feed_forward
         w, x, y, z = q = normalised(q)
         target = limited_target(target, constants.longest_target)
-        a_squared, ax, ay = tilt_products(w, x, y, z)
+        a_squared, ax, ay = half_tilt_products(w, x, y, z)
         cosine = 2.0 * a_squared - 1.0
         plausible = plausible_rates(body_rates)
         if cosine < constants.cos_recovery:

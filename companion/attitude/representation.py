@@ -5,7 +5,7 @@ Equations are those of the paper (`companion.attitude`); a, b, x, y, z are the f
 
 from math import atan2, inf, pi, sqrt
 
-from companion.attitude.kinematics import split, tilt_products
+from companion.attitude.kinematics import half_tilt_products, split
 from companion.attitude.rotation import attitude_of
 from companion.attitude.types import (
     BodyRates,
@@ -74,7 +74,7 @@ def coefficients(q: Quaternion) -> Coefficients:
     Raises:
         InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.
     """
-    _, ax, ay = tilt_products(*normalised(q))
+    _, ax, ay = half_tilt_products(*normalised(q))
     return Coefficients(-2.0 * ay, 2.0 * ax)
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from companion.attitude.kinematics import tilt_products
+from companion.attitude.kinematics import half_tilt_products
 from companion.attitude.planner import LAW_NAMES, Law, LawPlanner, Planner
 from companion.attitude.representation import require_period
 from companion.batch.checks import as_rows, compiled_check, limited_targets, unit_quaternions
@@ -144,7 +144,7 @@ def coefficients(q: ArrayLike) -> Array:
     quaternions = np.asarray(q, dtype=np.float64)
     if quaternions.ndim < 2 or quaternions.shape[-2] != _COMPONENTS:
         raise ValueError(f"q must have the shape (..., 4, n), not {quaternions.shape}")
-    _, ax, ay = tilt_products(*np.moveaxis(quaternions, -2, 0))
+    _, ax, ay = half_tilt_products(*np.moveaxis(quaternions, -2, 0))
     return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=-2)
 
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.attitude.kinematics import tilt_products
+from companion.attitude.kinematics import half_tilt_products
 from companion.attitude.limits import Constants
 from companion.attitude.planner import Law, LawPlanner
 from companion.attitude.rate_response import AxisResponse
@@ -107,7 +107,7 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
     one_law = compiler.compile_function(law)
     rotate = compiler.compile_function(after_constant_rates)
     lag_response, limit = compiler.compile_function(lag_step), compiler.compile_function(clamp)
-    products = compiler.compile_function(tilt_products)
+    products = compiler.compile_function(half_tilt_products)
     dt = 1.0 / STEP_HZ
 
     def fly(

@@ -162,7 +162,7 @@ class GuidanceLoop:
             self.step()
             await self._ticker.tick()
 
-    def step_soon(self) -> None:
+    def step_at_once(self) -> None:
         """Make the next command at once, because the source has a new reference."""
         self._ticker.trigger()
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from math import atan2
 
 from companion.attitude import BodyRates, Quaternion
-from companion.attitude.kinematics import tilt_products
+from companion.attitude.kinematics import half_tilt_products
 from companion.drag import AxisDrag
 from companion.guidance import (
     GRAVITY,
@@ -82,7 +82,7 @@ class MotionEstimate:
         """Take a measured attitude, which gives the direction of the thrust."""
         self._q, self._body_rates = sample.q, sample.body_rates
         self._heading = 2.0 * atan2(sample.q[3], sample.q[0])
-        square, ax, ay = tilt_products(*sample.q)
+        square, ax, ay = half_tilt_products(*sample.q)
         cosine = max(2.0 * square - 1.0, _LEAST_COS_TILT)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
-from companion.attitude.kinematics import tilt_products
+from companion.attitude.kinematics import half_tilt_products
 from companion.control.loop_record import Unanswered
 from companion.recording.mcap_file.loop_channels import (
     ATTITUDE_TARGET,
@@ -121,7 +121,7 @@ class SampleRows:
     ) -> tuple[float, ...]:
         rates, thrust, latency_ns, planner_input, planned_tilt, is_step, idle = answer
         q, target = planner_input or (sample.q, _NO_TARGET)
-        _, ax, ay = tilt_products(*q)
+        _, ax, ay = half_tilt_products(*q)
         roll, pitch, yaw = rates
         return (
             sample.received,

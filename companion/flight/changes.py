@@ -140,7 +140,7 @@ class Changes:
         return text
 
     @contextmanager
-    def limited_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
+    def judged_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
         """Let `refuses` judge each change and each undo while the `with` block runs.
 
         Args:

@@ -112,7 +112,9 @@ def _silence_duration(context: FlightContext, now: float) -> float | None:
     if heartbeat is None:
         return None
     silence = now - heartbeat.received
-    return silence if silence > context.heartbeat_limit else context.snapshot_builder.unheard(now)
+    return (
+        silence if silence > context.heartbeat_limit else context.snapshot_builder.long_silence(now)
+    )
 
 
 def _early_end(

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import hypot, sin, sqrt
 
 from companion.attitude import wrap_angle
-from companion.attitude.kinematics import heading_of, rates_to_speed, tilt_products
+from companion.attitude.kinematics import half_tilt_products, heading_of, rates_to_speed
 from companion.attitude.representation import normalised
 from companion.nmpc.coefficient_model import coefficient_model
 from companion.nmpc.messages import ControlInput, VehicleSnapshot
@@ -32,7 +32,7 @@ def motion_of(vehicle: VehicleSnapshot) -> Motion:
         TiltedTooFarError: the tilt exceeds 78°.
     """
     w, x, y, z = normalised(vehicle.q)
-    a_squared, ax, ay = tilt_products(w, x, y, z)
+    a_squared, ax, ay = half_tilt_products(w, x, y, z)
     if 2.0 * a_squared - 1.0 < _LEAST_COSINE:
         raise TiltedTooFarError
     speed_north, speed_east, _ = rates_to_speed(w, x, y, z, *vehicle.body_rates)

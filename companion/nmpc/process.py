@@ -19,7 +19,7 @@ from math import hypot, isfinite, sin
 from time import monotonic
 from typing import NamedTuple
 
-from companion.attitude.kinematics import tilt_products
+from companion.attitude.kinematics import half_tilt_products
 from companion.extras import require
 from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.messages import READY_MESSAGE, Answer, Request, Status
@@ -127,7 +127,7 @@ class Solver:
         except (BrokenPipeError, ConnectionResetError):
             self._handle_exit()
         else:
-            _, ax, ay = tilt_products(*request.vehicle.q)
+            _, ax, ay = half_tilt_products(*request.vehicle.q)
             longest_target = max(sin(self._settings.max_tilt), 2.0 * hypot(ax, ay))
             self._pending = _Pending(request.number, monotonic(), longest_target)
 

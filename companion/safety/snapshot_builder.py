@@ -100,7 +100,7 @@ class SnapshotBuilder:
         to_autopilot_frame = minus((0.0, 0.0, 0.0), self._loop.resets.position_shift)
         return FenceCentre(minus(self.fence_centre_ned, to_autopilot_frame), self._fence_place)
 
-    def unheard(self, now: float) -> float | None:
+    def long_silence(self, now: float) -> float | None:
         """Silence of the vehicle at `now`, s; None if it is not longer than `UNHEARD_S`."""
         self.listen(now)
         silence = now - self._heard_at

@@ -144,7 +144,7 @@ class ServedFlight:
             UnplannableError: no motion leads to the request; the previous one stays in force.
         """
         self._source.give(request, self._clock())
-        self._assembled.context.guidance_loop.step_soon()
+        self._assembled.context.guidance_loop.step_at_once()
 
     def expect_release(self) -> None:
         """Note that the owner has just commanded another mode, with which it releases control."""
@@ -156,7 +156,7 @@ class ServedFlight:
 
     async def run(self, command: ControlRequest | None) -> bool:
         """Fly; answer `command`, if there is one; return whether control had begun."""
-        with self._records.recording(self._record), self._changes.limited_by(change_refusal):
+        with self._records.recording(self._record), self._changes.judged_by(change_refusal):
             result = "stopped at once"
             self._record.begin_counting(self._assembled.context.link.stats)
             try:

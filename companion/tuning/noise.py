@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.attitude.kinematics import tilt_products
+from companion.attitude.kinematics import half_tilt_products
 from companion.guidance import GRAVITY
 from companion.mavlink.tlog_file import messages
 from companion.tuning.expectation import Disturbances, Floats
@@ -83,7 +83,7 @@ def _telemetry(log: Path) -> tuple[Floats, Floats]:
             continue
         time = 1e-3 * message.time_boot_ms
         if message_type == "ATTITUDE_QUATERNION":
-            a_squared, ax, ay = tilt_products(message.q1, message.q2, message.q3, message.q4)
+            a_squared, ax, ay = half_tilt_products(message.q1, message.q2, message.q3, message.q4)
             cosine = max(2.0 * a_squared - 1.0, 0.2)
             slopes.append((time, -2.0 * ay / cosine, 2.0 * ax / cosine))
             continue

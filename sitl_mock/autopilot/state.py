@@ -80,7 +80,7 @@ class State:
     intended_mode: Mode = Mode.LOITER
     mode_after_disarming: Mode = Mode.LOITER
     """The mode that PX4 enters when it disarms."""
-    status_us: int = 0
+    status_at_us: int = 0
     """Vehicle time at which PX4 last published its status (mode and arming), us."""
     failsafe: bool = False
     prearm_problem: str | None = "system is booting"

@@ -41,7 +41,7 @@ class Endpoint(Protocol):
         """Close the endpoint."""
 
 
-def bundles(frames: list[bytes]) -> list[bytes]:
+def joined_datagrams(frames: list[bytes]) -> list[bytes]:
     """Return the frames joined in order into datagrams of at most `MAX_BUNDLE` bytes."""
     joined: list[bytes] = []
     size = 0

@@ -25,10 +25,10 @@ class StreamSchedule(Protocol):
     def interval(self, message_id: int) -> int:
         """Return the interval of a message in us, -1 if it is not streamed."""
 
-    def due(self, slot_us: int, status_us: int = 0) -> list[int]:
+    def due(self, slot_us: int, status_at_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
 
-        ``status_us``: vehicle time at which PX4 last published its status, for CURRENT_MODE.
+        ``status_at_us``: vehicle time at which PX4 last published its status, for CURRENT_MODE.
         """
 
 

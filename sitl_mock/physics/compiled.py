@@ -207,7 +207,7 @@ class CompiledPlant:
             count,
         )
 
-    def row_before(self, steps: int) -> TruthRow:
+    def truth_ago(self, steps: int) -> TruthRow:
         """The true motion `steps` steps ago."""
         row: TruthRow = tuple(self._history[(self._steps - steps) % len(self._history)].tolist())
         return row

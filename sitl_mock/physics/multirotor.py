@@ -32,7 +32,7 @@ class Multirotor:
 
     Attributes:
         body: motion after the latest step. To stop the vehicle, assign `at_rest(q)`.
-        actuation: state of controller and rotors after the latest step, its `Mix` first.
+        actuation: state of controller and rotors after the latest step, its `Allocation` first.
     """
 
     def __init__(

@@ -28,10 +28,10 @@ from sitl_mock.physics.rate_shaping import (
 from sitl_mock.physics.rigid_body import Body, Load, Motion, advance, body_of, derivative
 from sitl_mock.physics.rotors import (
     STOPPED_MIX,
+    Allocation,
     FourFloats,
-    Mix,
     RotorConstants,
-    mix,
+    allocate,
     rotor_constants,
     rotor_step,
     steady_thrust,
@@ -58,7 +58,7 @@ class MultirotorConstants(NamedTuple):
 Kinematics = tuple[Motion, Vector, Vector]
 """Motion after a step, and the means over the step: acceleration (NED, m/s^2), and angular
 acceleration (FRD, rad/s^2)."""
-Actuation = tuple[Mix, FourFloats, AxisStates, ShapingState]
+Actuation = tuple[Allocation, FourFloats, AxisStates, ShapingState]
 """State of controller and rotors after a step: throttles, thrust of each rotor (N), rate loop,
 shaping."""
 
@@ -110,7 +110,7 @@ def steady_throttle(constants: MultirotorConstants, specific_thrust: float) -> f
 def initial_actuation(constants: MultirotorConstants, throttle: float) -> Actuation:
     """Return the state of controller and rotors at the start, with rotors at a steady speed."""
     thrust = steady_thrust(constants.rotors, throttle)
-    mixed = mix(throttle, 0.0, 0.0, 0.0)
+    mixed = allocate(throttle, 0.0, 0.0, 0.0)
     return mixed, (thrust, thrust, thrust, thrust), ZERO_STATE, INACTIVE_SHAPING
 
 
@@ -200,13 +200,13 @@ def _shape_setpoint(
     return setpoint, INACTIVE_SHAPING
 
 
-def _allocate(constants: MultirotorConstants, axes: AxisStates, throttle: float) -> Mix:
+def _allocate(constants: MultirotorConstants, axes: AxisStates, throttle: float) -> Allocation:
     """Allocate torques and throttle to the rotors."""
     # A NaN throttle fails this comparison, which stops the rotors.
     if throttle > 0.0:
         roll, pitch, yaw = axes
         tilt_torque = constants.tilt_torque
-        return mix(
+        return allocate(
             throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / constants.yaw_torque
         )
     return STOPPED_MIX

@@ -13,7 +13,7 @@ FourFloats = tuple[float, float, float, float]
 """One number for each rotor, or thrust and torques about body x, y, z."""
 
 
-class Mix(NamedTuple):
+class Allocation(NamedTuple):
     """Result of the allocation: throttles 0..1, and which torques saturated."""
 
     throttles: FourFloats
@@ -21,11 +21,11 @@ class Mix(NamedTuple):
     yaw_saturated: bool
 
 
-STOPPED_MIX = Mix((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
+STOPPED_MIX = Allocation((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
 """Result of the allocation while the rotors are off and give no torque."""
 
 
-def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
+def allocate(throttle: float, roll: float, pitch: float, yaw: float) -> Allocation:
     """Allocate rotor throttles with PX4's priorities: roll and pitch, thrust, yaw.
 
     Saturation reduces thrust but never increases it (no airmode): at throttle 0 no rotor turns.
@@ -56,7 +56,7 @@ def mix(throttle: float, roll: float, pitch: float, yaw: float) -> Mix:
     if yaw_saturated:
         headroom = max(headroom, 0.0)
         yaw = headroom if yaw > 0.0 else -headroom
-    return Mix(
+    return Allocation(
         (
             throttle - roll + pitch + yaw,
             throttle + roll - pitch + yaw,

@@ -207,16 +207,16 @@ class Estimator:
         )
         self.reset_counter += 1
 
-    def correct(self, time: float, row_before: Callable[[int], TruthRow]) -> None:
+    def correct(self, time: float, truth_ago: Callable[[int], TruthRow]) -> None:
         """Correct the errors if a fix of the navigation filter is due.
 
         Args:
             time: present time, s.
-            row_before: returns the true motion k steps ago, for k below `history_length`.
+            truth_ago: returns the true motion k steps ago, for k below `history_length`.
         """
         fusion_time = time - self._fusion_delay * self.constants.dt
         if self._filter is not None and self._filter.is_due(fusion_time):
-            self._filter.advance(row_before(self._fusion_delay), fusion_time, row_before(0), time)
+            self._filter.advance(truth_ago(self._fusion_delay), fusion_time, truth_ago(0), time)
             self.state = self.state._replace(filter=self._filter.state)
 
     def draw_noise(self) -> Sequence[float]:

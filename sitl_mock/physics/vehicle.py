@@ -158,7 +158,7 @@ class Vehicle:
     def estimate(self) -> Estimate:
         """Return the autopilot's present estimate; every call draws new noise."""
         estimator, time = self.estimator, self.time
-        estimator.correct(time, self.plant.row_before)
+        estimator.correct(time, self.plant.truth_ago)
         estimate, estimator.rotation = self.plant.estimate(
             estimator.constants, estimator.state, time, estimator.draw_noise()
         )

@@ -171,7 +171,7 @@ class Plant(Protocol):
         """Advance by `count` steps under one command."""
         ...
 
-    def row_before(self, steps: int) -> TruthRow:
+    def truth_ago(self, steps: int) -> TruthRow:
         """The true motion `steps` steps ago."""
         ...
 
@@ -205,7 +205,7 @@ class PythonPlant:
         )
         return outcome(self.state)
 
-    def row_before(self, steps: int) -> TruthRow:
+    def truth_ago(self, steps: int) -> TruthRow:
         """The true motion `steps` steps ago."""
         return self._history[(self.state.steps - steps) % len(self._history)]
 

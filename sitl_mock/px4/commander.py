@@ -216,8 +216,11 @@ class Px4Commander:
         """Publish the status when it changed, else twice a second."""
         state = self._state
         status = (state.armed, state.mode, state.intended_mode, state.failsafe)
-        if status != self._published_status or state.time_us - state.status_us >= STATUS_PERIOD_US:
-            self._published_status, state.status_us = status, state.time_us
+        if (
+            status != self._published_status
+            or state.time_us - state.status_at_us >= STATUS_PERIOD_US
+        ):
+            self._published_status, state.status_at_us = status, state.time_us
 
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:

@@ -24,7 +24,7 @@ VALUE_PERIOD_US = {LOCAL_POSITION_NED: 8000}
 
 
 class _Stream:
-    __slots__ = ("due_us", "interval_us", "message_id", "sent_us", "status_us")
+    __slots__ = ("due_us", "interval_us", "message_id", "sent_us", "status_at_us")
 
     def __init__(self, message_id: int, interval_us: int, due_us: int) -> None:
         self.message_id = message_id
@@ -32,7 +32,7 @@ class _Stream:
         self.due_us = due_us
         self.sent_us: int | None = None
         """Vehicle time of the latest slot in which the message was sent, us."""
-        self.status_us = -1
+        self.status_at_us = -1
         """Vehicle time of the latest status published before the message was last sent, us."""
 
 
@@ -76,11 +76,11 @@ class Px4Streams:
         stream = self._streams.get(message_id)
         return -1 if stream is None else stream.interval_us
 
-    def due(self, slot_us: int, status_us: int = 0) -> list[int]:
+    def due(self, slot_us: int, status_at_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
 
         CURRENT_MODE is sent at most once per publication of the vehicle status, the latest of which
-        was at ``status_us`` (measured: 2 Hz of 20 Hz requested).
+        was at ``status_at_us`` (measured: 2 Hz of 20 Hz requested).
         """
         due_ids = []
         for stream in self._streams.values():
@@ -88,14 +88,14 @@ class Px4Streams:
             if late_us < 0:
                 continue
             message_id = stream.message_id
-            nothing_new = message_id == CURRENT_MODE and stream.status_us == status_us
+            nothing_new = message_id == CURRENT_MODE and stream.status_at_us == status_at_us
             if nothing_new or self._misses_slot(stream, slot_us):
                 continue
             # Keep the phase while the stream is nearly on time, else restart it.
             nearly_on_time = 2 * late_us < stream.interval_us
             stream.due_us = (stream.due_us if nearly_on_time else slot_us) + stream.interval_us
             stream.sent_us = slot_us
-            stream.status_us = status_us
+            stream.status_at_us = status_at_us
             due_ids.append(message_id)
         self._last_slot_us = slot_us
         return due_ids

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from companion.attitude.kinematics import (
     cos_tilt,
+    half_tilt_products,
     heading_of,
     law_weight,
     levelling_rates,
@@ -19,7 +20,6 @@ from companion.attitude.kinematics import (
     speed_to_rates,
     split,
     tilt_angle,
-    tilt_products,
 )
 from companion.attitude.rotation import clamp, first_nonzero_is_negative, limit_rates
 from tests.attitude.independent import coefficients_of, headings_of, held, wrapped
@@ -53,7 +53,7 @@ def test_the_split_is_a_tilt_about_a_level_axis_and_then_a_heading():
         a, b, x, y, z = split(*q)
         whole = Rotation.from_quat([x, y, 0.0, a]) * Rotation.from_quat([0.0, 0.0, z, b])
         assert (whole.inv() * r).magnitude() < 1e-14
-        assert tilt_products(*q) == pytest.approx((a * a, a * x, a * y), abs=1e-15)
+        assert half_tilt_products(*q) == pytest.approx((a * a, a * x, a * y), abs=1e-15)
 
 
 def test_exactly_inverted_the_heading_is_zero():
@@ -87,7 +87,7 @@ def test_rates_move_the_coefficients_and_the_heading_as_differences_say():
 def test_the_rates_for_a_speed_make_it_and_keep_the_heading():
     rates, wanted = [], []
     for q, (e_x, e_y, _) in zip(scalars(UPRIGHT), RATES.tolist(), strict=True):
-        square, ax, ay = tilt_products(*q)
+        square, ax, ay = half_tilt_products(*q)
         cosine = 2.0 * square - 1.0
         roll, pitch, yaw = speed_to_rates(q[0], q[3], ax, ay, 1.0 / square, 1.0 / cosine, e_x, e_y)
         rates.append((roll, pitch, yaw))

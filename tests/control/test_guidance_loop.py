@@ -304,7 +304,7 @@ def test_it_steps_in_its_period_and_at_once_when_asked():
         running = asyncio.create_task(guidance.run())
         await asyncio.sleep(0)
         assert len(steps) == 1
-        guidance.step_soon()
+        guidance.step_at_once()
         for _ in range(5):
             await asyncio.sleep(0)
         assert len(steps) == 2

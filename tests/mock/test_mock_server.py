@@ -22,7 +22,7 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET
 from sitl_mock.exchange import burst_time
-from sitl_mock.link.endpoint import bundles
+from sitl_mock.link.endpoint import joined_datagrams
 from sitl_mock.link.framing import Framer, decode
 from sitl_mock.settings import MockSettings
 
@@ -304,11 +304,11 @@ def test_ctrl_c_ends_well():
 def test_bundles_keep_order_and_fit():
     rng = random.Random(1)
     frames = [rng.randbytes(rng.randrange(12, 280)) for _ in range(60)]
-    joined = bundles(frames)
+    joined = joined_datagrams(frames)
     assert b"".join(joined) == b"".join(frames)
     assert max(map(len, joined)) <= 1400
     assert len(joined) < 12
-    assert bundles([]) == []
+    assert joined_datagrams([]) == []
 
 
 def test_bursts_come_as_often_as_recorded():

@@ -7,7 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl_mock.config.airframe import AirframeConfig
-from sitl_mock.physics.rotors import mix, rotor_constants, rotor_step, steady_thrust, throttle_of
+from sitl_mock.physics.rotors import (
+    allocate,
+    rotor_constants,
+    rotor_step,
+    steady_thrust,
+    throttle_of,
+)
 
 AIRFRAME = AirframeConfig()
 ROTORS = rotor_constants(AIRFRAME, 1e-3)
@@ -27,7 +33,7 @@ def parts(throttles):
 @settings(max_examples=400, derandomize=True)
 @given(st.floats(0.0, 1.5), difference, difference, difference)
 def test_throttles_stay_possible_and_no_axis_turns_the_wrong_way(throttle, roll, pitch, yaw):
-    result = mix(throttle, roll, pitch, yaw)
+    result = allocate(throttle, roll, pitch, yaw)
     assert all(-1e-12 <= u <= 1.0 + 1e-12 for u in result.throttles)
     got = parts(result.throttles)
     assert got[0] <= throttle + 1e-12  # thrust gives way downwards only
@@ -39,25 +45,25 @@ def test_throttles_stay_possible_and_no_axis_turns_the_wrong_way(throttle, roll,
 @settings(derandomize=True)
 @given(st.floats(0.4, 0.6), *[st.floats(-0.1, 0.1)] * 3)
 def test_what_fits_is_given_exactly(throttle, roll, pitch, yaw):
-    result = mix(throttle, roll, pitch, yaw)
+    result = allocate(throttle, roll, pitch, yaw)
     assert not result.tilt_saturated
     assert not result.yaw_saturated
     assert parts(result.throttles) == pytest.approx((throttle, roll, pitch, yaw), abs=1e-12)
 
 
 def test_roll_and_pitch_go_before_yaw_and_before_thrust():
-    full = mix(1.0, 0.2, 0.1, 0.5)
+    full = allocate(1.0, 0.2, 0.1, 0.5)
     assert parts(full.throttles) == pytest.approx((0.7, 0.2, 0.1, 0.2), abs=1e-12)
     assert (full.tilt_saturated, full.yaw_saturated) == (False, True)
-    left = mix(0.3, 0.15, -0.15, -0.2)
+    left = allocate(0.3, 0.15, -0.15, -0.2)
     assert parts(left.throttles) == pytest.approx((0.3, 0.15, -0.15, 0.0), abs=1e-12)
-    cut = mix(0.1, 0.3, -0.1, 0.0)
+    cut = allocate(0.1, 0.3, -0.1, 0.0)
     assert parts(cut.throttles) == pytest.approx((0.1, 0.075, -0.025, 0.0), abs=1e-12)
     assert cut.tilt_saturated
 
 
 def test_nothing_turns_at_throttle_zero():
-    assert mix(0.0, 1.0, 1.0, 1.0).throttles == (0.0, 0.0, 0.0, 0.0)
+    assert allocate(0.0, 1.0, 1.0, 1.0).throttles == (0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from math import dist
 import numpy as np
 
 from companion.attitude import Limits, Quaternion, Target, make_planner
-from companion.attitude.kinematics import cos_tilt, tilt_products
+from companion.attitude.kinematics import cos_tilt, half_tilt_products
 from companion.drag import Drag
 from companion.guidance.reference import GRAVITY
 from companion.guidance.trajectory.sample import Vector
@@ -88,7 +88,7 @@ class Vehicle:
 
 def _thrust_and_gravity(q: Quaternion, thrust: float) -> Vector:
     """Acceleration by thrust and gravity, m/s², NED (equation 10)."""
-    _, ax, ay = tilt_products(*q)
+    _, ax, ay = half_tilt_products(*q)
     return -2.0 * ay * thrust, 2.0 * ax * thrust, GRAVITY - thrust * cos_tilt(q[1], q[2])
 
 
