@@ -118,7 +118,7 @@ class RealtimeSettings:
 
 
 @contextmanager
-def requested_settings(settings: RealtimeSettings) -> Iterator[tuple[SettingResult, ...]]:
+def request_settings(settings: RealtimeSettings) -> Iterator[tuple[SettingResult, ...]]:
     """Request all settings; undo the granted ones at the end of the block.
 
     Raises:

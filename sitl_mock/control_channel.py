@@ -18,7 +18,7 @@ from typing import Any, TypedDict
 from pydantic import ValidationError
 
 from sitl_mock.config.faults import Fault, fault_adapter
-from sitl_mock.config.section import ConfigError, describe_wrong_member, describe_wrong_value
+from sitl_mock.config.section import ConfigError, describe_wrong_kind, describe_wrong_value
 from sitl_mock.physics.quaternion import Quaternion, Vector
 from sitl_mock.simulation import Simulation
 
@@ -82,9 +82,7 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     except ValidationError as error:
         detail = error.errors()[0]
         key_path = ".".join(str(part) for part in detail["loc"])
-        problem = (
-            describe_wrong_member(detail, Fault) or f" {key_path}{describe_wrong_value(error)}"
-        )
+        problem = describe_wrong_kind(detail, Fault) or f" {key_path}{describe_wrong_value(error)}"
         raise ConfigError(f"fault{problem}") from error
     simulation.faults.add(valid_fault, simulation.time_us)
 

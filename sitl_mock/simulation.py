@@ -155,7 +155,7 @@ class Simulation:
     def _update_state(self) -> None:
         state, vehicle, behaviour = self.state, self.vehicle, self._behaviour
         behaviour.land_detector.step(contact=vehicle.on_ground)
-        if behaviour.commander.under_setpoints and self.effects.offboard_since_us is None:
+        if behaviour.commander.obeys_setpoints and self.effects.offboard_since_us is None:
             self.effects.offboard_since_us = state.time_us
         begun_faults, ended_faults = self.faults.update(
             state.time_us, self.effects.offboard_since_us

@@ -11,11 +11,11 @@ import sys
 import pytest
 
 from companion import realtime
-from companion.realtime import RealtimeError, RealtimeSettings, requested_settings
+from companion.realtime import RealtimeError, RealtimeSettings, request_settings
 
 
 def refusals(settings):
-    with requested_settings(settings) as grants:
+    with request_settings(settings) as grants:
         return [grant.refusal for grant in grants]
 
 
@@ -26,7 +26,7 @@ def test_who_asks_for_nothing_gets_nothing():
 def test_what_this_computer_surely_grants_is_granted_and_given_back():
     before = os.sched_getaffinity(0)
     one = (min(before),)
-    with requested_settings(
+    with request_settings(
         RealtimeSettings(processors=one, freeze_gc=True, required=True)
     ) as grants:
         assert [str(grant) for grant in grants] == [
@@ -90,7 +90,7 @@ def policies_elsewhere():
 
 before = os.sched_getscheduler(0)
 settings = realtime.RealtimeSettings(fifo_priority=7, lock_memory=True)
-with realtime.requested_settings(settings) as grants:
+with realtime.request_settings(settings) as grants:
     memory, scheduler = grants
     assert (os.sched_getscheduler(0) == os.SCHED_FIFO) == (scheduler.refusal is None)
     if scheduler.refusal is None:
@@ -153,7 +153,7 @@ def test_a_processor_that_is_not_there_is_named():
 def test_what_is_required_and_refused_is_raised_and_the_rest_given_back():
     with (
         pytest.raises(RealtimeError, match=r"processor 1023: not granted.*realtime\.required"),
-        requested_settings(RealtimeSettings(processors=(1023,), freeze_gc=True, required=True)),
+        request_settings(RealtimeSettings(processors=(1023,), freeze_gc=True, required=True)),
     ):
         raise AssertionError("nothing may fly")
     assert gc.isenabled()
@@ -190,7 +190,7 @@ def test_another_error_of_the_kernel_is_told_without_the_permission(monkeypatch)
 def test_a_collector_that_the_caller_stopped_stays_stopped():
     gc.disable()
     try:
-        with requested_settings(RealtimeSettings(freeze_gc=True)):
+        with request_settings(RealtimeSettings(freeze_gc=True)):
             assert not gc.isenabled()
         assert not gc.isenabled()
     finally:

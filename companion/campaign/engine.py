@@ -91,17 +91,19 @@ def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
     return Counter(result for result in results if result.startswith(INTERNAL_ERROR))
 
 
-def run_on_cluster(client: "Client", kind: str, cases: Sequence[Case], case_s: float) -> list[Row]:
+def run_on_cluster(
+    client: "Client", kind: str, cases: Sequence[Case], seconds_per_case: float
+) -> list[Row]:
     """Run any cases on the cluster; return their rows in order. Nothing is stored.
 
-    `case_s` is the wall time that a case takes, s.
+    `seconds_per_case` is the wall time that a case takes, s.
 
     Raises:
         ClusterError: the connection to the scheduler is lost, or a unit was given up.
         ConfigError: a worker refuses a case.
         VersionError: a worker that joined later has other versions.
     """
-    unit_size = cases_per_unit(len(cases), case_s, number_of_workers(client))
+    unit_size = cases_per_unit(len(cases), seconds_per_case, number_of_workers(client))
     units = unit_ranges(len(cases), unit_size)
     tasks = {
         number: (fly_cases, kind, [cases[index] for index in unit], versions())

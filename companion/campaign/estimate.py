@@ -41,15 +41,17 @@ def case_time(kind: str, cases: Sequence[Case]) -> float:
     return (perf_counter() - began) / len(timed_cases)
 
 
-def check_size(campaign: Campaign, case_s: float, workers: int) -> None:
-    """Refuse a campaign that is larger than its limits, if a case takes `case_s` s of wall time.
+def check_size(campaign: Campaign, seconds_per_case: float, workers: int) -> None:
+    """Refuse a campaign that is larger than its limits.
+
+    `seconds_per_case` is the wall time that a case takes, s.
 
     Raises:
         ConfigError: says the number of cases, the time they would take, and which key allows more.
     """
     cases, limits = campaign.number_of_cases, campaign.file.limits
     most_allowed = most_cases(campaign)
-    seconds = cases * case_s / workers
+    seconds = cases * seconds_per_case / workers
     if cases > most_allowed:
         key, allowed = "limits.max_cases", f"{most_allowed}"
     elif seconds > 3600.0 * limits.max_hours:

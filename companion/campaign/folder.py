@@ -48,11 +48,13 @@ class Description:
     """Time at which the folder was made, ISO 8601, UTC."""
 
 
-def describe(campaign: Campaign, unit_size: int, case_s: float | None) -> Description:
+def describe(campaign: Campaign, unit_size: int, seconds_per_case: float | None) -> Description:
     """The description of a campaign that begins now, with `unit_size` cases in a unit of work."""
     file, now = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
     cases = campaign.number_of_cases
-    return Description(file.name, file.kind, file.seed, cases, unit_size, case_s, versions(), now)
+    return Description(
+        file.name, file.kind, file.seed, cases, unit_size, seconds_per_case, versions(), now
+    )
 
 
 def new_path(campaign: Campaign) -> Path:

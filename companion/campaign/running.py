@@ -94,7 +94,7 @@ class _Run:
         is_continued = folder.holds_campaign(self._folder)
         if is_continued:
             folder.resume(self._folder, self._campaign)
-        case_s = None if is_continued else self._check_all_cases()
+        seconds_per_case = None if is_continued else self._check_all_cases()
         try:
             with (
                 interruptible(),
@@ -105,7 +105,7 @@ class _Run:
                     wait_for_workers(client)
                 workers = max(1, number_of_workers(client))  # the first may have left already
                 with folder.lock(self._folder):
-                    description = self._open_folder(case_s, workers)
+                    description = self._open_folder(seconds_per_case, workers)
                     self._console.print(f"Dask's dashboard: {client.dashboard_link}")
                     return self._run_with_progress(client, description)
         except KeyboardInterrupt:
@@ -125,25 +125,27 @@ class _Run:
         check_cases(kind, cases)
         if len(cases) <= _UNMEASURED_CASES_PER_WORKER * workers:
             return None
-        case_s = estimate.case_time(kind, cases)
+        seconds_per_case = estimate.case_time(kind, cases)
         if not self._options.yes:
-            estimate.check_size(campaign, case_s, workers)
-        return case_s
+            estimate.check_size(campaign, seconds_per_case, workers)
+        return seconds_per_case
 
-    def _open_folder(self, case_s: float | None, workers: int) -> Description:
+    def _open_folder(self, seconds_per_case: float | None, workers: int) -> Description:
         """Continue the campaign in its folder, or write the folder of a new one.
 
-        `case_s` is the wall time that a case takes, s; None: it was not measured.
+        `seconds_per_case` is the wall time that a case takes, s; None: it was not measured.
         """
         if folder.holds_campaign(self._folder):
             return folder.resume(self._folder, self._campaign)
         cases = self._campaign.number_of_cases
-        unit_size = 1 if case_s is None else cases_per_unit(cases, case_s, workers)
-        description = folder.describe(self._campaign, unit_size, case_s)
+        unit_size = (
+            1 if seconds_per_case is None else cases_per_unit(cases, seconds_per_case, workers)
+        )
+        description = folder.describe(self._campaign, unit_size, seconds_per_case)
         folder.make(self._folder, self._campaign, description)
         size = f"{cases} {self._noun}"
-        if case_s is not None:
-            size = estimate.size_text(self._campaign, cases * case_s / workers, workers)
+        if seconds_per_case is not None:
+            size = estimate.size_text(self._campaign, cases * seconds_per_case / workers, workers)
         self._console.print(f"{size}; results in {self._folder}")
         if warning := few_samples_warning(self._campaign.file):
             self._console.print(warning)

@@ -96,12 +96,12 @@ def _worker_address() -> str:
         return "this process"
 
 
-def cases_per_unit(cases: int, case_s: float, workers: int) -> int:
-    """The number of cases in a unit of work, if a case takes `case_s` s of wall time.
+def cases_per_unit(cases: int, seconds_per_case: float, workers: int) -> int:
+    """The number of cases in a unit of work, if a case takes `seconds_per_case` s of wall time.
 
     `workers` is 0 while the first worker is awaited, and then counts as 1.
     """
-    size_by_time = int(LONGEST_UNIT_S / max(case_s, 1e-6))
+    size_by_time = int(LONGEST_UNIT_S / max(seconds_per_case, 1e-6))
     size_by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
     return max(1, min(size_by_time, size_by_share))
 

@@ -135,7 +135,7 @@ class LoopRecord:
         return period
 
     def note_answer(
-        self, received: float, rates: BodyRates, thrust: float, telemetry_stale: float
+        self, received: float, rates: BodyRates, thrust: float, longest_interval: float
     ) -> None:
         """Note that a setpoint was sent.
 
@@ -143,12 +143,12 @@ class LoopRecord:
             received: when its sample arrived, s of event-loop time.
             rates: body rates of the setpoint, rad/s.
             thrust: thrust of the setpoint, 0..1.
-            telemetry_stale: a longer interval between setpoints is a gap, s.
+            longest_interval: a longer interval between setpoints is a gap, s.
         """
         self.setpoints += 1
         self.sent_setpoints.append((rates, thrust))
         interval = received - self.last_answered_arrival
-        if interval <= telemetry_stale:
+        if interval <= longest_interval:
             self.setpoint_intervals.add(interval)
         self.last_answered_arrival = self.gap_from = received
 

@@ -154,7 +154,7 @@ class Changes:
             self._refuses = _refuse_nothing
 
     @contextmanager
-    def applied_by(
+    def applying(
         self, retuning: Retuning, note: Callable[[str], None], record: FlightRecorder | None
     ) -> Iterator[None]:
         """Apply changes to the loops while the `with` block runs; apply earlier changes at once.

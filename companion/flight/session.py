@@ -99,7 +99,7 @@ class Session:
             config, self._folder, environment, self.note, flies_maneuvers=self._plan is None
         )
         settings = realtime_settings(self._config, environment)
-        with realtime.requested_settings(settings) as grants, record:
+        with realtime.request_settings(settings) as grants, record:
             recorder, opener = record.recorder(self._observer), environment.open_transport
             async with open_link(self._config, record.tap, self.note, opener) as link:
                 self._assembled = assemble(

@@ -88,7 +88,7 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
     )
     try:
         retuning, record = Retuning(loop, guidance_loop), assembled.trace.recorder
-        with assembled.changes.applied_by(retuning, flight.note, record):
+        with assembled.changes.applying(retuning, flight.note, record):
             yield
     finally:
         link.on_attitude = link.on_error = None

@@ -34,11 +34,12 @@ def coefficient_model(settings: Settings) -> Model:
     (`Settings.lag`, s).
 
     Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
-    p·(c_d − c) is at most `max_tilt_rate`; the heading rate is at most `max_yaw_rate`. The round
-    limits of c_d and of the tilt rate are replaced by polygons inside them, so the constraints are
-    linear in the control at a given state. Therefore the first control, the only one that is
-    applied, satisfies the limits after a single iteration from any guess. The dead time is not part
-    of the model: `Predictor` integrates the motion to the end of the dead time.
+    p·(c_d − c) is at most `max_tilt_rate`; the heading rate is at most `max_yaw_rate`.
+
+    The round limits of c_d and of the tilt rate are replaced by polygons inside them. This makes
+    the constraints linear in the control, so one iteration from any guess gives a first control
+    within the limits, and only the first control is applied. The dead time is not part of the
+    model: `Predictor` integrates the motion to its end.
     """
     symbols = Symbols(size=11, own_constants=1)
     speeds, commanded_rates = symbols.state[9:11], symbols.commanded_rates(settings)

@@ -95,7 +95,7 @@ def constants_symbols(own_count: int = 0) -> ca.SX:
 
 
 def own_constant(constants: ca.SX) -> ca.SX:
-    """Symbol of the first constant of a model that is not in `Conditions`; it follows them."""
+    """Symbol of a model's first own constant, which follows the constants of `Conditions`."""
     return constants[len(Conditions._fields)]
 
 

@@ -36,7 +36,7 @@ class ServedFlights:
 
     @property
     def may_retry(self) -> bool:
-        """Whether setpoints alone may begin a takeover: none failed in the last `_RETRY_PAUSE`."""
+        """Whether setpoints alone may begin a takeover; not for `_RETRY_PAUSE` after a failed one."""
         return self._clock() >= self._retry_time
 
     def fence_refusal(self) -> str | None:

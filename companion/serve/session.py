@@ -91,7 +91,7 @@ class ServeSession:
             SigningError: the key cannot be used.
         """
         settings = realtime_settings(self._config, self._environment)
-        with realtime.requested_settings(settings) as grants:
+        with realtime.request_settings(settings) as grants:
             self.records.grants = grants
             for grant in grants:
                 self._note(str(grant))

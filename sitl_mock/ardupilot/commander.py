@@ -64,7 +64,7 @@ class ArduPilotCommander:
         self._yaw_aligned = False
 
     @property
-    def under_setpoints(self) -> bool:
+    def obeys_setpoints(self) -> bool:
         """Whether attitude setpoints control the vehicle in GUIDED."""
         state = self._state
         follows_attitude = state.mode is Mode.GUIDED and self._guided.task is Task.ANGLE

@@ -25,7 +25,7 @@ class Commander(Protocol):
     """Whether a fault simulates a pilot at the sticks."""
 
     @property
-    def under_setpoints(self) -> bool:
+    def obeys_setpoints(self) -> bool:
         """Whether setpoints control the vehicle now."""
 
     def arm(self, *, force: bool = False) -> int:

@@ -95,7 +95,7 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
         return f"unknown key {full_key}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
         return f"{full_key} must be a number: {_number_advice(str(detail['input']))}"
-    if member_error := describe_wrong_member(detail, model):
+    if member_error := describe_wrong_kind(detail, model):
         return f"{full_key}{member_error}"
     return f"{full_key}{describe_wrong_value(error)} (got {detail['input']!r:.60})"
 
@@ -120,7 +120,7 @@ def describe_wrong_value(error: ValidationError) -> str:
     return f": {message}"
 
 
-def describe_wrong_member(detail: Any, annotation: Any) -> str:
+def describe_wrong_kind(detail: Any, annotation: Any) -> str:
     """Return what is wrong with a value that has a ``kind``, such as a fault.
 
     The value may be no mapping, or its ``kind`` may be missing or unknown; for other errors the

@@ -140,7 +140,7 @@ class Px4Commander:
             self._stream.accept(setpoint, self._state.time_us)
 
     @property
-    def under_setpoints(self) -> bool:
+    def obeys_setpoints(self) -> bool:
         """Whether the vehicle is armed in OFFBOARD."""
         return self._state.armed and self._state.mode is Mode.OFFBOARD
 

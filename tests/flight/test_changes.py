@@ -138,7 +138,7 @@ def test_a_second_change_counts_together_with_one_that_still_takes_effect():
 
     async def fly():
         changes = Changes(Config())
-        with changes.applied_by(Loops(), lambda _: None, None):
+        with changes.applying(Loops(), lambda _: None, None):
             changes.change({"planner": {"gain_per_s": 2.0}}, "the page")
             with pytest.raises(ChangeRefusedError, match=r"from 5 to 0\.8 is more than a factor"):
                 changes.change({"planner": {"gain_per_s": 0.8}}, "the file")

@@ -134,7 +134,7 @@ def test_the_pilot_and_an_estimators_reset_by_the_faults_of_every_family():
     told = truth(rig.simulation)
     assert (told["mode"], told["aborted"]) == ("LOITER", False)
     rig.rates(thrust=HOVER)
-    assert not rig.simulation.commander.under_setpoints
+    assert not rig.simulation.commander.obeys_setpoints
 
 
 def test_return_climbs_flies_home_waits_and_lands():

@@ -142,7 +142,7 @@ def test_the_angle_boost_divides_by_the_cosine_of_the_tilt(aloft):
 def test_targets_that_are_obeyed(aloft, target):
     aloft.rates(thrust=HOVER, target=target)
     aloft.run(0.01)
-    assert aloft.simulation.commander.under_setpoints
+    assert aloft.simulation.commander.obeys_setpoints
     assert aloft.switch(BRAKE) == aloft.switch(GUIDED) == ACCEPTED
 
 
@@ -154,7 +154,7 @@ def test_what_is_ignored_in_silence(aloft, target, source):
     aloft.rates(thrust=HOVER, target=target)
     aloft.framer = mine
     aloft.run(0.01)
-    assert not aloft.simulation.commander.under_setpoints
+    assert not aloft.simulation.commander.obeys_setpoints
 
 
 @pytest.mark.parametrize(
@@ -165,10 +165,10 @@ def test_what_is_ignored_in_silence(aloft, target, source):
 def test_what_cannot_be_flown_falls_back_to_holding_the_position(aloft, mask, q):
     aloft.rates(thrust=HOVER)
     aloft.run(0.05)
-    assert aloft.simulation.commander.under_setpoints
+    assert aloft.simulation.commander.obeys_setpoints
     aloft.rates(thrust=HOVER, mask=mask, q=q)
     aloft.run(0.05)
-    assert not aloft.simulation.commander.under_setpoints
+    assert not aloft.simulation.commander.obeys_setpoints
     assert aloft.state.position_controlled
 
 
@@ -228,7 +228,7 @@ def test_a_setpoint_ends_a_take_off_at_once():
     rig.run_until(lambda: rig.height > 1.0, 6.0)
     rig.rates(thrust=HOVER)
     rig.run(0.02)
-    assert rig.simulation.commander.under_setpoints
+    assert rig.simulation.commander.obeys_setpoints
     assert rig.base_mode() == 209
 
 

@@ -98,10 +98,10 @@ def _begin(search_folder: Path, campaign: Campaign) -> None:
 def _make_fly(client: "Client", campaign: Campaign) -> Fly:
     """A function that flies cases on the cluster; the time of a case is measured here first."""
     kind = campaign.file.kind
-    case_s = estimate.case_time(kind, list(campaign.cases())[:1])
+    seconds_per_case = estimate.case_time(kind, list(campaign.cases())[:1])
 
     def fly(cases_to_fly: Sequence[Case]) -> Sequence[Row]:
-        return engine.run_on_cluster(client, kind, cases_to_fly, case_s)
+        return engine.run_on_cluster(client, kind, cases_to_fly, seconds_per_case)
 
     return fly
 
