@@ -58,11 +58,11 @@ def line_over_time(
     name: str, curve: Curve, column: int, colour: str, **more: Any
 ) -> dict[str, Any]:
     """A column of a curve over time, thinned so that extremes are kept."""
-    indices = kept_indices(curve.values[:, column])
+    indices = drawn_indices(curve.values[:, column])
     return line(name, curve.time[indices], curve.values[indices, column], colour, **more)
 
 
-def kept_indices(values: Floats) -> Any:
+def drawn_indices(values: Floats) -> Any:
     """Indices (M,) of the points to draw: the extremes of many slices, and a NaN for each gap."""
     count = len(values)
     if count <= _MAX_POINTS:

@@ -36,7 +36,7 @@ class ServedFlights:
 
     @property
     def may_retry(self) -> bool:
-        """Whether setpoints alone may begin a takeover; not for `_RETRY_PAUSE` after a failed one."""
+        """Whether setpoints alone may begin a takeover: none has failed within `_RETRY_PAUSE`."""
         return self._clock() >= self._retry_time
 
     def fence_refusal(self) -> str | None:

@@ -20,7 +20,7 @@ from companion.report.control_plots import control_plots
 from companion.report.early_end import early_end
 from companion.report.flight_data import recorded_flight
 from companion.report.motion_plots import motion_plots
-from companion.report.plots import kept_indices
+from companion.report.plots import drawn_indices
 from tests.flight.fly import fly, mock_vehicle
 
 FLIGHT = {
@@ -295,7 +295,7 @@ def test_thinning_keeps_the_extremes_and_the_gaps(seed, count, missing):
     random = np.random.default_rng(seed)
     values = random.normal(size=count)
     values[random.random(count) < missing] = np.nan
-    kept = kept_indices(values)
+    kept = drawn_indices(values)
     assert len(kept) <= 3 * 2000
     assert (np.diff(kept) > 0).all()
     if not np.isnan(values).all():
