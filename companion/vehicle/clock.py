@@ -146,7 +146,7 @@ class VehicleClock:
         else:
             # The answer may be a little older than the newest sample.
             was_set_back = time < self._newest_time - _MIN_CLOCK_SETBACK
-            self._accept_jump(-setback, round(vehicle_ns * 1e-6), was_set_back=was_set_back)
+            self._accept_jump(-setback, round(vehicle_ns * 1e-6), set_back=was_set_back)
 
     def update(self, now: float) -> None:
         """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
@@ -207,7 +207,7 @@ class VehicleClock:
         jump = self._misfits.largest_offset() - quickest
         self._misfits.stamps.clear()
         self._quickest, self._newest_time = quickest, -inf
-        self._accept_jump(jump, time_boot_ms, was_set_back=jump < 0.0)
+        self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
         return None
 
     def _end_misfits(self, time_boot_ms: int, late: float) -> None:
@@ -221,7 +221,7 @@ class VehicleClock:
         lasted = self._misfits.stamps[-1].received - self._received
         self._drop_misfits()
         if clock_stopped and min(lasted, late) >= SMALLEST_JUMP:
-            self._accept_jump(-late, time_boot_ms, was_set_back=False)
+            self._accept_jump(-late, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
         """Drop the misfits; report, only once, a sample that was stamped ahead of the clock."""
@@ -235,7 +235,7 @@ class VehicleClock:
             )
         self._misfits.stamps.clear()
 
-    def _accept_jump(self, jump: float, time_boot_ms: int, *, was_set_back: bool) -> None:
+    def _accept_jump(self, jump: float, time_boot_ms: int, *, set_back: bool) -> None:
         """Accept that the vehicle's clock jumped by `jump` s; vehicle times stay continuous."""
         before = self._received + self._quickest - self._shift
         self._shift -= jump
@@ -243,10 +243,6 @@ class VehicleClock:
         if self._received - self._began < _SETTLING_TIME and jump > -RESTART_SETBACK:
             return
         self.change_count += 1
-        self.restart_count += (
-            was_set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
-        )
-        self.last_change = describe_change(
-            jump, before, time_boot_ms / 1000.0, was_set_back=was_set_back
-        )
+        self.restart_count += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
+        self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, set_back=was_set_back)
         self.on_event(self.last_change)

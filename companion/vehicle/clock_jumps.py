@@ -103,20 +103,20 @@ def has_wrapped(jump: float, before: float) -> bool:
     )
 
 
-def describe_change(jump: float, before: float, now: float, *, was_set_back: bool) -> str:
+def describe_change(jump: float, before: float, now: float, *, set_back: bool) -> str:
     """A change of the vehicle's clock in words.
 
     Args:
         jump: how far the clock moved, s.
         before: time since boot before the change, s.
         now: time since boot after the change, s.
-        was_set_back: for a negative `jump`: whether the clock was set back; False: it stood still.
+        set_back: for a negative `jump`: whether the clock was set back; False: it stood still.
     """
     if has_wrapped(jump, before):
         return "the vehicle's time since boot wrapped around after 49.7 days"
     if jump > 0.0:
         return f"the vehicle's clock jumped ahead by {jump:.2f} s"
-    if not was_set_back:
+    if not set_back:
         return f"the vehicle's clock stood still for {-jump:.2f} s"
     if jump < -RESTART_SETBACK:
         return (
