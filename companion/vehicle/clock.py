@@ -244,5 +244,5 @@ class VehicleClock:
             return
         self.change_count += 1
         self.restart_count += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK
-        self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, set_back=was_set_back)
+        self.last_change = describe_change(jump, before, time_boot_ms / 1000.0, set_back=set_back)
         self.on_event(self.last_change)
