@@ -53,11 +53,25 @@ async def takeoff(context: FlightContext) -> None:
     def require_ours() -> None:
         # Before each try: a disarmed PX4 stores the command and takes off once armed.
         _require_ground(context)
-        context.must_disarm = True
+        context.must_disarm = context.took_off = True
 
     await command_if_ours(context, command, require_ours, lambda: not state.landed)
     climb = _Climb(context, height)
     await context.until(climb.is_over)
+
+
+def ends_takeoff(context: FlightContext) -> bool:
+    """Whether a vehicle that we did not hear is in its take-off, or holds at its height after it.
+
+    A vehicle that holds lower was stopped by somebody else.
+    """
+    state = context.link.state
+    if in_role(context.link, Role.TAKEOFF):
+        return True
+    if not in_role(context.link, Role.READY) or state.mode_by_failsafe:
+        return False
+    lowest = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
+    return context.fresh_position() is not None and (state.height or 0.0) > lowest
 
 
 class _Climb:

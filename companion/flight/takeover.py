@@ -147,6 +147,7 @@ async def offboard(context: FlightContext) -> None:
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False
+    context.took_off = False
     await asyncio.sleep(_SETTLE_TIME)
 
 
