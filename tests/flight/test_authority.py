@@ -288,6 +288,21 @@ class LostAnswer:
         monkeypatch.setattr(CommandClient, "_on_ack", hear)
 
 
+def test_a_mode_that_the_autopilots_geofence_chose_is_not_told_as_the_pilots():
+    """ArduPilot's HEARTBEAT reports no failsafe then; only a text tells."""
+    message = dialect.MAVLink_statustext_message(5, b"Circle fence breached")
+    text = bytes(message.pack(dialect.MAVLink(None, 1, 1)))
+
+    def breach():
+        mock.to_companion = lambda data: [text, data]
+        mock.command(SET_MODE, 1, 6)  # RTL
+
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        summary = fly(mock, None, When("maneuvers", breach, after=1.0))
+        assert mock.state()["mode"] == "RTL"
+    assert summary.result == "the autopilot's failsafe took over: mode RTL"
+
+
 def test_a_pilots_disarming_is_not_undone_by_repeating_our_arming(tmp_path, monkeypatch):
     def disarm_soon():
         asyncio.get_running_loop().call_later(0.5, mock.command, ARM, 0)
