@@ -20,6 +20,8 @@ _EFFECT_TIMEOUT = 3.0
 effect later than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
+_MODE_TEXT_TIME = 1.0
+"""A text that came at most this long before a report of the mode may say why it changed, s."""
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 IsDone = Callable[[], bool]
@@ -57,10 +59,19 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
         raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
     who = (
         "the autopilot's failsafe took over"
-        if link.state.mode_by_failsafe
+        if _by_failsafe(link)
         else "the pilot or another station took over"
     )
     raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.RELEASE)
+
+
+def _by_failsafe(link: Link) -> bool:
+    """Whether a failsafe chose the present mode, by its reports or by a text shortly before."""
+    state, fence_text = link.state, link.autopilot.fence_text
+    since = state.mode_received - _MODE_TEXT_TIME
+    return state.mode_by_failsafe or any(
+        fence_text in each.text for each in state.texts if fence_text and each.time >= since
+    )
 
 
 def requiring_roles(link: Link, allowed: Set[Role]) -> RequireOurs:

@@ -4,6 +4,7 @@ import asyncio
 
 from companion.flight.commands import ask_to_hold, in_role, require_role, requiring_roles
 from companion.flight.context import FlightContext
+from companion.flight.takeoff import ends_takeoff
 from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
@@ -18,7 +19,7 @@ _HOLD_TIMEOUT = 10.0
 async def hold_when_heard(context: FlightContext) -> None:
     """Send nothing until the vehicle is heard; if it still obeys us, command it to hold.
 
-    A vehicle that we had asked to land, or that does not hold, is asked to land.
+    A vehicle that we had asked to land or to take off, or that does not hold, is asked to land.
     ArduPilot stays in GUIDED when setpoints end, and does not hold its position.
 
     Raises:
@@ -46,13 +47,16 @@ async def _hold_if_ours(context: FlightContext) -> None:
     context.detail = "its heartbeat"
     await context.fresh_heartbeat()  # only now, because a request during the silence is lost
     mode = context.link.state.mode
-    if not context.armed() or not in_role(context.link, Role.OFFBOARD):
+    lost_in_takeoff = context.took_off and ends_takeoff(context)
+    if not context.armed() or not (in_role(context.link, Role.OFFBOARD) or lost_in_takeoff):
         armed = "armed" if context.armed() else "disarmed"
         context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
         return
     if context.landing_requested:
         reason = f"the vehicle is heard again, still in {mode}: its landing was requested before"
         raise FlightEnded(reason, Exit.LAND)
+    if lost_in_takeoff:
+        raise FlightEnded(f"the vehicle is heard again after its take-off, in {mode}", Exit.LAND)
     context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
     context.detail = "its report that it holds"
     while True:

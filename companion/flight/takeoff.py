@@ -53,11 +53,25 @@ async def takeoff(context: FlightContext) -> None:
     def require_ours() -> None:
         # Before each try: a disarmed PX4 stores the command and takes off once armed.
         _require_ground(context)
-        context.must_disarm = True
+        context.must_disarm = context.took_off = True
 
     await command_if_ours(context, command, require_ours, lambda: not state.landed)
     climb = _Climb(context, height)
     await context.until(climb.is_over)
+
+
+def ends_takeoff(context: FlightContext) -> bool:
+    """Whether a vehicle that we did not hear is in its take-off, or holds at its height after it.
+
+    A vehicle that holds lower was stopped by somebody else.
+    """
+    state = context.link.state
+    if in_role(context.link, Role.TAKEOFF):
+        return True
+    if not in_role(context.link, Role.READY) or state.mode_by_failsafe:
+        return False
+    lowest = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
+    return context.fresh_position() is not None and (state.height or 0.0) > lowest
 
 
 class _Climb:
@@ -81,13 +95,15 @@ class _Climb:
             return False
         context.detail = f"{self._height:g} m, now {height:.1f} m"
         if height > self._height + _MAX_OVERSHOOT:
-            raise FlightEnded(
+            raise self._jump(height) or FlightEnded(
                 f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
             )
         is_near_height = height > self._height - MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
-            raise self._early_end(height)
+            raise self._jump(height) or FlightEnded(
+                f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE
+            )
         if is_near_height and state.landed:
             self._require_leaving_ground(height)
             return False  # a vehicle that stands must not be taken over: the thrust would lift it
@@ -114,18 +130,22 @@ class _Climb:
                 Exit.LAND,
             )
 
-    def _early_end(self, height: float) -> FlightEnded:
-        """Why the climb ended at a `height` above home (m) that is not the commanded one."""
+    def _jump(self, height: float) -> FlightEnded | None:
+        """The end of the flight if a jump explains the wrong `height` above home (m)."""
         motion = self._context.guidance_loop.motion
-        if motion is not None and self._start_down is not None:
-            climbed = self._start_down - motion.position_ned[2]  # without jumps of home or estimate
-            if climbed > self._height - MAX_UNDERSHOOT:
-                return FlightEnded(
-                    f"after a climb of {climbed:.1f} m the height above home is {height:.1f} m: "
-                    "home or the height estimate has jumped",
-                    Exit.LAND,
-                )
-        return FlightEnded(f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE)
+        if motion is None or self._start_down is None:
+            return None
+        climbed = self._start_down - motion.position_ned[2]  # without jumps of home or estimate
+        too_low = height < self._height
+        if too_low and climbed <= self._height - MAX_UNDERSHOOT:
+            return None
+        if not too_low and climbed > self._height + _MAX_OVERSHOOT:
+            return None
+        return FlightEnded(
+            f"after a climb of {climbed:.1f} m the height above home is {height:.1f} m: "
+            "home or the height estimate has jumped",
+            Exit.LAND,
+        )
 
 
 def _require_ground(context: FlightContext) -> None:

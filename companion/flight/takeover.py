@@ -144,9 +144,12 @@ async def offboard(context: FlightContext) -> None:
     await _require_learned_hover(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
+    if jump := hypot(*context.loop.resets.position_shift):  # the monitors count from here on
+        context.note(f"before the takeover the estimated position jumped by {jump:.1f} m")
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False
+    context.took_off = False
     await asyncio.sleep(_SETTLE_TIME)
 
 

@@ -98,6 +98,8 @@ class OtherNodes:
     """(system, component) of every node that was heard."""
     companions: set[tuple[int, int]] = field(default_factory=set)
     """Nodes whose heartbeat has the type onboard controller."""
+    autopilots: set[tuple[int, int]] = field(default_factory=set)
+    """Nodes whose heartbeat is that of an autopilot which this program flies."""
     setpoint_senders: set[tuple[int, int]] = field(default_factory=set)
     """Nodes that sent setpoints."""
     target_is_foreign: bool = False

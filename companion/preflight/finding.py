@@ -44,6 +44,7 @@ class Key(StrEnum):
     ATTITUDE = "vehicle.attitude"
     OUR_IDS = "link.our_ids"
     SECOND_COMPANION = "link.second_companion"
+    SECOND_VEHICLE = "link.second_vehicle"
     OTHER_SETPOINTS = "link.other_setpoints"
     OFFBOARD_LOSS = "safety.offboard_loss"
     FENCE = "safety.fence_polygon_deg"

@@ -127,7 +127,7 @@ def signing_findings(
 
 
 def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether other nodes use our ids, are companion computers, or send setpoints."""
+    """Whether other nodes use our ids, are companion computers or vehicles, or send setpoints."""
     link, others = config.link, evidence.other_nodes
     our_ids = link.source_system, link.source_component
     if our_ids in others.sources:
@@ -148,6 +148,17 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "if it sends commands or setpoints, two programs steer one vehicle",
             "make sure that it only listens",
             "HEARTBEAT of type onboard controller",
+        )
+    for system, component in sorted(others.autopilots):
+        if system == link.target_system:
+            continue  # a device of our vehicle
+        yield Finding(
+            Key.SECOND_VEHICLE,
+            INEFFECTIVE,
+            f"another vehicle is on the link, {system}/{component}",
+            f"only system {link.target_system} is checked, commanded and flown",
+            "make sure that link.target_system is the vehicle that shall fly",
+            "HEARTBEAT of an autopilot",
         )
     senders = sorted(others.setpoint_senders)
     if senders or others.target_is_foreign:

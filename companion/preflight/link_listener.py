@@ -7,15 +7,13 @@ from statistics import median
 
 from companion.attitude.representation import is_unit
 from companion.mavlink.framing import Frame
-from companion.mavlink.messages import Message, dialect
+from companion.mavlink.messages import Message, decode, dialect
 from companion.preflight.evidence import OtherNodes, SampleTimes
 from companion.vehicle.interval_sums import IntervalSums
 from companion.vehicle.link import Link
+from companion.vehicle.registry import AUTOPILOTS_BY_NUMBER
 
 _HEARTBEAT_ID = dialect.MAVLINK_MSG_ID_HEARTBEAT
-_TYPE_OFFSET = 4
-"""Offset of `type` in HEARTBEAT's payload."""
-_ONBOARD_CONTROLLER = bytes([dialect.MAV_TYPE_ONBOARD_CONTROLLER])
 _SETPOINT_IDS = frozenset(
     {
         dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET,
@@ -95,11 +93,13 @@ class LinkListener:
         self.other_nodes.sources.add(source)
         if frame.message_id in _SETPOINT_IDS:
             self.other_nodes.setpoint_senders.add(source)
-        if (
-            frame.message_id == _HEARTBEAT_ID
-            and frame.payload[_TYPE_OFFSET : _TYPE_OFFSET + 1] == _ONBOARD_CONTROLLER
-        ):
+        if frame.message_id != _HEARTBEAT_ID:
+            return
+        heartbeat = decode(frame.message_id, frame.payload)
+        if heartbeat.type == dialect.MAV_TYPE_ONBOARD_CONTROLLER:
             self.other_nodes.companions.add(source)
+        elif heartbeat.autopilot in AUTOPILOTS_BY_NUMBER:
+            self.other_nodes.autopilots.add(source)
 
     def _on_attitude(self, message: Message) -> None:
         now, clock = self._clock(), self._link.clock

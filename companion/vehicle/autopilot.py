@@ -102,6 +102,8 @@ class Autopilot(Protocol):
         forgets_lean: whether the autopilot's own modes begin level, so that a vehicle that leaned
             against the wind drifts downwind until their integral has grown.
         offboard_loss_failsafe: what the autopilot does when setpoints stop.
+        fence_text: part of the text by which its geofence tells that it changes the mode; None:
+            HEARTBEAT or CURRENT_MODE report it as a failsafe.
         cannot_arm_in: roles of the modes in which a disarmed vehicle cannot be armed.
         parameters: rules for the parameters that matter to a flight by body rates.
     """
@@ -120,6 +122,7 @@ class Autopilot(Protocol):
     can_compensate_tilt: bool
     forgets_lean: bool
     offboard_loss_failsafe: OffboardLossFailsafe
+    fence_text: str | None
     cannot_arm_in: frozenset[Role]
     parameters: tuple[ParameterRule, ...]
 

@@ -235,7 +235,7 @@ def test_a_pilot_who_took_over_unheard_is_not_overruled_once_heard(autopilot):
     assert summary.events[-1][1].endswith("nothing is commanded")
 
 
-def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go():
+def test_a_link_lost_in_the_takeoff_is_told_at_once():
     with mock_vehicle() as mock:
         cut = {"kind": "drop", "direction": "to_companion"}
         observer = When("takeoff", lambda: mock.inject(cut), after=1.0)
@@ -243,7 +243,8 @@ def test_a_link_lost_in_the_takeoff_is_told_at_once_and_lets_go():
         assert mock.state()["armed"]
     assert (summary.phase, "no heartbeat" in summary.result) == ("takeoff", True)
     began = next(at for at, text in summary.events if "TAKEOFF" in text)
-    assert summary.events[-1][0] < began + 5.0  # 1 s of climb, three heartbeats missed
+    lost = next(at for at, text in summary.events if "no heartbeat" in text)
+    assert lost < began + 5.0  # 1 s of climb, three heartbeats missed
 
 
 def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
@@ -285,6 +286,21 @@ class LostAnswer:
             heard(client, message)
 
         monkeypatch.setattr(CommandClient, "_on_ack", hear)
+
+
+def test_a_mode_that_the_autopilots_geofence_chose_is_not_told_as_the_pilots():
+    """ArduPilot's HEARTBEAT reports no failsafe then; only a text tells."""
+    message = dialect.MAVLink_statustext_message(5, b"Circle fence breached")
+    text = bytes(message.pack(dialect.MAVLink(None, 1, 1)))
+
+    def breach():
+        mock.to_companion = lambda data: [text, data]
+        mock.command(SET_MODE, 1, 6)  # RTL
+
+    with mock_vehicle(autopilot="ardupilot") as mock:
+        summary = fly(mock, None, When("maneuvers", breach, after=1.0))
+        assert mock.state()["mode"] == "RTL"
+    assert summary.result == "the autopilot's failsafe took over: mode RTL"
 
 
 def test_a_pilots_disarming_is_not_undone_by_repeating_our_arming(tmp_path, monkeypatch):

@@ -118,3 +118,28 @@ def test_a_vehicle_lost_as_it_was_to_land_is_asked_to_land_again():
         truth = mock.state()
     assert "battery at 15 %" in summary.result
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_vehicle_lost_in_its_take_off_is_landed_once_heard_again(autopilot):
+    """It flies by itself then, and would hover at its height with nobody to land it."""
+    with mock_vehicle(autopilot=autopilot) as mock:
+        lose = {"kind": "drop", "direction": "both", "duration_s": 5.0}
+        summary = fly(mock, None, When("takeoff", lambda: mock.inject(lose), after=1.0))
+        truth = mock.state()
+    assert "no heartbeat" in summary.result, summary.events
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_pilot_who_stopped_the_climb_unheard_keeps_the_vehicle(autopilot):
+    def stop():
+        mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 5.0})
+        mock.command(SET_MODE, 1, HOLD_MODE[autopilot], {"px4": 3.0}.get(autopilot, 0.0))
+
+    with mock_vehicle(autopilot=autopilot) as mock:
+        after = {"px4": 1.0, "ardupilot": 4.0}[autopilot]
+        high = {"takeoff_height_m": 20.0}
+        summary = fly(mock, None, When("takeoff", stop, after=after), flight=high)
+        assert mock.state()["armed"], summary.events
+    assert summary.events[-1][1].endswith("nothing is commanded")

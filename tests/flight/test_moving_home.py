@@ -79,6 +79,37 @@ def test_a_height_that_jumps_in_the_take_off_is_named_and_the_vehicle_lands(jump
     assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
 
 
+def test_a_home_that_is_set_far_below_in_the_climb_is_named():
+    """It was told as a climb to 50 m."""
+    moved = 0.0
+
+    def change(message):
+        if message.get_type() == "HOME_POSITION":
+            message.z += moved
+
+    def move():
+        nonlocal moved
+        moved = 50.0
+
+    with mock_vehicle() as mock:
+        Changed(mock, change)
+        summary = fly(mock, None, When("takeoff", move, after=1.0))
+        truth = mock.state()
+    assert summary.result.startswith("after a climb of "), summary.events
+    assert summary.result.endswith("home or the height estimate has jumped")
+    assert (truth["armed"], truth["landed"], truth["crashed"]) == (False, True, False)
+
+
+def test_an_estimate_that_jumps_in_the_climb_is_told_at_the_takeover():
+    jump = {"kind": "estimator_reset", "position_ned_m": (1.5, 0.0, 0.0)}
+    with mock_vehicle() as mock:
+        observer = When("takeoff", lambda: mock.inject(jump), after=1.0)
+        summary = fly(mock, None, observer, hover={"duration_s": 0.5})
+    assert summary.result == "ok", summary.events
+    texts = [text for _, text in summary.events]
+    assert "before the takeover the estimated position jumped by 1.5 m" in texts
+
+
 def test_a_vehicle_whose_height_jumps_on_the_ground_is_not_taken_over_there():
     """It was taken for a climb that had ended, and got setpoints with the thrust of a hover."""
     jump = {"kind": "estimator_reset", "position_ned_m": (0.0, 0.0, -2.5)}

@@ -198,6 +198,8 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
             OtherNodes(sources={(1, 192)}, companions={(1, 192)}),
             {Key.SECOND_COMPANION: INEFFECTIVE},
         ),
+        (OtherNodes(autopilots={(1, 100)}), {}),
+        (OtherNodes(autopilots={(2, 1)}), {Key.SECOND_VEHICLE: INEFFECTIVE}),
         (OtherNodes(setpoint_senders={(255, 190)}), {Key.OTHER_SETPOINTS: UNSAFE}),
         (OtherNodes(target_is_foreign=True), {Key.OTHER_SETPOINTS: UNSAFE}),
     ],

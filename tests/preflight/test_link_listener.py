@@ -45,15 +45,17 @@ def test_who_else_is_there_and_who_steers():
                     ((255, 190), of_type(GROUND_STATION)),
                     ((1, 192), of_type(COMPANION)),
                     ((1, 193), setpoint()),
+                    ((2, 1), heartbeat()),
                 ):
                     system, component = source
                     vehicle.send_raw(frames_of(message, system=system, component=component)[0])
-                await until(lambda: len(listener.other_nodes.sources) == 3)
+                await until(lambda: len(listener.other_nodes.sources) == 4)
+            assert listener.other_nodes.autopilots == {(2, 1)}
             assert listener.other_nodes.companions == {(1, 192)}
             assert listener.other_nodes.setpoint_senders == {(1, 193)}
             vehicle.send_raw(frames_of(setpoint(), system=9)[0])
-            await until(lambda: link.stats.ignored_foreign == 4)
-            assert len(listener.other_nodes.sources) == 3  # the listener is off
+            await until(lambda: link.stats.ignored_foreign == 5)
+            assert len(listener.other_nodes.sources) == 4  # the listener is off
 
     asyncio.run(scene())
 

@@ -79,6 +79,7 @@ class ArduPilot:
         "it levels and keeps its height, but drifts: it does not hold its position",
         brakes=False,
     )
+    fence_text: str | None = " breached"  # AC_Fence.cpp, as in "Circle fence breached"
     cannot_arm_in = frozenset[Role]()
     parameters = ARDUPILOT_PARAMETERS
 

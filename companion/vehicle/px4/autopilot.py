@@ -96,6 +96,7 @@ class Px4:
     offboard_loss_failsafe = OffboardLossFailsafe(
         "COM_OF_LOSS_T", "it takes the action that COM_OBL_RC_ACT sets", brakes=True
     )
+    fence_text: str | None = None
     cannot_arm_in = frozenset({Role.OFFBOARD, Role.LAND})
     parameters = PX4_PARAMETERS
 
