@@ -146,7 +146,19 @@ def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
     Args:
         main: the program.
         in_lockstep: run on the vehicle's time, for a vehicle in lockstep (`link.lockstep`).
+
+    Raises:
+        RuntimeError: an event loop runs already, as in a notebook.
     """
+    running_loop: asyncio.AbstractEventLoop | None = None
+    with suppress(RuntimeError):
+        running_loop = asyncio.get_running_loop()
+    if running_loop is not None:
+        main.close()
+        raise RuntimeError(
+            "an event loop runs here already, as in a notebook: "
+            "write `await main()` instead of `companion.run(main())`"
+        )
     return (lockstep.run if in_lockstep else loop.run)(main)
 
 

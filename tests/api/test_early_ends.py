@@ -1,15 +1,18 @@
 """A flight that ends early says why: in its summary, and to each later call of the program."""
 
 import asyncio
+import gc
 import json
 from functools import partial
 
 import pytest
 
 import companion
+from companion.api.program import ProgramPlan
 from companion.files.yaml_file import ConfigError
-from tests.api.test_flying import BOTH, flown
-from tests.flight.fly import QuickVehicle
+from companion.testing import connect, run
+from tests.api.test_flying import BOTH, Told, flown
+from tests.flight.fly import QUICK_FLIGHT, QuickVehicle
 
 CANCELLED = "the program cancelled its request"
 
@@ -134,3 +137,42 @@ def test_a_program_that_raises_after_its_landing_has_flown_well(tmp_path):
     summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
     assert summary["result"] == "ok"
     assert "the program raised ZeroDivisionError('mine')" in str(summary["events"])
+
+
+def test_a_program_cancelled_while_it_connects_leaves_no_warning():
+    """Python told of a "Future exception was never retrieved" after a Ctrl-C in `connect`."""
+    told = []
+
+    async def main():
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
+        ProgramPlan().end(companion.FlightEnded("interrupted"))
+        gc.collect()
+
+    asyncio.run(main())
+    assert not told
+
+
+def test_a_connection_that_is_dropped_in_flight_is_told_in_words():
+    """As by a cell of a notebook that runs twice; it was "the program raised GeneratorExit()"."""
+    told, mock = Told(), QuickVehicle()
+
+    async def main():
+        connection = connect(QUICK_FLIGHT, mock, observer=told)
+        vehicle = await connection.__aenter__()
+        await vehicle.take_off()
+        del connection
+        await asyncio.sleep(3.0)
+        return vehicle.summary.result
+
+    assert run(mock, main()) == "the program dropped its connection"
+    assert mock.state()["mode"] == "LOITER"
+
+
+def test_run_in_a_running_loop_says_what_to_write_instead():
+    """Python spoke of loops and left "coroutine was never awaited" behind."""
+
+    async def main():
+        with pytest.raises(RuntimeError, match=r"write `await main\(\)`"):
+            companion.run(asyncio.sleep(0))
+
+    asyncio.run(main())
