@@ -102,6 +102,8 @@ async def connect_configured(
         session, program = await loop.start(_make_session(config, folder, observer, environment))
         loop.register_end(partial(_end_lost_flight, session, program))
         flight = loop.start(_fly(session, program))
+        # No warning of asyncio: the program gets the error from its own call.
+        flight.add_done_callback(lambda end: end.cancelled() or end.exception())
         try:
             with on_ctrl_c(loop, session.interrupt):
                 async with _connected_vehicle(loop, session, program, flight) as vehicle:
@@ -110,8 +112,6 @@ async def connect_configured(
             wait_cancelled = True  # stays true if the wait is cancelled
             await asyncio.wait({flight})
             wait_cancelled = False
-            if not flight.cancelled():
-                flight.exception()  # no warning of asyncio: the program gets it from its own call
         flight.result()
     finally:
         loop.close(wait=not wait_cancelled)

@@ -90,6 +90,29 @@ def test_a_time_out_around_a_control_block_is_no_error_of_the_program():
     assert summary.result == "the program was cancelled"
 
 
+def test_a_control_block_that_is_cancelled_twice_leaves_no_warning():
+    """Python told of a "Task exception was never retrieved" beside the CancelledError."""
+
+    async def drift(vehicle):
+        async with vehicle.control() as control:
+            async for _ in control.states():
+                control.accelerate((0.0, 0.0, 0.0))
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        drifting = asyncio.ensure_future(drift(vehicle))
+        for seconds in (1.0, 0.02):
+            await asyncio.sleep(seconds)
+            drifting.cancel()
+        await asyncio.wait({drifting})
+        await asyncio.sleep(1.0)
+        del drifting
+        gc.collect()
+
+    summary, _ = flown(program, QuickVehicle())  # raises UnseenError
+    assert summary.result == "the program was cancelled"
+
+
 @pytest.mark.parametrize("slow_down", [False, True])
 def test_a_refused_go_to_says_what_helps_in_a_program(slow_down):
     """It advised `--slow-down` and `flight.slow_down`, which change nothing of a program's."""
