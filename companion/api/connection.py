@@ -102,6 +102,8 @@ async def connect_configured(
         session, program = await loop.start(_make_session(config, folder, observer, environment))
         loop.register_end(partial(_end_lost_flight, session, program))
         flight = loop.start(_fly(session, program))
+        # No warning of asyncio: the program gets the error from its own call.
+        flight.add_done_callback(lambda end: end.cancelled() or end.exception())
         try:
             with on_ctrl_c(loop, session.interrupt):
                 async with _connected_vehicle(loop, session, program, flight) as vehicle:
@@ -110,8 +112,6 @@ async def connect_configured(
             wait_cancelled = True  # stays true if the wait is cancelled
             await asyncio.wait({flight})
             wait_cancelled = False
-            if not flight.cancelled():
-                flight.exception()  # no warning of asyncio: the program gets it from its own call
         flight.result()
     finally:
         loop.close(wait=not wait_cancelled)
@@ -146,7 +146,19 @@ def run(main: Coroutine[Any, Any, T], *, in_lockstep: bool = False) -> T:
     Args:
         main: the program.
         in_lockstep: run on the vehicle's time, for a vehicle in lockstep (`link.lockstep`).
+
+    Raises:
+        RuntimeError: an event loop runs already, as in a notebook.
     """
+    running_loop: asyncio.AbstractEventLoop | None = None
+    with suppress(RuntimeError):
+        running_loop = asyncio.get_running_loop()
+    if running_loop is not None:
+        main.close()
+        raise RuntimeError(
+            "an event loop runs here already, as in a notebook: "
+            "write `await main()` instead of `companion.run(main())`"
+        )
     return (lockstep.run if in_lockstep else loop.run)(main)
 
 

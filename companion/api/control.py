@@ -190,6 +190,8 @@ async def program_control(
     Raises:
         FlightEnded: the flight ended before control began, or control ended early.
     """
+    # No warning of asyncio if the program gets another error, or is cancelled once more.
+    control_end.add_done_callback(lambda end: end.cancelled() or end.exception())
     try:
         while source.pose is None:  # guidance does not fly it yet
             done, _ = await asyncio.wait({control_end}, timeout=0.01)
@@ -203,6 +205,4 @@ async def program_control(
     finally:
         flight.loop.post(source.end)
         await asyncio.wait({control_end})
-        if not control_end.cancelled():
-            control_end.exception()
     control_end.result()

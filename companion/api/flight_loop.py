@@ -134,6 +134,8 @@ class OwnThreadLoop:
 
     async def _until_closed(self) -> None:
         while not self._closing.is_set() and not self._program_is_lost():
+            # Jupyter's handler of Ctrl-C schedules its callback without waking the program's loop.
+            self.post_to_program(lambda: None)
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._closing.wait(), _CHECK_PERIOD)
         if self._end_flight is not None:

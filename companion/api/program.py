@@ -143,6 +143,7 @@ class ProgramPlan:
         self._end_error, self.is_over = error, True
         if not self.connected.done():
             self.connected.set_exception(error)
+            self.connected.exception()  # no warning of asyncio if the program was cancelled
         for request in (self._running_request, *self._waiting_requests):
             if request is not None and not request.done.done():
                 request.done.set_exception(error)
@@ -173,7 +174,9 @@ def flight_ended(result: str) -> FlightEnded:
 
 
 def failure_words(name: str, error: BaseException) -> str:
-    """Say that the program or task `name` was cancelled, or which error it raised."""
+    """Say that the program or task `name` was cancelled or dropped, or which error it raised."""
     if isinstance(error, asyncio.CancelledError):
         return f"{name} was cancelled"
+    if isinstance(error, GeneratorExit):  # as when the cell of a notebook runs once more
+        return f"{name} dropped its connection"
     return f"{name} raised {error!r}"

@@ -1,15 +1,18 @@
 """A flight that ends early says why: in its summary, and to each later call of the program."""
 
 import asyncio
+import gc
 import json
 from functools import partial
 
 import pytest
 
 import companion
+from companion.api.program import ProgramPlan
 from companion.files.yaml_file import ConfigError
-from tests.api.test_flying import BOTH, flown
-from tests.flight.fly import QuickVehicle
+from companion.testing import connect, run
+from tests.api.test_flying import BOTH, Told, flown
+from tests.flight.fly import QUICK_FLIGHT, QuickVehicle
 
 CANCELLED = "the program cancelled its request"
 
@@ -87,6 +90,29 @@ def test_a_time_out_around_a_control_block_is_no_error_of_the_program():
     assert summary.result == "the program was cancelled"
 
 
+def test_a_control_block_that_is_cancelled_twice_leaves_no_warning():
+    """Python told of a "Task exception was never retrieved" beside the CancelledError."""
+
+    async def drift(vehicle):
+        async with vehicle.control() as control:
+            async for _ in control.states():
+                control.accelerate((0.0, 0.0, 0.0))
+
+    async def program(vehicle):
+        await vehicle.take_off()
+        drifting = asyncio.ensure_future(drift(vehicle))
+        for seconds in (1.0, 0.02):
+            await asyncio.sleep(seconds)
+            drifting.cancel()
+        await asyncio.wait({drifting})
+        await asyncio.sleep(1.0)
+        del drifting
+        gc.collect()
+
+    summary, _ = flown(program, QuickVehicle())  # raises UnseenError
+    assert summary.result == "the program was cancelled"
+
+
 @pytest.mark.parametrize("slow_down", [False, True])
 def test_a_refused_go_to_says_what_helps_in_a_program(slow_down):
     """It advised `--slow-down` and `flight.slow_down`, which change nothing of a program's."""
@@ -134,3 +160,42 @@ def test_a_program_that_raises_after_its_landing_has_flown_well(tmp_path):
     summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
     assert summary["result"] == "ok"
     assert "the program raised ZeroDivisionError('mine')" in str(summary["events"])
+
+
+def test_a_program_cancelled_while_it_connects_leaves_no_warning():
+    """Python told of a "Future exception was never retrieved" after a Ctrl-C in `connect`."""
+    told = []
+
+    async def main():
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
+        ProgramPlan().end(companion.FlightEnded("interrupted"))
+        gc.collect()
+
+    asyncio.run(main())
+    assert not told
+
+
+def test_a_connection_that_is_dropped_in_flight_is_told_in_words():
+    """As by a cell of a notebook that runs twice; it was "the program raised GeneratorExit()"."""
+    told, mock = Told(), QuickVehicle()
+
+    async def main():
+        connection = connect(QUICK_FLIGHT, mock, observer=told)
+        vehicle = await connection.__aenter__()
+        await vehicle.take_off()
+        del connection
+        await asyncio.sleep(3.0)
+        return vehicle.summary.result
+
+    assert run(mock, main()) == "the program dropped its connection"
+    assert mock.state()["mode"] == "LOITER"
+
+
+def test_run_in_a_running_loop_says_what_to_write_instead():
+    """Python spoke of loops and left "coroutine was never awaited" behind."""
+
+    async def main():
+        with pytest.raises(RuntimeError, match=r"write `await main\(\)`"):
+            companion.run(asyncio.sleep(0))
+
+    asyncio.run(main())

@@ -1,6 +1,7 @@
 """The thread of a flight and its event loop, without a flight."""
 
 import asyncio
+import signal
 import sys
 import threading
 import time
@@ -127,6 +128,23 @@ def test_python_changes_threads_quickly_while_any_flight_runs():
 
     asyncio.run(main())
     assert sys.getswitchinterval() == pytest.approx(before)
+
+
+def test_a_handler_of_ctrl_c_that_does_not_wake_the_loop_is_heard():
+    """Jupyter's handler calls `call_soon`; an interrupted cell went on until its call was done."""
+
+    async def main():
+        program, told = asyncio.get_running_loop(), asyncio.Event()
+        loop = flight_loop()
+        before = signal.signal(signal.SIGALRM, lambda *_: program.call_soon(told.set))
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        began = time.monotonic()
+        await asyncio.wait_for(told.wait(), 10.0)
+        signal.signal(signal.SIGALRM, before)
+        loop.close(wait=True)
+        return time.monotonic() - began
+
+    assert asyncio.run(main()) < 5.0
 
 
 def test_news_do_not_queue_up_while_the_program_does_not_run():

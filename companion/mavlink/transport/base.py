@@ -55,7 +55,7 @@ OPEN_TIMEOUT_S = 5.0
 
 _REMEDIES = {
     errno.EADDRINUSE: "the port is in use by another program (another companion, a ground "
-    "station?); end it or choose another port",
+    "station?) or an open connection of this one; end it or choose another port",
     errno.EACCES: "not permitted; use a port of 1024 or above",
     errno.EPERM: "not permitted; use a port of 1024 or above",
     errno.EADDRNOTAVAIL: "no interface of this computer has that address; use 0.0.0.0",
