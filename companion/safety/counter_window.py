@@ -1,6 +1,7 @@
 """Shares of lost frames, missed deadlines and CPU starvation, and rates, over the last second."""
 
 from collections import deque
+from math import inf
 from typing import NamedTuple
 
 from companion.control.loop_record import LoopRecord
@@ -42,6 +43,7 @@ class CounterWindow:
     def __init__(self, link: Link, record: LoopRecord, *, real_time: bool) -> None:
         self._link, self._record, self._real_time = link, record, real_time
         self._readings: deque[_Counters] = deque()
+        self._latest_stall = -inf  # when a late reading was made, s; most flights have none
 
     def clear(self) -> None:
         """Forget all readings."""
@@ -51,6 +53,8 @@ class CounterWindow:
         """Read the counters at `now`, s of event-loop time."""
         readings, stats, record = self._readings, self._link.stats, self._record
         late_by = max(0.0, now - readings[-1].now - _LONGEST_READING_INTERVAL) if readings else 0.0
+        if late_by > 0.0:
+            self._latest_stall = now
         readings.append(
             _Counters(
                 now,
@@ -71,6 +75,8 @@ class CounterWindow:
 
         Stalls that ended more than about a second ago are forgotten.
         """
+        if self._latest_stall <= since:
+            return 0.0
         return sum(reading.late_by for reading in self._readings if reading.now > since)
 
     def health(self) -> Health:
@@ -79,7 +85,7 @@ class CounterWindow:
         span = last.now - first.now
         if span < _FILLED_SHARE * _AVERAGING_TIME:
             return Health()
-        stalled = sum(reading.late_by for reading in self._readings) - first.late_by
+        stalled = self.stall_time(since=first.now)
         missed = (last.missed_deadlines - first.missed_deadlines) / max(
             1, last.setpoints - first.setpoints
         )

@@ -1,7 +1,6 @@
 """Flights in one process are measured, and are quicker than real time."""
 
 import json
-from functools import partial
 
 import pytest
 
@@ -17,7 +16,7 @@ LARGE = {"event loop and wire", "link: frames, messages, state", "guidance", "ve
 def test_the_table_of_the_bench_is_also_json(capsys, monkeypatch):
     monkeypatch.setattr(flight, "CONFIG_FILES", {"px4": flight.CONFIG_FILES["px4"]})
     monkeypatch.setattr(flight, "_FLIGHTS", 1)
-    monkeypatch.setattr(flight, "MockVehicle", partial(QuickVehicle, full_rate=True))
+    monkeypatch.setattr(flight, "MockVehicle", QuickVehicle)
     assert main(["bench", "flight", "--seconds", "0.2", "--json", "--profile"]) == 0
     figures = json.loads(capsys.readouterr().out)
     for clocks in figures.values():

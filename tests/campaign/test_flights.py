@@ -15,6 +15,7 @@ from companion.campaign.versions import VersionError, difference, require_equal,
 from companion.cli import campaign as commands
 from companion.cli.main import main
 from companion.config.files import load as load_config
+from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError
 from tests.campaign.test_campaign_file import CONFIGS, load
 from tests.flight.fly import LOOP_HZ, QUICK_PARAMETERS
@@ -32,8 +33,8 @@ QUICK = {
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
-    """Two flights of a circle, in a calm and in wind, and a batch of steps."""
-    circle = {**QUICK, "flight.maneuvers": ["circle"], "circle.speed_m_s": 3.0, "circle.laps": 1}
+    """Two flights of half a circle, in a calm and in wind, and a batch of steps."""
+    circle = {**QUICK, "flight.maneuvers": ["circle"], "circle.speed_m_s": 3.0, "circle.laps": 0.5}
     told = {"set": circle, "sweep": {"mock.wind.speed_m_s": [0.0, 5.0]}}
     return load(tmp_path_factory.mktemp("file"), **told)
 
@@ -73,7 +74,9 @@ def test_equal_cases_are_equal_flights_to_the_bit(campaign, tmp_path):
 
 def test_the_virtual_clock_waits_for_the_solver(tmp_path):
     pytest.importorskip("casadi")
-    line = CONFIGS / "trajectories" / "line.yaml"
+    line = tmp_path / "line.yaml"
+    limits = {"speed_m_s": 4.0, "acceleration_m_s2": 3.0, "jerk_m_s3": 10.0}
+    line.write_text(bounded_yaml.dump({"line": {"to_m": [3.0, 0.0, -1.0], **limits}}))
     told = {"flight.maneuvers": ["trajectory"], "flight.trajectory": str(line)}
     (case,) = load(tmp_path, set={**QUICK, **told, "guidance.kind": "nmpc"}).cases()
     row, again = flight.fly_case(case), flight.fly_case(case, tmp_path / "recorded")

@@ -12,8 +12,8 @@ VEHICLE = yaml.safe_load((CONFIGS / "vehicle-ardupilot.yaml").read_text())
 MANEUVERS = {
     **VEHICLE,
     "flight": {"maneuvers": ["hover", "steps", "circle"]},
-    "hover": {"duration_s": 3.0},
-    "steps": {"settle_s": 3.0},
+    "hover": {"duration_s": 1.0},
+    "steps": {"settle_s": 1.5},
     "circle": {"radius_m": 2.0},
 }
 IN_AIR = 2

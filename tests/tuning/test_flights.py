@@ -40,15 +40,15 @@ def quick_loop(monkeypatch):
 
 
 @pytest.fixture
-def one_lap(tmp_path, monkeypatch):
-    """The courses of the trial flights once instead of twice."""
+def few_laps(request, tmp_path, monkeypatch):
+    """The courses of the trial flights once instead of twice, or as often as the test says."""
 
     def shortened(name):
         if not name.startswith("trajectories/"):
             return shipped(name)
         ((kind, course),) = yaml.safe_load(shipped(name).read_text()).items()
         path = tmp_path / name.removeprefix("trajectories/")
-        path.write_text(yaml.safe_dump({kind: {**course, "laps": 1}}))
+        path.write_text(yaml.safe_dump({kind: {**course, "laps": getattr(request, "param", 1)}}))
         return path
 
     monkeypatch.setattr(flights, "shipped", shortened)
@@ -65,7 +65,7 @@ def started(autopilot, factor=1.0):
     return changed(config, {"vehicle": times, "limits": LIMITS}, "test")
 
 
-def test_in_gusts_the_error_is_much_smaller(one_lap):
+def test_in_gusts_the_error_is_much_smaller(few_laps):
     config = started("px4")
     before = fly_trial(config, CIRCLE_IN_GUSTS, "px4")
     after = fly_trial(propose(config).tuned, CIRCLE_IN_GUSTS, "px4")
@@ -75,7 +75,7 @@ def test_in_gusts_the_error_is_much_smaller(one_lap):
     assert after.rate_limited < 0.02
 
 
-def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts(one_lap):
+def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts(few_laps):
     """Without margins while the rate loop slews, such a proposal swung by more than 1 m."""
     vehicle = {"lag_ms": 23.0, "dead_time_ms": 14.9, "acceleration_limit_deg_s2": 1112.0}
     drag = {"drag_per_s": 0.33, "quadratic_drag_per_m": 0.022}
@@ -90,7 +90,7 @@ def test_what_an_identified_ardupilot_gets_does_not_swing_in_gusts(one_lap):
     assert after.reported < 1.1 * before.reported
 
 
-def test_a_pilots_small_limits_are_kept_and_slow_the_course_down(one_lap):
+def test_a_pilots_small_limits_are_kept_and_slow_the_course_down(few_laps):
     limits = {"max_tilt_deg": 20.0, "max_tilt_rate_deg_s": 45.0}
     config = changed(started("px4"), {"limits": limits}, "test")
     flight = fly_trial(config, EIGHT, "px4")
@@ -100,7 +100,8 @@ def test_a_pilots_small_limits_are_kept_and_slow_the_course_down(one_lap):
     assert flight.rate_limited < 0.05
 
 
-def test_a_configuration_without_drag_leaves_the_tilt_that_the_mock_vehicles_drag_needs(one_lap):
+@pytest.mark.parametrize("few_laps", [0.5], indirect=True)
+def test_a_configuration_without_drag_leaves_the_tilt_that_the_mock_vehicles_drag_needs(few_laps):
     """With the drag unknown, the circle needed more tilt than allowed: the error was 1.2 m."""
     config = load(shipped("px4.yaml"))
     assert config.guidance.drag is None
