@@ -105,14 +105,14 @@ def test_the_command_runs(
 
 def ready_to_fly(options: Namespace) -> None:
     """Make the configuration of a flight as the command does, with all its checks."""
-    bundled = options.run == "flights.demo" or getattr(options, "bundled", None) is not None
+    bundled = options.run == "cli.flights.demo" or getattr(options, "bundled", None) is not None
     path = getattr(options, "bundled", None) or options.config
     if path in (None, Path()):
         path = shipped("mock-px4.yaml")
     if bundled:
         options.endpoint, options.arm, options.take_over = "udpin://127.0.0.1:14540", True, False
     planner = None
-    if options.run.startswith("identify"):
+    if options.run.startswith("cli.identify"):
         options.maneuvers, planner = ("identify",), "first-order"
     try:
         flying.with_options(load(path), options, planner)

@@ -47,7 +47,7 @@ def _add_run(kinds: Commands) -> None:
     )
     _add_cluster_options(run)
     add_flag(run, "--yes", "run it regardless of its number of cases and its duration")
-    run.set_defaults(run="campaign.run")
+    run.set_defaults(run="campaign.running.run")
 
 
 def _add_cluster_options(command: argparse.ArgumentParser) -> None:
@@ -77,7 +77,7 @@ def _add_rerun(kinds: Commands) -> None:
     rerun.add_argument(
         "case", type=int, metavar="CASE", help="number of the case (column `case` of the results)"
     )
-    rerun.set_defaults(run="campaign.rerun")
+    rerun.set_defaults(run="cli.flights.rerun")
 
 
 def _add_report(kinds: Commands) -> None:
@@ -89,7 +89,7 @@ def _add_report(kinds: Commands) -> None:
     )
     add_path(report, "folder", "the campaign's folder", "FOLDER")
     add_path(report, "--out", "the page (FOLDER/report.html)")
-    report.set_defaults(run="campaign.report")
+    report.set_defaults(run="campaign.report.page.run")
 
 
 def _add_tune(kinds: Commands) -> None:
@@ -110,4 +110,4 @@ def _add_tune(kinds: Commands) -> None:
         help="number of trials; replaces tune.trials of the file",
     )
     _add_cluster_options(tune)
-    tune.set_defaults(run="campaign.tune")
+    tune.set_defaults(run="campaign.tune.command.run")

@@ -69,7 +69,7 @@ def _add_flights(commands: Commands) -> None:
     )
     add_required_config(fly)
     _add_link_options(fly)
-    fly.set_defaults(run="flights.fly")
+    fly.set_defaults(run="cli.flights.fly")
     demo = commands.add_parser(
         "demo",
         help="start the bundled vehicle and fly it",
@@ -77,7 +77,7 @@ def _add_flights(commands: Commands) -> None:
     )
     add_path(demo, "--config", "configuration (default: the shipped mock-px4.yaml)")
     add_flag(demo, "--open", "open the report in the browser after the flight")
-    demo.set_defaults(run="flights.demo")
+    demo.set_defaults(run="cli.flights.demo")
     for command in (fly, demo):
         command.add_argument(
             "--maneuvers",
@@ -130,7 +130,7 @@ def _add_doctor(commands: Commands) -> None:
     add_path(fix_or_undo, "--undo", "only restore the parameters in an undo file")
     add_flag(command, "--yes", "with --fix: set all without asking")
     _add_flight_options(command)
-    command.set_defaults(run="doctor.doctor")
+    command.set_defaults(run="cli.doctor.doctor")
 
 
 def _add_identify(commands: Commands) -> None:
@@ -162,7 +162,7 @@ def _add_identify(commands: Commands) -> None:
     _add_link_options(command)
     _add_flight_options(command)
     command.set_defaults(
-        run="identify.identify",
+        run="cli.identify.identify",
         trajectory=None,
         slow_down=False,
         watch=False,

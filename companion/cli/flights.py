@@ -1,7 +1,9 @@
-"""The commands `companion fly` and `companion demo`."""
+"""The commands `companion fly`, `companion demo` and `companion campaign rerun`."""
 
 import argparse
 import webbrowser
+
+from rich.console import Console
 
 from companion.cli import flying
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
@@ -20,9 +22,7 @@ def fly(options: argparse.Namespace) -> int:
     folder = flight_folder(config.recording.directory)
     invocation = flying.invocation(options)
     console = _console(options)
-    with helper_process(
-        options, config, options.config, config_as_read, folder, console, flies_maneuvers=True
-    ) as helper:
+    with helper_process(options, config, options.config, config_as_read, folder, console) as helper:
         summary = flying.fly(config, folder, console, invocation, helper)
     return _report_result(summary, options)
 
@@ -35,6 +35,18 @@ def demo(options: argparse.Namespace) -> int:
     if options.open and summary.log is not None and (page := summary.log / PAGE).is_file():
         webbrowser.open(page.resolve().as_uri())
     return _report_result(summary, options)
+
+
+def rerun(options: argparse.Namespace) -> int:
+    """Fly one case of a campaign again, and tell whether the flight is identical."""
+    from companion.campaign.rerun import rerun as fly_again  # noqa: PLC0415  no other command
+
+    again = fly_again(options.folder, options.case)
+    page = flying.write_flight_page(again.folder)
+    console = Console(highlight=False, soft_wrap=True, markup=False)
+    for text in (*again.lines, f"Recorded in {again.folder}", page):
+        console.print(text)
+    return EXIT_OK if again.identical else EXIT_FAILURE
 
 
 def _console(options: argparse.Namespace) -> FlightConsole:

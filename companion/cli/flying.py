@@ -169,9 +169,7 @@ def fly_bundled(
         folder = flight_folder(config.recording.directory)
         in_lockstep = config.link.lockstep
         with (
-            helper_process(
-                options, config, path, config_as_read, folder, console, flies_maneuvers=True
-            ) as helper,
+            helper_process(options, config, path, config_as_read, folder, console) as helper,
             demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
         ):
             return fly(config, folder, console, invocation, helper)

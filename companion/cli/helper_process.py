@@ -23,13 +23,12 @@ def helper_process(
     config_as_read: Config,
     folder: Path | None,
     console: Console,
-    *,
-    flies_maneuvers: bool,
 ) -> Iterator[Helper | None]:
     """Run the helper process that the options ask for, if any, while the block runs.
 
-    `--watch` watches the file `path`, which was read as `config_as_read`. `console` shows where the
-    live page and the live stream are.
+    `--watch` watches the file `path`, which was read as `config_as_read`. `folder` is that of the
+    flight of the configured maneuvers; None: other programs command the flights. `console` shows
+    where the live page and the live stream are.
 
     Raises:
         ConfigError: the page or the stream cannot be served at this address.
@@ -50,7 +49,7 @@ def helper_process(
         if each is not None:
             console.print(each.address_text(), highlight=False, soft_wrap=True)
     watched = path if options.watch else None
-    tasks = HelperTasks(watched, config_as_read, page, stream, flies_maneuvers, folder)
+    tasks = HelperTasks(watched, config_as_read, page, stream, folder is not None, folder)
     helper = Helper(tasks, config)
     if page is not None:
         page.listening_socket.close()  # the helper process has its own copy

@@ -37,9 +37,9 @@ Command = Callable[[argparse.Namespace], int]
 
 
 def command_of(options: argparse.Namespace) -> Command:
-    """Import the function that the command line asks for, such as `flights.fly`."""
-    module, _, function = options.run.partition(".")
-    command: Command = getattr(import_module(f"companion.cli.{module}"), function)
+    """Import the function that the command line asks for, such as `cli.flights.fly`."""
+    module, _, function = options.run.rpartition(".")
+    command: Command = getattr(import_module(f"companion.{module}"), function)
     return command
 
 

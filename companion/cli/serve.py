@@ -37,9 +37,7 @@ def serve(options: argparse.Namespace) -> int:
     def note(text: str) -> None:
         observers.event(time.monotonic() - began, text)
 
-    with helper_process(
-        options, config, options.config, config_as_read, None, console, flies_maneuvers=False
-    ) as helper:
+    with helper_process(options, config, options.config, config_as_read, None, console) as helper:
         observers = observer if helper is None else SeveralObservers(observer, helper)
         session = ServeSession(
             config, note, observers, environment(helper), config.recording.directory

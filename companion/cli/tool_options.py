@@ -43,7 +43,7 @@ def add_serve(commands: Commands) -> None:
     add_set(serve, "link.target_system=2")
     add_json(serve, "print the counters at the end as one line of JSON")
     add_live(serve)
-    serve.set_defaults(run="serve.serve")
+    serve.set_defaults(run="cli.serve.serve")
 
 
 def add_tune(commands: Commands) -> None:
@@ -74,7 +74,7 @@ def add_tune(commands: Commands) -> None:
     add_flag(tune, "--force", "replace FILE if it exists")
     add_flag(tune, "--no-flights", "do not fly the values on the mock vehicle")
     add_json(tune)
-    tune.set_defaults(run="tune.tune")
+    tune.set_defaults(run="cli.tune.tune")
 
 
 def add_benches(commands: Commands) -> None:
@@ -108,7 +108,7 @@ def add_benches(commands: Commands) -> None:
     add_flag(flight, "--profile", "also show the processor time of each part")
     for name, each in benches.choices.items():
         add_json(each, "print the figures as one JSON line")
-        each.set_defaults(run="tools.bench", bench=name)
+        each.set_defaults(run="cli.tools.bench", bench=name)
 
 
 def _add_seconds(
@@ -140,7 +140,7 @@ def add_study(commands: Commands) -> None:
         help="processes for `study all`; default: one for each core",
     )
     add_json(study, f"for {registry.names_with_json()}: print its rows as one JSON list")
-    study.set_defaults(run="tools.study")
+    study.set_defaults(run="cli.tools.study")
 
 
 def add_config(commands: Commands) -> None:
@@ -158,13 +158,13 @@ def add_config(commands: Commands) -> None:
     )
     add_flag(selection, "--schema", "print the JSON Schema, for editors")
     add_flag(selection, "--markdown", "print tables, as in docs/configuration.md")
-    show.set_defaults(run="config.show")
+    show.set_defaults(run="cli.config.show")
 
     start = commands.add_parser("init", help="write a commented starting configuration")
     start.add_argument("name", choices=list(STARTING_FILES), help="vehicle of the configuration")
     out_help = "file to write (default: companion.yaml); an existing file is never replaced"
     add_path(start, "--out", out_help, default=Path("companion.yaml"))
-    start.set_defaults(run="config.init")
+    start.set_defaults(run="cli.config.init")
 
     check = commands.add_parser(
         "check-config",
@@ -175,7 +175,7 @@ def add_config(commands: Commands) -> None:
     )
     check.add_argument("file", type=Path, metavar="FILE")
     add_set(check, "planner.gain_per_s=4")
-    check.set_defaults(run="config.check")
+    check.set_defaults(run="cli.config.check")
 
 
 def add_recordings(commands: Commands) -> None:
@@ -195,7 +195,7 @@ def _add_plot(commands: Commands) -> None:
     )
     add_flight_folder(plot)
     add_path(plot, "--out", "picture (default: FOLDER/flight.png)")
-    plot.set_defaults(run="recordings.plot")
+    plot.set_defaults(run="cli.recordings.plot")
 
 
 def _add_export(commands: Commands) -> None:
@@ -209,7 +209,7 @@ def _add_export(commands: Commands) -> None:
     add_flag(kind, "--csv", "one CSV file for each channel")
     add_flag(kind, "--parquet", "one Parquet file for each channel (extra `export`)")
     add_path(export, "--into", "folder for the files (default: FOLDER/export)", "FOLDER")
-    export.set_defaults(run="recordings.export")
+    export.set_defaults(run="cli.recordings.export")
 
 
 def _add_replay(commands: Commands) -> None:
@@ -224,7 +224,7 @@ def _add_replay(commands: Commands) -> None:
     add_path(replay, "--config", "configuration that replaces the flight's own")
     add_set(replay, "planner.gain_per_s=4")
     add_path(replay, "--csv", "write both setpoints for each sample to this file")
-    replay.set_defaults(run="recordings.replay")
+    replay.set_defaults(run="cli.recordings.replay")
 
 
 def _add_reports(commands: Commands) -> None:
@@ -235,7 +235,7 @@ def _add_reports(commands: Commands) -> None:
     )
     add_path(report, "flight", "the flight's folder, or a .tlog of any program", "FOLDER")
     add_path(report, "--out", "page (default: FOLDER/report.html)")
-    report.set_defaults(run="recordings.report")
+    report.set_defaults(run="cli.recordings.report")
     compare = commands.add_parser(
         "compare",
         help="one HTML page that compares flights (extra `report`)",
@@ -244,4 +244,4 @@ def _add_reports(commands: Commands) -> None:
     )
     add_path(compare, "flights", "folders of flights, or .tlog files", "FOLDER", nargs="+")
     add_path(compare, "--out", "page (default: compare.html)", default=Path("compare.html"))
-    compare.set_defaults(run="recordings.compare")
+    compare.set_defaults(run="cli.recordings.compare")

@@ -12,7 +12,7 @@ from companion.campaign.case import Fault
 from companion.campaign.cluster import ClusterError
 from companion.campaign.unit import cases_per_unit, unit_ranges
 from companion.campaign.versions import VersionError, difference, require_equal, versions
-from companion.cli import campaign as commands
+from companion.cli import flights as commands
 from companion.cli.main import main
 from companion.config.files import load as load_config
 from companion.files import bounded_yaml
