@@ -1,7 +1,13 @@
-"""A program that answers samples with link, control loop, planner and thrust of `companion fly`."""
+"""A program that answers samples with link, control loop, planner and thrust of `companion fly`.
+
+`python -m companion.bench.companion_program PORT [mavsdk | CLIENT_PORT]` listens on UDP port PORT.
+With `mavsdk`, MAVSDK forwards all frames (`link.backend: mavsdk`). With CLIENT_PORT, all messages
+are also forwarded to clients at this UDP port, like `companion serve`.
+"""
 
 import asyncio
 import sys
+from contextlib import AsyncExitStack
 from typing import NoReturn
 
 from companion.attitude import Target
@@ -13,18 +19,33 @@ from companion.control.loop_record import Deadlines
 from companion.mavlink import loop as link_loop
 from companion.mavlink.settings import LinkSettings
 from companion.recording.trace import FlightTrace
+from companion.serve.network.network import Network
 from companion.vehicle.link import Link
 
 _GUIDANCE_PERIOD_S = 0.02
 
 
-async def fly(port: int) -> None:
-    """Answer each attitude sample with a setpoint until killed; `port`: UDP port to listen on."""
-    async with Link(LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")) as link:
-        await answer(link)
+async def fly(port: str, how: str = "") -> None:
+    """Answer each attitude sample with a setpoint until killed; arguments: see the module."""
+    settings = LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")
+    async with AsyncExitStack() as stack:
+        link = await stack.enter_async_context(_link(settings, by_mavsdk=how == "mavsdk"))
+        if how.isdigit():
+            network = Network(link, [f"udpin://127.0.0.1:{how}"])
+            network = await stack.enter_async_context(network)
+            network.routing.intercept = lambda *_: False
+        await _answer(link)
 
 
-async def answer(link: Link) -> NoReturn:
+def _link(settings: LinkSettings, *, by_mavsdk: bool) -> Link:
+    if not by_mavsdk:
+        return Link(settings)
+    from companion.mavsdk_link import MavsdkLink  # noqa: PLC0415  an extra
+
+    return MavsdkLink(settings)
+
+
+async def _answer(link: Link) -> NoReturn:
     """Answer samples by a `ControlLoop`, which gets a new guidance command 50 times a second."""
     config = Config()
     now = asyncio.get_running_loop().time
@@ -45,4 +66,4 @@ async def answer(link: Link) -> NoReturn:
 
 
 if __name__ == "__main__":
-    link_loop.run(fly(int(sys.argv[1])))
+    link_loop.run(fly(*sys.argv[1:]))

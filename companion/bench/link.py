@@ -32,8 +32,8 @@ class _Program(NamedTuple):
     """Key of the program in the result."""
     title: str
     """Name to show to users."""
-    module: str
-    """Module of `companion.bench` that is run."""
+    command: str
+    """Module of `companion.bench` that is run, and further arguments."""
     read_stamp: StampReader = stamp_by_time
     """Reads from a setpoint the time stamp of its sample."""
     modulus: int = TIME_MODULUS
@@ -44,7 +44,7 @@ _PROGRAMS = (
     _Program("echo", "blocking echo", "echo_program"),
     _Program("companion", "companion", "companion_program"),
     _Program("pymavlink", "blocking pymavlink", "pymavlink_program"),
-    _Program("companion_mavsdk", "companion by MAVSDK", "backend_program"),
+    _Program("companion_mavsdk", "companion by MAVSDK", "companion_program mavsdk"),
     _Program("mavsdk", "MAVSDK", "mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
 )
 
@@ -84,8 +84,8 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(program: _Program) -> Sender:
-    benchmarked_program = BenchmarkedProgram(program.title, f"companion.bench.{program.module}")
-    return Sender(benchmarked_program, program.read_stamp, program.modulus)
+    started = BenchmarkedProgram(program.title, *f"companion.bench.{program.command}".split())
+    return Sender(started, program.read_stamp, program.modulus)
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:

@@ -75,7 +75,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(key: str, client_port: int) -> Sender:
-    program = BenchmarkedProgram(_TITLES[key], "companion.bench.serve_program", str(client_port))
+    program = BenchmarkedProgram(
+        _TITLES[key], "companion.bench.companion_program", str(client_port)
+    )
     return Sender(program, extra_messages=_TELEMETRY)
 
 
