@@ -16,7 +16,7 @@ from companion.attitude.kinematics import cos_tilt
 from companion.attitude.limits import Constants
 from companion.attitude.representation import normalised
 from companion.guidance.thrust import specific_thrust
-from companion.study.step import Floats
+from companion.study.step import LoopFlight
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
@@ -26,20 +26,6 @@ ROLL_STEP = BodyRates(0.5, 0.0, 0.0)
 """Step of the rate setpoint with which the rate loop is measured, rad/s."""
 ROLL_STEP_S = 0.25
 """Duration of the simulated response to `ROLL_STEP`, s."""
-
-
-@dataclass(frozen=True, slots=True)
-class InnerLoopFlight:
-    """Result of a flight of n planner samples. Rates are body rates (FRD), rad/s."""
-
-    time: Floats
-    """(n+1,), s from the start."""
-    q: Floats
-    """(n+1, 4), attitude (w, x, y, z), body → world (NED)."""
-    body_rates: Floats
-    """(n+1, 3), true rates of the vehicle."""
-    commanded_rates: Floats
-    """(n, 3), rates commanded at each sample, before any delay."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +42,7 @@ class InnerLoop:
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
-    ) -> InnerLoopFlight:
+    ) -> LoopFlight:
         """Fly from rest to a target; commanded rates are held until the next planner sample.
 
         The thrust holds the height at the tilt of each sample (`specific_thrust`, as in flight). It
@@ -74,12 +60,11 @@ class InnerLoop:
             InvalidTargetError: `target` is not finite, or far too large.
         """
         physics_steps = round(self.airframe.physics_rate_hz / rate_hz)
-        samples = round(seconds * rate_hz)
         q = normalised(start)
         multirotor = Multirotor(self.airframe, self.rate_loop, q, _thrust_to_hold_height(q))
         setpoints = self._setpoint_queue(multirotor.throttle(_thrust_to_hold_height(q)))
         attitudes, body_rates, commanded_rates = [q], [multirotor.body_rates], []
-        for _ in range(samples):
+        for _ in range(round(seconds * rate_hz)):
             rates = planner.rates(q, target, 1.0 / rate_hz, BodyRates(*multirotor.body_rates))
             setpoint = rates, multirotor.throttle(_thrust_to_hold_height(q))
             for _ in range(physics_steps):
@@ -89,12 +74,7 @@ class InnerLoop:
             attitudes.append(q)
             body_rates.append(multirotor.body_rates)
             commanded_rates.append(rates)
-        return InnerLoopFlight(
-            np.arange(samples + 1) / rate_hz,
-            np.array(attitudes),
-            np.array(body_rates),
-            np.array(commanded_rates),
-        )
+        return LoopFlight(np.array(attitudes), np.array(commanded_rates), np.array(body_rates))
 
     def rate_time_63(self) -> float:
         """Time until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint in hover, s.
@@ -112,8 +92,8 @@ class InnerLoop:
         )
         roll = flight.body_rates[:, 0]
         crossing = int(np.argmax(roll >= target_rate))
-        bracket = slice(crossing - 1, crossing + 1)
-        return float(np.interp(target_rate, roll[bracket], flight.time[bracket]))
+        bracket = np.array([crossing - 1, crossing])
+        return float(np.interp(target_rate, roll[bracket], bracket / self.airframe.physics_rate_hz))
 
     def _setpoint_queue(self, throttle: float) -> deque[tuple[BodyRates, float]]:
         """Queue of the delayed setpoints (rates, throttle), newest last; at first all rates 0."""

@@ -3,25 +3,15 @@
 from collections import deque
 from dataclasses import dataclass
 from math import exp
-from typing import NamedTuple
 
 import numpy as np
 
 from companion.attitude import BodyRates, Planner, Quaternion, Target
 from companion.attitude.rotation import after_constant_rates
-from companion.study.step import Floats
+from companion.study.step import LoopFlight
 
 STEP_HZ = 1000
 """Simulation steps per second; dead times and sample periods are whole numbers of steps."""
-
-
-class LagFlight(NamedTuple):
-    """Attitudes and commanded rates of a simulated flight with a `LagLoop`."""
-
-    q: Floats
-    """(samples + 1, 4), attitude (w, x, y, z)."""
-    commanded_rates: Floats
-    """(samples, 3), commanded body rates, rad/s."""
 
 
 class LagBody:
@@ -77,17 +67,18 @@ class LagLoop:
 
     def fly(
         self, planner: Planner, start: Quaternion, target: Target, *, seconds: float, rate_hz: float
-    ) -> LagFlight:
+    ) -> LoopFlight:
         """Fly from rest to a target; commanded rates are held until the next planner sample.
 
         `rate_hz` must divide `STEP_HZ`.
         """
         steps = round(STEP_HZ / rate_hz)
         body = LagBody(start, self.lag_ms, self.dead_time_ms)
-        attitudes, commanded_rates = [start], []
+        attitudes, commanded_rates, body_rates = [start], [], [body.rates]
         for _ in range(round(seconds * rate_hz)):
             rates = planner.rates(body.q, target, 1.0 / rate_hz, body.rates)
             commanded_rates.append(rates)
             body.simulate(rates, steps)
             attitudes.append(body.q)
-        return LagFlight(np.array(attitudes), np.array(commanded_rates))
+            body_rates.append(body.rates)
+        return LoopFlight(np.array(attitudes), np.array(commanded_rates), np.array(body_rates))

@@ -1,21 +1,18 @@
 """Measures of a response, such as its cross-track error, and a second-order model fitted to it."""
 
 from math import exp, log
-from typing import NamedTuple
 
 import numpy as np
 
-from companion.attitude import Coefficients
-from companion.attitude.reference import SecondOrderReference
 from companion.least_squares import minimise
+from companion.recording.measurements.second_order import RunData, SecondOrderModel
 from companion.study.step import Floats, Response, Step
 
 FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second order: ζ")
-"""Titles of `DelayedSecondOrder.cells`."""
+"""Titles of `fit_cells`."""
 
 _FIT_STRIDE = 10
 """The second-order model is fitted to every sample whose index is a multiple of this number."""
-_AT_REST = Coefficients(0.0, 0.0)
 _LOWER_BOUNDS = np.array([log(0.1), log(0.01), 0.0])
 """Lower bounds of log ω (ω in rad/s), log ζ and the dead time (s) in the fit."""
 _UPPER_BOUNDS = np.array([log(1000.0), log(100.0), 0.5])
@@ -84,29 +81,18 @@ def best_and_worst(values: Floats) -> tuple[int, int]:
     return int(ranked.argmin()), int(ranked.argmax())
 
 
-class DelayedSecondOrder(NamedTuple):
-    """A second-order model with a dead time."""
-
-    model: SecondOrderReference
-    """The model without dead time: natural frequency ω, rad/s, and damping ratio ζ."""
-    dead_time: float
-    """Time from the step until the model begins to move, s."""
-
-    @property
-    def cells(self) -> tuple[float, float, float]:
-        """The table cells for `FIT_COLUMNS`."""
-        return 1e3 * self.dead_time, self.model.frequency, self.model.damping
+def fit_cells(fit: SecondOrderModel) -> tuple[float, float, float]:
+    """The table cells for `FIT_COLUMNS`."""
+    return 1e3 * fit.dead_time, fit.frequency, fit.damping
 
 
-def second_order_path(step: Step, fit: DelayedSecondOrder, time: Floats) -> Floats:
+def second_order_path(step: Step, fit: SecondOrderModel, time: Floats) -> Floats:
     """(n, 2) coefficients of the fitted model, from rest, at (n,) times after the step, s."""
-    model_time = np.maximum(time - fit.dead_time, 0.0)
-    return np.array(
-        [fit.model.after(step.start, _AT_REST, step.target, float(t))[0] for t in model_time]
-    )
+    at_rest = np.array([step.start, (0.0, 0.0)])
+    return fit.path_at_rows(RunData(time, at_rest, np.zeros(1), np.array([step.target])))
 
 
-def fit_second_order(step: Step, path: Floats) -> DelayedSecondOrder:
+def fit_second_order(step: Step, path: Floats) -> SecondOrderModel:
     """Fit natural frequency, damping ratio and dead time to a response by least squares.
 
     Args:
@@ -122,6 +108,6 @@ def fit_second_order(step: Step, path: Floats) -> DelayedSecondOrder:
     return _fit_from(minimise(residual, start, _LOWER_BOUNDS, _UPPER_BOUNDS).unknown)
 
 
-def _fit_from(unknown: Floats) -> DelayedSecondOrder:
+def _fit_from(unknown: Floats) -> SecondOrderModel:
     frequency, damping, dead_time = (float(value) for value in unknown)
-    return DelayedSecondOrder(SecondOrderReference(exp(frequency), exp(damping)), dead_time)
+    return SecondOrderModel(exp(frequency), exp(damping), dead_time)

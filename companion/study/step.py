@@ -5,7 +5,7 @@ The paper is Xu & Pei; see `companion.attitude`.
 
 from dataclasses import dataclass
 from math import pi
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,18 +81,15 @@ class Response:
         return self.coefficients[:, :, heading_index]
 
 
-class LoopFlight(Protocol):
-    """Result of a flight with an inner loop, at one heading of the step."""
+class LoopFlight(NamedTuple):
+    """A flight with an inner loop, at one heading of the step; body rates (FRD) in rad/s."""
 
-    @property
-    def q(self) -> Floats:
-        """(samples + 1, 4) attitudes (w, x, y, z)."""
-        ...
-
-    @property
-    def commanded_rates(self) -> Floats:
-        """(samples, 3) commanded body rates, rad/s."""
-        ...
+    q: Floats
+    """(samples + 1, 4), attitude (w, x, y, z), body → world (NED)."""
+    commanded_rates: Floats
+    """(samples, 3), rates commanded at each sample, before any delay."""
+    body_rates: Floats
+    """(samples + 1, 3), true rates of the vehicle."""
 
 
 class Loop(Protocol):

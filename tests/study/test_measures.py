@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from companion.attitude import Coefficients
-from companion.attitude.reference import SecondOrderReference
+from companion.recording.measurements.second_order import SecondOrderModel
 from companion.study.measures import (
-    DelayedSecondOrder,
     cross_track,
     fit_second_order,
     heading_effect,
@@ -64,13 +63,12 @@ def test_the_tilt_rate_leaves_yaw_out():
 
 
 def test_a_second_order_response_is_found_again():
-    model = SecondOrderReference(9.0, 0.7)
-    path = second_order_path(STEP, DelayedSecondOrder(model, 0.043), STEP.time)
+    path = second_order_path(STEP, SecondOrderModel(9.0, 0.7, 0.043), STEP.time)
     assert path[4] == pytest.approx(STEP.start)  # still dead at 40 ms
     found = fit_second_order(STEP, path)
     assert found.dead_time == pytest.approx(0.043, rel=1e-3)
-    assert found.model.frequency == pytest.approx(9.0, rel=1e-3)
-    assert found.model.damping == pytest.approx(0.7, rel=1e-3)
+    assert found.frequency == pytest.approx(9.0, rel=1e-3)
+    assert found.damping == pytest.approx(0.7, rel=1e-3)
 
 
 def test_a_flown_response_begins_at_the_start_and_ends_at_the_target():

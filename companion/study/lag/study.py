@@ -3,6 +3,7 @@
 from itertools import product
 from typing import NamedTuple
 
+from companion.recording.measurements.second_order import SecondOrderModel
 from companion.study.lag.figure import CAPTION, draw_figure
 from companion.study.lag.findings import find
 from companion.study.lag.flights import (
@@ -29,7 +30,7 @@ from companion.study.lag.flights import (
 )
 from companion.study.measures import (
     FIT_COLUMNS,
-    DelayedSecondOrder,
+    fit_cells,
     fit_second_order,
     largest_deviation,
     largest_tilt_rate,
@@ -47,7 +48,7 @@ _SCORE_COLUMNS = ("cross-track", "time to 5 %, s")
 class _FittedModel(NamedTuple):
     """The second-order model fitted to a response, and the largest deviation from it."""
 
-    fit: DelayedSecondOrder
+    fit: SecondOrderModel
     deviation: float  # largest deviation of the response from the model
 
 
@@ -180,7 +181,7 @@ def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _FittedModel]
         " and the second-order model with dead time fitted to each response.",
         ("method", *_SCORE_COLUMNS, *FIT_COLUMNS, "largest deviation from it"),
         tuple(
-            (method.label, *scores[method], *model_fit.fit.cells, model_fit.deviation)
+            (method.label, *scores[method], *fit_cells(model_fit.fit), model_fit.deviation)
             for method, model_fit in fitted.items()
         ),
     )

@@ -10,6 +10,7 @@ from companion.study.drawing import draw_line, draw_plane, draw_reference, draw_
 from companion.study.measures import (
     FIT_COLUMNS,
     deviation,
+    fit_cells,
     heading_effect,
     largest_deviation,
     settling_time,
@@ -93,7 +94,7 @@ def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
                 float(largest_deviation(loop.responses[method], reference).max()),
                 loop.cross_track(method),
                 float(settling_time(loop.responses[method]).max()),
-                *loop.fits[method].cells,
+                *fit_cells(loop.fits[method]),
                 loop.deviation_from_second_order(method),
                 heading_effect(loop.responses[method]),
             )
@@ -226,7 +227,7 @@ def _second_order_finding(claimant: Claimant, speed: str, loop: LoopFlights) -> 
         f"With a complete inner loop that is {speed} the response of the proposed method is second"
         " order.",
         fit_deviation < bound,
-        f"It stays within {fit_deviation:.2g} of ω = {fit.model.frequency:.1f} rad/s,"
-        f" ζ = {fit.model.damping:.2f} after a dead time of {1e3 * fit.dead_time:.0f} ms; required"
+        f"It stays within {fit_deviation:.2g} of ω = {fit.frequency:.1f} rad/s,"
+        f" ζ = {fit.damping:.2f} after a dead time of {1e3 * fit.dead_time:.0f} ms; required"
         f" are 2 % of the step, {bound:.2g}.",
     )

@@ -4,9 +4,9 @@ from dataclasses import replace
 from math import pi
 from typing import NamedTuple
 
+from companion.recording.measurements.second_order import SecondOrderModel
 from companion.study.inner_loop import faster_inner_loop
 from companion.study.measures import (
-    DelayedSecondOrder,
     cross_track,
     fit_second_order,
     largest_deviation,
@@ -33,7 +33,7 @@ class LoopFlights(NamedTuple):
     """Time until the roll rate reaches 63 % of a step of its setpoint, s."""
     responses: dict[Method, Response]
     """Response of each method."""
-    fits: dict[Method, DelayedSecondOrder]
+    fits: dict[Method, SecondOrderModel]
     """Second-order model fitted to the response of each method at `worst_heading`."""
 
     def worst_heading(self, method: Method) -> int:
