@@ -3,9 +3,6 @@
 import tempfile
 from pathlib import Path
 
-import numpy as np
-
-from companion.attitude.kinematics import tilt_angle
 from companion.batch import can_compile
 from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
@@ -16,13 +13,12 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver
 from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
+from companion.testing.truth import TruthRecorder
 
 DATAGRAM_DELAY_S = 0.0005
 """Delay of a datagram between program and mock vehicle, as over UDP, s."""
 INTERNAL_ERROR = "internal error: "
 """Prefix of the result of a case in which the program itself failed."""
-_STEPS_PER_TRUTH_ROW = 5
-"""Steps of the mock vehicle from one recorded row of its true motion to the next."""
 _MAX_TIME_AFTER_END_S = 10.0
 """Longest time for which a vehicle that is still armed is simulated after the program ended, s."""
 _PILOT_MODES = (  # of PX4 and ArduPilot
@@ -72,14 +68,12 @@ class CaseFlight:
         self._config = _with_paths_in(case.config, files_folder)
         settings = {**case.mock, "lockstep": False}
         self._vehicle = MockVehicle(delay_s=DATAGRAM_DELAY_S, compiled=can_compile(), **settings)
-        self._truth: list[tuple[float, ...]] = []
-        self._steps = 0
+        self._truth = TruthRecorder(self._vehicle)
         self._time_limit_reached = False
 
     def fly(self, folder: Path | None) -> dict[str, Value]:
         """Fly the case; return its outcomes. `folder`: see `fly_case`."""
         vehicle, case = self._vehicle, self._case
-        vehicle.after_step.append(self._record_truth)
         injector = _FaultInjector(vehicle, case.fault)
         flight = session(self._config, vehicle, folder, injector)
 
@@ -118,7 +112,7 @@ class CaseFlight:
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
         crashed, fault = truth_afterwards["crashed"], self._case.fault
         measured_outcomes = {
-            **outcomes.tracking(summary, np.array(self._truth).reshape(-1, 5)),
+            **outcomes.tracking(summary, self._truth.rows()),
             **outcomes.response(summary),
             **outcomes.control_effort(setpoints, summary, self._config),
             "flight_s": flight_s,
@@ -142,13 +136,6 @@ class CaseFlight:
             "setpoints": len(setpoints),
             "digest": outcomes.digest(setpoints, truth_afterwards),
         }
-
-    def _record_truth(self) -> None:
-        self._steps += 1
-        if self._steps % _STEPS_PER_TRUTH_ROW == 0:
-            state = self._vehicle.state()
-            _, x, y, _ = state["q"]
-            self._truth.append((self._vehicle.time, *state["position"], tilt_angle(x, y)))
 
 
 class _FaultInjector(SilentObserver):

@@ -15,6 +15,7 @@ from companion.config import Config
 from companion.recording.measurements.maneuver_figures import settled_parts
 from companion.recording.measurements.summary import Summary, tracking_errors
 from companion.testing import ReceivedSetpoint, Truth
+from companion.testing.truth import true_positions
 
 Floats = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
 
     Args:
         summary: summary of the flight.
-        truth: (N, 5), vehicle time (s), north, east, down (m), tilt (rad).
+        truth: (N, 5), see `TruthRecorder.rows`.
 
     Returns:
         value by name of the outcome; empty without a closed-loop maneuver or without `truth`.
@@ -61,10 +62,8 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     if len(truth) and parts:
         settled_rows = np.concatenate(parts)
         figures["estimated_rms_m"] = tracking_errors(settled_rows)["position_rms_m"]
-        true_position = [
-            np.interp(settled_rows[:, 0], truth[:, 0], axis) for axis in truth[:, 1:4].T
-        ]
-        true_rows = np.column_stack([settled_rows[:, :4], *true_position])
+        true_position = true_positions(truth, settled_rows[:, 0])
+        true_rows = np.column_stack([settled_rows[:, :4], true_position])
         figures.update(tracking_errors(true_rows))
         figures.update(_horizontal_errors(settled_rows, true_rows))
         in_maneuvers = (truth[:, 0] >= settled_rows[0, 0]) & (truth[:, 0] <= settled_rows[-1, 0])

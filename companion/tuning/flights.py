@@ -1,7 +1,6 @@
 """Flies a configuration on the mock vehicle, in this process, and measures the tracking errors."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import hypot, nan
 
@@ -12,6 +11,7 @@ from companion.config.files import changed, load, shipped
 from companion.drag import NO_DRAG
 from companion.recording.measurements.maneuver_figures import in_maneuvers
 from companion.testing import MockVehicle, fly
+from companion.testing.truth import TruthRecorder, true_positions
 from companion.tuning.expectation import Floats
 
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
@@ -26,8 +26,6 @@ _LEAST_SPEED = 0.05
 """Speed of the reference from which it moves, m/s."""
 _DATAGRAM_DELAY_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
-_STEPS_PER_TRUTH_ROW = 5
-"""Steps of the mock vehicle from one recorded true position to the next."""
 _QUICK_TAKEOFF_AND_LANDING = {
     "px4": {"MPC_TKO_RAMP_T": 0.3, "MPC_TKO_SPEED": 3.0, "MPC_LAND_SPEED": 3.0},
     "ardupilot": {"LAND_SPEED": 150.0},
@@ -125,13 +123,13 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
         parameters={**parameters, **_QUICK_TAKEOFF_AND_LANDING[autopilot]},
     )
     flown_config = _flight_config(config, trial, mock)
-    with _recorded_truth(vehicle) as rows:
-        summary = fly(flown_config, vehicle)
+    truth = TruthRecorder(vehicle)
+    summary = fly(flown_config, vehicle)
     if summary.result != "ok":
         return TrialResult(summary.result)
     tracking = summary.trace.tracking.rows()
     course = tracking[in_maneuvers(tracking[:, 0], summary.trace.maneuvers)]
-    result = _tracking_figures(course, np.array(rows), vehicle, flown_config)
+    result = _tracking_figures(course, truth.rows(), vehicle, flown_config)
     return replace(result, wind=trial.wind.get("speed_m_s", 0.0))
 
 
@@ -142,7 +140,7 @@ def _tracking_figures(
 
     Args:
         tracking: rows of `FlightTrace.tracking` in the trial's maneuver.
-        truth: rows of `_recorded_truth`.
+        truth: see `TruthRecorder.rows`.
         vehicle: vehicle after the flight.
         flown_config: configuration of the flight.
     """
@@ -150,9 +148,7 @@ def _tracking_figures(
     speed = np.hypot(*np.gradient(reference, time, axis=0).T)
     moving_indices = np.flatnonzero(speed > _LEAST_SPEED)
     moving_rows = slice(moving_indices[0], moving_indices[-1] + 1)
-    true_position = np.column_stack(
-        [np.interp(time, truth[:, 0], column) for column in truth[:, 1:].T]
-    )
+    true_position = true_positions(truth, time)[:, :2]
     tilt_rates = [
         hypot(*column.rates[:2])
         for column in vehicle.setpoints
@@ -172,24 +168,6 @@ def _tracking_figures(
 
 def _rms(offsets: Floats) -> float:
     return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
-
-
-@contextmanager
-def _recorded_truth(vehicle: MockVehicle) -> Iterator[list[tuple[float, float, float]]]:
-    """In the context, record rows of vehicle time (s) and true position north and east (m)."""
-    rows: list[tuple[float, float, float]] = []
-    steps = 0
-
-    def record() -> None:
-        nonlocal steps
-        steps += 1
-        if steps % _STEPS_PER_TRUTH_ROW == 0:
-            north, east, _ = vehicle.state()["position"]
-            rows.append((vehicle.time, north, east))
-
-    vehicle.after_step.append(record)
-    yield rows
-    vehicle.after_step.remove(record)
 
 
 def _flight_config(config: Config, trial: TrialFlight, mock: Config) -> Config:

@@ -1,6 +1,5 @@
 """The flights of the study `track`: the mock vehicle follows trajectories in lockstep."""
 
-import asyncio
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -16,12 +15,13 @@ from companion.child_process import end_with_parent, interrupts_blocked, usable_
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.files import bounded_yaml
-from companion.flight.observer import SilentObserver
+from companion.recording.measurements.maneuver_figures import in_maneuvers
 from companion.study.outcome import Tick
 from companion.study.step import Floats
 from companion.study.track.tasks import Task
 from companion.testing import MockVehicle
 from companion.testing import fly as fly_in_memory
+from companion.testing.truth import TruthRecorder, true_positions
 
 POSITION_RATE_HZ = 30.0
 MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
@@ -29,7 +29,7 @@ MAX_TILT_DEG, MAX_TILT_RATE_DEG_S, MAX_THRUST = 58.0, 250.0, 0.98
 GUST_SHARE = 1.0 / 3.0
 """Standard deviation of the gusts north and east, as a share of the mean wind."""
 HOVER_S = 2.0
-"""Duration of the hover before the trajectory, s. The errors are measured after this hover."""
+"""Duration of the hover before the trajectory, s."""
 _HEIGHT_M = 3.0
 _QUICK_TAKEOFF_AND_LANDING = {
     "prearm_delay_s": 0.2,
@@ -42,9 +42,6 @@ _QUICK_TAKEOFF_AND_LANDING = {
     },
 }
 """Vehicle settings that shorten take-off and landing."""
-_TRUTH_PERIOD_S = 0.02
-"""Time between two records of the true position, s of vehicle time."""
-_MEASURED_PHASE = "maneuvers"
 
 
 class PositionError(NamedTuple):
@@ -110,17 +107,16 @@ def fly(task: Task) -> TrackedFlight:
     wind = {"speed_m_s": task.wind, "gust_m_s": GUST_SHARE * task.wind}
     settings = {**(base.mock or {}), **_QUICK_TAKEOFF_AND_LANDING, "wind": wind}
     vehicle = MockVehicle(**settings, compiled=can_compile())
-    truth_recorder = TruthRecorder(vehicle)
+    truth = TruthRecorder(vehicle)
     with tempfile.TemporaryDirectory(prefix="companion-track-") as folder:
         trajectory_file = Path(folder, "trajectory.yaml")
         trajectory_file.write_text(bounded_yaml.dump(task.trajectory.file_content))
-        summary = fly_in_memory(
-            _task_config(base, task, trajectory_file), vehicle, observer=truth_recorder
-        )
+        summary = fly_in_memory(_task_config(base, task, trajectory_file), vehicle)
     if summary.result != "ok":
         infinite_error = PositionError(inf, inf)
         return TrackedFlight(summary.result, infinite_error, infinite_error, np.empty((0, 4)))
-    return _measure(summary.trace.tracking.rows(), truth_recorder.rows())
+    tracking, (_, *trajectory) = summary.trace.tracking.rows(), summary.trace.maneuvers
+    return _measure(tracking[in_maneuvers(tracking[:, 0], trajectory)], truth.rows())
 
 
 def _task_config(base: Config, task: Task, trajectory_file: Path) -> Config:
@@ -145,49 +141,15 @@ def _task_config(base: Config, task: Task, trajectory_file: Path) -> Config:
     return changed(base, changes, "study track")
 
 
-class TruthRecorder(SilentObserver):
-    """Records the true position of a vehicle during the measured phase.
-
-    Args:
-        vehicle: the vehicle that is flown.
-    """
-
-    def __init__(self, vehicle: MockVehicle) -> None:
-        self._vehicle = vehicle
-        self._rows: list[tuple[float, ...]] = []
-        self._recording_task: asyncio.Task[None] | None = None
-
-    def phase(self, name: str, waits_for: str) -> None:
-        """Start to record when the measured phase begins, and stop when the next begins."""
-        if name == _MEASURED_PHASE:
-            self._recording_task = asyncio.create_task(self._record())
-        elif self._recording_task is not None:
-            self._recording_task.cancel()
-
-    def rows(self) -> Floats:
-        """(n, 4): vehicle time, s, and position north, east and down of home, m."""
-        return np.array(self._rows).reshape(-1, 4)
-
-    async def _record(self) -> None:
-        while True:
-            truth = self._vehicle.state()
-            self._rows.append((truth["time"], *truth["position"]))
-            await asyncio.sleep(_TRUTH_PERIOD_S)
-
-
 def _measure(tracking: Floats, truth: Floats) -> TrackedFlight:
-    """Measure the errors on the trajectory: from the end of the hover to the last true position.
+    """Measure the errors on the trajectory.
 
     Args:
-        tracking: rows of `FlightTrace.tracking`.
-        truth: rows of `TruthRecorder.rows`.
+        tracking: rows of `FlightTrace.tracking` on the trajectory.
+        truth: see `TruthRecorder.rows`.
     """
-    time = truth[:, 0]
-    trajectory_rows = tracking[(tracking[:, 0] >= time[0] + HOVER_S) & (tracking[:, 0] <= time[-1])]
-    reference, telemetry = trajectory_rows[:, 1:4], trajectory_rows[:, 4:7]
-    true_position = np.column_stack(
-        [np.interp(trajectory_rows[:, 0], time, axis) for axis in truth[:, 1:].T]
-    )
+    reference, telemetry = tracking[:, 1:4], tracking[:, 4:7]
+    true_position = true_positions(truth, tracking[:, 0])
     path = np.hstack([reference[:, :2], true_position[:, :2]])
     return TrackedFlight(
         "ok",
