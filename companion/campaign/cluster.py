@@ -204,10 +204,10 @@ def _ended_unit(number: int, future: "Future") -> EndedUnit:
 
 
 def _failure_reason(error: BaseException) -> str:
-    """Why a unit was given up; a VersionError or ConfigError is raised instead."""
+    """Why a unit was given up; a ConfigError is raised instead."""
     from distributed import KilledWorker  # noqa: PLC0415  an extra
 
-    if isinstance(error, VersionError | ConfigError):
+    if isinstance(error, ConfigError):
         raise error
     if isinstance(error, KilledWorker):
         return "its worker died each time it was tried"

@@ -45,10 +45,8 @@ def run(
         the progress, before the first unit and after each unit.
 
     Raises:
-        ClusterError: the connection to the scheduler is lost.
-        ConfigError: a worker refuses a case.
+        ClusterError, ConfigError: see `run_tasks`.
         OSError: the results cannot be written.
-        VersionError: a worker that joined later has other versions.
     """
     units = unit_ranges(description.cases, description.unit)
     finished_units = store.finished_units(folder)
@@ -99,14 +97,12 @@ def run_on_cluster(
     `seconds_per_case` is the wall time that a case takes, s.
 
     Raises:
-        ClusterError: the connection to the scheduler is lost, or a unit was given up.
-        ConfigError: a worker refuses a case.
-        VersionError: a worker that joined later has other versions.
+        ClusterError: a unit was given up; further, as ConfigError, see `run_tasks`.
     """
     unit_size = cases_per_unit(len(cases), seconds_per_case, number_of_workers(client))
     units = unit_ranges(len(cases), unit_size)
     tasks = {
-        number: (fly_cases, kind, [cases[index] for index in unit], versions())
+        number: (fly_cases, kind, cases[unit.start : unit.stop], versions())
         for number, unit in enumerate(units)
     }
     rows: dict[int, list[Row]] = {}

@@ -35,7 +35,6 @@ from companion.campaign.folder import Description
 from companion.campaign.loading import load
 from companion.campaign.report.results import Results
 from companion.campaign.unit import cases_per_unit, check_cases, unit_ranges
-from companion.campaign.versions import VersionError
 from companion.child_process import usable_cores
 from companion.files.yaml_file import ConfigError
 
@@ -69,10 +68,7 @@ def run(options: argparse.Namespace) -> int:
     campaign = load(path)
     campaign_folder = out or folder.new_path(campaign)
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    try:
-        return _Run(campaign, campaign_folder, options, console).run()
-    except VersionError as error:
-        raise ConfigError(str(error)) from error
+    return _Run(campaign, campaign_folder, options, console).run()
 
 
 class _Run:

@@ -8,6 +8,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from companion.files.yaml_file import ConfigError
+
 Versions = dict[str, str]
 """Version by name: of the program, its source, Python, NumPy, numba and SciPy."""
 
@@ -19,7 +21,7 @@ _UNUSED_BY_CASES = ("cli", "report", "live", "bench", "study", "replay", "mavsdk
 _DIGEST_LENGTH = 12
 
 
-class VersionError(Exception):
+class VersionError(ConfigError):
     """Two processes of a campaign, or this process and a campaign's folder, differ in versions."""
 
 

@@ -37,7 +37,6 @@ from companion.campaign.tune.writing import (
     result_text,
     summary_lines,
 )
-from companion.campaign.versions import VersionError
 from companion.extras import require
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
@@ -77,8 +76,6 @@ def run(options: argparse.Namespace) -> int:
                     raise ConfigError(str(error)) from error
                 results = _run_search(search, options.trials or tune.trials, console)
                 return _check_and_write(campaign, tune, search_folder, fly, results, console)
-        except VersionError as error:
-            raise ConfigError(str(error)) from error
         except (KeyboardInterrupt, ClusterError, StorageError) as error:
             why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
             command = f"companion campaign tune {shlex.quote(str(options.file))}"
