@@ -121,8 +121,8 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
     """
     omega = loop.s.imag
     by_acceleration = loop.responses_to_acceleration()
-    by_velocity = loop.responses_to_velocity_error()
-    by_position = loop.responses_to_position_error()
+    by_velocity = loop.responses_to_error(loop.velocity_feedback)
+    by_position = loop.responses_to_error(loop.position_feedback)
     gust_time, path_time = disturbances.gust_correlation_time, disturbances.path_correlation_time
     gusts = ((by_acceleration, _slow_density(omega, disturbances.gust * loop.drag, gust_time)),)
     path = (

@@ -73,16 +73,11 @@ class Loop:
         )
         return (GRAVITY * tilt + 1.0) * velocity_response / self.s, tilt / self.rate_response
 
-    def responses_to_position_error(self) -> tuple[Complex, Complex]:
-        """Responses of position (m) and commanded rate (rad/s) to an error of the position, m."""
-        return self._responses_to_measurement_error(self.position_feedback)
+    def responses_to_error(self, feedback: Complex) -> tuple[Complex, Complex]:
+        """Responses of position (m) and commanded rate (rad/s) to an error of a measurement.
 
-    def responses_to_velocity_error(self) -> tuple[Complex, Complex]:
-        """Responses of position (m) and commanded rate (rad/s) to an error of the velocity, m/s."""
-        return self._responses_to_measurement_error(self.velocity_feedback)
-
-    def _responses_to_measurement_error(self, feedback: Complex) -> tuple[Complex, Complex]:
-        """Responses of position and commanded rate to an error of the measurement of `feedback`."""
+        `feedback` is that of the measurement: `velocity_feedback` (m/s) or `position_feedback` (m).
+        """
         tilt = self._closed_loop_tilt(feedback)
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rate_response
 
