@@ -221,7 +221,7 @@ def _second_order(response: RateResponse) -> dict[str, float] | None:
         "frequency_rad_s": round(fit.frequency, 2),
         "damping": round(fit.damping, 3),
         "dead_time_ms": round(1e3 * fit.dead_time, 1),
-        "explained": round(fit.explained, 4),
+        "explained": round(fit.fit.explained, 4),
     }
 
 

@@ -40,9 +40,9 @@ from companion.identification.correlation import (
     dead_time_by_correlation as dead_time_by_correlation,
 )
 from companion.identification.delayed_model import SecondOrderFit as SecondOrderFit
-from companion.identification.fit import FitQuality as FitQuality
 from companion.identification.fragment import kept_axes as kept_axes
 from companion.identification.fragment import vehicle_fragment as vehicle_fragment
+from companion.identification.residual_analysis import FitQuality as FitQuality
 from companion.identification.response import BadFitError as BadFitError
 from companion.identification.response import FitNeeds as FitNeeds
 from companion.identification.response import RateResponse as RateResponse

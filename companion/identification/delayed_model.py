@@ -17,6 +17,7 @@ from companion.identification.lags import (
     value_at,
 )
 from companion.identification.record import LONGEST_DEAD_TIME, Stretch
+from companion.identification.residual_analysis import FitQuality
 from companion.least_squares import Floats, Solution, minimise, project
 
 
@@ -95,15 +96,8 @@ class SecondOrderFit:
     """Steady measured rate per commanded rate."""
     slew: float | None
     """Slew limit of the command, rad/s²; None: no limit was found."""
-    explained: float
-    """R², share of the measurements' variance that the model explains."""
-    misfit: float
-    """RMS of the error of the model, which is the part of the residual that correlates with the
-    commands and so is no noise; a share of the standard deviation of the measurements."""
-    dead_time_error: float
-    """Standard error of the dead time due to noise, s."""
-    lag_error: float
-    """Standard error of `lag` due to noise, s."""
+    fit: FitQuality
+    """Quality of the fit."""
 
     @property
     def lag(self) -> float:
@@ -116,7 +110,7 @@ class SecondOrderFit:
         return (
             f"second order, natural frequency {self.frequency:.1f} rad/s, damping ratio "
             f"{self.damping:.2f}, dead time {1e3 * self.dead_time:.0f} ms, explains "
-            f"{self.explained:.1%} of the variance"
+            f"{self.fit.explained:.1%} of the variance"
         )
 
 

@@ -19,7 +19,7 @@ from companion.identification.delayed_model import (
     frequency_damping,
 )
 from companion.identification.record import Stretch, most_excited_windows
-from companion.identification.residual_analysis import analyse_residual
+from companion.identification.residual_analysis import FitQuality, analyse_residual
 from companion.least_squares import Floats, Solution
 
 LAG_RANGE = exp(FirstOrder.lower_bounds[0]), exp(FirstOrder.upper_bounds[0])
@@ -50,26 +50,6 @@ _MOST_SAMPLES = 4000
 _FEWEST_SAMPLES = 10
 _NEIGHBOUR_DISTANCE = 0.005
 """Distance in lag and dead time at which neighbouring minima are searched, s."""
-
-
-@dataclass(frozen=True, slots=True)
-class FitQuality:
-    """Quality of a fit."""
-
-    explained: float
-    """R², share of the measurements' variance that the model explains."""
-    misfit: float
-    """Error of the model: RMS of the part of the residual that the commands explain, as a share of
-    the standard deviation of the measurements. Noise is not included."""
-    dead_time_error: float
-    """Standard error of the dead time due to noise, s."""
-    lag_error: float
-    """Standard error of the lag due to noise, s."""
-    span: float
-    """Largest minus smallest command, after the slew limit, in the unit of the commands."""
-    excited_samples: int
-    """Number of samples at which the model differs from the command by more than 2 % of the span.
-    Only such samples contain information on lag and dead time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,17 +150,13 @@ def _second_order_fit(
     if solution.rss > _CLEARLY_BETTER_SHARE * first_order.rss:
         return None
     frequency, damping = frequency_damping(solution.unknown)
-    quality = _quality(data, solution)
     return SecondOrderFit(
         frequency=frequency,
         damping=damping,
         dead_time=data.dead_time(solution.unknown),
         gain=float(solution.weights[0]),
         slew=data.slew(solution.unknown),
-        explained=quality.explained,
-        misfit=quality.misfit,
-        dead_time_error=quality.dead_time_error,
-        lag_error=quality.lag_error,
+        fit=_quality(data, solution),
     )
 
 

@@ -7,6 +7,7 @@ explains as much as a linear model of any order can (Ljung, System Identificatio
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +16,26 @@ from companion.least_squares import Floats, project
 _MOST_DELAYS = 24
 _SAMPLES_PER_DELAY = 8
 """Excited samples needed for each delay of the regression; with fewer it would fit the noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class FitQuality:
+    """Quality of a fit."""
+
+    explained: float
+    """R², share of the measurements' variance that the model explains."""
+    misfit: float
+    """Error of the model: RMS of the part of the residual that the commands explain, as a share of
+    the standard deviation of the measurements. Noise is not included."""
+    dead_time_error: float
+    """Standard error of the dead time due to noise, s."""
+    lag_error: float
+    """Standard error of the lag due to noise, s."""
+    span: float
+    """Largest minus smallest command, after the slew limit, in the unit of the commands."""
+    excited_samples: int
+    """Number of samples at which the model differs from the command by more than 2 % of the span.
+    Only such samples contain information on lag and dead time."""
 
 
 def analyse_residual(

@@ -6,8 +6,9 @@ from math import isnan
 from numpy.typing import ArrayLike
 
 from companion.identification.delayed_model import DEAD_TIME_RANGE, SecondOrderFit
-from companion.identification.fit import LAG_RANGE, FitQuality, fit_lag
+from companion.identification.fit import LAG_RANGE, fit_lag
 from companion.identification.record import stretches
+from companion.identification.residual_analysis import FitQuality
 
 
 class BadFitError(ValueError):

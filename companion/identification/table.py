@@ -54,22 +54,15 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
     verdict = "good" if response.is_good() else "bad"
     if isnan(response.lag):
         return *(_NO_VALUE,) * 6, verdict
-    fit, damping = response.fit, _NO_VALUE
-    times = (response.lag, fit.lag_error), (response.dead_time, fit.dead_time_error)
-    slew, misfit = response.slew, fit.misfit
-    if second_order is not None:
-        damping = f"{second_order.damping:.2f}"
-        times = (
-            (second_order.lag, second_order.lag_error),
-            (second_order.dead_time, second_order.dead_time_error),
-        )
-        slew, misfit = second_order.slew, second_order.misfit
+    shown = second_order or response
+    fit, slew = shown.fit, shown.slew
     return (
-        *(f"{1e3 * time:.1f} ± {1e3 * error:.1f}" for time, error in times),
-        damping,
+        f"{1e3 * shown.lag:.1f} ± {1e3 * fit.lag_error:.1f}",
+        f"{1e3 * shown.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f}",
+        _NO_VALUE if second_order is None else f"{second_order.damping:.2f}",
         f"{response.gain:.2f}",
         _NO_VALUE if slew is None else f"{degrees(slew):.0f}",
-        f"{misfit:.0%}",
+        f"{fit.misfit:.0%}",
         verdict,
     )
 
@@ -79,7 +72,7 @@ def _model_line(name: str, response: RateResponse, second_order: SecondOrderFit 
     share, better = f"{response.fit.explained:.1%}", response.second_order
     explains = f"explains {share} of the variance"
     if second_order is not None:
-        explained = f"explains {second_order.explained:.1%} of the variance"
+        explained = f"explains {second_order.fit.explained:.1%} of the variance"
         return f"{name}: second order, which {explained}; first order explains {share}"
     if better is None:
         return f"{name}: a lag of first order {explains}; second order is not clearly better"

@@ -30,7 +30,7 @@ from companion.cli.main import main
 from companion.config.files import changed, load
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
-from companion.identification import BadFitError, SecondOrderFit
+from companion.identification import BadFitError, FitQuality, SecondOrderFit
 from companion.recording.learned_file import LearnedFile
 from tests.campaign.test_campaign_tune import FILE, Proposal, campaign, row_of
 from tests.identification.test_fragment import PITCH, ROLL, VEHICLE
@@ -340,7 +340,8 @@ def test_first_flights_teach_the_drag(tmp_path, monkeypatch):
 @pytest.mark.parametrize("damped", [False, True])
 def test_first_flights_teach_the_response(tmp_path, monkeypatch, damped):
     """A second order is learned only where the search may set its damping."""
-    nearer = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998, 0.02, 0.0003, 0.0004)
+    quality = FitQuality(0.998, 0.02, 0.0003, 0.0004, 2.0, 500)
+    nearer = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, quality)
     seen = replace(
         VEHICLE, roll=replace(ROLL, second_order=nearer), pitch=replace(PITCH, second_order=nearer)
     )

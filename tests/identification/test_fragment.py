@@ -101,9 +101,9 @@ def test_pitch_is_written_where_it_differs_from_roll():
     assert axes["pitch"].acceleration_limit_deg_s2 == pytest.approx(np.degrees(16.0), abs=0.5)
 
 
-QUALITY = 0.02, 0.0003, 0.0004
-"""Misfit, and standard errors of dead time and lag, s."""
-NEARER = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, 0.998, *QUALITY)
+QUALITY = 0.02, 0.0003, 0.0004, 2.0, 500
+"""Misfit, standard errors of dead time and lag (s), span of the commands, excited samples."""
+NEARER = SecondOrderFit(20.0, 0.75, 0.0084, 1.05, None, FitQuality(0.998, *QUALITY))
 SECOND_ORDER = replace(
     VEHICLE, roll=replace(ROLL, second_order=NEARER), pitch=replace(PITCH, second_order=NEARER)
 )
@@ -192,7 +192,7 @@ def test_an_axis_of_which_nothing_is_known_is_not_left_to_roll(known):
 
 
 def test_each_axis_says_how_good_it_is():
-    nearer = SecondOrderFit(19.4, 0.72, 0.008, 1.02, None, 0.998, *QUALITY)
+    nearer = SecondOrderFit(19.4, 0.72, 0.008, 1.02, None, FitQuality(0.998, *QUALITY))
     text = vehicle_fragment(
         replace(VEHICLE, pitch=replace(PITCH, slew=19.2, second_order=nearer)), GRAVITY, {}
     )
@@ -227,7 +227,7 @@ def shown(vehicle):
 
 
 def test_the_table_tells_every_axis_within_80_columns():
-    nearer = SecondOrderFit(5.6, 0.94, 0.045, 0.92, 4.8, 0.9991, *QUALITY)
+    nearer = SecondOrderFit(5.6, 0.94, 0.045, 0.92, 4.8, FitQuality(0.9991, *QUALITY))
     text = shown(replace(VEHICLE, yaw=replace(YAW, slew=4.71239, second_order=nearer)))
     rows = {line.split("│")[1].strip(): line for line in text.splitlines() if "│" in line}
     assert [cell.strip() for cell in rows["roll"].split("│")[2:8]] == [

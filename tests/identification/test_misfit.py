@@ -38,7 +38,7 @@ def test_a_second_order_is_good_repeats_and_is_told(plant, doublets):
             2.0 * plant["damping"] / plant["frequency"] + plant["dead_time"], rel=0.05
         )
         assert nearer.damping == pytest.approx(plant["damping"], rel=0.1)
-        assert nearer.explained > max(0.995, each.fit.explained)
+        assert nearer.fit.explained > max(0.995, each.fit.explained)
         assert each.gain == nearer.gain == pytest.approx(plant["gain"], abs=0.02)
     assert np.ptp([each.lag for each in found]) < 0.005
     assert np.ptp([each.dead_time for each in found]) < 0.005
