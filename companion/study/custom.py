@@ -29,7 +29,7 @@ from companion.study.measures import (
     signed_distance_from_line,
 )
 from companion.study.methods import LAW_METHODS, LIMIT_STYLE, Method, planner_of
-from companion.study.outcome import Cell, Job, Outcome, Table, Tick
+from companion.study.outcome import Job, Outcome, Row, Table, Tick
 from companion.study.step import Floats, Response, fly, fly_loop
 
 Responses = dict[tuple[Method, float], Response]
@@ -71,29 +71,23 @@ def _run(case: Case, tick: Tick) -> Outcome:
 def _results(case: Case, responses: Responses) -> Table:
     """The table of the largest errors and rates of each method at each sample rate."""
     count = len(case.headings_deg)
+    reference = _reference_text(case)
     return Table(
         "custom",
         "The custom case; largest values over"
         f" {count} heading{'s' if count > 1 else ''}, rates as commanded.",
-        (
-            "method",
-            "rate, Hz",
-            "cross-track",
-            f"largest deviation from {_reference_text(case)}",
-            "time to 5 %, s",
-            "largest √(ω_x²+ω_y²), rad/s",
-            "difference between headings",
-        ),
         tuple(
-            (
-                method.label,
-                hz,
-                float(cross_track(response).max()),
-                float(largest_deviation(response, _reference(case, hz)).max()),
-                float(settling_time(response).max()),
-                largest_tilt_rate(response),
-                heading_effect(response),
-            )
+            {
+                "method": method.label,
+                "rate, Hz": hz,
+                "cross-track": float(cross_track(response).max()),
+                f"largest deviation from {reference}": float(
+                    largest_deviation(response, _reference(case, hz)).max()
+                ),
+                "time to 5 %, s": float(settling_time(response).max()),
+                "largest √(ω_x²+ω_y²), rad/s": largest_tilt_rate(response),
+                "difference between headings": heading_effect(response),
+            }
             for (method, hz), response in responses.items()
         ),
     )
@@ -104,25 +98,25 @@ def _responses(case: Case, responses: Responses) -> Table:
     return Table(
         "custom-response",
         "Every sample of every response; rates are held until the next sample.",
-        ("method", "rate, Hz", "heading, °", "time, s", "a_N", "a_E", "ω_x", "ω_y", "ω_z"),
         tuple(row for key, response in responses.items() for row in _samples(case, *key, response)),
     )
 
 
-def _samples(
-    case: Case, method: Method, hz: float, response: Response
-) -> Iterator[tuple[Cell, ...]]:
+def _samples(case: Case, method: Method, hz: float, response: Response) -> Iterator[Row]:
     """Table rows of one response: coefficients and commanded body rates of each sample."""
-    time = response.step.time
     for index, heading in enumerate(case.headings_deg):
-        paths, rates = response.at_heading(index), response.rates[:, :, index]
-        for instant, coefficients, body_rates in zip(time[:-1], paths[:-1], rates, strict=True):
-            yield (
-                method.label,
-                hz,
-                heading,
-                *(float(v) for v in (instant, *coefficients, *body_rates)),
-            )
+        columns = (
+            ("time, s", response.step.time[:-1]),
+            *zip(("a_N", "a_E"), response.at_heading(index)[:-1].T, strict=True),
+            *zip(("ω_x", "ω_y", "ω_z"), response.rates[:, :, index].T, strict=True),
+        )
+        for k in range(response.step.samples):
+            yield {
+                "method": method.label,
+                "rate, Hz": hz,
+                "heading, °": heading,
+                **{name: float(values[k]) for name, values in columns},
+            }
 
 
 def _fly(case: Case, method: Method, rate_hz: float) -> Response:

@@ -8,9 +8,6 @@ from companion.least_squares import minimise
 from companion.recording.measurements.second_order import RunData, SecondOrderModel
 from companion.study.step import Floats, Response, Step
 
-FIT_COLUMNS = ("second order: dead time, ms", "second order: ω, rad/s", "second order: ζ")
-"""Titles of `fit_cells`."""
-
 _FIT_STRIDE = 10
 """The second-order model is fitted to every sample whose index is a multiple of this number."""
 _LOWER_BOUNDS = np.array([log(0.1), log(0.01), 0.0])
@@ -81,9 +78,13 @@ def best_and_worst(values: Floats) -> tuple[int, int]:
     return int(ranked.argmin()), int(ranked.argmax())
 
 
-def fit_cells(fit: SecondOrderModel) -> tuple[float, float, float]:
-    """The table cells for `FIT_COLUMNS`."""
-    return 1e3 * fit.dead_time, fit.frequency, fit.damping
+def fit_cells(fit: SecondOrderModel) -> dict[str, float]:
+    """The cells of a fitted model in a table."""
+    return {
+        "second order: dead time, ms": 1e3 * fit.dead_time,
+        "second order: ω, rad/s": fit.frequency,
+        "second order: ζ": fit.damping,
+    }
 
 
 def second_order_path(step: Step, fit: SecondOrderModel, time: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import isinf
 from typing import Any, Literal, NamedTuple
@@ -14,6 +14,8 @@ Tick = Callable[[str], None]
 """Progress callback: a study calls it before each of its parts, with the name of the part."""
 
 Cell = str | float | int
+Row = Mapping[str, Cell]
+"""Cell by title of the column, with its unit."""
 
 Claimant = Literal["paper", "ours"]
 """Who claims a statement: the paper, or this project."""
@@ -27,16 +29,14 @@ class Table:
     """Name of the table's files, without extension."""
     caption: str
     """Caption, one sentence."""
-    columns: tuple[str, ...]
-    """Titles of the columns, with units."""
-    rows: tuple[tuple[Cell, ...], ...]
-    """Rows, with one cell for each column."""
+    rows: tuple[Row, ...]
+    """Rows, with the same columns in the same order."""
 
     def as_csv(self) -> str:
         """The table as comma-separated values, with all digits of numbers."""
         text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.columns)
+        writer = csv.DictWriter(text, self.rows[0], lineterminator="\n")
+        writer.writeheader()
         writer.writerows(self.rows)
         return text.getvalue()
 
@@ -49,13 +49,13 @@ class Table:
         return self._formatted("html")
 
     def _formatted(self, table_format: str) -> str:
-        numeric = [not isinstance(cell, str) for cell in self.rows[0]]
+        first = self.rows[0]
         return tabulate(
-            [[_rounded(cell) for cell in row] for row in self.rows],
-            self.columns,
+            [[_rounded(cell) for cell in row.values()] for row in self.rows],
+            list(first),
             tablefmt=table_format,
             disable_numparse=True,
-            colalign=["right" if number else "left" for number in numeric],
+            colalign=["left" if isinstance(cell, str) else "right" for cell in first.values()],
         )
 
 

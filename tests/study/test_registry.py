@@ -30,7 +30,7 @@ def run(tick):
         conditions="Two numbers.",
         figure=figure,
         caption="A line.",
-        tables=(Table("dummy", "The sum.", ("a", "b", "sum"), ((1, 2, 1 + 2),)),),
+        tables=(Table("dummy", "The sum.", ({"a": 1, "b": 2, "sum": 1 + 2},)),),
         findings=(Finding("asked", "The sum is 3.", 1 + 2 == 3, "It is 3."),),
     )
 """

@@ -10,7 +10,7 @@ from companion.study.inner_loop import InnerLoop
 from companion.study.lag_loop import LagLoop
 from companion.study.measures import cross_track, settling_time
 from companion.study.methods import LAW_METHODS, MODEL_FOLLOWING_METHOD, Method
-from companion.study.outcome import Tick
+from companion.study.outcome import Row, Tick
 from companion.study.step import FIGURE_2, Loop, Response, fly_loop
 
 METHODS = (*LAW_METHODS, MODEL_FOLLOWING_METHOD)
@@ -40,6 +40,11 @@ class DelayMismatch(NamedTuple):
     def __str__(self) -> str:
         return f"lag {in_percent(self.lag)} and dead time {in_percent(self.dead_time)}"
 
+    @property
+    def cells(self) -> Row:
+        """The cells of this error in a table."""
+        return {"error of the lag": self.lag, "error of the dead time": self.dead_time}
+
 
 NO_ERROR = DelayMismatch(0.0, 0.0)
 GRID_ERRORS = (-0.5, 0.0, 0.5)
@@ -57,13 +62,8 @@ class RateLoopDelays(NamedTuple):
 
     def with_error(self, error: DelayMismatch) -> "RateLoopDelays":
         """These lags and dead times, wrong by the relative errors `error`."""
-        lag, dead_time = 1.0 + error.lag, 1.0 + error.dead_time
-        return RateLoopDelays(
-            lag * self.lag,
-            dead_time * self.dead_time,
-            lag * self.yaw_lag,
-            dead_time * self.yaw_dead_time,
-        )
+        factors = 2 * (1.0 + error.lag, 1.0 + error.dead_time)
+        return RateLoopDelays(*(f * delay for f, delay in zip(factors, self, strict=True)))
 
 
 COMPLETE_DELAYS = RateLoopDelays(
@@ -82,6 +82,11 @@ class Score(NamedTuple):
     """Largest distance of the acceleration coefficients (no unit) from the line start → target."""
     settling_time: float
     """Time from which the distance to the target stays within 5 % of the step, s."""
+
+    @property
+    def cells(self) -> Row:
+        """The cells of this score in a table."""
+        return {"cross-track": self.cross_track, "time to 5 %, s": self.settling_time}
 
 
 class Comparison(NamedTuple):

@@ -1,7 +1,6 @@
 """The study `lag`: flights, tables, and section of the page."""
 
 from itertools import product
-from typing import NamedTuple
 
 from companion.recording.measurements.second_order import SecondOrderModel
 from companion.study.lag.figure import CAPTION, draw_figure
@@ -29,7 +28,6 @@ from companion.study.lag.flights import (
     score,
 )
 from companion.study.measures import (
-    FIT_COLUMNS,
     fit_cells,
     fit_second_order,
     largest_deviation,
@@ -37,19 +35,14 @@ from companion.study.measures import (
     second_order_path,
 )
 from companion.study.methods import Method
-from companion.study.outcome import Cell, Outcome, Table, Tick
+from companion.study.outcome import Outcome, Row, Table, Tick
 from companion.study.step import Response
 
 PARTS = len(DEAD_TIMES_MS) * len(LAGS_MS) + 1 + len(RATES_HZ)
 
-_SCORE_COLUMNS = ("cross-track", "time to 5 %, s")
 
-
-class _FittedModel(NamedTuple):
-    """The second-order model fitted to a response, and the largest deviation from it."""
-
-    fit: SecondOrderModel
-    deviation: float  # largest deviation of the response from the model
+_FittedModel = tuple[SecondOrderModel, float]
+"""The second-order model fitted to a response, and the largest deviation from it."""
 
 
 def run(tick: Tick) -> Outcome:
@@ -96,7 +89,10 @@ def run(tick: Tick) -> Outcome:
             ),
         ),
         findings=find(
-            grid, example, complete, {method: fit.deviation for method, fit in fitted.items()}
+            grid,
+            example,
+            complete,
+            {m: deviation for m, (_, deviation) in fitted.items()},
         ),
         series=(*_grid_series(grid), _complete_series(complete)),
     )
@@ -105,27 +101,29 @@ def run(tick: Tick) -> Outcome:
 def _fit_model(response: Response) -> _FittedModel:
     fit = fit_second_order(response.step, response.at_heading(0))
     model = second_order_path(response.step, fit, response.step.time)
-    return _FittedModel(fit, float(largest_deviation(response, model)[0]))
+    return fit, float(largest_deviation(response, model)[0])
 
 
 def _example_table(example: Example) -> Table:
     """Scores of every method by sample rate, and of model-following with a limited tilt rate."""
-    rows: list[tuple[Cell, ...]] = []
+    rows = []
     for rate, responses in example.unlimited_responses.items():
-        labelled_responses = [(method.label, response) for method, response in responses.items()]
-        labelled_responses.append(
-            ("model-following, W_M = π/2", example.rate_limited_responses[rate])
-        )
+        labelled_responses = {method.label: response for method, response in responses.items()}
+        limited_response = example.rate_limited_responses[rate]
+        labelled_responses["model-following, W_M = π/2"] = limited_response
         rows += [
-            (label, round(rate), *score(response), largest_tilt_rate(response))
-            for label, response in labelled_responses
+            {
+                "method": label,
+                "rate, Hz": round(rate),
+                **score(response).cells,
+                "largest √(ω_x²+ω_y²), rad/s": largest_tilt_rate(response),
+            }
+            for label, response in labelled_responses.items()
         ]
-    return Table(
-        "lag",
-        f"The example: dead time {EXAMPLE_LOOP.dead_time_ms} ms, lag {EXAMPLE_LOOP.lag_ms} ms.",
-        ("method", "rate, Hz", *_SCORE_COLUMNS, "largest √(ω_x²+ω_y²), rad/s"),
-        tuple(rows),
+    caption = (
+        f"The example: dead time {EXAMPLE_LOOP.dead_time_ms} ms, lag {EXAMPLE_LOOP.lag_ms} ms."
     )
+    return Table("lag", caption, tuple(rows))
 
 
 def _errors_table(name: str, caption: str, scores: dict[DelayMismatch, Score]) -> Table:
@@ -133,12 +131,12 @@ def _errors_table(name: str, caption: str, scores: dict[DelayMismatch, Score]) -
     return Table(
         name,
         caption,
-        ("lag", *(f"dead time {in_percent(error)}" for error in FINE_ERRORS)),
         tuple(
-            (
-                in_percent(lag),
-                *(scores[DelayMismatch(lag, dead_time)].cross_track for dead_time in FINE_ERRORS),
-            )
+            {"lag": in_percent(lag)}
+            | {
+                f"dead time {in_percent(error)}": scores[DelayMismatch(lag, error)].cross_track
+                for error in FINE_ERRORS
+            }
             for lag in FINE_ERRORS
         ),
     )
@@ -147,27 +145,20 @@ def _errors_table(name: str, caption: str, scores: dict[DelayMismatch, Score]) -
 def _worst_table(grid: Grid) -> Table:
     """Cross-track errors of model-following with the worst delays, and of the best other method."""
     dead_times = sorted({cell.dead_time_ms for cell in grid})
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for rate, lag in product(RATES_HZ, sorted({cell.lag_ms for cell in grid})):
-        comparisons = [grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times]
-        best_others = [item.other_scores[item.best_other].cross_track for item in comparisons]
-        rows.append(
-            (
-                f"{rate:.0f} Hz, {lag} ms",
-                *(comparison.worst_cross_track for comparison in comparisons),
-                *best_others,
-            )
-        )
+        flown = {dead_time: grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times}
+        worst = {f"worst, {ms} ms": each.worst_cross_track for ms, each in flown.items()}
+        best_others = {
+            f"best other, {ms} ms": each.other_scores[each.best_other].cross_track
+            for ms, each in flown.items()
+        }
+        rows.append({"rate, lag": f"{rate:.0f} Hz, {lag} ms", **worst, **best_others})
     return Table(
         "lag-worst-knowledge",
         "Cross-track over the grid, by rate and lag (rows) and dead time (columns): model-following"
         " with lag and dead time wrong by ±50 %, the worst combination, and the best of the other"
         " methods, which use neither.",
-        (
-            "rate, lag",
-            *(f"worst, {dead_time} ms" for dead_time in dead_times),
-            *(f"best other, {dead_time} ms" for dead_time in dead_times),
-        ),
         tuple(rows),
     )
 
@@ -179,46 +170,49 @@ def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _FittedModel]
         "lag-inner-loop",
         f"The complete inner loop with 20 ms of transport delay, {SHOWN_RATE_HZ:.0f} Hz, heading 0,"
         " and the second-order model with dead time fitted to each response.",
-        ("method", *_SCORE_COLUMNS, *FIT_COLUMNS, "largest deviation from it"),
         tuple(
-            (method.label, *scores[method], *fit_cells(model_fit.fit), model_fit.deviation)
-            for method, model_fit in fitted.items()
+            {
+                "method": method.label,
+                **scores[method].cells,
+                **fit_cells(fit),
+                "largest deviation from it": deviation,
+            }
+            for method, (fit, deviation) in fitted.items()
         ),
     )
 
 
 def _rates_table(complete: CompleteLoopFlights) -> Table:
     """Cross-track error of every method by sample rate; model-following also with wrong delays."""
-    by_rate = complete.by_rate
-    rows: list[tuple[Cell, ...]] = [
-        (m.label, *(comparison.by_method[m].cross_track for comparison in by_rate.values()))
+    flown = {f"{rate:.0f} Hz": comparison for rate, comparison in complete.by_rate.items()}
+    rows: list[Row] = [
+        {"method": m.label}
+        | {column: comparison.by_method[m].cross_track for column, comparison in flown.items()}
         for m in METHODS
     ]
-    rows.append(
-        (
-            "model-following, lag and dead time wrong by the worst error",
-            *(comparison.worst_cross_track for comparison in by_rate.values()),
-        )
-    )
+    worst = {column: comparison.worst_cross_track for column, comparison in flown.items()}
+    label = "model-following, lag and dead time wrong by the worst error"
     return Table(
         "lag-inner-loop-rates",
         "Cross-track with the complete inner loop by sample rate. In the last row the lag and"
         " dead time of model-following are wrong by up to ±50 %; the worst combination is shown.",
-        ("method", *(f"{rate:.0f} Hz" for rate in by_rate)),
-        tuple(rows),
+        (*rows, {"method": label, **worst}),
     )
 
 
 def _grid_series(grid: Grid) -> tuple[Table, Table]:
     """Every flight of the grid: a table with true, and one with wrong lag and dead time."""
-    cell_columns = ("dead time, ms", "lag, ms", "rate, Hz")
+
+    def conditions(cell: GridCell) -> Row:
+        times = {"dead time, ms": cell.dead_time_ms, "lag, ms": cell.lag_ms}
+        return {**times, "rate, Hz": cell.sample_rate_hz}
+
     return (
         Table(
             "lag-grid",
             "All methods over the grid, model-following with the true lag and dead time.",
-            ("method", *cell_columns, *_SCORE_COLUMNS),
             tuple(
-                (method.label, cell.dead_time_ms, cell.lag_ms, cell.sample_rate_hz, *method_score)
+                {"method": method.label, **conditions(cell), **method_score.cells}
                 for cell, comparison in grid.items()
                 for method, method_score in comparison.by_method.items()
             ),
@@ -226,9 +220,8 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
         Table(
             "lag-grid-wrong-knowledge",
             "model-following over the grid, with a wrong lag and dead time.",
-            (*cell_columns, "error of the lag", "error of the dead time", *_SCORE_COLUMNS),
             tuple(
-                (cell.dead_time_ms, cell.lag_ms, cell.sample_rate_hz, *error, *method_score)
+                {**conditions(cell), **error.cells, **method_score.cells}
                 for cell, comparison in grid.items()
                 for error, method_score in comparison.model_following_scores.items()
                 if error != NO_ERROR
@@ -242,9 +235,8 @@ def _complete_series(complete: CompleteLoopFlights) -> Table:
     return Table(
         "lag-inner-loop-beliefs",
         "Cross-track of model-following with the complete inner loop, by rate and error.",
-        ("rate, Hz", "error of the lag", "error of the dead time", "cross-track"),
         tuple(
-            (rate, *error, method_score.cross_track)
+            {"rate, Hz": rate, **error.cells, "cross-track": method_score.cross_track}
             for rate, comparison in complete.by_rate.items()
             for error, method_score in comparison.model_following_scores.items()
         ),

@@ -9,7 +9,6 @@ from companion.study.methods import REFERENCE_STYLE
 from companion.study.nmpc.findings import find
 from companion.study.nmpc.flights import FLIGHT_S, Flights, fly_all
 from companion.study.nmpc.timing import (
-    STATES,
     ColdStarts,
     ProcessTimes,
     count_iterations,
@@ -25,7 +24,7 @@ from companion.study.nmpc.variants import (
     Task,
     Variant,
 )
-from companion.study.outcome import Cell, Outcome, Table, Tick
+from companion.study.outcome import Outcome, Row, Table, Tick
 
 PARTS = FLIGHT_S + 2
 
@@ -73,34 +72,25 @@ def run(tick: Tick) -> Outcome:
 
 def _time_table(flights: Flights) -> Table:
     """Solve times of every model, with one iteration and with iterations to the tolerance."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for model in MODELS:
         one_iteration = flights[EIGHT.name, Variant(model)]
         to_tolerance = flights[EIGHT.name, Variant(model, MAX_ITERATIONS)]
         rows.append(
-            (
-                STYLES[model].label,
-                one_iteration.solve_ms(50),
-                one_iteration.solve_ms(99),
-                to_tolerance.solve_ms(50),
-                to_tolerance.solve_ms(99),
-                float(np.mean(to_tolerance.iterations)),
-                int(max(to_tolerance.iterations)),
-            )
+            {
+                "model": STYLES[model].label,
+                "one iteration: p50, ms": one_iteration.solve_ms(50),
+                "one iteration: p99, ms": one_iteration.solve_ms(99),
+                "to the end: p50, ms": to_tolerance.solve_ms(50),
+                "to the end: p99, ms": to_tolerance.solve_ms(99),
+                "iterations: mean": float(np.mean(to_tolerance.iterations)),
+                "iterations: most": int(max(to_tolerance.iterations)),
+            }
         )
     return Table(
         "nmpc",
         "Processor time of the solver on the figure-eight, all models in turn: the real-time"
         f" iteration, and the SQP to its tolerance or to {MAX_ITERATIONS} iterations (the end).",
-        (
-            "model",
-            "one iteration: p50, ms",
-            "one iteration: p99, ms",
-            "to the end: p50, ms",
-            "to the end: p99, ms",
-            "iterations: mean",
-            "iterations: most",
-        ),
         tuple(rows),
     )
 
@@ -111,53 +101,47 @@ def _cold_start_table(counts: ColdStarts) -> Table:
         "nmpc-cold-start",
         "SQP iterations to the tolerance, by the state of the vehicle while it should be on the"
         " circle at 5 m/s. The first guess is the circle.",
-        ("model", *STATES),
-        tuple((STYLES[model].label, *by_state.values()) for model, by_state in counts.items()),
+        tuple({"model": STYLES[model].label, **by_state} for model, by_state in counts.items()),
     )
 
 
 def _error_table(flights: Flights) -> Table:
     """Errors in flight, by model and by whether it knows the dead time."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for (task, variant), eight in flights.items():
         if task != EIGHT.name or variant.iterations > 1:
             continue
         circle = flights[CIRCLE.name, variant]
-        known = "known" if variant.knows_dead_time else "not known"
-        circle_errors, eight_errors = (
-            (flight.rms, flight.largest_error) for flight in (circle, eight)
+        rows.append(
+            {
+                "model": variant.label,
+                "dead time": "known" if variant.knows_dead_time else "not known",
+                "circle: RMS, m": circle.rms,
+                "circle: largest, m": circle.largest_error,
+                "eight: RMS, m": eight.rms,
+                "eight: largest, m": eight.largest_error,
+            }
         )
-        rows.append((variant.label, known, *circle_errors, *eight_errors))
     return Table(
         "nmpc-error",
         "Distance from the trajectory from 4 s on, one iteration per solve at 50 Hz: after"
         " the standing start into the circle, and on the figure-eight.",
-        (
-            "model",
-            "dead time",
-            "circle: RMS, m",
-            "circle: largest, m",
-            "eight: RMS, m",
-            "eight: largest, m",
-        ),
         tuple(rows),
     )
 
 
 def _process_table(times: ProcessTimes) -> Table:
     """Answer times of the solver process."""
-    rows = (
-        ("request to answer", times.answer_ms),
-        ("without data exchange", times.computing_ms),
-    )
+    rows = {"request to answer": times.answer_ms, "without data exchange": times.computing_ms}
+    shares = {"p50, ms": 50, "p99, ms": 99, "largest, ms": 100}
     return Table(
         "nmpc-exchange",
         "Our model's solver in its own process at 50 Hz, one iteration per solve: from the"
         " request to the answer, with prediction, reference and data exchange.",
-        ("what", "p50, ms", "p99, ms", "largest, ms"),
         tuple(
-            (name, *(float(np.percentile(ms, share)) for share in (50, 99, 100)))
-            for name, ms in rows
+            {"what": what}
+            | {title: float(np.percentile(ms, share)) for title, share in shares.items()}
+            for what, ms in rows.items()
         ),
     )
 
@@ -167,25 +151,16 @@ def _flights_table(flights: Flights) -> Table:
     return Table(
         "nmpc-flights",
         "All flights.",
-        (
-            "task",
-            "model",
-            "most iterations",
-            "dead time known",
-            "period",
-            "error, m",
-            "solve, s",
-        ),
         tuple(
-            (
-                task,
-                variant.label,
-                variant.iterations,
-                int(variant.knows_dead_time),
-                period,
-                error,
-                seconds,
-            )
+            {
+                "task": task,
+                "model": variant.label,
+                "most iterations": variant.iterations,
+                "dead time known": int(variant.knows_dead_time),
+                "period": period,
+                "error, m": error,
+                "solve, s": seconds,
+            }
             for (task, variant), flight in flights.items()
             for period, (error, seconds) in enumerate(
                 zip(flight.errors, flight.solve_s, strict=True)

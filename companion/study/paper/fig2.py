@@ -1,5 +1,6 @@
 """Figure 2: the step response of every method against the first-order reference."""
 
+from collections.abc import Iterator
 from math import degrees
 
 from matplotlib.figure import Figure
@@ -33,7 +34,7 @@ from companion.study.methods import (
     Method,
     planner_of,
 )
-from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
+from companion.study.outcome import Finding, Outcome, Row, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _EQUALITY_TOLERANCE = 1e-9
@@ -71,10 +72,8 @@ def run(tick: Tick) -> Outcome:
         LawPlanner(_printed_quaternion_law, planner_of(QUATERNION, FIGURE_2.gain).constants),
         FIGURE_2,
     )
-    rows: list[tuple[Cell, ...]] = []
-    for method, response in responses.items():
-        rows += _rows(method.label, response, reference)
-    rows += _rows("quaternion, error q_d ⊗ q⁻¹ as printed", printed_response, reference)
+    labelled_responses = {method.label: response for method, response in responses.items()}
+    labelled_responses["quaternion, error q_d ⊗ q⁻¹ as printed"] = printed_response
     return Outcome(
         name="fig2",
         title="Figure 2: step response without limits",
@@ -94,46 +93,33 @@ def run(tick: Tick) -> Outcome:
                 "fig2",
                 "Step response of figure 2. A method that depends on heading has two rows: for its"
                 " best and for its worst heading.",
-                (
-                    "method",
-                    "largest deviation from first order",
-                    "cross-track",
-                    "time to 5 %, s",
-                    "difference between headings",
+                tuple(
+                    row
+                    for label, response in labelled_responses.items()
+                    for row in _rows(label, response, reference)
                 ),
-                tuple(rows),
             ),
         ),
         findings=_findings(responses, printed_response, reference),
     )
 
 
-def _rows(label: str, response: Response, reference: Floats) -> list[tuple[Cell, ...]]:
-    deviations, cross_tracks = largest_deviation(response, reference), cross_track(response)
-    settling_times, effect = settling_time(response), heading_effect(response)
-    if effect < _EQUALITY_TOLERANCE:
-        return [
-            (
-                label,
-                float(deviations.max()),
-                float(cross_tracks.max()),
-                float(settling_times[0]),
-                effect,
-            )
-        ]
-    rows: list[tuple[Cell, ...]] = []
-    for rank, index in zip(("best", "worst"), best_and_worst(deviations), strict=True):
-        row_label = f"{label}, {rank} at {degrees(response.step.headings[index]):.0f}°"
-        rows.append(
-            (
-                row_label,
-                float(deviations[index]),
-                float(cross_tracks[index]),
-                float(settling_times[index]),
-                effect,
-            )
-        )
-    return rows
+def _rows(label: str, response: Response, reference: Floats) -> Iterator[Row]:
+    deviations, effect = largest_deviation(response, reference), heading_effect(response)
+    shown = {label: int(deviations.argmax())}
+    if effect >= _EQUALITY_TOLERANCE:
+        shown = {
+            f"{label}, {rank} at {degrees(response.step.headings[index]):.0f}°": index
+            for rank, index in zip(("best", "worst"), best_and_worst(deviations), strict=True)
+        }
+    for row_label, index in shown.items():
+        yield {
+            "method": row_label,
+            "largest deviation from first order": float(deviations[index]),
+            "cross-track": float(cross_track(response)[index]),
+            "time to 5 %, s": float(settling_time(response)[index]),
+            "difference between headings": effect,
+        }
 
 
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:

@@ -24,7 +24,7 @@ def run(tick: Tick) -> Outcome:
     tick(EULER.label)
     response = fly(planner_of(EULER, FIGURE_2.gain), FIGURE_2)
     reference = FIGURE_2.reference()
-    deviations, cross_tracks = largest_deviation(response, reference), cross_track(response)
+    deviations = largest_deviation(response, reference)
     best, worst = best_and_worst(deviations)
     tick(PROPOSED.label)
     proposed_deviations = largest_deviation(
@@ -44,10 +44,15 @@ def run(tick: Tick) -> Outcome:
             Table(
                 "fig3",
                 "The Euler-angle method by heading.",
-                ("heading, °", "largest deviation from first order", "cross-track"),
                 tuple(
-                    (heading_deg[k], float(deviations[k]), float(cross_tracks[k]))
-                    for k in range(len(heading_deg))
+                    {
+                        "heading, °": heading,
+                        "largest deviation from first order": float(deviation),
+                        "cross-track": float(distance),
+                    }
+                    for heading, deviation, distance in zip(
+                        heading_deg, deviations, cross_track(response), strict=True
+                    )
                 ),
             ),
         ),

@@ -31,7 +31,7 @@ from companion.study.methods import (
     Method,
     planner_of,
 )
-from companion.study.outcome import Cell, Finding, Outcome, Table, Tick
+from companion.study.outcome import Finding, Outcome, Row, Table, Tick
 from companion.study.step import FIGURE_4, Floats, Response, fly
 
 MAX_TILT = radians(40.0)
@@ -69,13 +69,6 @@ def run(tick: Tick) -> Outcome:
             Table(
                 "fig4",
                 "Step response of figure 4 under W_M = π/2 rad/s; largest values over 72 headings.",
-                (
-                    "method",
-                    "largest √(ω_x²+ω_y²), rad/s",
-                    "time to 5 %, s",
-                    "cross-track",
-                    "largest deviation from the reference of equation 33",
-                ),
                 tuple(_row(method, responses[method], reference) for method in _METHODS),
             ),
         ),
@@ -83,14 +76,15 @@ def run(tick: Tick) -> Outcome:
     )
 
 
-def _row(method: Method, response: Response, reference: Floats) -> tuple[Cell, ...]:
-    return (
-        method.label,
-        largest_tilt_rate(response),
-        float(settling_time(response).max()),
-        float(cross_track(response).max()),
-        float(largest_deviation(response, reference).max()),
-    )
+def _row(method: Method, response: Response, reference: Floats) -> Row:
+    deviation = float(largest_deviation(response, reference).max())
+    return {
+        "method": method.label,
+        "largest √(ω_x²+ω_y²), rad/s": largest_tilt_rate(response),
+        "time to 5 %, s": float(settling_time(response).max()),
+        "cross-track": float(cross_track(response).max()),
+        "largest deviation from the reference of equation 33": deviation,
+    }
 
 
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:

@@ -8,7 +8,6 @@ from matplotlib.figure import Figure
 
 from companion.study.drawing import draw_line, draw_plane, draw_reference, draw_response, new_figure
 from companion.study.measures import (
-    FIT_COLUMNS,
     deviation,
     fit_cells,
     heading_effect,
@@ -77,27 +76,19 @@ def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
         "fig5",
         "Step response with the complete inner loop; largest values over 8 headings. The"
         " second-order model is fitted at the heading of the largest cross-track.",
-        (
-            "method",
-            "63 % of a rate step, ms",
-            "largest deviation from first order",
-            "cross-track",
-            "time to 5 %, s",
-            *FIT_COLUMNS,
-            "largest deviation from it",
-            "difference between headings",
-        ),
         tuple(
-            (
-                method.label,
-                1e3 * loop.time_63,
-                float(largest_deviation(loop.responses[method], reference).max()),
-                loop.cross_track(method),
-                float(settling_time(loop.responses[method]).max()),
-                *fit_cells(loop.fits[method]),
-                loop.deviation_from_second_order(method),
-                heading_effect(loop.responses[method]),
-            )
+            {
+                "method": method.label,
+                "63 % of a rate step, ms": 1e3 * loop.time_63,
+                "largest deviation from first order": float(
+                    largest_deviation(loop.responses[method], reference).max()
+                ),
+                "cross-track": loop.cross_track(method),
+                "time to 5 %, s": float(settling_time(loop.responses[method]).max()),
+                **fit_cells(loop.fits[method]),
+                "largest deviation from it": loop.deviation_from_second_order(method),
+                "difference between headings": heading_effect(loop.responses[method]),
+            }
             for loop in (quick, measured)
             for method in LAW_METHODS
         ),
@@ -108,9 +99,11 @@ def _sweep_table(sweep: Sweep) -> Table:
     return Table(
         "fig5-quickness",
         "Cross-track by the speed of the inner loop, heading 0.",
-        ("63 % of a rate step, ms", *(method.label for method in PAPER_METHODS)),
         tuple(
-            (1e3 * time_63, *(cross_tracks[method] for method in PAPER_METHODS))
+            {
+                "63 % of a rate step, ms": 1e3 * time_63,
+                **{method.label: cross_tracks[method] for method in PAPER_METHODS},
+            }
             for time_63, cross_tracks in sweep.items()
         ),
     )

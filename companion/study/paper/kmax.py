@@ -22,6 +22,16 @@ _DIRECTIONS = 72
 PARTS = 2
 
 
+_COLUMNS = (
+    "tilt, °",
+    "K_max computed",
+    "1/(1 − 2A_M²)² = 1/cos² tilt, A_M = sin(tilt/2)",
+    "K_min computed",
+    "mean rate over largest rate",
+)
+"""Titles of the fields of `_Row`."""
+
+
 class _Row(NamedTuple):
     """Scaling factor K (see `scaling_factor`) at one tilt, over all directions."""
 
@@ -83,14 +93,7 @@ def run(tick: Tick) -> Outcome:
             Table(
                 "kmax",
                 "Scaling factor by tilt.",
-                (
-                    "tilt, °",
-                    "K_max computed",
-                    "1/(1 − 2A_M²)² = 1/cos² tilt, A_M = sin(tilt/2)",
-                    "K_min computed",
-                    "mean rate over largest rate",
-                ),
-                rows,
+                tuple(dict(zip(_COLUMNS, row, strict=True)) for row in rows),
             ),
         ),
         findings=_findings(rows, by_tilt),

@@ -29,13 +29,13 @@ def run(tick: Tick) -> Outcome:
         for key, response in responses.items()
     }
     rows = tuple(
-        (
-            round(hz),
-            largest_deviations[PROPOSED, hz],
-            float(cross_track(responses[PROPOSED, hz]).max()),
-            largest_deviations[EXACT, hz],
-            float(cross_track(responses[EXACT, hz]).max()),
-        )
+        {
+            "rate, Hz": round(hz),
+            "proposed: deviation": largest_deviations[PROPOSED, hz],
+            "proposed: cross-track": float(cross_track(responses[PROPOSED, hz]).max()),
+            "exact: deviation": largest_deviations[EXACT, hz],
+            "exact: cross-track": float(cross_track(responses[EXACT, hz]).max()),
+        }
         for hz in RATES_HZ
     )
     return Outcome(
@@ -51,13 +51,6 @@ def run(tick: Tick) -> Outcome:
             Table(
                 "rates",
                 "The proposed planner beside its exact form in discrete time.",
-                (
-                    "rate, Hz",
-                    "proposed: deviation",
-                    "proposed: cross-track",
-                    "exact: deviation",
-                    "exact: cross-track",
-                ),
                 rows,
             ),
         ),

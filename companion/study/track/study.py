@@ -1,6 +1,6 @@
 """The study `track`: flights, tables, rows for `--json`, and section of the page."""
 
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 from companion.attitude import PLANNER_NAMES
@@ -81,6 +81,7 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
         if not task.lead:
             continue
         without_lead = flights.get(task._replace(lead=False))
+        not_led = PositionError(inf, inf) if without_lead is None else without_lead.telemetry_error
         rows.append(
             {
                 "trajectory": task.trajectory.shape,
@@ -92,12 +93,8 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
                 "position_max_m": _or_null(flight.telemetry_error.largest),
                 "true_rms_m": _or_null(flight.true_error.rms),
                 "true_max_m": _or_null(flight.true_error.largest),
-                "not_led_rms_m": None
-                if without_lead is None
-                else _or_null(without_lead.telemetry_error.rms),
-                "not_led_max_m": None
-                if without_lead is None
-                else _or_null(without_lead.telemetry_error.largest),
+                "not_led_rms_m": _or_null(not_led.rms),
+                "not_led_max_m": _or_null(not_led.largest),
                 "result": flight.result,
             }
         )
@@ -131,51 +128,38 @@ def _flights_table(flights: TrackedFlights) -> Table:
     return Table(
         "track-flights",
         "Every flight.",
-        (
-            "trajectory",
-            "speed, m/s",
-            "planner",
-            "guidance",
-            "wind, m/s",
-            "led",
-            "rms, m",
-            "largest, m",
-            "true rms, m",
-            "true largest, m",
-            "result",
-        ),
         tuple(
-            (
-                task.trajectory.shape,
-                task.trajectory.speed,
-                task.planner,
-                task.guidance,
-                task.wind,
-                "yes" if task.lead else "no",
-                *_cells(flight.telemetry_error),
-                *_cells(flight.true_error),
-                flight.result,
-            )
+            {
+                "trajectory": task.trajectory.shape,
+                "speed, m/s": task.trajectory.speed,
+                "planner": task.planner,
+                "guidance": task.guidance,
+                "wind, m/s": task.wind,
+                "led": "yes" if task.lead else "no",
+                "rms, m": _cell(flight.telemetry_error.rms),
+                "largest, m": _cell(flight.telemetry_error.largest),
+                "true rms, m": _cell(flight.true_error.rms),
+                "true largest, m": _cell(flight.true_error.largest),
+                "result": flight.result,
+            }
             for task, flight in flights.items()
         ),
     )
 
 
 def _planners_table(name: str, caption: str, errors: dict[Task, float]) -> Table:
+    def error(trajectory: TrajectoryAtSpeed, planner: str, guidance: str) -> Cell:
+        flown = planner in planners(guidance)
+        return _in_mm(errors[Task(trajectory, planner, guidance)]) if flown else ""
+
     return Table(
         name,
         caption,
-        ("trajectory, guidance", *PLANNER_NAMES),
         tuple(
-            (
-                f"{trajectory}, {guidance}",
-                *(
-                    _in_mm(errors[Task(trajectory, planner, guidance)])
-                    if planner in planners(guidance)
-                    else ""
-                    for planner in PLANNER_NAMES
-                ),
-            )
+            {
+                "trajectory, guidance": f"{trajectory}, {guidance}",
+                **{planner: error(trajectory, planner, guidance) for planner in PLANNER_NAMES},
+            }
             for guidance in GUIDANCES
             for trajectory in TRAJECTORIES
         ),
@@ -191,30 +175,18 @@ def _lead_and_wind_table(flights: TrackedFlights) -> Table:
         f"Position error by telemetry, rms, mm: in still air and in {WINDY:g} m/s of wind, with"
         " lead and without (not led). In wind the circle at 7 m/s needs more thrust than the"
         " vehicle has.",
-        (
-            "trajectory",
-            "still: model-following",
-            "still: not led",
-            "wind: model-following",
-            "wind: not led",
-            "wind: first-order",
-        ),
         tuple(
-            (
-                str(trajectory),
-                rms(trajectory, MODEL_FOLLOWING, CALM),
-                rms(trajectory, MODEL_FOLLOWING, CALM, lead=False),
-                rms(trajectory, MODEL_FOLLOWING, WINDY),
-                rms(trajectory, MODEL_FOLLOWING, WINDY, lead=False),
-                rms(trajectory, FIRST_ORDER, WINDY),
-            )
+            {
+                "trajectory": str(trajectory),
+                "still: model-following": rms(trajectory, MODEL_FOLLOWING, CALM),
+                "still: not led": rms(trajectory, MODEL_FOLLOWING, CALM, lead=False),
+                "wind: model-following": rms(trajectory, MODEL_FOLLOWING, WINDY),
+                "wind: not led": rms(trajectory, MODEL_FOLLOWING, WINDY, lead=False),
+                "wind: first-order": rms(trajectory, FIRST_ORDER, WINDY),
+            }
             for trajectory in TRAJECTORIES
         ),
     )
-
-
-def _cells(error: PositionError) -> tuple[Cell, Cell]:
-    return _cell(error.rms), _cell(error.largest)
 
 
 def _in_mm(metres: float) -> Cell:
