@@ -6,7 +6,7 @@ A second-order lag is tried too, and reported if it fits clearly better.
 
 from dataclasses import dataclass
 from itertools import product
-from math import exp, log
+from math import exp, log, nan
 
 import numpy as np
 
@@ -54,22 +54,25 @@ _NEIGHBOUR_DISTANCE = 0.005
 
 @dataclass(frozen=True, slots=True)
 class LagFit:
-    """Result of `fit_lag`, in the units of commands and measurements."""
+    """First order with dead time: lag·ẏ(t) = gain·u(t − dead_time) + offset − y(t).
+
+    Units are those of the commands u and the measurements y. NaN: not found.
+    """
 
     dead_time: float
-    """Dead time, s."""
+    """Time from a sample to the first effect of its command, s."""
     lag: float
-    """Lag, s."""
+    """Time constant τ of the first-order lag, s."""
     gain: float
-    """Measured value per commanded value; fitted even if lag and dead time are for a given gain."""
-    offset: float
-    """Measurement at a command of zero."""
+    """Steady measurement per command; fitted even if lag and dead time are for a given gain."""
     slew: float | None
-    """Slew limit of the command, per second; None: no limit was found."""
-    quality: FitQuality
+    """Slew limit of the command, before the lag, per second; None: no limit was found."""
+    fit: FitQuality
     """Quality of the fit."""
-    second_order: SecondOrderFit | None
+    second_order: SecondOrderFit | None = None
     """Second-order fit; None if it is not clearly better."""
+    offset: float = nan
+    """Measurement at a command of zero."""
 
 
 def fit_lag(
@@ -100,10 +103,10 @@ def fit_lag(
         dead_time=fine.dead_time(best.unknown),
         lag=exp(best.unknown[0]),
         gain=float(best_free_gain.weights[0]),
-        offset=float(best.weights[1]),
         slew=fine.slew(best.unknown),
-        quality=_quality(fine, best),
+        fit=_quality(fine, best),
         second_order=_second_order_fit(record, free_gain, best_free_gain, coarse_thinning),
+        offset=float(best.weights[1]),
     )
 
 

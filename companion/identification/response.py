@@ -5,8 +5,8 @@ from math import isnan
 
 from numpy.typing import ArrayLike
 
-from companion.identification.delayed_model import DEAD_TIME_RANGE, SecondOrderFit
-from companion.identification.fit import LAG_RANGE, fit_lag
+from companion.identification.delayed_model import DEAD_TIME_RANGE
+from companion.identification.fit import LAG_RANGE, LagFit, fit_lag
 from companion.identification.record import stretches
 from companion.identification.residual_analysis import FitQuality
 
@@ -39,22 +39,8 @@ _EDGE_TOLERANCE = 1e-6  # s
 
 
 @dataclass(frozen=True, slots=True)
-class RateResponse:
-    """First order with dead time: lag·ω̇(t) = gain·ω_command(t − dead_time) + offset − ω(t)."""
-
-    dead_time: float
-    """Time from a sample to the first effect of its command, s; NaN if not found."""
-    lag: float
-    """Time constant τ of the first-order lag, s; NaN if not found."""
-    gain: float
-    """Steady rate per commanded rate; NaN if not found. It is fitted even if lag and dead time are
-    fitted for a given gain. If there is a second-order fit, this is its gain."""
-    slew: float | None
-    """Slew limit of the commanded rate, before the lag, rad/s²; None if none was found."""
-    fit: FitQuality
-    """Quality of the fit."""
-    second_order: SecondOrderFit | None = None
-    """Second-order fit; None if it is not clearly better."""
+class RateResponse(LagFit):
+    """A `LagFit` of a body rate, in rad/s. If there is a second-order fit, `gain` is its gain."""
 
     def flaw(self, needs: FitNeeds = DEFAULT_NEEDS) -> str | None:
         """Reason why this fit must not be used, without full stop; None if it may be used."""
@@ -147,6 +133,7 @@ def fit_rate_response(
     fit = fit_lag(stretches(time, commanded, measured_time, measured), gain)
     if fit is None:
         return _NOT_FOUND
-    second_order = fit.second_order
-    fitted_gain = fit.gain if second_order is None else second_order.gain
-    return RateResponse(fit.dead_time, fit.lag, fitted_gain, fit.slew, fit.quality, second_order)
+    gain = fit.gain if fit.second_order is None else fit.second_order.gain
+    return RateResponse(
+        fit.dead_time, fit.lag, gain, fit.slew, fit.fit, fit.second_order, fit.offset
+    )

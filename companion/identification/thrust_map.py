@@ -112,4 +112,4 @@ def fit_thrust_map(
     fit = fit_lag(record, search_slew_limit=False)
     if fit is None:
         return None
-    return ThrustMap(fit.gain, fit.offset, fit.lag, fit.dead_time, fit.quality.explained)
+    return ThrustMap(fit.gain, fit.offset, fit.lag, fit.dead_time, fit.fit.explained)
