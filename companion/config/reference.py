@@ -6,6 +6,7 @@ All text comes from the sections themselves, so that a key is described in one p
 import textwrap
 from collections.abc import Iterable, Iterator
 from functools import cache
+from itertools import groupby
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
@@ -83,36 +84,28 @@ def changed_keys(config: Config) -> Iterator[ConfigKey]:
 
 def as_yaml(config_keys: Iterable[ConfigKey]) -> str:
     """Keys as commented YAML that is a valid configuration."""
-    models, lines, section = sections(), list[str](), ""
-    for key in config_keys:
-        if key.section != section:
-            section = key.section
-            lines += ["", *_comment(models[section].__doc__ or "", ""), f"{section}:"]
-        lines += _comment(key.meaning, "  ")
-        limits = ", ".join(part for part in (key.unit, key.allowed_values) if part)
-        if key.value != key.default:
-            limits += f"; default: {dump_value(key.default)}"
-        note = f"  # {limits.removeprefix('; ')}" if limits else ""
-        lines.append(f"  {key.name}: {dump_value(key.value)}{note}")
+    models, lines = sections(), list[str]()
+    for section, section_keys in groupby(config_keys, lambda key: key.section):
+        lines += ["", *_comment(models[section].__doc__ or "", ""), f"{section}:"]
+        for key in section_keys:
+            lines += _comment(key.meaning, "  ")
+            limits = ", ".join(part for part in (key.unit, key.allowed_values) if part)
+            if key.value != key.default:
+                limits += f"; default: {dump_value(key.default)}"
+            note = f"  # {limits.removeprefix('; ')}" if limits else ""
+            lines.append(f"  {key.name}: {dump_value(key.value)}{note}")
     return "\n".join(lines).strip() + "\n"
 
 
 def as_markdown(config_keys: Iterable[ConfigKey]) -> str:
     """Keys as Markdown tables, one for each section."""
-    models, lines, section = sections(), list[str](), ""
-    for key in config_keys:
-        if key.section != section:
-            section = key.section
-            lines += ["", f"## {section}", "", _one_line(models[section].__doc__ or ""), ""]
-            lines += ["| key | default | unit | range | meaning |", "|---|---|---|---|---|"]
-        cells = (
-            f"`{key.name}`",
-            f"`{dump_value(key.default)}`",
-            key.unit,
-            key.allowed_values,
-            key.meaning,
-        )
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+    models, lines = sections(), list[str]()
+    for section, section_keys in groupby(config_keys, lambda key: key.section):
+        lines += ["", f"## {section}", "", _one_line(models[section].__doc__ or ""), ""]
+        lines += ["| key | default | unit | range | meaning |", "|---|---|---|---|---|"]
+        for key in section_keys:
+            cells = f"`{key.name}`", f"`{dump_value(key.default)}`", *key[4:]
+            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines).strip() + "\n"
 
 

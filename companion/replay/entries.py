@@ -4,7 +4,10 @@ They are samples, guidance steps, actions of phases, changes of configuration va
 the autopilot's ATTITUDE_TARGET.
 """
 
+from collections import deque
 from collections.abc import Iterator
+from math import nan
+from typing import Any
 
 from companion.recording.flight_record import FlightRecord, record_errors
 from companion.recording.mcap_file.fields import Channel
@@ -61,9 +64,9 @@ def recorded_inputs(record: FlightRecord) -> Iterator[RecordedInput]:
             elif topic == ATTITUDE_TARGET.topic:
                 yield attitude_target(messages.take(ATTITUDE_TARGET))
             elif topic == _CHANGE_TOPIC:
-                yield messages.take_change()
+                yield messages.take_next()
             else:  # an output; the sample or the step before it was not recorded
-                messages.skip(topic)
+                messages.take_next()
 
 
 _CHANGE_TOPIC = "/change"
@@ -74,28 +77,21 @@ class _Messages:
     """Reads messages of the replayed channels, and changes of values, in the order of the file."""
 
     def __init__(self, record: FlightRecord) -> None:
-        used = {_CHANGE_TOPIC, *(channel.topic for channel in _CHANNELS)}
-        self._order = [topic for topic in record.content.order if topic in used]
-        self._changes = iter(record.changes)
-        self._rows = {each.topic: iter(record.rows(each.name).tolist()) for each in _CHANNELS}
-        self._index = 0
+        self._rows: dict[str, Iterator[Any]] = {_CHANGE_TOPIC: iter(record.changes)}
+        for each in _CHANNELS:
+            self._rows[each.topic] = iter(record.rows(each.name).tolist())
+        self._order = deque(topic for topic in record.content.order if topic in self._rows)
 
     def next_topic(self) -> str | None:
         """Topic of the next message; None at the end."""
-        return self._order[self._index] if self._index < len(self._order) else None
+        return self._order[0] if self._order else None
 
-    def take_change(self) -> ValuesChange:
-        self._index += 1
-        return next(self._changes)
-
-    def skip(self, topic: str) -> None:
-        """Skip the next message, which has this topic."""
-        self._index += 1
-        next(self._rows[topic])
+    def take_next(self) -> Any:
+        """Take the next message: the values of its columns, or a change."""
+        return next(self._rows[self._order.popleft()])
 
     def take(self, channel: Channel) -> Row:
         """Take the next message if it is of `channel`; else take none and return NaN values."""
         if self.next_topic() != channel.topic:
-            return dict.fromkeys(channel.columns, float("nan"))
-        self._index += 1
-        return dict(zip(channel.columns, next(self._rows[channel.topic]), strict=True))
+            return dict.fromkeys(channel.columns, nan)
+        return dict(zip(channel.columns, self.take_next(), strict=True))
