@@ -21,6 +21,7 @@ from companion.report.plots import (
     REFERENCE_COLOUR,
     Plot,
     axes,
+    line,
     numbers,
 )
 
@@ -135,7 +136,15 @@ def pareto(results: Results) -> Iterator[Plot]:
             marker["color"] = MEASURED_COLOUR if part is front else IDEAL_COLOUR
         if part.any():
             shown = [titles[k] for k in np.flatnonzero(part)]
-            traces.append(_points(name, goals[part], shown, marker))
+            traces.append(
+                line(
+                    *(name, goals[part, 1], goals[part, 0], MEASURED_COLOUR),
+                    mode="markers",
+                    text=shown,
+                    hovertemplate="%{text}<br>%{y:.3g}, %{x:.3g}<extra></extra>",
+                    marker=marker,
+                )
+            )
     criteria = "error, rate use and thrust use" if thrust else "error and rate use"
     note = (
         "Each point is one choice of the program's own keys: the medians over all other factors, "
@@ -144,19 +153,6 @@ def pareto(results: Results) -> Iterator[Plot]:
     )
     layout = axes(x=label(RATE_OUTCOME), y=label(results.error_outcome))
     yield Plot("Pareto front", note, traces, layout, 420)
-
-
-def _points(name: str, goals: Floats, titles: list[str], marker: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": name,
-        "x": numbers(goals[:, 1]),
-        "y": numbers(goals[:, 0]),
-        "text": titles,
-        "hovertemplate": "%{text}<br>%{y:.3g}, %{x:.3g}<extra></extra>",
-        "marker": marker,
-    }
 
 
 def _colour_scale(values: Floats, all_values: Floats, *, shown: bool) -> dict[str, Any]:

@@ -81,32 +81,22 @@ def configuration(campaign: Campaign) -> Table:
 def success_by_factor(results: Results, order: Sequence[str]) -> Table:
     """Success rate, median error and median body rate by level of the most influential factors."""
     rows = [row for name in order[:_MOST_FACTORS] for row in _level_rows(results, name)]
-    has_faults = "as_documented" in results.columns and "fault" in results.factors
-    header = ["factor", "value", results.noun, "good (95 % interval)"]
-    header += ["ended as documented (95 % interval)"] if has_faults else []
-    header += [f"median {label(results.error_outcome)}", f"median {label(RATE_OUTCOME)}"]
-    return Table("Success by factor", tuple(header), rows)
+    return Table("Success by factor", tuple(rows[0]), [tuple(row.values()) for row in rows])
 
 
-def _level_rows(results: Results, name: str) -> Iterator[tuple[str, ...]]:
+def _level_rows(results: Results, name: str) -> Iterator[dict[str, str]]:
+    """A row for each level of a factor: cell by title of the column."""
     columns = results.columns
     for level in levels(columns[name]):
-        row = [name, level.name, str(int(level.cases.sum()))]
-        row.append(str(share_of(results.good[level.cases])))
+        row = {"factor": name, "value": level.name, results.noun: str(int(level.cases.sum()))}
+        row["good (95 % interval)"] = str(share_of(results.good[level.cases]))
         if "as_documented" in columns and "fault" in results.factors:
-            endings_documented = [
-                value for value in columns["as_documented"][level.cases] if value is not None
-            ]
-            row.append(
-                str(share_of(np.array(endings_documented, dtype=bool)))
-                if endings_documented
-                else EMPTY
-            )
-        row += [
-            _median_text(columns[outcome][level.cases])
-            for outcome in (results.error_outcome, RATE_OUTCOME)
-        ]
-        yield tuple(row)
+            endings = [end for end in columns["as_documented"][level.cases] if end is not None]
+            share = str(share_of(np.array(endings, dtype=bool))) if endings else EMPTY
+            row["ended as documented (95 % interval)"] = share
+        for outcome in (results.error_outcome, RATE_OUTCOME):
+            row[f"median {label(outcome)}"] = _median_text(columns[outcome][level.cases])
+        yield row
 
 
 def _median_text(values: Floats) -> str:
