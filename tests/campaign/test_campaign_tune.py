@@ -150,7 +150,7 @@ def test_a_flight_that_ended_early_is_no_error_but_is_told(tmp_path):
     ended = flown[0] | {"result": "the fence was left"}
     score = score_of([*flown[:2], ended, flown[3]], 1.0)
     assert score.is_inside == (True, True, False, True)
-    assert Score.from_attributes(json.loads(json.dumps(score.as_attributes()))) == score
+    assert Score._make(map(tuple, json.loads(json.dumps(score)))) == score
     comparison = compare(score, score_of(flown, 1.0), 4)
     assert comparison.samples == 3
     assert comparison.ratio.value == pytest.approx(1.0)

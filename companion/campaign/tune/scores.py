@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,6 @@ from companion.campaign.tune.candidates import Values
 
 Floats = NDArray[np.float64]
 Row = Mapping[str, Value]
-_ERROR_NAMES = "true_errors", "estimated_errors", "estimator_errors"
-"""Attributes of a score that are errors in m."""
 
 
 class Score(NamedTuple):
@@ -49,23 +47,6 @@ class Score(NamedTuple):
     def combined_with(self, rest: "Score") -> "Score":
         """The score on these cases and those of `rest` together."""
         return Score._make(ours + theirs for ours, theirs in zip(self, rest, strict=True))
-
-    def as_attributes(self) -> dict[str, Any]:
-        """The score as JSON values; an infinite number becomes None."""
-        attributes: dict[str, Any] = {
-            name: [error if isfinite(error) else None for error in getattr(self, name)]
-            for name in _ERROR_NAMES
-        }
-        return {**attributes, "inside": list(self.is_inside)}
-
-    @classmethod
-    def from_attributes(cls, attributes: Mapping[str, Any]) -> "Score":
-        """The score from the values that `as_attributes` returned."""
-        true_errors, estimated_errors, estimator_errors = (
-            tuple(inf if error is None else float(error) for error in attributes[name])
-            for name in _ERROR_NAMES
-        )
-        return cls(true_errors, estimated_errors, estimator_errors, tuple(attributes["inside"]))
 
 
 @dataclass(frozen=True)

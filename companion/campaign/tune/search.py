@@ -145,7 +145,7 @@ class Search:
             Candidate(
                 trial.number,
                 trial.user_attrs[_VALUES_KEY],
-                Score.from_attributes(trial.user_attrs[_SCORE_KEY]),
+                Score._make(map(tuple, trial.user_attrs[_SCORE_KEY])),
             )
             for trial in complete_trials
             if trial.user_attrs[_VIOLATION_KEY] <= 0.0
@@ -206,7 +206,7 @@ class Search:
         score = score.combined_with(
             score_of(self._fly(all_cases[first_count:]), self._tune.envelope_m)
         )
-        trial.set_user_attr(_SCORE_KEY, score.as_attributes())
+        trial.set_user_attr(_SCORE_KEY, score)
         self._set_violation(trial, self._shortfall(score, len(all_cases)))
         trial.set_user_attr(_COMPLETE_KEY, True)
         self._study.tell(trial, _capped_rms(score))
