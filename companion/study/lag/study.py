@@ -56,6 +56,7 @@ def run(tick: Tick) -> Outcome:
     example = fly_example()
     complete = fly_complete(tick)
     fitted = {method: _fit_model(response) for method, response in complete.shown_responses.items()}
+    deviations = {method: deviation for method, (_, deviation) in fitted.items()}
     return Outcome(
         name="lag",
         title="Lag: behind a rate loop with dead time and lag",
@@ -88,12 +89,7 @@ def run(tick: Tick) -> Outcome:
                 complete.by_rate[SHOWN_RATE_HZ].model_following_scores,
             ),
         ),
-        findings=find(
-            grid,
-            example,
-            complete,
-            {m: deviation for m, (_, deviation) in fitted.items()},
-        ),
+        findings=find(grid, example, complete, deviations),
         series=(*_grid_series(grid), _complete_series(complete)),
     )
 
