@@ -12,7 +12,7 @@ from companion.campaign.case import Fault
 from companion.campaign.cluster import ClusterError
 from companion.campaign.unit import cases_per_unit, unit_ranges
 from companion.campaign.versions import VersionError, difference, require_equal, versions
-from companion.cli import flights as commands
+from companion.cli import flying
 from companion.cli.main import main
 from companion.config.files import load as load_config
 from companion.files import bounded_yaml
@@ -172,7 +172,7 @@ def test_a_campaign_is_run_resumed_and_one_case_is_flown_again(quick, threads, c
     assert {
         path.name: path.read_bytes() for path in (out / "results").glob("unit*.parquet")
     } == whole
-    monkeypatch.setattr(commands, "write_flight_page", lambda place: f"Report: {place}")
+    monkeypatch.setattr(flying, "write_flight_page", lambda place: f"Report: {place}")
     assert main(["campaign", "rerun", str(out), "2"]) == 0
     said = capsys.readouterr().out
     assert "bit-identical to the campaign's flight" in said
