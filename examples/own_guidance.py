@@ -24,7 +24,7 @@ async def main() -> None:
         begin = vehicle.state
         n0, e0, down = begin.position_ned
         async with vehicle.control() as control:
-            async for state in control.states(seconds=20.0):
+            async for state in control.states(seconds=12.0):
                 t = state.time - begin.time
                 c, s = RADIUS * cos(TURN * t), RADIUS * sin(TURN * t)
                 (n, e, d), (vn, ve, vd) = state.position_ned, state.velocity_ned

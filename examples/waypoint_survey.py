@@ -12,7 +12,7 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance.trajectory import waypoints
 from companion.testing import MockVehicle, connect, run
 
-LENGTH, LANES, APART, PX4 = 9.0, 3, 3.0, shipped("mock-px4.yaml")  # m
+LENGTH, LANES, APART, PX4 = 6.0, 3, 2.0, shipped("mock-px4.yaml")  # m
 mock = MockVehicle(config=PX4)
 corners = [(LENGTH, 0.0, 0.0)]
 for lane in range(1, LANES):

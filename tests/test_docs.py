@@ -170,11 +170,21 @@ def test_the_site_has_every_page_in_the_order_of_the_index() -> None:
 
 
 @cache
+def nodes_of_the_program() -> dict[Path, list[ast.AST]]:
+    """The syntax of `companion` by file; only what speaks is kept: texts, `raise`, `return`."""
+    kept = ast.Constant | ast.JoinedStr | ast.Raise | ast.Return
+    return {
+        file: [each for each in ast.walk(ast.parse(file.read_bytes())) if isinstance(each, kept)]
+        for file in (ROOT / "companion").rglob("*.py")
+    }
+
+
+@cache
 def texts_of_the_program() -> str:
     """Every text in `companion`; a value within a text stands as `\\0`."""
     found = []
-    for file in (ROOT / "companion").rglob("*.py"):
-        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+    for nodes in nodes_of_the_program().values():
+        for node in nodes:
             if isinstance(node, ast.JoinedStr):
                 parts = (getattr(part, "value", "") for part in node.values)
                 found.append("".join(part if isinstance(part, str) else "\0" for part in parts))
@@ -223,9 +233,9 @@ def texts(node: ast.AST | None) -> Iterator[str]:
 
 def raised_and_judged() -> Iterator[str]:
     """What ends a flight: texts of its exceptions, and what the judges of monitors return."""
-    for file in (ROOT / "companion").rglob("*.py"):
+    for file, nodes in nodes_of_the_program().items():
         judge = file.name.endswith("_judges.py")
-        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+        for node in nodes:
             if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
                 if getattr(node.exc.func, "id", "") in ENDINGS and node.exc.args:
                     yield from texts(node.exc.args[0])

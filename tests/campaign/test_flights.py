@@ -5,7 +5,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
-from distributed import Client, LocalCluster
 
 from companion.campaign import flight, folder, outcomes, running, store, unit
 from companion.campaign.case import Fault
@@ -139,6 +138,8 @@ def threads(monkeypatch):
 
     @contextmanager
     def connected(_scheduler, _workers):
+        from distributed import Client, LocalCluster  # noqa: PLC0415  slow to import
+
         options = {"processes": False, "dashboard_address": "127.0.0.1:0", "protocol": "inproc://"}
         with (
             LocalCluster(n_workers=1, threads_per_worker=1, **options) as cluster,

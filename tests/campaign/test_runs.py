@@ -8,8 +8,6 @@ import threading
 from contextlib import contextmanager
 
 import pytest
-from distributed import KilledWorker
-from distributed.client import FutureCancelledError
 
 from companion.campaign import cluster, engine, estimate, folder, outcomes, running, store, unit
 from companion.campaign.cluster import ClusterError
@@ -194,6 +192,8 @@ def test_sigterm_ends_a_campaign_like_ctrl_c_and_a_second_one_is_ignored():
 
 def test_the_reason_of_a_lost_unit_is_a_sentence():
     assert cluster._failure_reason(ValueError("x")) == "ValueError: x"
+    from distributed import KilledWorker  # noqa: PLC0415  slow to import
+
     died = KilledWorker("a task", None, [])
     assert cluster._failure_reason(died) == "its worker died each time it was tried"
     with pytest.raises(ConfigError, match="bad key"):
@@ -206,6 +206,8 @@ class Gone:
     status = "finished"
 
     def result(self):
+        from distributed.client import FutureCancelledError  # noqa: PLC0415  slow to import
+
         raise FutureCancelledError("x", "lost")
 
 

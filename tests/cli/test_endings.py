@@ -28,7 +28,6 @@ from companion.extras import MissingExtraError
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import LinkError
 from companion.mavlink.loop import run as run_loop
-from companion.study import runner
 
 ENOSPC = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -127,16 +126,17 @@ def test_a_study_that_is_interrupted_says_which_files_are_complete(monkeypatch, 
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(runner, "run", interrupted)
+    monkeypatch.setattr("companion.study.runner.run", interrupted)
     out = tmp_path / "a [b]"
     assert main(["study", "track", "--out", str(out)]) == 1
     told = " ".join(capsys.readouterr().out.split())
     assert "Interrupted: in " in told
     assert "a [b] only the files of finished studies are complete. Run the command again." in told
-    monkeypatch.setattr(runner, "run", lambda *_: (out / "index.html", [{"rms": 0.1}]))
+    rows = [{"rms": 0.1}]
+    monkeypatch.setattr("companion.study.runner.run", lambda *_: (out / "index.html", rows))
     assert main(["study", "track", "--out", str(out), "--json"]) == 0
     told = capsys.readouterr()
-    assert json.loads(told.out) == [{"rms": 0.1}]
+    assert json.loads(told.out) == rows
     assert told.err == f"Open {out / 'index.html'}\n"
 
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 
 from companion.guidance.reference import GRAVITY
 from companion.identification import identify_vehicle
@@ -75,6 +74,8 @@ def judged(axis, mock_settings):
 
     Doublets of the maneuver's sizes in still air without noise, and SciPy's filter and optimiser.
     """
+    from scipy.signal import lfilter  # noqa: PLC0415  a second, which only this test needs
+
     vehicle = Multirotor(
         AirframeConfig(**mock_settings.get("airframe", {})),
         RateLoopConfig.model_validate(mock_settings.get("rate_loop", "px4")),

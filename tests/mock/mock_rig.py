@@ -1,5 +1,6 @@
 """A bench for the autopilot without sockets: commands in, telemetry out, vehicle time at will."""
 
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -43,6 +44,7 @@ class Rig:
         self.heartbeat_type = dialect.MAV_TYPE_GCS if gcs else dialect.MAV_TYPE_ONBOARD_CONTROLLER
         self._frames: list[tuple[float, bytes]] = []
         self._read: dict[int, list[Any]] = {}
+        self._numbers: dict[int, list[int]] = defaultdict(list)  # of frames, by message
         self.each_tick: Callable[[], None] | None = None
         if boot:
             self.heartbeat()
@@ -88,7 +90,9 @@ class Rig:
             self.run(0.004)
 
     def _take(self) -> None:
-        self._frames += [(self.time, frame) for frame in self.simulation.companion.take_frames()]
+        for frame in self.simulation.companion.take_frames():
+            self._numbers[int.from_bytes(frame[7:10], "little")].append(len(self._frames))
+            self._frames.append((self.time, frame))
 
     def _decoded(self, frame: bytes) -> list[Any]:
         return decode(frame)
@@ -108,6 +112,7 @@ class Rig:
     def forget(self) -> None:
         """Forget what was heard."""
         self._frames, self._read = [], {}
+        self._numbers.clear()
 
     def messages(self, name: str, since: float = 0.0) -> list[Any]:
         wanted = getattr(ardupilotmega, f"MAVLINK_MSG_ID_{name}", None)
@@ -115,8 +120,8 @@ class Rig:
             wanted = getattr(dialect, f"MAVLINK_MSG_ID_{name}")
         return [
             message
-            for number, (at, frame) in enumerate(self._frames)
-            if at >= since and int.from_bytes(frame[7:10], "little") == wanted
+            for number in self._numbers.get(wanted, ())
+            if self._frames[number][0] >= since
             for message in self._messages_of(number)
         ]
 

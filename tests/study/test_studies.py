@@ -50,9 +50,10 @@ def results(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runner, "_tick", counting)
         patch.setattr(registry, "STUDIES", {name: STUDIES[name] for name in PARTS})
-        patch.setattr(fig2, "FIGURE_2", replace(fig2.FIGURE_2, headings=EIGHT))
-        patch.setattr(fig3, "FIGURE_2", replace(fig3.FIGURE_2, seconds=1.0))
-        patch.setattr(fig4, "FIGURE_4", replace(fig4.FIGURE_4, headings=EIGHT))
+        # They are away from the reference most, and reach 5 %, within a second; Euler in half.
+        patch.setattr(fig2, "FIGURE_2", replace(fig2.FIGURE_2, headings=EIGHT, seconds=1.0))
+        patch.setattr(fig3, "FIGURE_2", replace(fig3.FIGURE_2, seconds=0.5))
+        patch.setattr(fig4, "FIGURE_4", replace(fig4.FIGURE_4, headings=EIGHT, seconds=1.0))
         step = replace(fig5_flights.STEP, headings=EIGHT[3:6:2], seconds=1.0)
         patch.setattr(fig5_flights, "STEP", step)
         # Of the sweep only the cross-track is shown, which is largest in the first half second.
@@ -223,7 +224,7 @@ def test_a_case_of_ones_own(tmp_path, capsys):
 
 def test_a_case_with_the_inner_loop_and_the_limit_of_equation_33(tmp_path, capsys):
     limits = {"max_tilt_deg": 40.0, "max_tilt_rate_deg_s": 90.0, "rate_limit": "paper"}
-    changes = {"limits": limits, "headings_deg": [0.0], "seconds": 0.4}
+    changes = {"limits": limits, "headings_deg": [0.0], "rates_hz": [100.0], "seconds": 0.4}
     methods = {"methods": ["first-order"]}
     assert custom(tmp_path, capsys, **changes, **methods)[0] == 0
     ideal = (tmp_path / "out" / "custom.csv").read_text()

@@ -1,7 +1,5 @@
 """Studies in worker processes: the outcomes, the progress, an error, and the same files."""
 
-import os
-import signal
 from pathlib import Path
 
 import pytest
@@ -10,21 +8,7 @@ from rich.console import Console
 from companion.cli.main import main
 from companion.study import runner
 from companion.study.workers import run_in_workers
-
-
-def returns_its_name(name, tick):
-    tick("only part")
-    return f"outcome of {name}"
-
-
-def fails_in_second(name, tick):
-    if name == "second":
-        raise OSError("the disk is full")
-    return name
-
-
-def is_killed(_name, _tick):
-    os.kill(os.getpid(), signal.SIGKILL)
+from tests.study.studies_of_workers import fails_in_second, is_killed, returns_its_name
 
 
 def test_outcomes_keep_their_order_and_every_part_is_told():
