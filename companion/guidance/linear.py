@@ -106,13 +106,11 @@ class Guidance(Protocol):
 
         `GuidanceInput.predicted` is the motion after this delay.
         """
-        ...
 
     def command(
         self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
     ) -> LinearCommand:
         """Compute the command of one guidance step; see `LinearGuidance.command`."""
-        ...
 
 
 class Trim:

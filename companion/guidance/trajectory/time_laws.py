@@ -76,16 +76,13 @@ class TimeLaw(Protocol):
 
     def pieces(self) -> Sequence[Piece]:
         """The smooth parts of the law, in order, from 0 to the duration."""
-        ...
 
     @property
     def duration(self) -> float:
         """Duration, s."""
-        ...
 
     def at(self, time: float) -> Progress:
         """Progress at `time`; at rest before 0 and past the duration."""
-        ...
 
 
 Ramp = Callable[[float, float, float], Progress]
