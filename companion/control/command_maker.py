@@ -17,8 +17,6 @@ class CommandMaker:
     """Asks guidance or predictive control for a command; limits its tilt so that height is held.
 
     Args:
-        guidance: makes targets from references.
-        flown_source: provides the reference.
         estimate: provides the state of the vehicle; is given the commanded vertical thrust.
         learning: provides the largest tilt and the thrust limits.
         period: period of guidance, s.

@@ -30,9 +30,7 @@ class PlannerRunner:
     During open-loop steps, and for seconds after them, this frame is the `StepFrame`.
 
     Args:
-        planner: the planner.
         resets: the estimator resets, which the planner must not see.
-        limits: limits of all body rates.
 
     Attributes:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates

@@ -60,10 +60,6 @@ class Retuning:
     """Applies the values of a configuration to the loops of a flight.
 
     Only the keys that may change in flight have an effect; see `companion.config.in_flight`.
-
-    Args:
-        loop: the control loop.
-        guidance_loop: the guidance loop.
     """
 
     def __init__(self, loop: ControlLoop, guidance_loop: GuidanceLoop) -> None:

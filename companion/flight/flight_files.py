@@ -33,9 +33,7 @@ class FlightFiles:
     and the summary by `save`.
 
     Args:
-        config: configuration of the flight.
         folder: existing folder for the files; None: nothing is written.
-        environment: environment of the flight.
         note: called with a failure of the recording.
         flies_maneuvers: whether the maneuvers of the configuration are flown.
 

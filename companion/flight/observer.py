@@ -40,11 +40,7 @@ class SilentObserver:
 
 
 class SeveralObservers:
-    """Passes everything to several observers, in order.
-
-    Args:
-        observers: the observers.
-    """
+    """Passes everything to several observers, in order."""
 
     def __init__(self, *observers: Observer) -> None:
         self._observers = observers
@@ -88,7 +84,6 @@ class EventRecorder:
         note: called once if the other observer fails, to make it an event of the flight.
 
     Args:
-        observer: the other observer.
         clock: our clock, s.
         write: records a text with the present time.
         file: `flight.mcap`; None: the flight is not recorded.

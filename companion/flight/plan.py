@@ -37,9 +37,6 @@ class Plan(Protocol):
 class ConfiguredPlan:
     """The plan of `companion fly`: take off, or take over from the pilot; fly the maneuvers; end.
 
-    Args:
-        config: configuration of the flight.
-
     Attributes:
         drag: drag assumed for the maneuvers.
 

@@ -80,9 +80,7 @@ class StatusReporter:
         real_time: whether latencies are meaningful.
 
     Args:
-        context: context of the flight.
         ladder: tells which safety monitors have raised an alarm.
-        trace: receives the motion.
         began: when the flight began, s on our clock.
         phase: returns the running phase, and when it began, s on our clock.
         show: called with the state; it must return at once. None: the state is not shown.

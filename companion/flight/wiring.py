@@ -104,7 +104,6 @@ class StateLogger:
     The first call notes the present mode and arming state, but no text from before.
 
     Args:
-        state: telemetry of the vehicle.
         note: called with each change as a sentence.
     """
 

@@ -162,10 +162,6 @@ class StampWriter:
     """Writes the stamps every 10 s, when a new stream is heard, and at the end, in a thread.
 
     So the event loop never waits for a disk. A failure is reported once, in `Signing.remarks`.
-
-    Args:
-        signing: holds the stamps.
-        file: the file to which the stamps are written.
     """
 
     def __init__(self, signing: Signing, file: StampFile) -> None:

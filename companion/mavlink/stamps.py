@@ -72,7 +72,6 @@ class StampJudge:
     - A stamp further ahead is refused.
 
     Args:
-        kept_stamps: the stamps kept by the last run.
         clock: returns Unix time in s; called once.
         monotonic_clock: returns monotonic time in s.
 

@@ -71,11 +71,7 @@ class LinkStats:
 
 
 class FrameCounter:
-    """Counts the vehicle's accepted frames and the gaps in its sequence numbers (0..255, wrapping).
-
-    Args:
-        stats: takes the counts.
-    """
+    """Counts accepted frames, and the gaps in their sequence numbers (0..255, wrapping)."""
 
     def __init__(self, stats: LinkStats) -> None:
         self._stats = stats

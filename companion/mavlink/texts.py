@@ -108,9 +108,6 @@ class TextFrames:
 
     The component id of the frames is MAV_COMP_ID_LOG. With this program's own component id, their
     sequence numbers would make other frames look lost.
-
-    Args:
-        system: system id of the frames.
     """
 
     def __init__(self, system: int) -> None:

@@ -34,10 +34,6 @@ class RecedingHorizon:
 
     The cost has the same weights for all models: on deviations of position, velocity, heading,
     attitude rate and thrust from the reference; see `Weights`.
-
-    Args:
-        settings: vehicle, horizon and solver.
-        make_model: makes the prediction model.
     """
 
     def __init__(self, settings: Settings, make_model: Callable[[Settings], Model]) -> None:

@@ -52,8 +52,6 @@ class UndoFile:
 
     Args:
         directory: folder for the file.
-        link: link to the vehicle.
-        identity: the vehicle's AUTOPILOT_VERSION.
 
     Attributes:
         path: the file; it does not exist before the first `add`.

@@ -144,13 +144,7 @@ def _link_quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> Li
 
 
 class PreflightSession:
-    """Checks one vehicle over an open link.
-
-    Args:
-        config: configuration of the flight.
-        link: link to the vehicle.
-        notices: notices of the link.
-    """
+    """Checks one vehicle over an open link."""
 
     def __init__(self, config: Config, link: Link, notices: Sequence[str]) -> None:
         self._config, self._notices = config, notices

@@ -39,7 +39,6 @@ class ServeSession:
     Signal handlers of the event loop may call `stop` and `leave`.
 
     Args:
-        config: configuration of the vehicle, with the section `serve`.
         note: called with each event, as a sentence for the user.
         observer: receives phases and events of each flight under a client's control.
         environment: clocks and transports of this computer, or their replacement in tests.

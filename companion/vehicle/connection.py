@@ -24,12 +24,9 @@ class Connection:
     called.
 
     Args:
-        endpoint: the endpoint to open.
         inbox: takes the bytes that arrive.
         outbox: sends over the open transport; drops frames while none is open.
-        stats: counts the reconnects.
         on_dropped: called with the reason when the connection drops.
-        opener: opens the transport.
     """
 
     def __init__(
