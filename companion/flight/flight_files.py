@@ -33,12 +33,11 @@ class FlightFiles:
     and the summary by `save`.
 
     Args:
-        folder: existing folder for the files; None: nothing is written.
         note: called with a failure of the recording.
         flies_maneuvers: whether the maneuvers of the configuration are flown.
 
     Attributes:
-        folder: folder of the files, or None.
+        folder: existing folder for the files; None: nothing is written.
         tap: records frames; None if they are not recorded.
         mcap: records the flight, or None.
 

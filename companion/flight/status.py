@@ -77,7 +77,7 @@ class StatusReporter:
     Attributes:
         takeoff: time when the vehicle left the ground, s on our clock; None: it has not.
         battery_at_takeoff: remaining charge at that time, 0..1, or None.
-        real_time: whether latencies are meaningful.
+        real_time: whether latencies are meaningful: False if the vehicle waits for us.
 
     Args:
         ladder: tells which safety monitors have raised an alarm.
@@ -85,7 +85,6 @@ class StatusReporter:
         phase: returns the running phase, and when it began, s on our clock.
         show: called with the state; it must return at once. None: the state is not shown.
         clock: our clock, s.
-        real_time: whether latencies are meaningful: False if the vehicle waits for us.
     """
 
     def __init__(

@@ -97,7 +97,6 @@ class CommandedSource:
     holds its position, and later references are not flown.
 
     Args:
-        name: who gives the references.
         max_age: largest age of a reference that is flown, s.
         begins_within: time allowed for the first reference, s.
 

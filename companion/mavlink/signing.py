@@ -65,10 +65,9 @@ class Signing:
         link_id: link id in the signatures that are sent, 0..255.
         clock: returns Unix time in s; called once, at the start.
         monotonic_clock: returns the time in s that the stamps follow after the start.
-        file: keeps the newest stamps from one run to the next; `None`: they are not kept.
 
     Attributes:
-        file: see the argument.
+        file: keeps the newest stamps from one run to the next; `None`: they are not kept.
         remarks: sentences about time stamps for the user; the code that shows them removes them.
         changed: set when the time stamps should be written to the file soon.
 
