@@ -24,7 +24,6 @@ class FollowedTrajectory(NamedTuple):
     """The trajectory maneuver that is flown at present."""
 
     maneuver: Follow
-    """The maneuver that flies the trajectory."""
     time: float
     """Time since the maneuver began, s."""
     pose: Pose

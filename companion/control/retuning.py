@@ -27,11 +27,8 @@ class LoopSettings(NamedTuple):
     """The values of a configuration that may change in flight, computed for the loops."""
 
     guidance: LinearSettings
-    """Settings of linear guidance."""
     observer: ObserverSettings
-    """Settings of the motion observer."""
     correction: CorrectionSettings
-    """Settings of the position correction."""
     constants: Constants
     """Gains and limits of the planner."""
     limits: Limits

@@ -56,11 +56,9 @@ class GuidedVehicle(NamedTuple):
     """The vehicle as guidance reads it."""
 
     state: Telemetry
-    """Telemetry of the vehicle."""
     ground: Ground
     """Tells whether the vehicle stands on the ground."""
     clock: Clock
-    """The vehicle's clock."""
 
     def fresh_position(self, now: float, max_age: float) -> LocalPosition | None:
         """The newest position; None if its arrival or measurement is over `max_age` s before `now`.

@@ -33,7 +33,6 @@ class FlightStatus(NamedTuple):
     airborne_time: float | None
     """Time since the vehicle left the ground, s."""
     phase: str
-    """Name of the phase."""
     detail: str
     """What the phase waits for."""
     elapsed: float
@@ -62,7 +61,6 @@ class FlightStatus(NamedTuple):
     missed_deadlines: int | None = None
     """Deadlines missed so far; None in lockstep."""
     battery: Battery | None = None
-    """Battery of the vehicle."""
     monitored: bool = False
     """Whether the safety monitors are active."""
     alarms: tuple[str, ...] = ()

@@ -49,7 +49,6 @@ class Stamps:
     date: int = 0
     """This program's date when the stamps were written."""
     newest_sent: int = 0
-    """The newest stamp that was sent."""
     streams: dict[SignatureStream, tuple[int, ...]] = field(default_factory=dict)
     """The newest stamps accepted on each stream: one near this program's date, and one far ahead of
     it, if the vehicle proved that date (see `StampJudge`)."""

@@ -38,7 +38,6 @@ class GuidedFlight:
     _parameters: ParameterTable
     """Speeds and options."""
     _guided: Guided
-    """The task."""
     _hold: PositionHold
     """Holds a point, a heading and a height."""
     _output: ActuatorOutput

@@ -42,7 +42,6 @@ class Link:
     _framer: Framer
     """Packs frames."""
     streams: StreamSchedule
-    """Schedules telemetry."""
     signing: Signing | None = None
     """Signs and verifies frames; None = no signing."""
     outbox: list[bytes] = field(default_factory=list, init=False)

@@ -30,7 +30,6 @@ class ArmingChecks:
     _ready_us: int
     """Vehicle time at which the estimator is ready."""
     crashed: bool = field(default=False, init=False)
-    """Whether the vehicle has crashed."""
 
     @property
     def offboard_alive(self) -> bool:

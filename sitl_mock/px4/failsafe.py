@@ -44,7 +44,6 @@ class Failsafe:
     _parameters: ParameterTable
     _announce: AnnounceEvent
     _actions: FailsafeActions
-    """Executes the action of a failsafe."""
     _pilot_present: bool = field(default=False, init=False)
     _pilot_optional: bool = field(default=True, init=False)
     _pilot_lost_us: int | None = field(default=None, init=False)
