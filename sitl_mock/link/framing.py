@@ -120,8 +120,6 @@ class Framer:
     """Packs the MAVLink 2 frames of one component on one link, with their sequence numbers.
 
     Args:
-        system_id: system id of the sender.
-        component_id: component id of the sender.
         signed: set the flag of signed frames; `Signing.sign` appends the signature.
     """
 

@@ -130,12 +130,7 @@ def _send(link: Link, layout: Layout, payload: bytes) -> None:
 
 
 class Announcer:
-    """Announces events: as EVENT on all links, as text on those with a ground station.
-
-    Args:
-        links: links for the texts.
-        events: sends the events.
-    """
+    """Announces events: as EVENT on all links, as text on those with a ground station."""
 
     def __init__(self, links: Iterable[Link], events: EventLog) -> None:
         self._links = list(links)

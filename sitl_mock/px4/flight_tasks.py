@@ -18,11 +18,7 @@ LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
 
 
 class FlightTasks:
-    """Computes the demand on the position controller, from the mode or from a setpoint.
-
-    Args:
-        parameters: speeds, heights and times.
-    """
+    """Computes the demand on the position controller, from the mode or from a setpoint."""
 
     def __init__(self, state: State, parameters: ParameterTable) -> None:
         self._state = state
