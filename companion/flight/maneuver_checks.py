@@ -42,11 +42,6 @@ _SLOWER_IN_PROGRAM = (
 def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
     """Check a maneuver other than a trajectory against the fence; a circle also against limits.
 
-    Args:
-        config: configuration of the flight.
-        part: the maneuver.
-        drag: drag of the vehicle.
-
     Raises:
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """

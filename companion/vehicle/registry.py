@@ -48,9 +48,6 @@ def read_events(
 ) -> None:
     """Turn PX4's events into texts; on some links PX4 sends events instead of STATUSTEXT.
 
-    Args:
-        dispatcher: delivers EVENT.
-        texts: takes the texts.
-        clock: returns the event-loop time, s.
+    `clock` returns the event-loop time, s.
     """
     dispatcher.subscribe_raw("EVENT", EventReader(texts, clock).take)
