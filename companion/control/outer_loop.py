@@ -71,10 +71,7 @@ def make_guidance(config: Config) -> Guidance:
 def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:
     """Check guidance of another package: ask it once to hold a vehicle that is at rest.
 
-    Args:
-        kind: name of the guidance in `guidance.kind`.
-        guidance: the guidance.
-        thrust: smallest and largest specific thrust, m/s².
+    `kind`: its name in `guidance.kind`. `thrust`: smallest and largest specific thrust, m/s².
 
     Raises:
         ConfigError: the guidance raises, or does not return a `LinearCommand` of finite numbers.

@@ -44,10 +44,7 @@ def in_role(link: Link, role: Role) -> bool:
 def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     """Release control if the present mode has none of the allowed roles.
 
-    Args:
-        link: link to the vehicle.
-        allowed: roles, of which the present mode needs one.
-        released_by: client in control that has just commanded another mode; "": none.
+    `released_by`: client in control that has just commanded another mode; "": none.
 
     Raises:
         ControlReleased: the client in control commanded that mode.

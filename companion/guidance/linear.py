@@ -199,10 +199,7 @@ class LinearGuidance:
     def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> NorthEast:
         """Horizontal acceleration that corrects errors and disturbance, m/s².
 
-        Args:
-            now: the present reference.
-            later: the reference at the time when the feedback takes effect.
-            inputs: motion, thrust and disturbance of the vehicle.
+        `later` is the reference at the time when the feedback takes effect.
         """
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.horizontal is HorizontalMode.ACCELERATION:

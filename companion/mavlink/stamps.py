@@ -177,9 +177,7 @@ class StampJudge:
     def _kept_stamp(self, stream: SignatureStream, ahead: bool) -> int:
         """The newest stamp of a stream on disk, ticks; 0 without one.
 
-        Args:
-            stream: the signer's stream.
-            ahead: whether to search only the stamps far ahead of the date, or only the others.
+        `ahead`: whether to search only the stamps far ahead of the date, or only the others.
         """
         stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)

@@ -38,13 +38,7 @@ class TextAssembler:
         self._events: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
 
     def take_event(self, severity: int, text: str, now: float) -> None:
-        """Take the text of an event.
-
-        Args:
-            severity: MAV_SEVERITY.
-            text: the text.
-            now: event-loop time, s.
-        """
+        """Take the text of an event, with its MAV_SEVERITY; `now` is event-loop time, s."""
         if not _is_repetition(self.texts, text, now):
             event = StatusText(now, severity, text)
             self.texts.append(event)

@@ -121,9 +121,7 @@ def no_beacon_message(settings: LinkSettings, stats: LinkStats) -> str:
 def _refusal_message(opening: str, stats: LinkStats) -> str | None:
     """The error message if frames were refused for their sender or signature; otherwise None.
 
-    Args:
-        opening: first clause of the message.
-        stats: counters of the link.
+    `opening` is its first clause.
     """
     if stats.unclaimed:
         return (

@@ -35,11 +35,7 @@ def derivatives(
 ) -> tuple[Triple, Triple, Triple]:
     """Velocity, acceleration and jerk along a curve, by the chain rule.
 
-    Args:
-        progress: progress along the curve.
-        first: derivative of the curve by its phase.
-        second: second derivative of the curve by its phase.
-        third: third derivative of the curve by its phase.
+    `first`, `second` and `third` are the derivatives of the curve by its phase.
     """
     _, r, s, t = progress
     return (
