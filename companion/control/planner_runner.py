@@ -82,10 +82,7 @@ class PlannerRunner:
     ) -> BodyRates:
         """Body rates for a sample, rad/s, limited: those in the command, or else the planner's.
 
-        Args:
-            sample: the sample to answer.
-            command: the command of guidance.
-            arrival_period: vehicle time from the previous usable sample to this one, s.
+        `arrival_period`: vehicle time from the previous usable sample to this one, s.
 
         Raises:
             AttitudeError: the planner cannot use this attitude or target.

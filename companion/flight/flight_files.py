@@ -140,10 +140,8 @@ class FlightFiles:
     ) -> Summary:
         """The summary of a finished flight, before its log is closed. Also saves the learned drag.
 
-        Args:
-            assembled: the flight.
-            result: "ok", or the reason why it ended early.
-            grants: which requested real-time settings were granted.
+        `result`: "ok", or the reason why it ended early. `grants`: which requested real-time
+        settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.measure_whole_flight()

@@ -24,10 +24,8 @@ async def connected(
 
     Only one flight at a time may be connected to a link.
 
-    Args:
-        assembled: the flight.
-        beside: more to run meanwhile; an exception in it, or in the reporter, is noted as an event
-            and does not end the flight.
+    `beside`: more to run meanwhile; an exception in it, or in the reporter, is noted as an event
+    and does not end the flight.
     """
 
     async def run_guarded(work: Coroutine[Any, Any, None]) -> None:

@@ -171,10 +171,8 @@ class LinearGuidance:
     ) -> LinearCommand:
         """Compute the target and the vertical acceleration of one guidance step.
 
-        Args:
-            reference_at: the reference over time; it is also read shortly before and after `time`.
-            time: the present time, s.
-            inputs: motion, thrust and disturbance of the vehicle.
+        `reference_at`: the reference over time; it is also read shortly before and after `time`.
+        `time`: the present time, s.
         """
         reference, settings = reference_at(time), self._settings
         ahead = reference_at(time + settings.thrust_lag)

@@ -82,10 +82,8 @@ def _is_repetition(texts: deque[StatusText], text: str, now: float) -> bool:
 def status_texts(text: str, severity: int, text_id: int) -> list[Message]:
     """The STATUSTEXTs of an ASCII text: a long one in pieces of 50 characters, the last shorter.
 
-    Args:
-        text: the text.
-        severity: MAV_SEVERITY.
-        text_id: number that joins the pieces of one text, 1..65535; not used for a single piece.
+    `severity`: MAV_SEVERITY. `text_id`: number that joins the pieces of one text, 1..65535; not
+    used for a single piece.
     """
     if len(text) <= _CHUNK_CHARACTERS:
         return [dialect.MAVLink_statustext_message(severity, text.encode("ascii"))]

@@ -210,9 +210,7 @@ async def open_session(
 ) -> AsyncIterator[PreflightSession]:
     """Open the link. Until the session requests something, we send only heartbeats and TIMESYNC.
 
-    Args:
-        config: configuration of the flight.
-        make_link: makes the link; its argument takes the link's notices.
+    `make_link`: makes the link; its argument takes the link's notices.
 
     Raises:
         EndpointError: the endpoint cannot be opened.

@@ -87,10 +87,8 @@ class Px4Commander:
         A disarmed vehicle enters every mode (arming may fail then). An armed one refuses a mode
         that cannot run.
 
-        Args:
-            mode: requested mode.
-            takeoff_z: down position where TAKEOFF ends, m; None = MIS_TAKEOFF_ALT above home.
-            hold_position: position to hold in LOITER, m NED; None = where the vehicle can stop.
+        `takeoff_z`: down position where TAKEOFF ends, m; None = MIS_TAKEOFF_ALT above home.
+        `hold_position`: position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         state = self._state
         if state.armed and not self._can_run(mode):

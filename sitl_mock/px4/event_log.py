@@ -140,10 +140,8 @@ class Announcer:
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"") -> None:
         """Announce an event.
 
-        Args:
-            kind: kind of the event.
-            detail: replaces the placeholder in the event's text.
-            arguments: packed arguments that replace the constant ones of the event.
+        `detail`: replaces the placeholder in the event's text. `arguments`: packed arguments that
+        replace the constant ones of the event.
         """
         event = PX4_EVENTS[kind]
         if event.event_id:

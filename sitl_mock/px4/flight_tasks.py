@@ -35,10 +35,8 @@ class FlightTasks:
     ) -> None:
         """Begin a mode from the estimated position, velocity and heading.
 
-        Args:
-            mode: the mode to begin.
-            takeoff_z: down position at which TAKEOFF ends, m; None = unchanged.
-            hold_position: position to hold in LOITER, m NED; None = where the vehicle can stop.
+        `takeoff_z`: down position at which TAKEOFF ends, m; None = unchanged. `hold_position`:
+        position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         estimate = self._state.estimate
         self._entered_us = self._state.time_us
