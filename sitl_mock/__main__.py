@@ -24,7 +24,6 @@ EXIT_USAGE = 2
 _STATUS_PERIOD_S = 0.25
 
 _END_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that end the vehicles."""
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -20,10 +20,6 @@ from sitl_mock.simulation import Simulation
 class Connections:
     """The endpoints, each with its link, and the control channel.
 
-    Args:
-        simulation: the vehicle, on which the control channel acts.
-        exchange: takes arriving datagrams, and provides datagrams to send.
-
     Attributes:
         companion: the companion's endpoint.
 

@@ -28,7 +28,6 @@ class Server:
     """Runs one vehicle in real time or in lockstep.
 
     Args:
-        settings: settings of this vehicle (see `MockSettings.for_vehicle`).
         show_status: shows the running vehicle after each slot, None = headless.
 
     Raises:

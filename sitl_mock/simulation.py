@@ -30,9 +30,6 @@ COMMANDER_PERIOD_US = 50_000
 class Simulation:
     """One vehicle with its autopilot.
 
-    Args:
-        plant: computes the physics, see `Vehicle`.
-
     Attributes:
         vehicle: the simulated vehicle: true motion, battery and sensors.
         state: the estimate, modes and targets of its autopilot.

@@ -54,9 +54,7 @@ class SharedLoop:
         """Call `callback(*args)` at once."""
         callback(*args)
 
-    def post_to_program(self, callback: Callable[[*Arguments], object], *args: *Arguments) -> None:
-        """Call `callback(*args)` at once."""
-        callback(*args)
+    post_to_program = post
 
     def register_end(self, end: Callable[[], Awaitable[object]]) -> None:
         """Do nothing: the flight ends with the loop."""

@@ -99,9 +99,7 @@ class ConnectedFlight(NamedTuple):
     context: FlightContext
     """Context of the flight; the program only reads it."""
     newest_state: NewestState
-    """The newest state of the vehicle."""
     loop: FlightLoop
-    """Event loop of the flight."""
 
 
 class _PendingCall:

@@ -27,9 +27,7 @@ class AxisLead:
 
     Args:
         index: `ROLL` or `PITCH`.
-        axis: response of this axis.
         plan_delay: larger dead time of roll and pitch minus that of this axis, s.
-        plans: plans of tilt and heading.
     """
 
     __slots__ = ("_heading_change", "_index", "_lag", "_plan", "_plan_delay", "_plans", "_sigma")
@@ -90,8 +88,6 @@ class FeedForward:
     the time when they take effect.
 
     Args:
-        constants: gains and limits.
-        response: response of the vehicle's rate loop.
         longest_period: longest sample period, s.
 
     Attributes:

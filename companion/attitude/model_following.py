@@ -41,10 +41,6 @@ class ModelFollowingPlanner:
 
     Beyond the recovery angle the rates are those of `first-order`; a new plan begins below it.
 
-    Args:
-        constants: gains and limits.
-        response: response of the vehicle's rate loop.
-
     Attributes:
         plan_in_effect: the plan in effect at the newest sample; None before the first sample and
             beyond the recovery angle.

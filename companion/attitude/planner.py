@@ -36,7 +36,6 @@ class Planner(Protocol):
         Raises:
             AttitudeError: the input cannot be used; nothing is sent for this sample.
         """
-        ...
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
         """Note an attitude target (ATTITUDE_TARGET), `age` s older than the newest sample.
@@ -44,14 +43,12 @@ class Planner(Protocol):
         Called only for an autopilot that applies body rates along the axes of its attitude target
         (ArduPilot). Other autopilots apply body rates along the axes of the body.
         """
-        ...
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Begin a new plan at `q`: after a gap, a change of mode, or a jump of the estimate.
 
         `body_rates`: measured rates, rad/s; None: unknown.
         """
-        ...
 
 
 _NO_TARGET = object()

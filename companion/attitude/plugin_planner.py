@@ -13,7 +13,6 @@ class PluginPlanner:
     """Checks the planner of another package and limits its body rates.
 
     Args:
-        planner: planner of another package.
         limits: limits of the body rates; `max_tilt` is not applied.
     """
 

@@ -80,7 +80,6 @@ class ReferenceModel:
     that case, if the body rates are limited, v changes by at most `_LARGEST_RATE_CHANGE` within τ.
 
     Args:
-        constants: gains and limits.
         lag: τ, s.
         acceleration: slew limit of the autopilot, rad/s².
         sigma: σ, s²; 0 if the lag of the vehicle is of first order.

@@ -15,7 +15,6 @@ class HeadingModel:
     """Plans the heading ψ: ψ̈ = (v − ψ̇)/τ, v = k·(ψ_d − ψ) + ψ̇_d; v has a limit and a slew limit.
 
     Args:
-        constants: gains and limits.
         yaw: the vehicle's response in yaw; τ is its lag.
 
     Attributes:
@@ -55,9 +54,6 @@ class HeadingModel:
 
 class YawModel:
     """Predicts the yaw of the body from the yaw rates sent: slew limit, then lag, no dead time.
-
-    Args:
-        response: response of the yaw axis.
 
     Attributes:
         rate: predicted yaw rate, rad/s.
@@ -106,9 +102,6 @@ class TargetFrame:
     A yaw rate turns the attitude target at once, within its slew limit; the body follows 0.2 s
     later. ATTITUDE_TARGET reports the target's heading; `advance` adds the turn by the rates sent
     since then.
-
-    Args:
-        response: response of the vehicle's rate loop.
     """
 
     __slots__ = (

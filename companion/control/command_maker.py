@@ -1,5 +1,6 @@
 """Makes the command of one guidance step from the reference and the estimated motion."""
 
+from dataclasses import dataclass, field
 from functools import cache
 from math import isfinite
 
@@ -13,33 +14,21 @@ from companion.guidance import GRAVITY, GuidanceInput, Reference
 from companion.guidance.linear import Guidance
 
 
+@dataclass(eq=False)
 class CommandMaker:
-    """Asks guidance or predictive control for a command; limits its tilt so that height is held.
+    """Asks guidance or predictive control for a command; limits its tilt so that height is held."""
 
-    Args:
-        guidance: makes targets from references.
-        flown_source: provides the reference.
-        estimate: provides the state of the vehicle; is given the commanded vertical thrust.
-        learning: provides the largest tilt and the thrust limits.
-        period: period of guidance, s.
-
-    Attributes:
-        guidance: makes targets from references.
-        predictive_control: flies trajectories instead of `guidance`; None: `guidance` flies them.
-    """
-
-    def __init__(
-        self,
-        guidance: Guidance,
-        flown_source: FlownSource,
-        estimate: MotionEstimate,
-        learning: HoverLearning,
-        period: float,
-    ) -> None:
-        self.guidance = guidance
-        self.predictive_control: PredictiveControl | None = None
-        self._flown_source, self._estimate, self._learning = flown_source, estimate, learning
-        self._period = period
+    guidance: Guidance
+    """Makes targets from references."""
+    _flown_source: FlownSource
+    _estimate: MotionEstimate
+    """Provides the state of the vehicle; is given the commanded vertical thrust."""
+    _learning: HoverLearning
+    """Provides the largest tilt and the thrust limits."""
+    _period: float
+    """Period of guidance, s."""
+    predictive_control: PredictiveControl | None = field(default=None, init=False)
+    """Flies trajectories instead of `guidance`; None: `guidance` flies them."""
 
     def guidance_input(self, now: float) -> GuidanceInput:
         """Estimate the motion at `now` (s of event-loop time) and when a command takes effect.

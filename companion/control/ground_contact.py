@@ -21,7 +21,6 @@ class GroundContact:
     height or vertical speed contradict the flag.
 
     Args:
-        state: the vehicle's telemetry.
         clock: returns event-loop time, s.
 
     Attributes:

@@ -1,5 +1,6 @@
 """Ends a maneuver or a commanded motion by a hold: the vehicle brakes, and holds where it stops."""
 
+from dataclasses import dataclass, field
 from math import degrees, tan
 
 from companion.attitude import Quaternion
@@ -12,33 +13,22 @@ from companion.guidance.braking import AssumedBraking, Braking, brake, brake_upw
 from companion.guidance.reference import NorthEast
 
 
+@dataclass(eq=False)
 class Hold:
-    """Begins a hold on request, or when open-loop body rates tilt the vehicle too far.
+    """Begins a hold on request, or when open-loop body rates tilt the vehicle too far."""
 
-    Args:
-        flown_source: what guidance flies; the hold replaces it.
-        maker: provides the estimated motion of the vehicle.
-        learning: learns the hover thrust, which limits the tilt at which the height is held.
-        max_tilt: largest tilt in open loop, rad.
-        assumed_braking: reaction time and deceleration that the monitors of the fence assume.
-
-    Attributes:
-        max_tilt: largest tilt in open loop, rad; it may change in flight.
-        give_up_reason: why a source was given up because of its tilt, or None.
-    """
-
-    def __init__(
-        self,
-        flown_source: FlownSource,
-        maker: CommandMaker,
-        learning: HoverLearning,
-        max_tilt: float,
-        assumed_braking: AssumedBraking,
-    ) -> None:
-        self.max_tilt = max_tilt
-        self.give_up_reason: str | None = None
-        self._flown_source, self._maker, self._learning = flown_source, maker, learning
-        self._assumed_braking = assumed_braking
+    _flown_source: FlownSource
+    """What guidance flies; the hold replaces it."""
+    _maker: CommandMaker
+    """Provides the estimated motion of the vehicle."""
+    _learning: HoverLearning
+    """Learns the hover thrust, which limits the tilt at which the height is held."""
+    max_tilt: float
+    """Largest tilt in open loop, rad."""
+    _assumed_braking: AssumedBraking
+    """Reaction time and deceleration that the monitors of the fence assume."""
+    give_up_reason: str | None = field(default=None, init=False)
+    """Why a source was given up because of its tilt, or None."""
 
     def begin(self, now: float, heading: float) -> None:
         """Brake, and hold this heading (rad) at the place where the vehicle stops.

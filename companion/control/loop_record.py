@@ -97,7 +97,6 @@ class LoopRecord:
     samples: int = 0
     """Samples received while the loop was on."""
     setpoints: int = 0
-    """Setpoints sent."""
     missed_deadlines: int = 0
     """Setpoints sent later than `Deadlines.deadline` after their sample."""
     unanswered: dict[Unanswered, int] = field(default_factory=lambda: dict.fromkeys(Unanswered, 0))

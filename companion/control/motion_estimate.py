@@ -33,9 +33,6 @@ class MotionEstimate:
     """Passes measurements to the motion observer, on the vehicle's clock; predicts the motion.
 
     Args:
-        observer: estimates position, velocity and disturbance.
-        correction: corrects the measured positions.
-        drag: estimates the drag.
         offset: returns vehicle time minus event-loop time, s, or None before the first attitude.
 
     Attributes:

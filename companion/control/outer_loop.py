@@ -71,10 +71,7 @@ def make_guidance(config: Config) -> Guidance:
 def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:
     """Check guidance of another package: ask it once to hold a vehicle that is at rest.
 
-    Args:
-        kind: name of the guidance in `guidance.kind`.
-        guidance: the guidance.
-        thrust: smallest and largest specific thrust, m/s².
+    `kind`: its name in `guidance.kind`. `thrust`: smallest and largest specific thrust, m/s².
 
     Raises:
         ConfigError: the guidance raises, or does not return a `LinearCommand` of finite numbers.
@@ -127,9 +124,7 @@ def linear_settings(config: Config) -> LinearSettings:
 def motion_estimate(config: Config, offset: Callable[[], float | None]) -> MotionEstimate:
     """The motion estimate with its observer, position correction and drag estimate.
 
-    Args:
-        config: configuration of the flight.
-        offset: returns vehicle time minus event-loop time, s; None: not known yet.
+    `offset`: returns vehicle time minus event-loop time, s; None: not known yet.
     """
     return MotionEstimate(
         MotionObserver(observer_settings(config)),
@@ -166,10 +161,8 @@ def make_predictive_control(
 def predictive_settings(config: Config, *, vehicle_waits: bool = False) -> Settings:
     """The settings of predictive control: response and limits of the vehicle.
 
-    Args:
-        config: configuration of the flight.
-        vehicle_waits: whether the vehicle waits for the solver, whose deadline is then longer than
-            the period of guidance.
+    `vehicle_waits`: whether the vehicle waits for the solver, whose deadline is then longer than
+    the period of guidance.
 
     Raises:
         ConfigError: the planner's response is too fast for the steps of the horizon, or gravity

@@ -30,9 +30,7 @@ class PlannerRunner:
     During open-loop steps, and for seconds after them, this frame is the `StepFrame`.
 
     Args:
-        planner: the planner.
         resets: the estimator resets, which the planner must not see.
-        limits: limits of all body rates.
 
     Attributes:
         attitude_target: returns the newest ATTITUDE_TARGET of an autopilot that takes body rates
@@ -84,10 +82,7 @@ class PlannerRunner:
     ) -> BodyRates:
         """Body rates for a sample, rad/s, limited: those in the command, or else the planner's.
 
-        Args:
-            sample: the sample to answer.
-            command: the command of guidance.
-            arrival_period: vehicle time from the previous usable sample to this one, s.
+        `arrival_period`: vehicle time from the previous usable sample to this one, s.
 
         Raises:
             AttitudeError: the planner cannot use this attitude or target.

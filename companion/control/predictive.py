@@ -24,7 +24,6 @@ class FollowedTrajectory(NamedTuple):
     """The trajectory maneuver that is flown at present."""
 
     maneuver: Follow
-    """The maneuver that flies the trajectory."""
     time: float
     """Time since the maneuver began, s."""
     pose: Pose
@@ -92,11 +91,7 @@ class PredictiveControl:
         The solver works in the estimator's frame, whose heading jumps at each reset. The solver's
         target is constant for a period, which its model takes into account.
 
-        Args:
-            linear_command: command of linear guidance.
-            frame: the frame without heading resets.
-            vehicle: present state of the vehicle.
-            followed: the trajectory that is followed, or None.
+        `frame`: the frame without heading resets.
         """
         target, down = linear_command.target, linear_command.down
         target = target._replace(heading=frame.estimated_heading(target.heading))

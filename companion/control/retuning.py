@@ -27,11 +27,8 @@ class LoopSettings(NamedTuple):
     """The values of a configuration that may change in flight, computed for the loops."""
 
     guidance: LinearSettings
-    """Settings of linear guidance."""
     observer: ObserverSettings
-    """Settings of the motion observer."""
     correction: CorrectionSettings
-    """Settings of the position correction."""
     constants: Constants
     """Gains and limits of the planner."""
     limits: Limits
@@ -60,10 +57,6 @@ class Retuning:
     """Applies the values of a configuration to the loops of a flight.
 
     Only the keys that may change in flight have an effect; see `companion.config.in_flight`.
-
-    Args:
-        loop: the control loop.
-        guidance_loop: the guidance loop.
     """
 
     def __init__(self, loop: ControlLoop, guidance_loop: GuidanceLoop) -> None:

@@ -22,9 +22,7 @@ class SampleRecorder:
     the flight is not recorded in a file, `answer` suffices.
 
     Args:
-        trace: the trace of the flight, and its file.
         planner: provides the planner's input, and reports each new ATTITUDE_TARGET.
-        limits: limits of the body rates.
         thrust_limits: smallest and largest thrust that is sent, 0..1.
         clock: returns event-loop time, s.
 

@@ -82,7 +82,6 @@ class SampleRows:
     """Writes the numeric channels of the control loop.
 
     Args:
-        limits: limits of the body rates.
         thrust_limits: smallest and largest thrust that is sent, 0..1.
     """
 

@@ -16,11 +16,6 @@ from companion.recording.trace import FlightTrace
 class StepRecorder:
     """Records each guidance step, and the beginning of each maneuver.
 
-    Args:
-        trace: the trace of the flight, and its file.
-        flown_source: the source that guidance flies.
-        vehicle: what the steps read.
-
     Attributes:
         note: called with a message for each maneuver that begins.
     """

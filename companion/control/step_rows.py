@@ -27,7 +27,6 @@ class StepFlags(NamedTuple):
     """State of the vehicle at a guidance step."""
 
     fresh: bool
-    """Whether the position is fresh."""
     standing: bool
     """Whether the vehicle stands on the ground."""
     may_idle: bool
@@ -42,17 +41,14 @@ class StepInput(NamedTuple):
     time: float
     """When the step began, s of event-loop time."""
     position: LocalPosition | None
-    """The newest position."""
     clock_offset: float | None
     """Vehicle time minus event-loop time, s."""
     battery: Battery | None
-    """Battery of the vehicle."""
     autopilot_thrust: AttitudeTargetThrust | None
     """Thrust in ATTITUDE_TARGET."""
     height: float | None
     """Height above home, m."""
     armed: bool | None
-    """Whether the vehicle is armed."""
     flags: StepFlags
     """State of the vehicle at the step."""
 
@@ -67,7 +63,6 @@ class StepOutput(NamedTuple):
     inputs: GuidanceInput
     """Motion, wind and drag at the step."""
     reference: Reference
-    """Reference of the step."""
     error: float | None
     """Distance from the reference, m; None as in `FlownSource.tracking_error`."""
 

@@ -11,27 +11,22 @@ class Telemetry(Protocol):
     @property
     def position(self) -> LocalPosition | None:
         """The newest position."""
-        ...
 
     @property
     def battery(self) -> Battery | None:
         """The newest state of the battery."""
-        ...
 
     @property
     def attitude_target_thrust(self) -> AttitudeTargetThrust | None:
         """The newest thrust in ATTITUDE_TARGET: the autopilot's own, or ours in offboard."""
-        ...
 
     @property
     def height(self) -> float | None:
         """Height above home, m."""
-        ...
 
     @property
     def armed(self) -> bool | None:
         """Whether the vehicle is armed; None: unknown."""
-        ...
 
 
 class Ground(Protocol):
@@ -40,12 +35,10 @@ class Ground(Protocol):
     @property
     def standing(self) -> bool:
         """Whether the vehicle stands on the ground."""
-        ...
 
     @property
     def may_idle(self) -> bool:
         """Whether zero thrust is safe."""
-        ...
 
 
 class Clock(Protocol):
@@ -54,22 +47,18 @@ class Clock(Protocol):
     @property
     def offset(self) -> float | None:
         """Vehicle time minus event-loop time, s; None: not known yet."""
-        ...
 
     def age(self, vehicle_time: float, now: float) -> float | None:
         """Age, at event-loop time `now`, of a message stamped `vehicle_time`, s; None: unknown."""
-        ...
 
 
 class GuidedVehicle(NamedTuple):
     """The vehicle as guidance reads it."""
 
     state: Telemetry
-    """Telemetry of the vehicle."""
     ground: Ground
     """Tells whether the vehicle stands on the ground."""
     clock: Clock
-    """The vehicle's clock."""
 
     def fresh_position(self, now: float, max_age: float) -> LocalPosition | None:
         """The newest position; None if its arrival or measurement is over `max_age` s before `now`.

@@ -67,9 +67,6 @@ class Changes:
         on_change: called with `wanted_config` after each change.
         on_drag: called with the known drag of the vehicle, once its hardware id was read; some
             checks of a change need it.
-
-    Args:
-        start_config: the configuration before the first change.
     """
 
     def __init__(self, start_config: Config) -> None:

@@ -44,10 +44,7 @@ def in_role(link: Link, role: Role) -> bool:
 def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     """Release control if the present mode has none of the allowed roles.
 
-    Args:
-        link: link to the vehicle.
-        allowed: roles, of which the present mode needs one.
-        released_by: client in control that has just commanded another mode; "": none.
+    `released_by`: client in control that has just commanded another mode; "": none.
 
     Raises:
         ControlReleased: the client in control commanded that mode.
@@ -87,11 +84,8 @@ async def command_if_ours(
     A command is never repeated blindly. The vehicle may have obeyed a command whose answer was
     lost, and a pilot may have taken over since.
 
-    Args:
-        context: context of the flight.
-        command: command to send.
-        require_ours: called before each try; if it raises, nothing is sent.
-        done: see `IsDone`; called before a repetition.
+    `require_ours`: called before each try; if it raises, nothing is sent. `done`: see `IsDone`;
+    called before a repetition.
 
     Raises:
         FlightEnded: somebody else has the vehicle, or another vehicle answers.
@@ -179,9 +173,7 @@ async def leave_offboard(
     began there. PX4's pre-arm checks fail in AUTO.LAND, and in OFFBOARD without setpoints
     (measured). Other modes and armed vehicles are left alone.
 
-    Args:
-        context: context of the flight.
-        cannot_arm_in: roles of the modes to leave.
+    `cannot_arm_in`: roles of the modes to leave.
 
     Raises:
         FlightEnded: somebody else armed it or changed its mode, or it refuses to hold.

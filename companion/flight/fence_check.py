@@ -11,7 +11,7 @@ import numpy as np
 
 from companion.guidance.fence import Breach, Fence, Place
 from companion.guidance.reference import Vector
-from companion.guidance.trajectory.demand import Motion
+from companion.guidance.trajectory.demand import Motion, columns
 from companion.guidance.trajectory.feasibility import Violation
 from companion.guidance.trajectory.septic_spline import Floats
 
@@ -53,10 +53,10 @@ class FenceCheck:
 
     def _worst_breach(self, motion: Motion) -> tuple[float, Breach] | None:
         """The worst breach and its time, s."""
-        columns = self.fence.stopping_point(
-            _columns(motion.position), _columns(motion.velocity), _horizontal(motion.acceleration)
+        stopping_point = self.fence.stopping_point(
+            columns(motion.position), columns(motion.velocity), _horizontal(motion.acceleration)
         )
-        stops = np.stack(columns, axis=1)
+        stops = np.stack(stopping_point, axis=1)
         breaches = [
             (motion.times[k], breach)
             for k in self._candidate_indices(stops)
@@ -123,10 +123,6 @@ def _remedy(slowing_helps: bool) -> str:
             "fly it more slowly (--slow-down finds how much for a trajectory), or widen the fence"
         )
     return "shrink it or widen the fence"
-
-
-def _columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
-    return vectors[:, 0], vectors[:, 1], vectors[:, 2]
 
 
 def _horizontal(vectors: Floats) -> tuple[Floats, Floats]:

@@ -33,10 +33,7 @@ class Flight:
         events: (time since the flight began, s; text) of each event.
 
     Args:
-        context: context of the flight.
-        plan: provides the phases.
         watch: runs the safety monitors beside the phases.
-        observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
     """
 

@@ -70,11 +70,7 @@ def facts_of(
 ) -> FlightFacts:
     """The facts of a finished flight.
 
-    Args:
-        assembled: the flight.
-        result: result of the flight.
-        advice_texts: advice of the flight; see `advice`.
-        drag_kept: see `advice`.
+    `advice_texts`: advice of the flight; see `advice`. `drag_kept`: see `advice`.
     """
     flight, context, reporter = assembled.flight, assembled.context, assembled.reporter
     state, began, config = context.link.state, flight.began, context.config

@@ -33,14 +33,11 @@ class FlightFiles:
     and the summary by `save`.
 
     Args:
-        config: configuration of the flight.
-        folder: existing folder for the files; None: nothing is written.
-        environment: environment of the flight.
         note: called with a failure of the recording.
         flies_maneuvers: whether the maneuvers of the configuration are flown.
 
     Attributes:
-        folder: folder of the files, or None.
+        folder: existing folder for the files; None: nothing is written.
         tap: records frames; None if they are not recorded.
         mcap: records the flight, or None.
 
@@ -143,10 +140,8 @@ class FlightFiles:
     ) -> Summary:
         """The summary of a finished flight, before its log is closed. Also saves the learned drag.
 
-        Args:
-            assembled: the flight.
-            result: "ok", or the reason why it ended early.
-            grants: which requested real-time settings were granted.
+        `result`: "ok", or the reason why it ended early. `grants`: which requested real-time
+        settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.measure_whole_flight()

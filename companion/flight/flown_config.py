@@ -28,10 +28,8 @@ def record(config: Config, folder: Path, *, flies_maneuvers: bool = True) -> Non
     The file contains the keys of included files. Other files, such as a signing key, are not
     copied; they are named by their absolute path.
 
-    Args:
-        config: configuration of the flight, whose trajectory was read without error.
-        folder: folder of the flight.
-        flies_maneuvers: whether the maneuvers of the configuration are flown, and its trajectory.
+    `config`: configuration of the flight, whose trajectory was read without error.
+    `flies_maneuvers`: whether the maneuvers of the configuration are flown, and its trajectory.
 
     Raises:
         ConfigError: the trajectory's file has changed and holds no trajectory.

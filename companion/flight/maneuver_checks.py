@@ -42,11 +42,6 @@ _SLOWER_IN_PROGRAM = (
 def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
     """Check a maneuver other than a trajectory against the fence; a circle also against limits.
 
-    Args:
-        config: configuration of the flight.
-        part: the maneuver.
-        drag: drag of the vehicle.
-
     Raises:
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """
@@ -64,11 +59,7 @@ def require_inside(
 ) -> None:
     """Check that all maneuvers stay inside the fence, including one in latitude and longitude.
 
-    Args:
-        config: configuration of the flight.
-        parts: the maneuvers.
-        origin: geographic position where control begins, or None.
-        drag: drag of the vehicle.
+    `origin`: geographic position where control begins, or None.
 
     Raises:
         ConfigError: a maneuver leaves the fence, or could not stop inside it.
@@ -80,11 +71,8 @@ def require_inside(
 def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: KnownDrag) -> None:
     """Check a trajectory that a program flies from the present place against limits and fence.
 
-    Args:
-        config: configuration of the flight.
-        maneuver: `Follow` or `HeldHeadingManeuver`.
-        begin: start of the trajectory relative to where control began, m NED.
-        drag: drag of the vehicle.
+    `maneuver`: `Follow` or `HeldHeadingManeuver`. `begin`: start of the trajectory relative to
+    where control began, m NED.
 
     Raises:
         ConfigError: the trajectory cannot be computed, or not be flown within the limits and the
@@ -118,10 +106,8 @@ def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: Know
 
     The check uses the trajectory that is flown; it is not read or slowed down again.
 
-    Args:
-        config: the changed configuration; its maneuvers are those of `sequence`.
-        sequence: the maneuvers that were made when the flight began.
-        drag: drag of the vehicle.
+    `config`: the changed configuration; its maneuvers are those of `sequence`. `sequence`: the
+    maneuvers that were made when the flight began.
 
     Raises:
         ConfigError: a maneuver cannot be computed, or not be flown within the limits and the

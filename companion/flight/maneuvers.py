@@ -21,11 +21,8 @@ from companion.guidance.trajectory import slow_down, violations
 def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> ManeuverSequence:
     """The sequence of maneuvers from `flight.maneuvers`, checked against limits and fence.
 
-    Args:
-        config: configuration of the flight.
-        drag: drag of the vehicle; None: drag of the vehicle that flew last. A flight checks again
-            with the vehicle's own drag as soon as it is known
-            (`maneuver_checks.require_still_flyable`).
+    `drag`: drag of the vehicle; None: drag of the vehicle that flew last. A flight checks again
+    with the vehicle's own drag as soon as it is known (`maneuver_checks.require_still_flyable`).
 
     Raises:
         ConfigError: a trajectory cannot be read, or a maneuver cannot be flown within the limits

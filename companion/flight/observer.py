@@ -12,19 +12,15 @@ class Observer(Protocol):
 
     def phase(self, name: str, waits_for: str) -> None:
         """A phase began; `waits_for` names the condition that ends it, as shown to the user."""
-        ...
 
     def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
         """Once a second: name of the phase, what it waits for, elapsed time and timeout (s)."""
-        ...
 
     def status(self, status: FlightStatus) -> None:
         """Ten times a second: the state of the flight."""
-        ...
 
     def event(self, time: float, text: str) -> None:
         """An event, `time` s after the flight began."""
-        ...
 
 
 class SilentObserver:
@@ -44,11 +40,7 @@ class SilentObserver:
 
 
 class SeveralObservers:
-    """Passes everything to several observers, in order.
-
-    Args:
-        observers: the observers.
-    """
+    """Passes everything to several observers, in order."""
 
     def __init__(self, *observers: Observer) -> None:
         self._observers = observers
@@ -92,7 +84,6 @@ class EventRecorder:
         note: called once if the other observer fails, to make it an event of the flight.
 
     Args:
-        observer: the other observer.
         clock: our clock, s.
         write: records a text with the present time.
         file: `flight.mcap`; None: the flight is not recorded.

@@ -20,11 +20,9 @@ class Phase:
     waits_for: str
     """The condition that ends the phase, shown to the user."""
     work: Work
-    """The coroutine of the phase."""
     timeout: float
     """Time after which the phase has failed, s; may be infinite."""
     on_failure: Exit = Exit.LEAVE
-    """The exit if the phase fails."""
     on_failure_on_ground: Exit | None = None
     """The exit if the phase fails while the vehicle is on the ground; None: `on_failure`."""
     allowed_roles: frozenset[Role] = frozenset()

@@ -29,18 +29,13 @@ class Plan(Protocol):
     @property
     def maneuvers(self) -> ManeuverSequence:
         """The maneuvers known before the flight; the preflight checks judge them."""
-        ...
 
     def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """The phases of the flight; requested again when the checks must be repeated."""
-        ...
 
 
 class ConfiguredPlan:
     """The plan of `companion fly`: take off, or take over from the pilot; fly the maneuvers; end.
-
-    Args:
-        config: configuration of the flight.
 
     Attributes:
         drag: drag assumed for the maneuvers.

@@ -40,9 +40,6 @@ class PreflightChecks:
         drag_of: called with the vehicle's identity; returns what is known of its drag.
 
     Args:
-        config: configuration of the flight.
-        link: link to the vehicle.
-        replacement_detector: detects a replaced vehicle.
         maneuvers: copy of the maneuvers of the flight, used only by the checks.
     """
 

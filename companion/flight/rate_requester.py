@@ -33,10 +33,6 @@ class RateRequester:
 
     Attributes:
         note: called with messages about requests and their errors.
-
-    Args:
-        link: link to the vehicle.
-        link_config: section `link` with the wanted and the smallest rates.
     """
 
     def __init__(self, link: Link, link_config: LinkConfig) -> None:

@@ -25,9 +25,7 @@ class Session:
     always written.
 
     Args:
-        config: configuration of the flight.
         folder: an existing folder for this flight's files; None: nothing is recorded.
-        observer: receives phases and events.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
         plan: plan of the flight; None: the configured one.
         environment: clocks and transports of this computer, or their replacement in tests.

@@ -33,7 +33,6 @@ class FlightStatus(NamedTuple):
     airborne_time: float | None
     """Time since the vehicle left the ground, s."""
     phase: str
-    """Name of the phase."""
     detail: str
     """What the phase waits for."""
     elapsed: float
@@ -62,7 +61,6 @@ class FlightStatus(NamedTuple):
     missed_deadlines: int | None = None
     """Deadlines missed so far; None in lockstep."""
     battery: Battery | None = None
-    """Battery of the vehicle."""
     monitored: bool = False
     """Whether the safety monitors are active."""
     alarms: tuple[str, ...] = ()
@@ -77,17 +75,14 @@ class StatusReporter:
     Attributes:
         takeoff: time when the vehicle left the ground, s on our clock; None: it has not.
         battery_at_takeoff: remaining charge at that time, 0..1, or None.
-        real_time: whether latencies are meaningful.
+        real_time: whether latencies are meaningful: False if the vehicle waits for us.
 
     Args:
-        context: context of the flight.
         ladder: tells which safety monitors have raised an alarm.
-        trace: receives the motion.
         began: when the flight began, s on our clock.
         phase: returns the running phase, and when it began, s on our clock.
         show: called with the state; it must return at once. None: the state is not shown.
         clock: our clock, s.
-        real_time: whether latencies are meaningful: False if the vehicle waits for us.
     """
 
     def __init__(

@@ -27,8 +27,6 @@ class StatusRows:
     """Records thrust ten times a second, and resources and link once a second.
 
     Args:
-        context: context of the flight.
-        recorder: recorder of the flight, or None.
         clock: our clock, s.
     """
 
@@ -88,12 +86,7 @@ class StatusRows:
 
 
 class _FenceDrawing:
-    """Records the fence as a wireframe, every 10 s from the beginning of control on.
-
-    Args:
-        context: context of the flight.
-        recorder: recorder of the flight.
-    """
+    """Records the fence as a wireframe, every 10 s from the beginning of control on."""
 
     def __init__(self, context: FlightContext, recorder: FlightRecorder) -> None:
         self._context, self._recorder = context, recorder

@@ -29,7 +29,6 @@ class ReplacementDetector:
     on the link, a restarted clock, another hardware id, or a long silence.
 
     Args:
-        link: link to the vehicle.
         clock: our clock, s.
 
     Attributes:
@@ -125,9 +124,7 @@ class DragMemory:
     A configured drag takes precedence. A vehicle without a hardware id is not remembered.
 
     Args:
-        config: configuration of the flight.
         directory: folder of the flights; None: nothing is remembered.
-        estimate: the drag estimate.
         note: called with messages for the user.
 
     Attributes:

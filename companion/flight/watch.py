@@ -26,9 +26,7 @@ class Watch:
     """Detects what the control loop cannot: silence, pilot takeovers, breaches of safety limits.
 
     Args:
-        context: context of the flight.
         ladder: judges the snapshots while the autopilot obeys us.
-        rate_requester: requests telemetry rates that have become too low.
         clock: our clock, s.
     """
 

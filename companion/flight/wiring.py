@@ -24,10 +24,8 @@ async def connected(
 
     Only one flight at a time may be connected to a link.
 
-    Args:
-        assembled: the flight.
-        beside: more to run meanwhile; an exception in it, or in the reporter, is noted as an event
-            and does not end the flight.
+    `beside`: more to run meanwhile; an exception in it, or in the reporter, is noted as an event
+    and does not end the flight.
     """
 
     async def run_guarded(work: Coroutine[Any, Any, None]) -> None:
@@ -104,7 +102,6 @@ class StateLogger:
     The first call notes the present mode and arming state, but no text from before.
 
     Args:
-        state: telemetry of the vehicle.
         note: called with each change as a sentence.
     """
 

@@ -14,7 +14,6 @@ slew limit could not be told from a lag."""
 _REST_TIME = 0.5
 """Time of zero rates after a doublet of body rates, in which the slowest axis comes to rest, s."""
 _CLIMB_COUNT = 3
-"""Number of climb doublets."""
 
 
 class _Doublet(NamedTuple):

@@ -115,10 +115,8 @@ class HoverThrust:
     ) -> float:
         """Normalised thrust for a wanted vertical acceleration, clamped to `limits`.
 
-        Args:
-            acceleration_down: wanted acceleration by thrust and gravity, m/s², positive down.
-            q: attitude.
-            body_rates: measured body rates, rad/s.
+        `acceleration_down`: wanted acceleration by thrust and gravity, m/s², positive down.
+        `body_rates`: measured body rates, rad/s.
         """
         settings = self._settings
         cosine = predicted_cos_tilt(q, body_rates, settings.lag)

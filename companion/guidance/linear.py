@@ -106,13 +106,11 @@ class Guidance(Protocol):
 
         `GuidanceInput.predicted` is the motion after this delay.
         """
-        ...
 
     def command(
         self, reference_at: ReferenceAt, time: float, inputs: GuidanceInput
     ) -> LinearCommand:
         """Compute the command of one guidance step; see `LinearGuidance.command`."""
-        ...
 
 
 class Trim:
@@ -173,10 +171,8 @@ class LinearGuidance:
     ) -> LinearCommand:
         """Compute the target and the vertical acceleration of one guidance step.
 
-        Args:
-            reference_at: the reference over time; it is also read shortly before and after `time`.
-            time: the present time, s.
-            inputs: motion, thrust and disturbance of the vehicle.
+        `reference_at`: the reference over time; it is also read shortly before and after `time`.
+        `time`: the present time, s.
         """
         reference, settings = reference_at(time), self._settings
         ahead = reference_at(time + settings.thrust_lag)
@@ -201,10 +197,7 @@ class LinearGuidance:
     def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> NorthEast:
         """Horizontal acceleration that corrects errors and disturbance, m/s².
 
-        Args:
-            now: the present reference.
-            later: the reference at the time when the feedback takes effect.
-            inputs: motion, thrust and disturbance of the vehicle.
+        `later` is the reference at the time when the feedback takes effect.
         """
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
         if now.horizontal is HorizontalMode.ACCELERATION:

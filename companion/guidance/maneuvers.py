@@ -21,16 +21,13 @@ class Maneuver(Protocol):
     @property
     def name(self) -> str:
         """Name in the configuration and in messages."""
-        ...
 
     @property
     def duration(self) -> float:
         """Duration, s."""
-        ...
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference `time` seconds after the maneuver began at `start`."""
-        ...
 
     def check_times(self) -> list[float]:
         """Times at which the maneuver is checked against limits and fence, s, ascending.
@@ -38,7 +35,6 @@ class Maneuver(Protocol):
         Raises:
             TrajectoryError: the maneuver is too long to be checked.
         """
-        ...
 
 
 def check_times_between(begin: float, end: float) -> list[float]:

@@ -58,9 +58,6 @@ class PositionCorrection:
 
     r is computed from two positions a short time apart, which amplifies their noise. Low-pass
     filters reduce the noise but delay the correction, so their time constant follows the noise.
-
-    Args:
-        settings: settings of the correction.
     """
 
     def __init__(self, settings: CorrectionSettings) -> None:

@@ -37,10 +37,7 @@ def predict(
 ) -> Iterator[PredictedMotion]:
     """The predicted motion at each of the maneuver's `check_times`, beginning at rest.
 
-    Args:
-        maneuver: the maneuver.
-        heading: heading at the beginning, rad.
-        drag: drag in still air.
+    `heading`: heading at the beginning, rad. `drag`: drag in still air.
 
     Raises:
         TrajectoryError: the maneuver is too long to be checked.

@@ -27,16 +27,13 @@ class Source(Protocol):
     @property
     def name(self) -> str:
         """Name to show to the user."""
-        ...
 
     @property
     def failure(self) -> str | None:
         """Why the source cannot continue although it has not finished; None: it can continue."""
-        ...
 
     def begin(self, now: float, pose: Pose) -> None:
         """Start at `now` from `pose`, which the vehicle holds or at which it is about to stop."""
-        ...
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The reference as a function of time; guidance calls this at least once in each period.
@@ -45,11 +42,9 @@ class Source(Protocol):
             now: time of this step of guidance.
             motion: motion of the vehicle at `now`.
         """
-        ...
 
     def finished(self, now: float) -> bool:
         """Whether the source has reached its end; `reference` can still be called after it."""
-        ...
 
 
 class ManeuverSource:
@@ -102,7 +97,6 @@ class CommandedSource:
     holds its position, and later references are not flown.
 
     Args:
-        name: who gives the references.
         max_age: largest age of a reference that is flown, s.
         begins_within: time allowed for the first reference, s.
 

@@ -28,8 +28,6 @@ class FrameFilter:
     """Passes only the vehicle's frames, and counts those that it refuses.
 
     Args:
-        settings: the vehicle's ids, and the signing key.
-        stats: counts foreign frames and bad signatures.
         notice: called once with each notice about signatures and their time stamps.
     """
 

@@ -52,7 +52,6 @@ class FrameScanner:
     Args:
         streaming: True if a frame may continue in the next call (TCP, serial). False for
             datagrams: an incomplete frame is dropped.
-        stats: counts wrong checksums and unknown messages.
         keep_unknown: whether frames of unknown messages (id not in `CRC_EXTRA`) are returned too;
             their checksum cannot be checked.
     """

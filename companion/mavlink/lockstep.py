@@ -43,11 +43,9 @@ class LockstepClock(Protocol):
 
     def read(self) -> float:
         """Event-loop time, s."""
-        ...
 
     def advance(self, vehicle_time: float) -> bool:
         """Set the vehicle time, s; return False for a repeated beacon."""
-        ...
 
 
 class _BeaconClock:

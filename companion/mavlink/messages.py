@@ -48,7 +48,6 @@ class CurrentModeMessage:
 
 
 _CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMessage}
-"""Message classes by message id."""
 
 UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
 """Ids of messages of MAVLink common that pymavlink lacks; their payloads are not decoded."""

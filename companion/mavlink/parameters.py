@@ -44,9 +44,6 @@ class ParameterClient:
     """Reads and writes single parameters.
 
     Args:
-        settings: system and component ids of the vehicle and of this program.
-        outbox: sends the requests.
-        dispatcher: delivers the answers.
         registry: ends the waits when the connection drops.
         bytewise: returns whether an integer is sent as its four bytes (PX4) instead of as a float
             (ArduPilot).

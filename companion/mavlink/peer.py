@@ -93,7 +93,6 @@ class PeerRule:
     `CLAIM_DURATION_S`, except while setpoints are sent and for 2 s after the last one.
 
     Args:
-        stats: counts the changes of the peer.
         notice: called with a sentence for the user at each change, and by `report_ignored`.
         clock: returns the event-loop time, s.
         last_setpoint: returns the event-loop time of the last setpoint, s; −inf before the first.

@@ -65,10 +65,9 @@ class Signing:
         link_id: link id in the signatures that are sent, 0..255.
         clock: returns Unix time in s; called once, at the start.
         monotonic_clock: returns the time in s that the stamps follow after the start.
-        file: keeps the newest stamps from one run to the next; `None`: they are not kept.
 
     Attributes:
-        file: see the argument.
+        file: keeps the newest stamps from one run to the next; `None`: they are not kept.
         remarks: sentences about time stamps for the user; the code that shows them removes them.
         changed: set when the time stamps should be written to the file soon.
 
@@ -162,10 +161,6 @@ class StampWriter:
     """Writes the stamps every 10 s, when a new stream is heard, and at the end, in a thread.
 
     So the event loop never waits for a disk. A failure is reported once, in `Signing.remarks`.
-
-    Args:
-        signing: holds the stamps.
-        file: the file to which the stamps are written.
     """
 
     def __init__(self, signing: Signing, file: StampFile) -> None:

@@ -49,7 +49,6 @@ class Stamps:
     date: int = 0
     """This program's date when the stamps were written."""
     newest_sent: int = 0
-    """The newest stamp that was sent."""
     streams: dict[SignatureStream, tuple[int, ...]] = field(default_factory=dict)
     """The newest stamps accepted on each stream: one near this program's date, and one far ahead of
     it, if the vehicle proved that date (see `StampJudge`)."""
@@ -72,7 +71,6 @@ class StampJudge:
     - A stamp further ahead is refused.
 
     Args:
-        kept_stamps: the stamps kept by the last run.
         clock: returns Unix time in s; called once.
         monotonic_clock: returns monotonic time in s.
 
@@ -179,9 +177,7 @@ class StampJudge:
     def _kept_stamp(self, stream: SignatureStream, ahead: bool) -> int:
         """The newest stamp of a stream on disk, ticks; 0 without one.
 
-        Args:
-            stream: the signer's stream.
-            ahead: whether to search only the stamps far ahead of the date, or only the others.
+        `ahead`: whether to search only the stamps far ahead of the date, or only the others.
         """
         stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)

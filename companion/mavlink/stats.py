@@ -60,22 +60,13 @@ class LinkStats:
     """(system, component) of the frames in `ignored_foreign`."""
 
     def refuse_non_finite(self, message: str, now: float) -> None:
-        """Count a message that was refused for a NaN or infinity.
-
-        Args:
-            message: name of the message.
-            now: event-loop time, s.
-        """
+        """Count a message (its name) refused for a NaN or infinity; `now`: event-loop time, s."""
         self.non_finite += 1
         self.non_finite_at[message] = now
 
 
 class FrameCounter:
-    """Counts the vehicle's accepted frames and the gaps in its sequence numbers (0..255, wrapping).
-
-    Args:
-        stats: takes the counts.
-    """
+    """Counts accepted frames, and the gaps in their sequence numbers (0..255, wrapping)."""
 
     def __init__(self, stats: LinkStats) -> None:
         self._stats = stats

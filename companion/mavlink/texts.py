@@ -38,13 +38,7 @@ class TextAssembler:
         self._events: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
 
     def take_event(self, severity: int, text: str, now: float) -> None:
-        """Take the text of an event.
-
-        Args:
-            severity: MAV_SEVERITY.
-            text: the text.
-            now: event-loop time, s.
-        """
+        """Take the text of an event, with its MAV_SEVERITY; `now` is event-loop time, s."""
         if not _is_repetition(self.texts, text, now):
             event = StatusText(now, severity, text)
             self.texts.append(event)
@@ -88,10 +82,8 @@ def _is_repetition(texts: deque[StatusText], text: str, now: float) -> bool:
 def status_texts(text: str, severity: int, text_id: int) -> list[Message]:
     """The STATUSTEXTs of an ASCII text: a long one in pieces of 50 characters, the last shorter.
 
-    Args:
-        text: the text.
-        severity: MAV_SEVERITY.
-        text_id: number that joins the pieces of one text, 1..65535; not used for a single piece.
+    `severity`: MAV_SEVERITY. `text_id`: number that joins the pieces of one text, 1..65535; not
+    used for a single piece.
     """
     if len(text) <= _CHUNK_CHARACTERS:
         return [dialect.MAVLink_statustext_message(severity, text.encode("ascii"))]
@@ -108,9 +100,6 @@ class TextFrames:
 
     The component id of the frames is MAV_COMP_ID_LOG. With this program's own component id, their
     sequence numbers would make other frames look lost.
-
-    Args:
-        system: system id of the frames.
     """
 
     def __init__(self, system: int) -> None:

@@ -40,10 +40,8 @@ def messages(
     An incomplete record at the end is left out. So are damaged records: a card that loses power
     leaves some, and some programs also record bytes of the radio that are no frame.
 
-    Args:
-        path: the log.
-        names: names of the messages.
-        on_damage: called at the end with a sentence if damaged records were left out.
+    `names`: names of the messages. `on_damage`: called at the end with a sentence if damaged
+    records were left out.
 
     Raises:
         LogError: the file cannot be read, or is not a `.tlog`.

@@ -28,7 +28,6 @@ class VehicleSnapshot(NamedTuple):
     disturbance: Vector = (0.0, 0.0, 0.0)
     """Acceleration by wind and other unmodelled forces, m/s², NED."""
     drag: Drag = NO_DRAG
-    """Estimated drag."""
     axis_drag: float = 0.0
     """Coefficient of `AxisDrag`, 1/m."""
 
@@ -77,7 +76,6 @@ class Answer(NamedTuple):
     """Answer to a request."""
 
     number: int
-    """Number of the request."""
     status: Status
     """How the solve ended; unless it is `SOLVED`, target, thrust, `solver_seconds` and `iterations`
     are 0."""

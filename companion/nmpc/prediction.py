@@ -53,11 +53,7 @@ def conditions_of(vehicle: VehicleSnapshot) -> Conditions:
 
 
 class Predictor:
-    """Integrates the `coefficient_model` to a later time, with the control inputs until then.
-
-    Args:
-        settings: settings of the vehicle.
-    """
+    """Integrates the `coefficient_model` to a later time, with the control inputs until then."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings

@@ -154,12 +154,7 @@ class Solution(NamedTuple):
 
 
 class SqpSolver:
-    """CasADi's SQP method with HPIPM for the quadratic programs; no code is generated.
-
-    Args:
-        model: the prediction model.
-        settings: horizon, cost and iterations.
-    """
+    """CasADi's SQP method with HPIPM for the quadratic programs; no code is generated."""
 
     def __init__(self, model: Model, settings: Settings) -> None:
         self._state_size = model.state.numel()

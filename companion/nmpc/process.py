@@ -67,7 +67,6 @@ class Solver:
     process is reported at the next call.
 
     Args:
-        settings: vehicle, horizon and solver.
         trajectory: the trajectory to follow; it is pickled.
         report: called with each trouble, by the method that notices it.
 

@@ -34,10 +34,6 @@ class RecedingHorizon:
 
     The cost has the same weights for all models: on deviations of position, velocity, heading,
     attitude rate and thrust from the reference; see `Weights`.
-
-    Args:
-        settings: vehicle, horizon and solver.
-        make_model: makes the prediction model.
     """
 
     def __init__(self, settings: Settings, make_model: Callable[[Settings], Model]) -> None:
@@ -100,10 +96,8 @@ class RecedingHorizon:
 def shifted_plan(model: Model, plan: Floats, steps: float) -> Floats:
     """A plan shifted to a time `steps` steps later; beyond its end the last values repeat.
 
-    Args:
-        model: the model of the plan.
-        plan: (x_0, u_0, …, x_N).
-        steps: number of steps, not negative; the plan is interpolated between nodes.
+    `plan`: (x_0, u_0, …, x_N). `steps`: number of steps, not negative; the plan is interpolated
+    between nodes.
     """
     n = model.state.numel()
     stages = plan[:-n].reshape(-1, n + model.control.numel())

@@ -44,8 +44,6 @@ class Worker:
     starts at that time.
 
     Args:
-        settings: vehicle, horizon and solver.
-        trajectory: the trajectory to follow.
         make_model: makes the prediction model; only studies use another than the default.
     """
 

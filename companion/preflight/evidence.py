@@ -73,7 +73,6 @@ class SampleTimes(NamedTuple):
     """Times of the attitude samples received, by the vehicle's clock and by ours."""
 
     sample_count: int = 0
-    """Number of samples."""
     longest_pause: float = 0.0
     """Longest time between two samples by our clock, s."""
     not_newer_count: int = 0
@@ -101,7 +100,6 @@ class OtherNodes:
     autopilots: set[tuple[int, int]] = field(default_factory=set)
     """Nodes whose heartbeat is that of an autopilot which this program flies."""
     setpoint_senders: set[tuple[int, int]] = field(default_factory=set)
-    """Nodes that sent setpoints."""
     target_is_foreign: bool = False
     """Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed, so that another
     node must have sent setpoints."""
@@ -112,7 +110,6 @@ class Evidence:
     """What was received and measured in one session with the vehicle, for the checks to judge."""
 
     autopilot: Autopilot
-    """The kind of autopilot."""
     state: VehicleState
     """The vehicle's newest telemetry."""
     survey: Survey
@@ -124,11 +121,8 @@ class Evidence:
     counting_time: float
     """Time over which messages were counted, s."""
     link: LinkQuality
-    """Quality of the link."""
     samples: SampleTimes
-    """Times of the attitude samples."""
     other_nodes: OtherNodes
-    """Other nodes on the link."""
     reset_count: int
     """Number of estimator resets while we listened."""
     identity: Identity

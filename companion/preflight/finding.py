@@ -80,7 +80,6 @@ class Finding:
     key: str
     """A `Key`, the newest name of a parameter, or the key of a message rate."""
     result: CheckResult
-    """Severity of the finding."""
     found: str
     """The fact, as a clause."""
     because: str = ""

@@ -113,14 +113,8 @@ def worst_reach(
 def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str | None:
     """The breach of the fence at a place that the vehicle can reach after the setpoints stop.
 
-    Args:
-        config: configuration of the flight.
-        offset: position when the setpoints stop, relative to where control began, m NED.
-        reached: how far the vehicle can be carried from there.
-        fence: the fence.
-
-    Returns:
-        The breach, as the end of a sentence; `None`: none.
+    It is the end of a sentence; `None`: none. `offset`: position when the setpoints stop, relative
+    to where control began, m NED. `reached`: how far the vehicle can be carried from there.
     """
     north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
     distance = hypot(north, east)

@@ -52,8 +52,6 @@ class UndoFile:
 
     Args:
         directory: folder for the file.
-        link: link to the vehicle.
-        identity: the vehicle's AUTOPILOT_VERSION.
 
     Attributes:
         path: the file; it does not exist before the first `add`.
@@ -169,10 +167,7 @@ async def apply_fixes(
 async def restore(link: Link, undo: Undo, report: Callable[[ChangeOutcome], None]) -> None:
     """Restore the values of the undo file, the last change first.
 
-    Args:
-        link: link to the vehicle.
-        undo: contents of the undo file.
-        report: called with the outcome of each parameter.
+    `report`: called with the outcome of each parameter.
 
     Raises:
         VehicleArmedError: the vehicle is armed or may be armed; nothing more was set.

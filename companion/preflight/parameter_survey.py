@@ -60,11 +60,8 @@ async def survey(
     requested in a second round, for longer, but only if the link loses frames and at least one
     parameter was answered. Without losses, no answer means that the autopilot lacks the parameter.
 
-    Args:
-        link: link to the vehicle.
-        rules: rules of its autopilot.
-        earlier_survey: survey of the same vehicle. Parameters without a value in it are not
-            requested again, because each costs seconds on a link that loses frames.
+    `earlier_survey`: survey of the same vehicle. Parameters without a value in it are not requested
+    again, because each costs seconds on a link that loses frames.
 
     Raises:
         LinkLost: the connection was lost.

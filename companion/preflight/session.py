@@ -144,13 +144,7 @@ def _link_quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> Li
 
 
 class PreflightSession:
-    """Checks one vehicle over an open link.
-
-    Args:
-        config: configuration of the flight.
-        link: link to the vehicle.
-        notices: notices of the link.
-    """
+    """Checks one vehicle over an open link."""
 
     def __init__(self, config: Config, link: Link, notices: Sequence[str]) -> None:
         self._config, self._notices = config, notices
@@ -216,9 +210,7 @@ async def open_session(
 ) -> AsyncIterator[PreflightSession]:
     """Open the link. Until the session requests something, we send only heartbeats and TIMESYNC.
 
-    Args:
-        config: configuration of the flight.
-        make_link: makes the link; its argument takes the link's notices.
+    `make_link`: makes the link; its argument takes the link's notices.
 
     Raises:
         EndpointError: the endpoint cannot be opened.

@@ -105,9 +105,7 @@ class ControlReleased(FlightEnded):
 def fault_message(error: Exception, exit_: Exit = Exit.LEAVE) -> str:
     """The message for an unexpected exception: a fault of this program or of user code.
 
-    Args:
-        error: the exception.
-        exit_: what the flight does with the vehicle because of it.
+    `exit_`: what the flight does with the vehicle because of it.
     """
     if not isinstance(error, UserCodeError):
         return f"internal error: {error!r}"

@@ -35,8 +35,6 @@ class CounterWindow:
     """The readings of the counters over the last second.
 
     Args:
-        link: link to the vehicle.
-        record: record of the control loop.
         real_time: whether deadlines count; in lockstep they do not, because the vehicle waits.
     """
 

@@ -40,9 +40,6 @@ class SnapshotBuilder:
             not known. It is where control began, unless `begin` got another centre.
 
     Args:
-        link: link to the vehicle.
-        loop: the control loop, which answers the samples.
-        guidance_loop: makes the commands for the control loop.
         real_time: whether deadlines count; in lockstep they do not, because the vehicle waits.
     """
 

@@ -35,8 +35,6 @@ class Component:
     """The MAVLink component of the companion computer: sends to clients, and answers commands.
 
     Args:
-        settings: ids and signing key of this program.
-        network: network of the clients.
         to_vehicle: sends a message over the link, so that it reaches ground stations connected to
             the autopilot.
     """

@@ -24,7 +24,6 @@ class FlightRecords:
 
     Args:
         directory: folder for the flights' folders; None: nothing is recorded.
-        environment: environment of the flights.
         note: called with each event, as a sentence for the user.
 
     Attributes:

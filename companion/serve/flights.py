@@ -48,12 +48,8 @@ class ServedFlights:
     ) -> None:
         """Begin a flight.
 
-        Args:
-            owner: the program in control.
-            request: the first request to fly.
-            command: the command that requested control, to be answered; None: setpoints alone
-                requested it.
-            from_ground: whether the vehicle stands armed, and takes off first.
+        `command`: the command that requested control, to be answered; None: setpoints alone
+        requested it. `from_ground`: whether the vehicle stands armed, and takes off first.
 
         Raises:
             UnplannableError: no motion leads to the request.

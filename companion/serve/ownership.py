@@ -1,6 +1,6 @@
 """The clients' programs: which one controls the vehicle, and what each of them last requested."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from math import inf
 from typing import NamedTuple
@@ -45,21 +45,17 @@ class _Stream:
     """Event-loop time at which the setpoint before the newest arrived, s; −inf: none yet."""
 
 
+@dataclass(eq=False)
 class Ownership:
-    """Keeps one owner, the client in control, and refuses all others with a reason.
+    """Keeps one owner, the client in control, and refuses all others with a reason."""
 
-    Args:
-        timeout: time without a setpoint after which a client counts as silent, s.
-        hold_time: time for which the vehicle is held for a silent owner, s.
-
-    Attributes:
-        owner: the client in control, or None.
-    """
-
-    def __init__(self, timeout: float, hold_time: float) -> None:
-        self._timeout, self._hold_time = timeout, hold_time
-        self.owner: Program | None = None
-        self._streams: dict[Program, _Stream] = {}
+    _timeout: float
+    """Time without a setpoint after which a client counts as silent, s."""
+    _hold_time: float
+    """Time for which the vehicle is held for a silent owner, s."""
+    owner: Program | None = field(default=None, init=False)
+    """The client in control, or None."""
+    _streams: dict[Program, _Stream] = field(default_factory=dict, init=False)
 
     def note_setpoint(self, client: Program, now: float) -> str | None:
         """Note a setpoint; return why it is not flown, or None.

@@ -63,8 +63,6 @@ class ServedFlight:
     """Takes over, flies the requests of the owner, and hands back.
 
     Args:
-        name: name of the owner.
-        vehicle: see `ServedVehicle`.
         ownership: decides which client's requests are flown, and how long.
         fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
             control begins.

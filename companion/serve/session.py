@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,7 +39,6 @@ class ServeSession:
     Signal handlers of the event loop may call `stop` and `leave`.
 
     Args:
-        config: configuration of the vehicle, with the section `serve`.
         note: called with each event, as a sentence for the user.
         observer: receives phases and events of each flight under a client's control.
         environment: clocks and transports of this computer, or their replacement in tests.
@@ -172,19 +171,15 @@ class ServeSession:
             self._note(f"{error} (still waiting for the vehicle; clients are served)")
 
 
+@dataclass(eq=False)
 class _FrameInterceptor:
     """Refuses frames that a client may not send, and passes setpoints to `ServedControl`."""
 
-    def __init__(
-        self,
-        permission: Permission,
-        component: Component,
-        control: "ServedControl | None",
-        routing: Routing,
-        system: int,
-    ) -> None:
-        self._permission, self._component, self._control = permission, component, control
-        self._routing, self._system = routing, system
+    _permission: Permission
+    _component: Component
+    _control: "ServedControl | None"
+    _routing: Routing
+    _system: int
 
     def intercept(self, client: Client, frame: Frame) -> bool:
         """Whether a frame was refused or handled here, and so must not be forwarded."""

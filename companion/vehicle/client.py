@@ -23,10 +23,6 @@ class VehicleClient:
     """The part of a link that sends requests and subscribes to messages.
 
     Args:
-        settings: the endpoint, and the ids of the vehicle and of this program.
-        outbox: sends the requests.
-        dispatcher: delivers the messages received.
-        stats: counters of the link.
         clock: returns the event-loop time, s.
         vehicle_clock: converts the time stamps of positions.
 

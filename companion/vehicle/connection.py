@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from companion.mavlink.errors import EndpointError
 from companion.mavlink.outbox import Outbox
@@ -17,34 +18,25 @@ _LOG = logging.getLogger(__name__)
 _BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
 
 
+@dataclass(eq=False)
 class Connection:
     """A connection that is opened again when it drops, with growing pauses.
 
     When it drops, unsent frames and an incomplete frame received are discarded, and `on_dropped` is
     called.
-
-    Args:
-        endpoint: the endpoint to open.
-        inbox: takes the bytes that arrive.
-        outbox: sends over the open transport; drops frames while none is open.
-        stats: counts the reconnects.
-        on_dropped: called with the reason when the connection drops.
-        opener: opens the transport.
     """
 
-    def __init__(
-        self,
-        endpoint: Endpoint,
-        inbox: Inbox,
-        outbox: Outbox,
-        stats: LinkStats,
-        on_dropped: Callable[[str], None],
-        opener: OpenTransport,
-    ) -> None:
-        self._endpoint, self._inbox, self._outbox = endpoint, inbox, outbox
-        self._stats, self._on_dropped, self._opener = stats, on_dropped, opener
-        self._reopening: asyncio.Task[None] | None = None
-        self._lost_early: str | None = None
+    _endpoint: Endpoint
+    _inbox: Inbox
+    """Takes the bytes that arrive."""
+    _outbox: Outbox
+    """Sends over the open transport; drops frames while none is open."""
+    _stats: LinkStats
+    _on_dropped: Callable[[str], None]
+    """Called with the reason when the connection drops."""
+    _opener: OpenTransport
+    _reopening: asyncio.Task[None] | None = field(default=None, init=False)
+    _lost_early: str | None = field(default=None, init=False)
 
     async def open(self) -> None:
         """Open the transport.
@@ -129,9 +121,7 @@ def no_beacon_message(settings: LinkSettings, stats: LinkStats) -> str:
 def _refusal_message(opening: str, stats: LinkStats) -> str | None:
     """The error message if frames were refused for their sender or signature; otherwise None.
 
-    Args:
-        opening: first clause of the message.
-        stats: counters of the link.
+    `opening` is its first clause.
     """
     if stats.unclaimed:
         return (

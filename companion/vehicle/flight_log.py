@@ -88,7 +88,6 @@ class _Reader:
     autopilot: Autopilot | None = None
     """The autopilot, by its first heartbeat."""
     obeyed_setpoints: list[Row] = field(default_factory=list)
-    """Setpoints that the autopilot obeyed."""
     rates_with_quaternion: list[Row] = field(default_factory=list)
     """Body rates from ATTITUDE_QUATERNION."""
     rates_with_euler: list[Row] = field(default_factory=list)

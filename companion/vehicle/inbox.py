@@ -41,10 +41,6 @@ class Inbox:
     """Passes attitude samples to the control loop, and all accepted frames to the dispatcher.
 
     Args:
-        settings: ids of the vehicle, and the signing key.
-        stats: counters of the link.
-        dispatcher: takes every accepted frame.
-        callbacks: take samples and frames.
         tap: called with every accepted frame, for recordings.
         notice: called once with each notice about signatures, their time stamps and the peer.
         clock: the vehicle's clock; takes the time stamp of every sample.

@@ -35,9 +35,7 @@ class Link(VehicleClient, LinkCallbacks):
     setpoint: each one is sent by one call of `send_setpoint`.
 
     Args:
-        settings: the endpoint, and the ids of the vehicle and of this program.
         tap: called with every frame accepted from and sent to the vehicle, for recordings.
-        opener: opens the transport.
         notice: called once with each notice about signatures, their time stamps and the peer; by
             default it logs a warning.
 

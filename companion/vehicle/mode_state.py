@@ -18,7 +18,6 @@ class ModeState:
     """The newest heartbeat and mode; each is `None` until its message has come.
 
     Args:
-        dispatcher: delivers HEARTBEAT and CURRENT_MODE.
         clock: returns the event-loop time, s.
 
     Attributes:

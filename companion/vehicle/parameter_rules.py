@@ -58,7 +58,6 @@ class Problem(NamedTuple):
     """What is wrong with the value of a parameter."""
 
     result: CheckResult
-    """Severity."""
     because: str
     """Consequence of the value, one sentence."""
     set_to: float | None = None
@@ -111,7 +110,6 @@ class ParameterFinding(NamedTuple):
     value: float
     """The autopilot's value."""
     result: CheckResult
-    """Severity."""
     because: str = ""
     """Consequence of the value; empty if it is safe."""
     set_to: float | None = None

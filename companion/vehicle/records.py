@@ -58,7 +58,6 @@ class Heartbeat(NamedTuple):
     mode: str
     """The autopilot's name for the mode."""
     armed: bool
-    """Whether the vehicle is armed."""
     system_status: int
     """MAV_STATE: 3 standby, 4 active; 5 critical, 6 emergency, 8 termination."""
 

@@ -13,7 +13,6 @@ from companion.vehicle.px4.events import EventReader
 AUTOPILOTS: tuple[Autopilot, ...] = (Px4(), ArduPilot())
 
 AUTOPILOTS_BY_NUMBER = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
-"""The autopilots by MAV_AUTOPILOT."""
 
 AUTOPILOT_NAMES = " or ".join(
     f"{autopilot.name} ({autopilot.mav_autopilot})" for autopilot in AUTOPILOTS
@@ -49,9 +48,6 @@ def read_events(
 ) -> None:
     """Turn PX4's events into texts; on some links PX4 sends events instead of STATUSTEXT.
 
-    Args:
-        dispatcher: delivers EVENT.
-        texts: takes the texts.
-        clock: returns the event-loop time, s.
+    `clock` returns the event-loop time, s.
     """
     dispatcher.subscribe_raw("EVENT", EventReader(texts, clock).take)

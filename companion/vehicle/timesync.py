@@ -84,8 +84,6 @@ class TimeSync:
     """Sends TIMESYNC requests, gives the answers to `VehicleClock`, and answers the vehicle's own.
 
     Args:
-        outbox: sends requests and answers.
-        dispatcher: delivers TIMESYNC.
         clock: returns the event-loop time, s.
         vehicle_clock: takes each exchange of request and answer.
     """

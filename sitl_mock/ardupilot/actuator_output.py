@@ -1,6 +1,7 @@
 """Converts attitude or rates, with thrust, to the actuator command."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import cos, radians
 
 from sitl_mock.ardupilot.guided import Guided, Task
@@ -20,32 +21,22 @@ HOVER_LEARNING_TIME_S = 10.0
 _ATTITUDE_GAINS = AttitudeGains(4.5, 4.5, 1.5, 1.0, (radians(180.0), radians(180.0), radians(45.0)))
 
 
+@dataclass(eq=False)
 class ActuatorOutput:
-    """Computes the command to the rate loop and the rotors, and learns the hover thrust.
+    """Computes the command to the rate loop and the rotors, and learns the hover thrust."""
 
-    Args:
-        state: the autopilot's state; its ``attitude_target`` is written here.
-        parameters: the autopilot's parameters; MOT_THST_HOVER is written here.
-        guided: the task of GUIDED; during a take-off the rotors turn on the ground.
-        hold: the position hold, whose climb rate shows whether the vehicle hovers.
-        to_throttle: specific thrust, m/s^2 -> collective throttle of the rotors.
-    """
-
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        guided: Guided,
-        hold: PositionHold,
-        to_throttle: Callable[[float], float],
-    ) -> None:
-        self._state = state
-        self._parameters = parameters
-        self._guided = guided
-        self._hold = hold
-        self._to_throttle = to_throttle
-        self.thrust = 0.0
-        """Latest normalised thrust, 0..1, without the angle boost."""
+    _state: State
+    """The autopilot's state; its ``attitude_target`` is written here."""
+    _parameters: ParameterTable
+    """The autopilot's parameters; MOT_THST_HOVER is written here."""
+    _guided: Guided
+    """The task of GUIDED; during a take-off the rotors turn on the ground."""
+    _hold: PositionHold
+    """The position hold, whose climb rate shows whether the vehicle hovers."""
+    _to_throttle: Callable[[float], float]
+    """Specific thrust, m/s^2 -> collective throttle of the rotors."""
+    thrust: float = field(default=0.0, init=False)
+    """Latest normalised thrust, 0..1, without the angle boost."""
 
     @property
     def taking_off(self) -> bool:

@@ -63,7 +63,6 @@ class Boot:
 
     Args:
         state: the autopilot's state, which gives the vehicle time.
-        notifier: sends the texts and messages of the boot.
         ready_us: vehicle time at which the position estimate is good; the other times of the boot
             are scaled with it.
         elevation: elevation of home above sea level, m.

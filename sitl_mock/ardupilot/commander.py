@@ -29,9 +29,6 @@ class ArduPilotCommander:
 
     Args:
         vehicle: the simulated vehicle; the failsafe reads its battery.
-        control: controls the vehicle in each mode.
-        stream: receives the accepted setpoints.
-        notifier: sends texts, the home position and changed parameters.
     """
 
     def __init__(

@@ -1,6 +1,7 @@
 """ArduCopter's failsafes: loss of ground station or position, low battery."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from sitl_mock.ardupilot.modes import PILOTED_MODES, POSITION_MODES
 from sitl_mock.autopilot.events import Announce, EventKind
@@ -31,35 +32,26 @@ _GCS_CONTINUE_IF_PILOT_CONTROL = 16
 """Bit of FS_OPTIONS: the loss of the ground station has no effect in a pilot's mode."""
 
 
+@dataclass(eq=False)
 class ArduPilotFailsafe:
     """Detects a lost ground station, a lost position and a low battery, and acts while armed.
 
     Each failsafe acts once, when it begins. The battery failsafe acts again when the charge becomes
     critical.
-
-    Args:
-        vehicle: the simulated vehicle, which has the battery's voltage.
-        act: enters the mode of a failsafe, or disarms a vehicle that is on the ground.
     """
 
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        vehicle: Vehicle,
-        announce: Announce,
-        act: Callable[[Mode], None],
-    ) -> None:
-        self._state = state
-        self._parameters = parameters
-        self._vehicle = vehicle
-        self._announce = announce
-        self._act = act
-        self._gcs_heartbeat_us: int | None = None
-        self.gcs_lost = False
-        """Whether the ground station failsafe is active."""
-        self._position_lost = False
-        self._voltage_low_since_us: int | None = None
+    _state: State
+    _parameters: ParameterTable
+    _vehicle: Vehicle
+    """The simulated vehicle, which has the battery's voltage."""
+    _announce: Announce
+    _act: Callable[[Mode], None]
+    """Enters the mode of a failsafe, or disarms a vehicle that is on the ground."""
+    _gcs_heartbeat_us: int | None = field(default=None, init=False)
+    gcs_lost: bool = field(default=False, init=False)
+    """Whether the ground station failsafe is active."""
+    _position_lost: bool = field(default=False, init=False)
+    _voltage_low_since_us: int | None = field(default=None, init=False)
 
     def receive_heartbeat(self, heartbeat: Message) -> None:
         """Record a heartbeat; the ground station has the system id MAV_GCS_SYSID."""

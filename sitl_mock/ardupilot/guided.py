@@ -67,7 +67,6 @@ class Guided:
         self.takeoff_height = 0.0
         """Height at which a take-off ends, m above home."""
         self.setpoint: Setpoint | None = None
-        """The latest setpoint."""
         self.setpoint_us = 0
         """Vehicle time at which the latest setpoint was received, us."""
         self.task_changed = True

@@ -1,5 +1,6 @@
 """The control in GUIDED: take-off, attitude or position setpoints, hold."""
 
+from dataclasses import dataclass, field
 from math import isnan
 
 from sitl_mock.ardupilot.actuator_output import ActuatorOutput
@@ -29,31 +30,20 @@ _MIN_CLIMB_RATE = 0.1
 """Smallest climb rate of a take-off, m/s; a rate decreasing to 0 would never reach the height."""
 
 
+@dataclass(eq=False)
 class GuidedFlight:
-    """Executes the task of GUIDED.
+    """Executes the task of GUIDED."""
 
-    Args:
-        parameters: speeds and options.
-        guided: the task.
-        hold: holds a point, a heading and a height.
-        output: commands the rate loop and the rotors.
-    """
-
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        guided: Guided,
-        hold: PositionHold,
-        output: ActuatorOutput,
-    ) -> None:
-        self._state = state
-        self._parameters = parameters
-        self._guided = guided
-        self._hold = hold
-        self._output = output
-        self._spooling_since_us = 0
-        self._timed_out = False
+    _state: State
+    _parameters: ParameterTable
+    """Speeds and options."""
+    _guided: Guided
+    _hold: PositionHold
+    """Holds a point, a heading and a height."""
+    _output: ActuatorOutput
+    """Commands the rate loop and the rotors."""
+    _spooling_since_us: int = field(default=0, init=False)
+    _timed_out: bool = field(default=False, init=False)
 
     def command(self, dt: float) -> ActuatorCommand:
         """Return the actuator command for the next ``dt`` s."""

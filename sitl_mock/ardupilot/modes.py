@@ -28,7 +28,6 @@ MODE_FOR_PX4_MODE = {
 }
 """Pilot's mode of PX4 -> the corresponding mode of ArduCopter."""
 PILOTED_MODES = frozenset({Mode.STABILIZE, Mode.ALT_HOLD, Mode.LOITER})
-"""Modes that a pilot flies."""
 
 
 def base_mode(*, armed: bool, position_controlled: bool) -> int:

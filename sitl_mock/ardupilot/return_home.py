@@ -22,11 +22,7 @@ class Leg(Enum):
 
 
 class ReturnHome:
-    """The height and the leg of a return.
-
-    Args:
-        parameters: heights and times.
-    """
+    """The height and the leg of a return."""
 
     def __init__(self, state: State, parameters: ParameterTable) -> None:
         self._state = state

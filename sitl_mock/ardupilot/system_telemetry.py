@@ -34,11 +34,7 @@ _STICKS_US = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
 
 
 class ArduPilotSystemTelemetry(SystemTelemetry):
-    """Builds messages about the state, the battery, GPS and the estimator.
-
-    Args:
-        vehicle: the simulated vehicle, whose battery is reported.
-    """
+    """Builds messages about the state, the battery, GPS and the estimator."""
 
     def __init__(
         self, state: State, origin: Geodetic, identity: Identity, vehicle: Vehicle, boot: Boot

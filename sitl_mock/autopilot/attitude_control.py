@@ -41,11 +41,8 @@ def attitude_rates(
     The angle of the remaining rotation about this axis is multiplied by ``yaw_weight``, and the yaw
     gain is divided by ``yaw_weight``.
 
-    Args:
-        q: present attitude.
-        target: attitude to reach, of any length.
-        yaw_rate: feed-forward about the world's down axis, rad/s.
-        gains: gains and limits.
+    `target`: attitude to reach, of any length. `yaw_rate`: feed-forward about the world's down
+    axis, rad/s.
     """
     target = normalise(target)
     reduced_target = multiply(_shortest_arc(q, target), q)

@@ -1,7 +1,7 @@
 """The schedule of the faults, and their effects on the vehicle."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import nan, radians
 
 from pymavlink.dialects.v20 import ardupilotmega
@@ -107,36 +107,26 @@ class FaultSchedule:
         return fault.duration_s is None or now_us < start_us + fault.duration_s * 1e6
 
 
+@dataclass(eq=False)
 class FaultEffects:
-    """Applies vehicle faults; `Exchange` applies those of the link.
+    """Applies vehicle faults; `Exchange` applies those of the link."""
 
-    Args:
-        vehicle: the simulated vehicle; faults change its estimator and its battery.
-        commander: refuses arming or changes the mode when a fault demands it.
-        control: moves its held position and heading when the estimator resets.
-        links: links whose messages `NanField` faults change.
-    """
-
-    def __init__(
-        self,
-        state: State,
-        vehicle: Vehicle,
-        commander: Commander,
-        control: ModeControl,
-        links: list[Link],
-    ) -> None:
-        self.offboard_since_us: int | None = None
-        """Vehicle time when setpoints first controlled the vehicle, us; None: not yet."""
-        self.clock_frozen = False
-        self._state = state
-        self._vehicle = vehicle
-        self._commander = commander
-        self._control = control
-        self._links = links
-        self._telemetry_stops: list[StopTelemetry] = []
-        self._nan_fields: list[NanField] = []
-        self._gps_lost_us = 0
-        self._slip_s = 0.0
+    _state: State
+    _vehicle: Vehicle
+    """The simulated vehicle; faults change its estimator and its battery."""
+    _commander: Commander
+    """Refuses arming or changes the mode when a fault demands it."""
+    _control: ModeControl
+    """Moves its held position and heading when the estimator resets."""
+    _links: list[Link]
+    """Links whose messages `NanField` faults change."""
+    offboard_since_us: int | None = field(default=None, init=False)
+    """Vehicle time when setpoints first controlled the vehicle, us; None: not yet."""
+    clock_frozen: bool = field(default=False, init=False)
+    _telemetry_stops: list[StopTelemetry] = field(default_factory=list, init=False)
+    _nan_fields: list[NanField] = field(default_factory=list, init=False)
+    _gps_lost_us: int = field(default=0, init=False)
+    _slip_s: float = field(default=0.0, init=False)
 
     def apply(self, begun_faults: list[VehicleFault], ended_faults: list[VehicleFault]) -> None:
         """Apply the faults that began, and undo those that ended, as far as they can be undone."""

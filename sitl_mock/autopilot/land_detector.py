@@ -16,7 +16,6 @@ class LandDetector:
     """Updates ``contact``, ``landed``, ``landed_state`` and ``took_off`` of the state.
 
     Args:
-        announce: announces take-off and landing.
         hover_thrust: returns the thrust command that hovers, 0..1.
         landed_after_us: contact with low thrust for this time is a landing.
         is_climbing: returns whether a take-off is under way and has not reached its height.

@@ -1,6 +1,7 @@
 """Telemetry of position and motion; the defaults follow PX4's conventions."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import degrees, hypot, isnan, nan
 
 from pymavlink.dialects.v20 import development as dialect
@@ -27,20 +28,17 @@ _POSE_VARIANCES = (0.041, 0.041, 0.074, 3.3e-4, 3.5e-4, 5.9e-3)
 _VELOCITY_VARIANCES = (0.0095, 0.0086, 0.0052, 0.0, 0.0, 0.0)
 
 
+@dataclass(eq=False)
 class MotionTelemetry:
-    """Builds messages from the estimate.
+    """Builds messages from the estimate."""
 
-    Args:
-        vehicle: the simulated vehicle; its rotors, its reset counter and (for ArduPilot) its
-            shaped attitude target are reported.
-        slips: lag of the time stamp of LOCAL_POSITION_NED behind the true time.
-    """
-
-    def __init__(self, state: State, vehicle: Vehicle, origin: Geodetic, slips: StampSlips) -> None:
-        self._state = state
-        self._vehicle = vehicle
-        self._origin = origin
-        self._slips = slips
+    _state: State
+    _vehicle: Vehicle
+    """The simulated vehicle; its rotors, its reset counter and (for ArduPilot) its shaped attitude
+    target are reported."""
+    _origin: Geodetic
+    _slips: StampSlips
+    """Lag of the time stamp of LOCAL_POSITION_NED behind the true time."""
 
     airspeed = nan
     """Airspeed in VFR_HUD, m/s; NaN because there is no airspeed sensor."""

@@ -22,12 +22,7 @@ _PARAMETERS_PER_SLOT = 4
 
 
 class ParameterProtocol:
-    """Answers parameter messages.
-
-    Args:
-        parameters: the table that is read and changed.
-        encoding: encoding of the autopilot.
-    """
+    """Answers parameter messages."""
 
     def __init__(self, parameters: ParameterTable, encoding: Encoding) -> None:
         self._parameters = parameters

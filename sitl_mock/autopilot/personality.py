@@ -72,13 +72,11 @@ class Personality(Protocol):
 
     boot_mode: Mode
     system_id_parameter: str
-    """Name of the parameter with the system id."""
     any_component: bool
     """Whether the autopilot handles messages to any component of its system."""
     unsigned_links: Collection[str]
     """Links on which the autopilot accepts unsigned frames although signing is on."""
     parameters: tuple[Parameter, ...]
-    """All parameters with their defaults."""
 
     def with_defaults(self, section: dict[str, Any]) -> dict[str, Any]:
         """Return the ``mock:`` section, completed by the defaults of this autopilot."""

@@ -1,5 +1,6 @@
 """Telemetry of the autopilot's state that all autopilots build alike."""
 
+from dataclasses import dataclass
 from math import hypot
 
 from pymavlink.dialects.v20 import development as dialect
@@ -20,20 +21,15 @@ NO_VALUE = 65535
 """Content of an unsigned 16-bit field that has no value."""
 
 
+@dataclass(eq=False)
 class SystemTelemetry:
-    """Builds messages about state and link; an autopilot adds its own.
+    """Builds messages about state and link; an autopilot adds its own."""
 
-    Args:
-        vehicle: the simulated vehicle, whose battery is reported.
-    """
-
-    def __init__(
-        self, state: State, origin: Geodetic, identity: Identity, vehicle: Vehicle
-    ) -> None:
-        self._state = state
-        self._origin = origin
-        self._identity = identity
-        self._vehicle = vehicle
+    _state: State
+    _origin: Geodetic
+    _identity: Identity
+    _vehicle: Vehicle
+    """The simulated vehicle, whose battery is reported."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder."""

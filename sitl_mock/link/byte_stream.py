@@ -2,32 +2,29 @@
 
 import os
 from collections import deque
+from dataclasses import dataclass, field
 
 from sitl_mock.link.framing import split_frames
 
 _READ_BYTES = 65536
 
 
+@dataclass(eq=False)
 class ByteStream:
     """Reads and writes whole frames without blocking.
 
     Frames are never truncated: if the kernel takes only a part of a batch, the rest is kept and
     written first. Until it is written, further frames are dropped, as an autopilot does when its
     transmit buffer is full.
-
-    Attributes:
-        open: False after the other side closed, or reading or writing failed.
-
-    Args:
-        descriptor: non-blocking; the caller closes it.
     """
 
-    def __init__(self, descriptor: int) -> None:
-        self.open = True
-        self._descriptor = descriptor
-        self._frames: deque[bytes] = deque()
-        self._partial_frame = b""
-        self._unsent_bytes = b""
+    _descriptor: int
+    """Non-blocking; the caller closes it."""
+    open: bool = field(default=True, init=False)
+    """False after the other side closed, or reading or writing failed."""
+    _frames: deque[bytes] = field(default_factory=deque, init=False)
+    _partial_frame: bytes = field(default=b"", init=False)
+    _unsent_bytes: bytes = field(default=b"", init=False)
 
     def receive(self) -> bytes | None:
         """Return the next complete frame, None if there is none yet."""

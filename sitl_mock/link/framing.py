@@ -18,7 +18,6 @@ __all__ = ["SIGNATURE_BYTES", "SIGNED_FLAG", "Framer", "Message", "decode", "spl
 _MAGIC_V1 = 0xFE
 _MAGIC_V2 = 0xFD
 SIGNED_FLAG = 0x01
-"""Incompatibility flag of a signed frame."""
 SIGNATURE_BYTES = 13
 _OVERHEAD_V1 = 8
 _OVERHEAD_V2 = 12
@@ -121,8 +120,6 @@ class Framer:
     """Packs the MAVLink 2 frames of one component on one link, with their sequence numbers.
 
     Args:
-        system_id: system id of the sender.
-        component_id: component id of the sender.
         signed: set the flag of signed frames; `Signing.sign` appends the signature.
     """
 

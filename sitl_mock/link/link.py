@@ -1,6 +1,7 @@
 """One MAVLink link of the vehicle: telemetry streams, signing, queue of outgoing frames."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from pymavlink.dialects.v20 import development as dialect
@@ -32,32 +33,24 @@ class StreamSchedule(Protocol):
         """
 
 
+@dataclass(eq=False)
 class Link:
-    """One link, without its socket: `Exchange.outgoing` takes the frames that are queued.
+    """One link, without its socket: `Exchange.outgoing` takes the frames that are queued."""
 
-    Args:
-        name: ``companion`` or ``gcs``.
-        framer: packs frames.
-        streams: schedules telemetry.
-        signing: signs and verifies frames; None = no signing.
-
-    Attributes:
-        client_heard: whether an accepted message of a client arrived.
-        gcs_heard: whether a heartbeat of a ground station arrived.
-        tamper: changes each message before it is packed (faults); None = no change.
-    """
-
-    def __init__(
-        self, name: str, framer: Framer, streams: StreamSchedule, signing: Signing | None = None
-    ) -> None:
-        self.name = name
-        self.signing = signing
-        self.streams = streams
-        self.outbox: list[bytes] = []
-        self.gcs_heard = False
-        self.client_heard = False
-        self.tamper: Callable[[Message], None] | None = None
-        self._framer = framer
+    name: str
+    """``companion`` or ``gcs``."""
+    _framer: Framer
+    """Packs frames."""
+    streams: StreamSchedule
+    signing: Signing | None = None
+    """Signs and verifies frames; None = no signing."""
+    outbox: list[bytes] = field(default_factory=list, init=False)
+    gcs_heard: bool = field(default=False, init=False)
+    """Whether a heartbeat of a ground station arrived."""
+    client_heard: bool = field(default=False, init=False)
+    """Whether an accepted message of a client arrived."""
+    tamper: Callable[[Message], None] | None = field(default=None, init=False)
+    """Changes each message before it is packed (faults); None = no change."""
 
     def send(self, message: Message) -> None:
         """Queue a message."""

@@ -25,8 +25,6 @@ class Multirotor:
     The multirotor starts at rest, with rotors at a steady speed.
 
     Args:
-        airframe: body and rotors.
-        rate_loop: the body-rate controller.
         q: attitude at the start.
         specific_thrust: specific thrust of all rotors at the start, m/s^2.
 

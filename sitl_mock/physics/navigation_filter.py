@@ -40,7 +40,6 @@ class NavigationFilter:
     """Computes the errors of the navigation filter from fix to fix.
 
     Args:
-        config: noise, delays and gains.
         start: the true motion at time 0.
 
     Attributes:

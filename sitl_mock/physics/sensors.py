@@ -138,7 +138,6 @@ class Estimator:
     calls. The noise of the navigation filter depends on the seed and the time.
 
     Args:
-        config: noise, delays and filter.
         start: the true motion at time 0.
         gravity: acceleration of gravity, m/s^2.
         dt: length of a step, s.

@@ -63,11 +63,6 @@ class Vehicle:
     """One vehicle, on the ground at time 0; settings, seed and commands determine its motion.
 
     Args:
-        airframe: body and rotors.
-        rate_loop: the body-rate controller.
-        wind: steady wind and gusts.
-        battery: capacity and voltages.
-        sensors: errors of the estimate.
         heading: heading at the start, rad clockwise from north.
         plant: computes steps and estimates: `PythonPlant`, or `compiled.CompiledPlant`.
 

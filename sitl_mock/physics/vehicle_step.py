@@ -165,26 +165,21 @@ class Plant(Protocol):
     @property
     def state(self) -> VehicleState:
         """State after the latest step."""
-        ...
 
     def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
         """Advance by `count` steps under one command."""
-        ...
 
     def truth_ago(self, steps: int) -> TruthRow:
         """The true motion `steps` steps ago."""
-        ...
 
     def estimate(
         self, constants: SensorConstants, state: SensorState, time: float, noise: Sequence[float]
     ) -> tuple[Estimate, Vector]:
         """The present estimate of the autopilot: see `sensors.estimate`."""
-        ...
 
     @staticmethod
     def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
         """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
-        ...
 
 
 class PythonPlant:

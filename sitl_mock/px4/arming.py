@@ -1,5 +1,7 @@
 """Whether PX4 may be armed, and when it disarms by itself on the ground."""
 
+from dataclasses import dataclass, field
+
 from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.setpoints import OffboardStream
@@ -14,33 +16,20 @@ PREFLIGHT_MARGIN_US = 1_000_000
 (measured: 11 s with COM_DISARM_PRFLT = 10 s)."""
 
 
+@dataclass(eq=False)
 class ArmingChecks:
-    """Finds what forbids arming, and reports it.
+    """Finds what forbids arming, and reports it."""
 
-    Args:
-        state: the autopilot's state; the problem found is written here.
-        parameters: NAV_DLL_ACT and COM_OF_LOSS_T.
-        health: sends the failing checks as events.
-        ready_us: vehicle time at which the estimator is ready.
-
-    Attributes:
-        crashed: whether the vehicle has crashed.
-    """
-
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        stream: OffboardStream,
-        health: HealthReport,
-        ready_us: int,
-    ) -> None:
-        self.crashed = False
-        self._state = state
-        self._parameters = parameters
-        self._stream = stream
-        self._health = health
-        self._ready_us = ready_us
+    _state: State
+    """The autopilot's state; the problem found is written here."""
+    _parameters: ParameterTable
+    """NAV_DLL_ACT and COM_OF_LOSS_T."""
+    _stream: OffboardStream
+    _health: HealthReport
+    """Sends the failing checks as events."""
+    _ready_us: int
+    """Vehicle time at which the estimator is ready."""
+    crashed: bool = field(default=False, init=False)
 
     @property
     def offboard_alive(self) -> bool:
@@ -84,17 +73,14 @@ class ArmingChecks:
         return self._parameters["NAV_DLL_ACT"] > 0
 
 
+@dataclass(eq=False)
 class AutoDisarm:
-    """Decides when an armed vehicle on the ground disarms.
+    """Decides when an armed vehicle on the ground disarms."""
 
-    Args:
-        parameters: COM_DISARM_LAND and COM_DISARM_PRFLT, s; 0 or less means never.
-    """
-
-    def __init__(self, state: State, parameters: ParameterTable) -> None:
-        self._state = state
-        self._parameters = parameters
-        self._landed_since_us = 0
+    _state: State
+    _parameters: ParameterTable
+    """COM_DISARM_LAND and COM_DISARM_PRFLT, s; 0 or less means never."""
+    _landed_since_us: int = field(default=0, init=False)
 
     def begin(self) -> None:
         """Start counting the time on the ground, because the vehicle was armed."""

@@ -1,6 +1,7 @@
 """PX4's rules of arming and modes, as measured."""
 
 import struct
+from dataclasses import dataclass, field
 
 from sitl_mock.autopilot.commander import ACCEPTED, TEMPORARILY_REJECTED
 from sitl_mock.autopilot.events import EventKind
@@ -22,39 +23,30 @@ STATUS_PERIOD_US = 500_000
 """Period at which the vehicle status is published, us; also at every change (measured)."""
 
 
+@dataclass(eq=False)
 class Px4Commander:
-    """The `Commander` of PX4.
+    """The `Commander` of PX4."""
 
-    Args:
-        control: begins each mode that is entered.
-        checks: finds what forbids arming, and sends the health report.
-    """
+    _state: State
+    _parameters: ParameterTable
+    _control: Px4ModeControl
+    """Begins each mode that is entered."""
+    _stream: OffboardStream
+    _announce: AnnounceEvent
+    _checks: ArmingChecks
+    """Finds what forbids arming, and sends the health report."""
+    refusal: str | None = field(default=None, init=False)
+    pilot_simulated: bool = field(default=False, init=False)
+    _requested_takeoff_z: float | None = field(default=None, init=False)
+    _published_status: tuple[bool, Mode, Mode, bool] | None = field(default=None, init=False)
 
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        control: Px4ModeControl,
-        stream: OffboardStream,
-        announce: AnnounceEvent,
-        checks: ArmingChecks,
-    ) -> None:
-        self.refusal: str | None = None
-        self.pilot_simulated = False
+    def __post_init__(self) -> None:
         self._actions = FailsafeActions(
-            state, parameters, announce, self._enter_mode, self._stop_motors
+            self._state, self._parameters, self._announce, self._enter_mode, self._stop_motors
         )
-        self.failsafe = Failsafe(state, parameters, announce, self._actions)
-        self._sticks = Sticks(parameters)
-        self._checks = checks
-        self._auto_disarm = AutoDisarm(state, parameters)
-        self._state = state
-        self._parameters = parameters
-        self._control = control
-        self._stream = stream
-        self._announce = announce
-        self._requested_takeoff_z: float | None = None
-        self._published_status: tuple[bool, Mode, Mode, bool] | None = None
+        self.failsafe = Failsafe(self._state, self._parameters, self._announce, self._actions)
+        self._sticks = Sticks(self._parameters)
+        self._auto_disarm = AutoDisarm(self._state, self._parameters)
 
     def arm(self, *, force: bool = False) -> int:
         """Arm, and return a MAV_RESULT; ``force`` skips all checks except for a crash."""
@@ -95,10 +87,8 @@ class Px4Commander:
         A disarmed vehicle enters every mode (arming may fail then). An armed one refuses a mode
         that cannot run.
 
-        Args:
-            mode: requested mode.
-            takeoff_z: down position where TAKEOFF ends, m; None = MIS_TAKEOFF_ALT above home.
-            hold_position: position to hold in LOITER, m NED; None = where the vehicle can stop.
+        `takeoff_z`: down position where TAKEOFF ends, m; None = MIS_TAKEOFF_ALT above home.
+        `hold_position`: position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         state = self._state
         if state.armed and not self._can_run(mode):

@@ -130,12 +130,7 @@ def _send(link: Link, layout: Layout, payload: bytes) -> None:
 
 
 class Announcer:
-    """Announces events: as EVENT on all links, as text on those with a ground station.
-
-    Args:
-        links: links for the texts.
-        events: sends the events.
-    """
+    """Announces events: as EVENT on all links, as text on those with a ground station."""
 
     def __init__(self, links: Iterable[Link], events: EventLog) -> None:
         self._links = list(links)
@@ -145,10 +140,8 @@ class Announcer:
     def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"") -> None:
         """Announce an event.
 
-        Args:
-            kind: kind of the event.
-            detail: replaces the placeholder in the event's text.
-            arguments: packed arguments that replace the constant ones of the event.
+        `detail`: replaces the placeholder in the event's text. `arguments`: packed arguments that
+        replace the constant ones of the event.
         """
         event = PX4_EVENTS[kind]
         if event.event_id:

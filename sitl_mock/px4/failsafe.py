@@ -1,5 +1,7 @@
 """PX4's failsafes: loss of a link, of offboard setpoints, of position; low battery."""
 
+from dataclasses import dataclass, field
+
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.events import EventKind
@@ -34,32 +36,22 @@ _WARNINGS = {
 _AUTO_MODES = frozenset({Mode.LOITER, Mode.TAKEOFF, Mode.RTL, Mode.LAND})
 
 
+@dataclass(eq=False)
 class Failsafe:
-    """Detects losses, and starts failsafes while armed.
+    """Detects losses, and starts failsafes while armed."""
 
-    Args:
-        actions: executes the action of a failsafe.
-    """
-
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        announce: AnnounceEvent,
-        actions: FailsafeActions,
-    ) -> None:
-        self._state = state
-        self._parameters = parameters
-        self._announce = announce
-        self._actions = actions
-        self._pilot_present = False
-        self._pilot_optional = True
-        self._pilot_lost_us: int | None = None
-        self._disarmed_warning_sent = False
-        self._gcs_heartbeat_us: int | None = None
-        self._gcs_lost_us: int | None = None
-        self._companion_heartbeat_us: int | None = None
-        self._companion_lost = False
+    _state: State
+    _parameters: ParameterTable
+    _announce: AnnounceEvent
+    _actions: FailsafeActions
+    _pilot_present: bool = field(default=False, init=False)
+    _pilot_optional: bool = field(default=True, init=False)
+    _pilot_lost_us: int | None = field(default=None, init=False)
+    _disarmed_warning_sent: bool = field(default=False, init=False)
+    _gcs_heartbeat_us: int | None = field(default=None, init=False)
+    _gcs_lost_us: int | None = field(default=None, init=False)
+    _companion_heartbeat_us: int | None = field(default=None, init=False)
+    _companion_lost: bool = field(default=False, init=False)
 
     def clear(self) -> None:
         """End any failsafe, because a mode was requested or the vehicle disarmed."""

@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple, Protocol
 
@@ -75,32 +76,22 @@ class AnnounceEvent(Protocol):
         """Announce an event, with a detail for its text and packed arguments."""
 
 
+@dataclass(eq=False)
 class FailsafeActions:
-    """Executes the action of the failsafe with the most severe cause.
+    """Executes the action of the failsafe with the most severe cause."""
 
-    Args:
-        state: the autopilot's state; ``failsafe`` is written here.
-        parameters: COM_FAIL_ACT_T, and the parameters that name actions.
-        enter: enters a mode and leaves the intended mode as it is.
-        stop: stops the motors and announces the event.
-    """
-
-    def __init__(
-        self,
-        state: State,
-        parameters: ParameterTable,
-        announce: AnnounceEvent,
-        enter: Callable[[Mode], None],
-        stop: Callable[[EventKind], None],
-    ) -> None:
-        self._state = state
-        self._parameters = parameters
-        self._announce = announce
-        self.enter = enter
-        self._stop = stop
-        self._announced_action: tuple[Cause, Action] | None = None
-        self.cause: Cause | None = None
-        """Cause of the active failsafe, None if none is active."""
+    _state: State
+    """The autopilot's state; ``failsafe`` is written here."""
+    _parameters: ParameterTable
+    """COM_FAIL_ACT_T, and the parameters that name actions."""
+    _announce: AnnounceEvent
+    enter: Callable[[Mode], None]
+    """Enters a mode and leaves the intended mode as it is."""
+    _stop: Callable[[EventKind], None]
+    """Stops the motors and announces the event."""
+    _announced_action: tuple[Cause, Action] | None = field(default=None, init=False)
+    cause: Cause | None = field(default=None, init=False)
+    """Cause of the active failsafe, None if none is active."""
 
     def clear(self) -> None:
         """End the active failsafe."""

@@ -18,11 +18,7 @@ LEVEL_DEMAND_ACCELERATION: Vector = (0.0, 0.0, nan)
 
 
 class FlightTasks:
-    """Computes the demand on the position controller, from the mode or from a setpoint.
-
-    Args:
-        parameters: speeds, heights and times.
-    """
+    """Computes the demand on the position controller, from the mode or from a setpoint."""
 
     def __init__(self, state: State, parameters: ParameterTable) -> None:
         self._state = state
@@ -39,10 +35,8 @@ class FlightTasks:
     ) -> None:
         """Begin a mode from the estimated position, velocity and heading.
 
-        Args:
-            mode: the mode to begin.
-            takeoff_z: down position at which TAKEOFF ends, m; None = unchanged.
-            hold_position: position to hold in LOITER, m NED; None = where the vehicle can stop.
+        `takeoff_z`: down position at which TAKEOFF ends, m; None = unchanged. `hold_position`:
+        position to hold in LOITER, m NED; None = where the vehicle can stop.
         """
         estimate = self._state.estimate
         self._entered_us = self._state.time_us

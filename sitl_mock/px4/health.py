@@ -61,7 +61,6 @@ class HealthReport:
     """Sends a report when it changed, at least two seconds after the last one.
 
     Args:
-        events: sends the report.
         ready_us: vehicle time at which the estimator is ready.
     """
 

@@ -25,11 +25,7 @@ _ESTIMATOR_NO_POSITION = 164
 
 
 class Px4SystemTelemetry(SystemTelemetry):
-    """Builds messages about the state, the battery, GPS and the link.
-
-    Args:
-        vehicle: the simulated vehicle, whose battery is reported.
-    """
+    """Builds messages about the state, the battery, GPS and the link."""
 
     def __init__(
         self,

@@ -38,10 +38,7 @@ def checked_table(table: Table) -> Table:
 def _array(name: str, values: ArrayLike, shape: tuple[int, ...] | None) -> Floats:
     """Convert `values` to an array of finite floats; messages call it `name`.
 
-    Args:
-        name: name of the array in messages.
-        values: the numbers.
-        shape: required shape; None: one dimension of any length.
+    `shape`: the required one; None: one dimension of any length.
 
     Raises:
         TrajectoryError: `values` have another shape, or a value is no finite number.

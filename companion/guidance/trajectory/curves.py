@@ -62,7 +62,6 @@ class Curve(Protocol):
 
     def at(self, phase: float) -> CurvePoint:
         """The point at `phase`."""
-        ...
 
     def sampling(self) -> PhaseSampling:
         """The phases at which to check the curve against limits.
@@ -70,7 +69,6 @@ class Curve(Protocol):
         Raises:
             TrajectoryError: the curve needs too many checks.
         """
-        ...
 
 
 class Figure(Curve, Protocol):

@@ -31,7 +31,7 @@ class Motion:
                 each of `times`; (m,).
         """
         velocity, acceleration, jerk = derivatives(
-            progress, _columns(self.velocity), _columns(self.acceleration), _columns(self.jerk)
+            progress, columns(self.velocity), columns(self.acceleration), columns(self.jerk)
         )
         return Motion(
             times,
@@ -117,7 +117,7 @@ def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
         drag: drag of the vehicle.
         gravity: gravity, m/s².
     """
-    velocity, acceleration = _columns(motion.velocity), _columns(motion.acceleration)
+    velocity, acceleration = columns(motion.velocity), columns(motion.acceleration)
     deceleration = np.stack(drag.deceleration(velocity), axis=1)
     force = motion.acceleration + deceleration - np.array([0.0, 0.0, gravity])
     force_rate = motion.jerk + np.stack(drag.deceleration_rate(velocity, acceleration), axis=1)
@@ -129,5 +129,6 @@ def demand(motion: Motion, drag: Drag, gravity: float) -> Demand:
     return Demand(tilt, tilt_rate, thrust)
 
 
-def _columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
+def columns(vectors: Floats) -> tuple[Floats, Floats, Floats]:
+    """The components of vectors (m, 3): three arrays (m,)."""
     return vectors[:, 0], vectors[:, 1], vectors[:, 2]

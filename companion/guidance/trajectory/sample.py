@@ -54,21 +54,17 @@ class Trajectory(Protocol):
     @property
     def name(self) -> str:
         """Name for messages."""
-        ...
 
     @property
     def duration(self) -> float:
         """Duration, s."""
-        ...
 
     @property
     def holds_heading(self) -> bool:
         """Whether the vehicle keeps its heading; the samples' `heading` is then 0."""
-        ...
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the start; at rest before the start and after the end."""
-        ...
 
     def check_times(self) -> Sequence[float]:
         """Times at which to check the trajectory against limits, s, ascending from 0 to its end.
@@ -76,7 +72,6 @@ class Trajectory(Protocol):
         Raises:
             TrajectoryError: the trajectory is too long to be checked.
         """
-        ...
 
 
 @contextmanager

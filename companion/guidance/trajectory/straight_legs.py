@@ -47,12 +47,7 @@ class Legs:
     """Time law of legs one after another, each from rest to rest in pieces of constant jerk."""
 
     def __init__(self, legs: Sequence[LimitedJerk], phases: Sequence[float]) -> None:
-        """Join the legs.
-
-        Args:
-            legs: the time law of each leg.
-            phases: phase where each leg begins, m.
-        """
+        """Join the time laws of the legs; `phases`: where each leg begins, m."""
         self._legs, self._phases = legs, phases
         *self._begins, self.duration = accumulate((leg.duration for leg in legs), initial=0.0)
 

@@ -35,11 +35,7 @@ def derivatives(
 ) -> tuple[Triple, Triple, Triple]:
     """Velocity, acceleration and jerk along a curve, by the chain rule.
 
-    Args:
-        progress: progress along the curve.
-        first: derivative of the curve by its phase.
-        second: second derivative of the curve by its phase.
-        third: third derivative of the curve by its phase.
+    `first`, `second` and `third` are the derivatives of the curve by its phase.
     """
     _, r, s, t = progress
     return (
@@ -76,16 +72,13 @@ class TimeLaw(Protocol):
 
     def pieces(self) -> Sequence[Piece]:
         """The smooth parts of the law, in order, from 0 to the duration."""
-        ...
 
     @property
     def duration(self) -> float:
         """Duration, s."""
-        ...
 
     def at(self, time: float) -> Progress:
         """Progress at `time`; at rest before 0 and past the duration."""
-        ...
 
 
 Ramp = Callable[[float, float, float], Progress]

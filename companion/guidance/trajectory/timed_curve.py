@@ -117,7 +117,6 @@ class Heading(Protocol):
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Heading in rad, and its derivative by the phase, at a point of the curve."""
-        ...
 
 
 class HeldHeading:

@@ -61,11 +61,8 @@ def decode_local_target(
 ) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_LOCAL_NED.
 
-    Args:
-        message: the setpoint.
-        situation: position and yaw of the vehicle.
-        body_yaw_is_relative: whether a yaw in a body frame is relative to the present yaw
-            (ArduPilot), not to north (PX4).
+    `body_yaw_is_relative`: whether a yaw in a body frame is relative to the present yaw
+    (ArduPilot), not to north (PX4).
 
     Raises:
         RefusedSetpoint: the setpoint is contradictory, incomplete, not finite, too large, or of a

@@ -23,11 +23,8 @@ def decode_setpoint(
 ) -> Request:
     """Decode a client's setpoint to a request.
 
-    Args:
-        frame: frame of the setpoint.
-        situation: position and yaw of the vehicle.
-        targets: the autopilot and our component; a setpoint may be addressed to either.
-        body_yaw_is_relative: see `decode_local_target`.
+    `targets`: the autopilot and our component; a setpoint may be addressed to either.
+    `body_yaw_is_relative`: see `decode_local_target`.
 
     Raises:
         RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not finite,

@@ -169,7 +169,6 @@ class EventReader:
     that fail only because no setpoints are sent are never reported.
 
     Args:
-        texts: takes the texts.
         clock: returns the event-loop time, s.
     """
 
