@@ -43,7 +43,7 @@ def test_more_thrust_than_there_is_is_full_throttle():
 def test_it_sinks_below_its_weight_and_lifts_above(factor):
     standing = multirotor(factor * AIRFRAME.gravity_m_s2)
     load = standing.drive(REST, standing.throttle(factor * AIRFRAME.gravity_m_s2))
-    assert does_not_rise(standing.law, standing.body, load) == (factor < 1.0)
+    assert does_not_rise(standing.constants, standing.body, load) == (factor < 1.0)
 
 
 @pytest.mark.parametrize("throttle", [nan, 0.0, -1.0])

@@ -56,7 +56,7 @@ def errors(config, way, seconds, seed=1):
         now = step * DT
         if step >= late and navigation.is_due(now - late * DT):
             navigation.advance(way(now - late * DT), now - late * DT, way(now), now)
-        error = error_at(navigation.law, navigation.state, way(now), now)
+        error = error_at(navigation.constants, navigation.state, way(now), now)
         rows.append((now, *error.position, *error.velocity, *error.rotation))
     return np.array(rows)[round(SETTLED_S / DT) :]
 
