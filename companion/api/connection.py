@@ -21,7 +21,7 @@ from companion.flight.phase import Phase
 from companion.flight.phases import hand_back_phase
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
-from companion.recording.folder import flight_folder
+from companion.recording.folder import flight_folder, own_folder
 from companion.safety.actions import FlightEnded
 
 T = TypeVar("T")
@@ -51,11 +51,11 @@ async def connect(
         endpoint: replaces `link.endpoint`.
         arm: replaces `flight.arm`. True: `Vehicle.take_off` arms. False: the pilot arms.
         changes: other keys to change, by section, such as `{"limits": {"max_tilt_deg": 20}}`.
-        folder: an existing folder for the records; None: a new one in `recording.directory`.
+        folder: folder for the records of this flight; None: a new one in `recording.directory`.
         observer: receives phases and events in the flight's thread; it must return at once.
 
     Raises:
-        ConfigError: the configuration is wrong.
+        ConfigError: the configuration is wrong, or the folder holds a flight.
         FlightEnded: the vehicle did not pass the checks, or the flight ended early.
         LinkError: the link could not be opened; nothing was sent.
         OSError: the folder cannot be written; nothing was sent.
@@ -68,7 +68,11 @@ async def connect(
     if arm is not None:
         overrides["flight"]["arm"] = arm
     flown_config = changed(changed(flown_config, changes or {}, "changes"), overrides, "connect")
-    records = flight_folder(flown_config.recording.directory) if folder is None else Path(folder)
+    records = (
+        flight_folder(flown_config.recording.directory)
+        if folder is None
+        else own_folder(Path(folder))
+    )
     async with connect_configured(flown_config, records, observer) as vehicle:
         yield vehicle
 

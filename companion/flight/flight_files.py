@@ -20,7 +20,7 @@ from companion.mavlink.texts import TextFrames
 from companion.recording.folder import space_warning
 from companion.recording.measurements.summary import Summary
 from companion.recording.recorder import FlightRecorder
-from companion.recording.tlog import TlogWriter
+from companion.recording.tlog import TLOG_FILE, TlogWriter
 
 _SUMMARY_RESERVE = 1 << 18
 """Disk space reserved for `summary.json`, bytes; most need less than 10 kB."""
@@ -76,7 +76,7 @@ class FlightFiles:
             def on_bad_entry(text: str) -> None:  # the same
                 loop.call_soon_threadsafe(note, text)
 
-            self.tap = TlogWriter(folder / "flight.tlog", epoch, on_failure)
+            self.tap = TlogWriter(folder / TLOG_FILE, epoch, on_failure)
             self.mcap = FlightRecorder(
                 folder / "flight.mcap",
                 epoch,

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from companion.files.yaml_file import ConfigError
+from companion.recording.tlog import TLOG_FILE
 
 _BYTES_PER_S = 160_000
 """What a flight with 250 attitude samples a second records, measured."""
@@ -31,6 +32,21 @@ def flight_folder(directory: Path) -> Path:
             ) from error
         return folder
     raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
+
+
+def own_folder(folder: Path) -> Path:
+    """Make the folder that the user names for one flight, unless it exists.
+
+    Raises:
+        ConfigError: the folder cannot be made, or it holds the records of a flight.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"folder: cannot make {folder}: {error.strerror}") from error
+    if (folder / TLOG_FILE).exists():
+        raise ConfigError(f"folder: {folder} holds a flight already; name another folder")
+    return folder
 
 
 def space_warning(folder: Path) -> str | None:
