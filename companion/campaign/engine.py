@@ -97,7 +97,8 @@ def run_on_cluster(
     `seconds_per_case` is the wall time that a case takes, s.
 
     Raises:
-        ClusterError: a unit was given up; further, as ConfigError, see `run_tasks`.
+        ClusterError: a unit was given up, or see `run_tasks`.
+        ConfigError: see `run_tasks`.
     """
     unit_size = cases_per_unit(len(cases), seconds_per_case, number_of_workers(client))
     units = unit_ranges(len(cases), unit_size)

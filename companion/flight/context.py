@@ -74,8 +74,9 @@ class FlightContext:
     """Whether the flight must disarm the vehicle on the ground, because we commanded arming or
     take-off."""
     took_off: bool = False
-    """Whether we have commanded the take-off and not taken over since. A vehicle that is lost
-    meanwhile and heard again must land, because it would hover without end."""
+    """Whether we have commanded the take-off, and the vehicle neither was taken over nor began to
+    land since. A vehicle that is lost meanwhile and heard again must land, because it would hover
+    without end."""
     landing_requested: bool = False
     """Whether the landing has begun or was to begin; a vehicle lost meanwhile must still land."""
     fence_centre: FenceCentre | None = None

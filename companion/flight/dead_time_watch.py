@@ -36,6 +36,7 @@ class DeadTimeWatch:
 
     Args:
         trace: records of the flight, with the commanded and the measured body rates.
+        axes: configured response of "roll", "pitch" and "yaw".
         note: called with the warning.
     """
 

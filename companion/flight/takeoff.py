@@ -63,15 +63,17 @@ async def takeoff(context: FlightContext) -> None:
 def ends_takeoff(context: FlightContext) -> bool:
     """Whether a vehicle that we did not hear is in its take-off, or holds at its height after it.
 
-    A vehicle that holds lower was stopped by somebody else.
+    A vehicle that holds lower was stopped by somebody else, and one that holds higher was flown.
     """
     state = context.link.state
     if in_role(context.link, Role.TAKEOFF):
         return True
     if not in_role(context.link, Role.READY) or state.mode_by_failsafe:
         return False
-    lowest = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
-    return context.fresh_position() is not None and (state.height or 0.0) > lowest
+    if context.fresh_position() is None or state.height is None:
+        return False
+    above = state.height - context.config.flight.takeoff_height_m
+    return -MAX_UNDERSHOOT < above < _MAX_OVERSHOOT
 
 
 class _Climb:

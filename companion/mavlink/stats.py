@@ -60,7 +60,7 @@ class LinkStats:
     """(system, component) of the frames in `ignored_foreign`."""
 
     def refuse_non_finite(self, message: str, now: float) -> None:
-        """Count a message (its name) refused for a NaN or infinity; `now`: event-loop time, s."""
+        """Count, by its name, a message with a NaN or infinity; `now`: event-loop time, s."""
         self.non_finite += 1
         self.non_finite_at[message] = now
 

@@ -13,6 +13,7 @@ from companion.vehicle.px4.events import EventReader
 AUTOPILOTS: tuple[Autopilot, ...] = (Px4(), ArduPilot())
 
 AUTOPILOTS_BY_NUMBER = {autopilot.mav_autopilot: autopilot for autopilot in AUTOPILOTS}
+"""The autopilots by MAV_AUTOPILOT."""
 
 AUTOPILOT_NAMES = " or ".join(
     f"{autopilot.name} ({autopilot.mav_autopilot})" for autopilot in AUTOPILOTS

@@ -102,16 +102,16 @@ def _load_and_store(numba_type: Any) -> tuple[Any, Any]:
 
 _EXAMPLE = Vehicle(seed=0)  # its attributes have the types to compile for
 _EXAMPLE_SENSORS = _EXAMPLE.estimator.constants, _EXAMPLE.estimator.state
-_load_law, _store_law = _load_and_store(numba.typeof(_EXAMPLE.plant.constants))
+_load_constants, _store_constants = _load_and_store(numba.typeof(_EXAMPLE.plant.constants))
 _load_state, _store_state = _load_and_store(numba.typeof(_EXAMPLE.plant.state))
 _load_sensors, _store_sensors = _load_and_store(numba.typeof(_EXAMPLE_SENSORS))
 
 
 @_compiled
 def _store_start(
-    law_memory: Any, constants: VehicleConstants, state_memory: Any, state: VehicleState
+    constants_memory: Any, constants: VehicleConstants, state_memory: Any, state: VehicleState
 ) -> None:
-    _store_law(law_memory, constants)
+    _store_constants(constants_memory, constants)
     _store_state(state_memory, state)
 
 
@@ -122,7 +122,7 @@ def _read_state(state_memory: Any) -> Any:
 
 @_compiled
 def _advance(
-    law_memory: Any,
+    constants_memory: Any,
     state_memory: Any,
     before_shaping: Any,
     before_rate_loop: Any,
@@ -138,7 +138,7 @@ def _advance(
     count: int,
 ) -> Outcome:
     state = advance(
-        _load_law(law_memory),
+        _load_constants(constants_memory),
         DelayRings(before_shaping, before_rate_loop),
         history,
         _load_state(state_memory),
@@ -170,12 +170,9 @@ class CompiledPlant:
     def __init__(
         self, constants: VehicleConstants, state: VehicleState, history_length: int
     ) -> None:
-        self.constants, self._law_memory, self._state_memory = (
-            constants,
-            _memory_for(constants),
-            _memory_for(state),
-        )
-        _store_start(self._law_memory, constants, self._state_memory, state)
+        self.constants, self._constants_memory = constants, _memory_for(constants)
+        self._state_memory = _memory_for(state)
+        _store_start(self._constants_memory, constants, self._state_memory, state)
         self._before_shaping, self._before_rate_loop = (
             np.array(ring) for ring in empty_rings(constants.multirotor)
         )
@@ -197,7 +194,7 @@ class CompiledPlant:
         self._steps += count
         self._state = None
         return _advance(
-            self._law_memory,
+            self._constants_memory,
             self._state_memory,
             self._before_shaping,
             self._before_rate_loop,

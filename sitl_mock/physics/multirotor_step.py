@@ -27,7 +27,7 @@ from sitl_mock.physics.rate_shaping import (
 )
 from sitl_mock.physics.rigid_body import Body, Load, Motion, advance, body_of, derivative
 from sitl_mock.physics.rotors import (
-    STOPPED_MIX,
+    STOPPED_ALLOCATION,
     Allocation,
     FourFloats,
     RotorConstants,
@@ -209,7 +209,7 @@ def _allocate(constants: MultirotorConstants, axes: AxisStates, throttle: float)
         return allocate(
             throttle, roll[1] / tilt_torque, pitch[1] / tilt_torque, yaw[1] / constants.yaw_torque
         )
-    return STOPPED_MIX
+    return STOPPED_ALLOCATION
 
 
 def _load(constants: MultirotorConstants, wrench: FourFloats, wind: Vector) -> Load:

@@ -89,7 +89,7 @@ class RateConstants(NamedTuple):
 
 
 def rate_constants(config: RateLoopConfig, dt: float) -> RateConstants:
-    """Return the rate controller for steps of `dt` seconds."""
+    """Return the constants of the rate controller for steps of `dt` seconds."""
     roll, pitch, yaw = config.roll, config.pitch, config.yaw
     delays_ms = (roll.setpoint_delay_ms, pitch.setpoint_delay_ms, yaw.setpoint_delay_ms)
     return RateConstants(

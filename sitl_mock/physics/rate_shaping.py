@@ -88,9 +88,9 @@ class ShapingConstants(NamedTuple):
 def shaping_constants(
     axes: tuple[AxisShaping, AxisShaping, AxisShaping] | None, dt: float
 ) -> ShapingConstants:
-    """Return the shaping of roll, pitch and yaw for steps of `dt` seconds.
+    """Return the constants of the shaping of roll, pitch and yaw for steps of `dt` seconds.
 
-    For None return an unused constants, because the compiler needs a value of this type.
+    For None they are unused; the compiler needs a value of this type.
     """
     if axes is None:
         return ShapingConstants(

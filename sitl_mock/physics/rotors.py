@@ -21,7 +21,7 @@ class Allocation(NamedTuple):
     yaw_saturated: bool
 
 
-STOPPED_MIX = Allocation((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
+STOPPED_ALLOCATION = Allocation((0.0, 0.0, 0.0, 0.0), tilt_saturated=True, yaw_saturated=True)
 """Result of the allocation while the rotors are off and give no torque."""
 
 
@@ -81,7 +81,7 @@ class RotorConstants(NamedTuple):
 
 
 def rotor_constants(airframe: AirframeConfig, dt: float) -> RotorConstants:
-    """Return the rotors of an airframe for steps of `dt` seconds."""
+    """Return the constants of an airframe's rotors for steps of `dt` seconds."""
     per_rotor = airframe.mass_kg / 4.0
     slope = airframe.thrust_slope_m_s2 * per_rotor
     offset = airframe.thrust_offset_m_s2 * per_rotor
@@ -119,7 +119,7 @@ def rotor_step(
     thrusts before and after the step is accurate to second order.
 
     Args:
-        constants: the rotors.
+        constants: constants of the rotors.
         thrusts: thrust of each rotor before the step, N.
         throttles: throttle of each rotor, 0..1.
         thrust_factor: factor of the battery voltage on the thrust of every rotor.
