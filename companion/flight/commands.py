@@ -52,11 +52,12 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     """
     if roles_of(link) & allowed:
         return
-    if released_by and not link.state.mode_by_failsafe:
+    by_failsafe = _by_failsafe(link)
+    if released_by and not by_failsafe:
         raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
     who = (
         "the autopilot's failsafe took over"
-        if _by_failsafe(link)
+        if by_failsafe
         else "the pilot or another station took over"
     )
     raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.RELEASE)

@@ -15,6 +15,7 @@ from companion.flight.preflight_checks import PreflightChecks
 from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
 from companion.guidance.fence import FenceCentre
+from companion.guidance.reference import NorthEast
 from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import dialect
 from companion.safety.actions import Exit, FlightEnded
@@ -73,10 +74,10 @@ class FlightContext:
     must_disarm: bool = False
     """Whether the flight must disarm the vehicle on the ground, because we commanded arming or
     take-off."""
-    took_off: bool = False
-    """Whether we have commanded the take-off, and the vehicle neither was taken over nor began to
-    land since. A vehicle that is lost meanwhile and heard again must land, because it would hover
-    without end."""
+    took_off_from: NorthEast | None = None
+    """Where the vehicle stood when we commanded the take-off, m; None: we did not, or it was taken
+    over or began to land since. A vehicle that is lost meanwhile and heard again must land, because
+    it would hover without end."""
     landing_requested: bool = False
     """Whether the landing has begun or was to begin; a vehicle lost meanwhile must still land."""
     fence_centre: FenceCentre | None = None
@@ -167,6 +168,14 @@ class FlightContext:
         finally:
             request_task.cancel()
             unsubscribe()
+
+    async def next_position(self) -> LocalPosition:
+        """The newest position, or the next one if there is no fresh one."""
+        position = self.fresh_position()
+        while position is None:
+            await self.until(lambda: self.fresh_position() is not None, "a fresh position")
+            position = self.fresh_position()
+        return position
 
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it is stale."""

@@ -152,7 +152,7 @@ async def land(context: FlightContext) -> None:
     context.detail = "the autopilot to accept the landing"
     context.landing_requested = True
     await hand_over_to_landing(context)
-    context.took_off = False  # from here on only somebody else can end the landing
+    context.took_off_from = None  # from here on only somebody else can end the landing
     allowed = context.config.flight.landing_timeout_s
 
     def touched_down() -> bool:

@@ -47,8 +47,12 @@ async def _hold_if_ours(context: FlightContext) -> None:
     context.detail = "its heartbeat"
     await context.fresh_heartbeat()  # only now, because a request during the silence is lost
     mode = context.link.state.mode
-    lost_in_takeoff = context.took_off and ends_takeoff(context)
-    if not context.armed() or not (in_role(context.link, Role.OFFBOARD) or lost_in_takeoff):
+    lost_in_takeoff = await ends_takeoff(context)
+    # Another station may have flown an ArduPilot elsewhere in the mode of the take-off.
+    obeys = in_role(context.link, Role.OFFBOARD) and (
+        context.took_off_from is None or not in_role(context.link, Role.TAKEOFF)
+    )
+    if not context.armed() or not (obeys or lost_in_takeoff):
         armed = "armed" if context.armed() else "disarmed"
         context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
         return

@@ -127,7 +127,7 @@ async def undo_arming(context: FlightContext) -> None:
 async def _arm(context: FlightContext) -> None:
     """Arm, after the checks are repeated."""
     state = context.link.state
-    await context.until(lambda: context.fresh_position() is not None, "a fresh position")
+    await context.next_position()
     context.detail = "the autopilot to accept arming"
     *before, command = context.link.autopilot.arm()
     for each in before:

@@ -1,6 +1,7 @@
 """The phase in which the autopilot takes off."""
 
 import asyncio
+from math import dist
 
 from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import FlightContext
@@ -16,6 +17,9 @@ MAX_UNDERSHOOT = 0.5
 
 _MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
+
+_LARGEST_DRIFT = 3.0
+"""A vehicle further away from where it stood was not only carried by the wind in its climb, m."""
 
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after hold mode is shown, s; then the climb counts as stopped."""
@@ -39,7 +43,7 @@ async def takeoff(context: FlightContext) -> None:
     """Let the autopilot take off, and wait for the height."""
     state = context.link.state
     context.replacement_detector.note_arming()
-    await context.until(lambda: context.fresh_position() is not None, "a fresh position")
+    north, east, _ = (await context.next_position()).position_ned
     await context.preflight.require(Stage.ARMED)
     await context.fresh_heartbeat()
     _require_ground(context)
@@ -53,24 +57,27 @@ async def takeoff(context: FlightContext) -> None:
     def require_ours() -> None:
         # Before each try: a disarmed PX4 stores the command and takes off once armed.
         _require_ground(context)
-        context.must_disarm = context.took_off = True
+        context.must_disarm, context.took_off_from = True, (north, east)
 
     await command_if_ours(context, command, require_ours, lambda: not state.landed)
     climb = _Climb(context, height)
     await context.until(climb.is_over)
 
 
-def ends_takeoff(context: FlightContext) -> bool:
+async def ends_takeoff(context: FlightContext) -> bool:
     """Whether a vehicle that we did not hear is in its take-off, or holds at its height after it.
 
-    A vehicle that holds lower was stopped by somebody else, and one that holds higher was flown.
+    A vehicle that holds lower was stopped by somebody else; one that is elsewhere was flown there.
     """
-    state = context.link.state
+    state, place = context.link.state, context.took_off_from
+    if place is None:
+        return False
+    position = await context.next_position()
+    if dist(place, position.position_ned[:2]) > _LARGEST_DRIFT:
+        return False
     if in_role(context.link, Role.TAKEOFF):
         return True
-    if not in_role(context.link, Role.READY) or state.mode_by_failsafe:
-        return False
-    if context.fresh_position() is None or state.height is None:
+    if not in_role(context.link, Role.READY) or state.mode_by_failsafe or state.height is None:
         return False
     above = state.height - context.config.flight.takeoff_height_m
     return -MAX_UNDERSHOOT < above < _MAX_OVERSHOOT

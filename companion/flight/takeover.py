@@ -111,7 +111,7 @@ async def _check_stage(
     await request_telemetry(context)
     await _landed_or_flying(context)
     require(context)
-    await context.until(lambda: context.fresh_position() is not None, "a fresh position")
+    await context.next_position()
     evidence = await judge_vehicle(context, stage)
     use_evidence(context, evidence)
     require(context)
@@ -149,7 +149,7 @@ async def offboard(context: FlightContext) -> None:
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False
-    context.took_off = False
+    context.took_off_from = None
     await asyncio.sleep(_SETTLE_TIME)
 
 

@@ -146,7 +146,8 @@ class Watch:
         state, loop = self._context.link.state, self._context.loop
         # While taking over, it may obey the first setpoint although no heartbeat has told so.
         in_control = loop.offboard_active or loop.taking_over or self._stopped_in_control
-        exit_ = Exit.LISTEN if in_control or self._context.took_off else Exit.RELEASE
+        climbs_alone = self._context.took_off_from is not None
+        exit_ = Exit.LISTEN if in_control or climbs_alone else Exit.RELEASE
 
         def age(received: float) -> float:
             stalled = self._context.snapshot_builder.counters.stall_time(since=received)

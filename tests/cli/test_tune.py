@@ -55,7 +55,7 @@ def test_the_users_own_configuration_is_not_told_to_include_what_includes_it(veh
     code, told, _ = run(capsys, own, "--config", own, "--no-flights")
     tuned = vehicle.with_name("tuned.yaml")
     assert code == 0
-    assert f"name {tuned} instead of {own} with --config" in told
+    assert f"Fly it with --config {tuned}; do not include it in {own}." in told
     assert "Let your configuration include it" not in told
     assert load(tuned).limits.max_tilt_deg == 20.0  # so it can be flown itself
     code, told, _ = run(capsys, vehicle, "--config", own, "--no-flights", "--force")

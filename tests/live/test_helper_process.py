@@ -34,9 +34,7 @@ def started(console=None, folder=None, path=None, **options):
     asked = {"watch": False, "live": None, "foxglove": None, **options}
     read = Config() if path is None else load(path)
     shown = console or Console(file=io.StringIO())
-    return helper_process(
-        argparse.Namespace(**asked), read, path, read, folder, shown, flies_maneuvers=True
-    )
+    return helper_process(argparse.Namespace(**asked), read, path, read, folder, shown)
 
 
 def test_without_the_options_nothing_is_started():

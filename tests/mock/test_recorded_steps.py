@@ -26,6 +26,7 @@ def recorded(family, dialect):
         elif message.get_type() == "SET_ATTITUDE_TARGET" and samples:
             rates = (message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
             setpoints.append((now, *rates, message.thrust))
+    log.close()
     return np.array(samples), np.array(setpoints)
 
 
