@@ -104,7 +104,8 @@ def as_markdown(config_keys: Iterable[ConfigKey]) -> str:
         lines += ["", f"## {section}", "", _one_line(models[section].__doc__ or ""), ""]
         lines += ["| key | default | unit | range | meaning |", "|---|---|---|---|---|"]
         for key in section_keys:
-            cells = f"`{key.name}`", f"`{dump_value(key.default)}`", *key[4:]
+            name, default = f"`{key.name}`", f"`{dump_value(key.default)}`"
+            cells = name, default, key.unit, key.allowed_values, key.meaning
             lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines).strip() + "\n"
 

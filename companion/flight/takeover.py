@@ -144,7 +144,8 @@ async def offboard(context: FlightContext) -> None:
     await _require_learned_hover(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
-    if jump := hypot(*context.loop.resets.position_shift):  # the monitors count from here on
+    jump = hypot(*context.loop.resets.position_shift)
+    if jump and context.took_off_from is not None:  # the monitors count from here on
         context.note(f"before the takeover the estimated position jumped by {jump:.1f} m")
     await _take_over(context)
     context.guidance_loop.hold_here()

@@ -1,12 +1,15 @@
 """A vehicle that was silent is heard again while it still obeys us: it holds, or it lands."""
 
+from math import isnan, nan
+
 import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
-SET_MODE, FAILED = 176, 4
+SET_MODE, DO_REPOSITION, FAILED = 176, 192, 4
+HOME = (47.3977433, 8.5455942, 489.4)
 RATE_HOLD = {"px4": "COM_OF_LOSS_T", "ardupilot": "GUID_TIMEOUT"}
 HOLD_MODE = {"px4": 4.0, "ardupilot": 17.0}
 """Second parameter of the command that asks for the hold."""
@@ -142,4 +145,21 @@ def test_a_pilot_who_stopped_the_climb_unheard_keeps_the_vehicle(autopilot):
         high = {"takeoff_height_m": 20.0}
         summary = fly(mock, None, When("takeoff", stop, after=after), flight=high)
         assert mock.state()["armed"], summary.events
+    assert summary.events[-1][1].endswith("nothing is commanded")
+
+
+@pytest.mark.parametrize(("north", "up"), [(9.0, nan), (nan, 9.0)])
+def test_a_pilot_who_flew_it_elsewhere_unheard_keeps_it(north, up):
+    """There it holds in the mode in which it would hold after its take-off, too."""
+
+    def fly_there():
+        mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 9.0})
+        east = nan if isnan(north) else HOME[1]
+        mock.command(DO_REPOSITION, -1, 1, 0, nan, HOME[0] + north / 111_195.0, east, HOME[2] + up)
+
+    with mock_vehicle() as mock:
+        observer = When("takeoff", fly_there, after=2.0)
+        summary = fly(mock, None, observer, flight={"takeoff_height_m": 3.0})
+        truth = mock.state()
+    assert (truth["mode"], truth["armed"]) == ("LOITER", True), summary.events
     assert summary.events[-1][1].endswith("nothing is commanded")
