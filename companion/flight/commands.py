@@ -20,8 +20,9 @@ _EFFECT_TIMEOUT = 3.0
 effect later than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
-_MODE_TEXT_TIME = 1.0
-"""A text that came at most this long before a report of the mode may say why it changed, s."""
+_TEXT_TIME = 0.3
+"""A text that says why the mode changed comes at most this long before or after the mode, s."""
+_BY_FAILSAFE = "the autopilot's failsafe took over"
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 IsDone = Callable[[], bool]
@@ -52,24 +53,28 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     """
     if roles_of(link) & allowed:
         return
-    by_failsafe = _by_failsafe(link)
-    if released_by and not by_failsafe:
+    if released_by and not link.state.mode_by_failsafe:
         raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
-    who = (
-        "the autopilot's failsafe took over"
-        if by_failsafe
-        else "the pilot or another station took over"
-    )
-    raise FlightEnded(f"{who}: mode {link.state.mode}", Exit.RELEASE)
+    if link.state.mode_by_failsafe:
+        raise FlightEnded(f"{_BY_FAILSAFE}: mode {link.state.mode}", Exit.RELEASE)
+    raise ModeTaken(f"the pilot or another station took over: mode {link.state.mode}", Exit.RELEASE)
 
 
-def _by_failsafe(link: Link) -> bool:
-    """Whether a failsafe chose the present mode, by its reports or by a text shortly before."""
-    state, fence_text = link.state, link.autopilot.fence_text
-    since = state.mode_received - _MODE_TEXT_TIME
-    return state.mode_by_failsafe or any(
-        fence_text in each.text for each in state.texts if fence_text and each.time >= since
-    )
+class ModeTaken(FlightEnded):
+    """A mode that is not ours, and that the autopilot does not report as a failsafe's."""
+
+
+async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
+    """Release control, and name the autopilot's geofence if only a text says that it acted."""
+    state, fence_text = context.link.state, context.link.autopilot.fence_text
+    if not isinstance(ended, ModeTaken) or fence_text is None:
+        return ended
+    context.release()
+    mode, since = state.mode, state.mode_received - _TEXT_TIME
+    await asyncio.sleep(_TEXT_TIME)
+    if not any(fence_text in each.text for each in state.texts if each.time >= since):
+        return ended
+    return FlightEnded(f"{_BY_FAILSAFE}: mode {mode}", ended.exit)
 
 
 def requiring_roles(link: Link, allowed: Set[Role]) -> RequireOurs:

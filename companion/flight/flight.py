@@ -6,6 +6,7 @@ from contextlib import aclosing
 from math import inf
 from typing import Any
 
+from companion.flight.commands import with_cause
 from companion.flight.context import FlightContext, cancel
 from companion.flight.observer import Observer
 from companion.flight.phase import Phase
@@ -64,7 +65,8 @@ class Flight:
         ]
         try:
             await self._fly_all()
-        except FlightEnded as ended:
+        except FlightEnded as first:
+            ended = await with_cause(self._context, first)
             self.failed_in, self.end_reason = self.phase, ended.reason
             self.note(ended.reason)
             await self._leave(ended.exit or self._usual_exit())

@@ -294,7 +294,7 @@ def test_a_mode_that_the_autopilots_geofence_chose_is_not_told_as_the_pilots():
     text = bytes(message.pack(dialect.MAVLink(None, 1, 1)))
 
     def breach():
-        mock.to_companion = lambda data: [text, data]
+        mock.to_companion = lambda data: [data, text]  # after the HEARTBEAT, as the real one
         mock.command(SET_MODE, 1, 6)  # RTL
 
     with mock_vehicle(autopilot="ardupilot") as mock:

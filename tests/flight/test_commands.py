@@ -41,7 +41,7 @@ class Vehicle:
         self.answers = list(answers)
         self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
         self.link = self.autopilot = self.state = self
-        self.now, self.fence_text, self.texts = 0.0, None, ()
+        self.now = 0.0
         self.replacement_detector = SimpleNamespace(require=lambda: None)
 
     @property

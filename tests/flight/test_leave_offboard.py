@@ -42,7 +42,7 @@ class Vehicle:
         self.note = self.notes.append
         self.replacement_detector = SimpleNamespace(require=lambda: None)
 
-    mode_received, fence_text, texts = 0.0, None, ()
+    mode_received = 0.0
 
     def armed(self):
         return self.is_armed

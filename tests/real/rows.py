@@ -10,8 +10,9 @@ from math import hypot
 
 from pymavlink.dialects.v20 import common
 
+from tests.real.lost_control import lost_in_takeoff, own_fence
 from tests.real.next_flights import left_by_failsafe, left_by_ladder
-from tests.real.vehicle import Vehicle
+from tests.real.outcome import figures
 
 FROZEN_GUIDANCE = """
 from companion.control.guidance_loop import GuidanceLoop
@@ -22,26 +23,6 @@ def freezing(guide):
 GuidanceLoop.step = freezing
 """
 NEW_MODES = {"px4": ("LOITER", "LAND", "RTL"), "ardupilot": ("LOITER", "LAND", "ALT_HOLD")}
-WATCHED = 12.0
-"""After an event the vehicle is watched for this long, s."""
-
-
-def figures(vehicle: Vehicle, flight, event: float, seconds: float = WATCHED, **more):
-    """What came of an event."""
-    time.sleep(max(0.0, event + seconds - time.monotonic()))
-    station = vehicle.station
-    out = {
-        "result": flight.result.get("result"),
-        "exit": flight.process.poll(),
-        "last_setpoint": flight.last_setpoint(event),
-        "modes": station.modes_since(event),
-        **station.motion_since(event, event + seconds),
-        **more,
-        "load": vehicle.load(),
-    }
-    vehicle.bring_down()
-    out["left_in"] = station.mode
-    return out
 
 
 def good_end(vehicle):
@@ -228,6 +209,8 @@ ROWS = {
     "unplugged": unplugged,
     "link_lost": link_lost,
     "link_lost_on_circle": lambda vehicle: link_lost(vehicle, "circle"),
+    "lost_in_takeoff": lost_in_takeoff,
+    "own_fence": own_fence,
     "battery": battery,
     "pilot": pilot,
     "no_gps": no_gps,
