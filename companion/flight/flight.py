@@ -66,8 +66,9 @@ class Flight:
         try:
             await self._fly_all()
         except FlightEnded as first:
+            self.failed_in, self.end_reason = self.phase, first.reason
             ended = await with_cause(self._context, first)
-            self.failed_in, self.end_reason = self.phase, ended.reason
+            self.end_reason = ended.reason
             self.note(ended.reason)
             await self._leave(ended.exit or self._usual_exit())
             return ended.result

@@ -73,13 +73,15 @@ def test_while_a_monitor_lands_the_vehicle_calls_say_what_it_said(autopilot):
     assert all("limits.min_battery_percent" in text for text in said), said
 
 
+async def drift(vehicle):
+    """Fly without acceleration until cancelled."""
+    async with vehicle.control() as control:
+        async for _ in control.states():
+            control.accelerate((0.0, 0.0, 0.0))
+
+
 def test_a_time_out_around_a_control_block_is_no_error_of_the_program():
     """The result was "the program raised CancelledError()"."""
-
-    async def drift(vehicle):
-        async with vehicle.control() as control:
-            async for _ in control.states():
-                control.accelerate((0.0, 0.0, 0.0))
 
     async def program(vehicle):
         await vehicle.take_off()
@@ -92,11 +94,6 @@ def test_a_time_out_around_a_control_block_is_no_error_of_the_program():
 
 def test_a_control_block_that_is_cancelled_twice_leaves_no_warning():
     """Python told of a "Task exception was never retrieved" beside the CancelledError."""
-
-    async def drift(vehicle):
-        async with vehicle.control() as control:
-            async for _ in control.states():
-                control.accelerate((0.0, 0.0, 0.0))
 
     async def program(vehicle):
         await vehicle.take_off()
