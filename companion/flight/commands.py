@@ -66,8 +66,10 @@ class ModeTaken(FlightEnded):
 
 async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
     """Release control, and name the autopilot's geofence if only a text says that it acted."""
+    if not isinstance(ended, ModeTaken):
+        return ended
     state, fence_text = context.link.state, context.link.autopilot.fence_text
-    if not isinstance(ended, ModeTaken) or fence_text is None:
+    if fence_text is None:
         return ended
     context.release()
     mode, since = state.mode, state.mode_received - _TEXT_TIME
