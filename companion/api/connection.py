@@ -9,7 +9,12 @@ from typing import Any, TypeVar
 
 from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import FlightLoop, flight_loop
-from companion.api.program import ProgramPlan, failure_words, flight_ended
+from companion.api.program import (
+    ProgramPlan,
+    failure_words,
+    flight_ended,
+    mark_error_as_heard,
+)
 from companion.api.state import ConnectedFlight, NewestState
 from companion.api.vehicle import Vehicle
 from companion.config import Config
@@ -106,8 +111,7 @@ async def connect_configured(
         session, program = await loop.start(_make_session(config, folder, observer, environment))
         loop.register_end(partial(_end_lost_flight, session, program))
         flight = loop.start(_fly(session, program))
-        # No warning of asyncio: the program gets the error from its own call.
-        flight.add_done_callback(lambda end: end.cancelled() or end.exception())
+        flight.add_done_callback(mark_error_as_heard)
         try:
             with on_ctrl_c(loop, session.interrupt):
                 async with _connected_vehicle(loop, session, program, flight) as vehicle:

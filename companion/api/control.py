@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 from math import inf, isnan
 
 from companion.api.commanded import checked_copy
-from companion.api.program import failure_words
+from companion.api.program import failure_words, mark_error_as_heard
 from companion.api.state import ConnectedFlight, State
 from companion.attitude import BodyRates, Coefficients
 from companion.guidance.finite import finite_vector
@@ -190,8 +190,7 @@ async def program_control(
     Raises:
         FlightEnded: the flight ended before control began, or control ended early.
     """
-    # No warning of asyncio if the program gets another error, or is cancelled once more.
-    control_end.add_done_callback(lambda end: end.cancelled() or end.exception())
+    control_end.add_done_callback(mark_error_as_heard)
     try:
         while source.pose is None:  # guidance does not fly it yet
             done, _ = await asyncio.wait({control_end}, timeout=0.01)

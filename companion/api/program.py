@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import AsyncGenerator, Callable, Sequence
 from dataclasses import dataclass, field
 from math import inf
+from typing import Any
 
 from companion.flight.context import FlightContext
 from companion.flight.phase import Phase
@@ -171,6 +172,12 @@ def unless_disarmed(
 def flight_ended(result: str) -> FlightEnded:
     """The exception for calls after the end of a flight whose summary has this `result`."""
     return FlightEnded("the flight is over" if result == "ok" else result)
+
+
+def mark_error_as_heard(ended: asyncio.Future[Any]) -> None:
+    """Done-callback: asyncio does not warn of an error that the program gets by its own call."""
+    if not ended.cancelled():
+        ended.exception()
 
 
 def failure_words(name: str, error: BaseException) -> str:

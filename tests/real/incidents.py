@@ -7,10 +7,10 @@ from pathlib import Path
 
 from tests.real.flight import Flight
 from tests.real.flights import configuration, shipped
+from tests.real.outcome import WATCHED
 from tests.real.relay import SETPOINT, frames
 from tests.real.vehicle import Vehicle
 
-_WATCHED_S = 12.0
 _BATTERY = {"px4": 75.0, "ardupilot": 96.0}
 """Below this limit a simulated battery comes within a minute, %."""
 _LANDED_S = 120.0
@@ -46,7 +46,7 @@ def rival(vehicle: Vehicle, folder: Path) -> dict:
     """Another program sends setpoints, too, 100 times a second, until ours hands back."""
     flight = hovering(vehicle, folder)
     event = time.monotonic()
-    while flight.process.poll() is None and time.monotonic() < event + _WATCHED_S:
+    while flight.process.poll() is None and time.monotonic() < event + WATCHED:
         vehicle.station.send_rates((0.2, 0.0, 0.0), _RIVAL_THRUST[vehicle.autopilot])
         time.sleep(0.01)
     return {"result": flight.finish()["result"]} | _watched(vehicle, event)
@@ -163,12 +163,12 @@ def hovering(vehicle: Vehicle, folder: Path) -> Flight:
 def _watched(vehicle: Vehicle, event: float) -> dict:
     """What followed; a vehicle that lands by itself is left to."""
     station = vehicle.station
-    time.sleep(max(0.0, event + _WATCHED_S - time.monotonic()))
+    time.sleep(max(0.0, event + WATCHED - time.monotonic()))
     if station.mode in ("LAND", "RTL", "DESCEND"):
         deadline = time.monotonic() + _LANDED_S
         while station.armed and time.monotonic() < deadline:
             time.sleep(0.1)
-    return {"modes": station.modes_since(event), **station.motion_since(event, event + _WATCHED_S)}
+    return {"modes": station.modes_since(event), **station.motion_since(event, event + WATCHED)}
 
 
 def sent(log: Path):
