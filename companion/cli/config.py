@@ -128,7 +128,10 @@ def check(options: argparse.Namespace) -> int:
     except MissingExtraError as error:  # the computer that flies may have it
         print(f"warning: {error}")
     if config.flight.trajectory is not None and "trajectory" not in config.flight.maneuvers:
-        print("warning: flight.trajectory is not flown; add trajectory to flight.maneuvers")
+        print(
+            "warning: flight.trajectory is not flown; add trajectory to flight.maneuvers, as in "
+            "`--set flight.maneuvers=[trajectory]`"
+        )
     if config.mock is None and not list(changed_keys(config)):
         print(f"warning: {options.file} changes no default; is it the file that you meant?")
     print(f"{options.file}: ok")

@@ -116,9 +116,7 @@ def _remedy(detail: Any, key: str | int) -> str:
     one_value = kind == "tuple_type" and isinstance(value, str | int | float)
     if not one_value or len(str(value)) > _LONGEST_SHOWN:
         return ""
-    if isinstance(key, int):
-        return f" is a list: write `[{value}]`"
-    return f" is a list: write `{key}: [{value}]`"
+    return f" is a list: write `[{value}]`"
 
 
 def _number_advice(key: str, text: str) -> str:

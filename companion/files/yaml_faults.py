@@ -170,7 +170,8 @@ def _unknown_key(location: Location, value: Any, model: type[BaseModel]) -> str:
     if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in section_keys):
         same_name = [".".join((*place, key)) for key, place in other_keys if key == name]
         if same_name:
-            return f"is in the wrong section; write {_joined_by_or(same_name)}"
+            here = [f", or here `{key}`" for key in section_keys if key.endswith(f"_{name}")][:1]
+            return f"is in the wrong section; write {_joined_by_or(same_name)}{''.join(here)}"
     near = most_similar_name(name, section_keys, MIN_SIMILARITY)
     if not isinstance(value, dict):
         far = most_similar_name(name, [key for key, _ in other_keys], MIN_SIMILARITY_ELSEWHERE)

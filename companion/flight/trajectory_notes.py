@@ -35,9 +35,11 @@ def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> 
         return ()
     after = slow_down.trajectory
     speed, speed_before = (_largest_speed(sampled_motion(each)) for each in (after, before))
+    slowed, unslowed = f"{speed:.2f} m/s", f"{speed_before:.2f} m/s"
     result = (
         f"{before.name} now lasts {after.duration:.1f} s instead of {before.duration:.1f} s, and "
-        f"its highest speed is {speed:.2f} m/s instead of {speed_before:.2f} m/s"
+        f"its highest speed is "
+        + (f"still {slowed}" if slowed == unslowed else f"{slowed} instead of {unslowed}")
     )
     if slow_down.even:
         (whole,) = slow_down.parts

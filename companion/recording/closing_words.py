@@ -109,7 +109,8 @@ def _extent_line(figures: Figures) -> str:
     extent = figures["extent"]
     # After a full disk the figures count only what was recorded.
     at_least = "at least " if any(LOST_ROWS in text for text in figures["advice"]) else ""
-    parts = [f"{at_least}{extent['under_control_s']:.0f} s under our control"]
+    under_control = f"{extent['under_control_s']:.0f} s under our control"
+    parts = [f"{at_least}{under_control} by planner {figures['planner']}"]
     for key, words in (
         ("height_max_m", "up to {:.1f} m high"),
         ("maneuver_speed_max_m_s", "{:.1f} m/s fast"),

@@ -154,5 +154,5 @@ def _draw_ground(axes: "Axes", flight: FlightData) -> None:
     axes.plot(position[:, 1], position[:, 0], color=_MEASURED_COLOUR, label="flown")
     axes.set(title="Ground track", xlabel="east, m", ylabel="north, m")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.legend(loc="center", fontsize="small")
+    axes.legend(fontsize="small")
     axes.grid(alpha=0.3)

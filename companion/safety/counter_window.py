@@ -35,7 +35,8 @@ class CounterWindow:
     """The readings of the counters over the last second.
 
     Args:
-        real_time: whether deadlines count; in lockstep they do not, because the vehicle waits.
+        real_time: whether deadlines and stalls count; in lockstep they do not: the vehicle waits,
+            and event-loop time jumps only where the vehicle is gone.
     """
 
     def __init__(self, link: Link, record: LoopRecord, *, real_time: bool) -> None:
@@ -50,7 +51,9 @@ class CounterWindow:
     def read(self, now: float) -> None:
         """Read the counters at `now`, s of event-loop time."""
         readings, stats, record = self._readings, self._link.stats, self._record
-        late_by = max(0.0, now - readings[-1].now - _LONGEST_READING_INTERVAL) if readings else 0.0
+        late_by = 0.0
+        if readings and self._real_time:
+            late_by = max(0.0, now - readings[-1].now - _LONGEST_READING_INTERVAL)
         if late_by > 0.0:
             self._latest_stall = now
         readings.append(

@@ -55,7 +55,7 @@ def told(tmp_path, text):
         ("limits: {max_tilt_deg: }", "has no value; write one, or take the key out"),
         ("limits: 20", "`limits` is a section: write its keys on the lines below it, indented"),
         ("limits:\n  max_tilt_deg:20\n", "each as `key: value`"),
-        ("flight: {maneuvers: hover}", "is a list: write `maneuvers: [hover]`"),
+        ("flight: {maneuvers: hover}", "is a list: write `[hover]`"),
         ("flight: {maneuvers: []}", "`flight.maneuvers` has 0 values; it needs at least 1"),
         (
             "safety: {fence_polygon_m: [[0, 0], [5, 0], [5]]}",
@@ -76,6 +76,7 @@ def told(tmp_path, text):
         ("safety: {fence_polygon_m: [5]}", "`safety.fence_polygon_m.0` is a list: write `[5]`"),
         ("safety: {fence_polygon_m: {a: 5}}", "_polygon_m` must be a list (got a section)"),
         ("limits.max_tilt_deg: 20", "contains a dot; write `limits: {max_tilt_deg: 20}`"),
+        ("corners: {coefficient: 0.1}", "`steps.coefficient`, or here `north_coefficient`"),
         ("deadman: {stale_ms: 100}", "did you mean `telemetry_stale_ms`?"),
     ],
 )
@@ -116,7 +117,7 @@ def test_no_value_of_any_key_is_refused_in_the_words_of_pydantic(section):
 def test_an_error_in_one_of_several_forms_is_told_once():
     """`ends` of a campaign's fault is a list, or a section by phase."""
     for value, words in (
-        ("ok", "`ends` is a list: write `ends: [ok]`"),
+        ("ok", "`ends` is a list: write `[ok]`"),
         (["okay"], "`ends.0` must be ground, ok, landed, held or pilot (got 'okay')"),
         ({"land": ["okay"]}, "`ends.land.0` must be ground, ok, landed, held or pilot"),
     ):

@@ -96,7 +96,7 @@ def test_a_good_flight_is_called_good_with_its_figures_and_limits():
     )
     assert "  circle: 0.20 m RMS from its path (limit 0.25 m), at most 0.06 m; 0.02 m" in text
     assert "  latency: 0.26 ms in 99 % of the answers (deadline 4 ms)" in text
-    assert "  38 s under our control, up to 5.0 m high, 5.1 m/s fast, 25° tilted" in text
+    assert "  38 s under our control by planner model-following, up to 5.0 m high, 5.1" in text
     assert told.next_command == "companion plot flights/one"
 
 

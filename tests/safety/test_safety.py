@@ -183,6 +183,15 @@ def test_a_stall_of_our_own_is_counted_from_the_last_setpoint():
     assert window.stall_time(since=3.53) == 0.0
 
 
+def test_in_lockstep_a_jump_of_time_is_a_silent_vehicle_and_no_stall_of_ours():
+    state = SimpleNamespace(position_count=0)
+    link = SimpleNamespace(state=state, stats=SimpleNamespace(frames=0, lost=0))
+    window = CounterWindow(link, LoopRecord(), real_time=False)
+    for now in (0.0, 0.02, 2.02):
+        window.read(now)
+    assert window.stall_time(since=0.0) == 0.0
+
+
 @pytest.mark.parametrize(
     ("name", "snapshot", "action", "lasts", "words"),
     BREACHES,

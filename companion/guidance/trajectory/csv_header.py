@@ -137,7 +137,8 @@ def _missing(group: str, header: list[str]) -> str:
         fault = f"the column {' and '.join(missing)} of the {group} is missing"
     else:
         fault = f"the header names no {group}"
-    return f"{fault}; expected {expected}, found {excerpt(','.join(header))}"
+    frame = ", in NED below a line `# frame: ned`" if group == "position" else ""
+    return f"{fault}; expected {expected}{frame}, found {excerpt(','.join(header))}"
 
 
 def excerpt(text: str) -> str:

@@ -129,8 +129,12 @@ def _tracking(guidance: Rows) -> NDArray[np.float64]:
 
 
 def reference_positions(guidance: Rows) -> NDArray[np.float64]:
-    """(N, 3), positions of the reference, m, NED; NaN where there is none, as in open loop."""
+    """(N, 3), positions of the reference, m, NED; NaN where there is none, as in open loop.
+
+    While the autopilot does not obey us, the recorded reference is where the vehicle is.
+    """
     positions = matrix(guidance, vector_names("reference", "m"))
+    positions[guidance["offboard_active"] == 0] = np.nan
     positions[guidance["holds_position"] == 0, :2] = np.nan
     positions[guidance["holds_height"] == 0, 2] = np.nan
     return positions
