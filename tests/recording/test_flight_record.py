@@ -16,10 +16,20 @@ from companion.recording.folder import flight_folder, own_folder
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
 from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, TOPICS
-from companion.recording.mcap_file.loop_channels import ACTION, INPUT, SETPOINT, UNANSWERED_CODES
+from companion.recording.mcap_file.loop_channels import (
+    ACTION,
+    INPUT,
+    SETPOINT,
+    UNANSWERED_CODES,
+    vector_names,
+)
 from companion.recording.mcap_file.scene import Entity, scene_message
 from companion.recording.mcap_file.writer import McapWriter
-from companion.recording.measurements.recorded_summary import derived_summary, summary_of
+from companion.recording.measurements.recorded_summary import (
+    derived_summary,
+    reference_positions,
+    summary_of,
+)
 from companion.recording.recorder import FlightRecorder
 from companion.recording.tlog import TLOG_FILE
 from companion.replay.entries import recorded_inputs
@@ -245,6 +255,15 @@ def test_a_summary_without_its_keys_is_derived_from_the_record(tmp_path, found):
     summary, provisional = summary_of(read_flight(tmp_path))
     assert provisional
     assert summary["setpoints"] == ROWS
+
+
+def test_where_nobody_flies_a_reference_none_is_drawn():
+    """The recorded one is then the vehicle's own position."""
+    names = (*vector_names("reference", "m"), "offboard_active", "holds_position", "holds_height")
+    guidance = np.ones(3, dtype=[(name, float) for name in names])
+    guidance["offboard_active"][0] = guidance["holds_position"][1] = 0.0
+    drawn = ~np.isnan(reference_positions(guidance))
+    assert drawn.tolist() == [[False] * 3, [False, False, True], [True] * 3]
 
 
 @pytest.mark.parametrize("command", ["plot", "report", "replay", "export --csv"])

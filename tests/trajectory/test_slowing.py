@@ -164,6 +164,8 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
     assert ", because of limits.max_tilt_rate_deg_s at" in notes[0]  # without the reserve
     assert f"instead of {ANGULAR.duration:.1f} s, and its highest speed is" in notes[1]
     assert f"{found.trajectory.duration:.1f} s, at most" in overview(found.trajectory)
+    as_fast = slow_down_notes(ANGULAR, found._replace(trajectory=ANGULAR), 0.5)[1]
+    assert "and its highest speed is still" in as_fast
 
 
 @pytest.mark.parametrize(
