@@ -32,9 +32,14 @@ RequireOurs = Callable[[], None]
 
 
 def roles_of(link: Link) -> frozenset[Role]:
-    """The roles of the vehicle's mode; empty if the mode is unknown or has no role in a flight."""
+    """The roles of the vehicle's mode; empty if the mode is unknown or has no role in a flight.
+
+    A hold that a failsafe chose is not ready for a take-off or takeover: PX4 holds for
+    COM_FAIL_ACT_T before it returns or lands, and a command of ours would end the failsafe.
+    """
     mode = link.state.mode
-    return frozenset() if mode is None else link.autopilot.roles(mode)
+    roles = frozenset[Role]() if mode is None else link.autopilot.roles(mode)
+    return roles - {Role.READY} if link.state.mode_not_intended else roles
 
 
 def in_role(link: Link, role: Role) -> bool:
@@ -66,7 +71,7 @@ class ModeTaken(FlightEnded):
 
 async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
     """Release control, and name the autopilot's geofence if only a text says that it acted."""
-    if not isinstance(ended, ModeTaken):
+    if not isinstance(ended, ModeTaken | ControlReleased):
         return ended
     state, fence_text = context.link.state, context.link.autopilot.fence_text
     if fence_text is None:

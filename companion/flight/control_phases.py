@@ -15,6 +15,7 @@ from companion.flight.commands import (
 from companion.flight.context import FlightContext
 from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
 from companion.guidance import ManeuverSequence
+from companion.guidance.fence import height_in_words
 from companion.guidance.source import ManeuverSource, Source
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
@@ -157,7 +158,9 @@ async def land(context: FlightContext) -> None:
 
     def touched_down() -> bool:
         height = context.link.state.height
-        context.detail = "touchdown" + ("" if height is None else f", now {height:.1f} m")
+        context.detail = "touchdown" + (
+            "" if height is None else f", now {height_in_words(height)}"
+        )
         _require_landing(context)
         _require_not_falling(context)
         return context.ground.touched_down
@@ -166,7 +169,10 @@ async def land(context: FlightContext) -> None:
         async with asyncio.timeout(allowed):
             await context.until(touched_down)
     except TimeoutError:
-        raise context.timed_out(allowed, "touchdown") from None
+        raise FlightEnded(
+            f"waited {allowed:g} s for {context.detail}: if the vehicle stands with its motors "
+            "turning, disarm it by transmitter or ground station"
+        ) from None
 
 
 async def disarm(context: FlightContext) -> None:

@@ -34,12 +34,23 @@ async def hold_when_heard(context: FlightContext) -> None:
             deadline.reschedule(asyncio.get_running_loop().time() + _HOLD_TIMEOUT)
             await _hold_if_ours(context)
     except TimeoutError:
-        obeys = heard and context.armed() and in_role(context.link, Role.OFFBOARD)
-        raise context.timed_out(
-            _HOLD_TIMEOUT if heard else _LISTENING_TIMEOUT,
-            "the vehicle to be heard and to hold",
-            Exit.LAND if obeys else None,
-        ) from None
+        if not heard:
+            raise context.timed_out(_LISTENING_TIMEOUT, "the vehicle to be heard") from None
+        if _obeys(context):
+            raise context.timed_out(_HOLD_TIMEOUT, "the vehicle to hold", Exit.LAND) from None
+        _note_left_alone(context, f", after {_HOLD_TIMEOUT:g} s without {context.detail}")
+
+
+def _obeys(context: FlightContext) -> bool:
+    return context.armed() and in_role(context.link, Role.OFFBOARD)
+
+
+def _note_left_alone(context: FlightContext, reason: str = "") -> None:
+    armed = "armed" if context.armed() else "disarmed"
+    context.note(
+        f"the vehicle is heard again, {armed} in {context.link.state.mode}{reason}: "
+        "nothing is commanded"
+    )
 
 
 async def _hold_if_ours(context: FlightContext) -> None:
@@ -47,14 +58,9 @@ async def _hold_if_ours(context: FlightContext) -> None:
     context.detail = "its heartbeat"
     await context.fresh_heartbeat()  # only now, because a request during the silence is lost
     mode = context.link.state.mode
-    lost_in_takeoff = await ends_takeoff(context)
-    # Another station may have flown an ArduPilot elsewhere in the mode of the take-off.
-    obeys = in_role(context.link, Role.OFFBOARD) and (
-        context.took_off_from is None or not in_role(context.link, Role.TAKEOFF)
-    )
-    if not context.armed() or not (obeys or lost_in_takeoff):
-        armed = "armed" if context.armed() else "disarmed"
-        context.note(f"the vehicle is heard again, {armed} in {mode}: nothing is commanded")
+    lost_in_takeoff = context.armed() and await ends_takeoff(context)
+    if not (_obeys(context) or lost_in_takeoff):
+        _note_left_alone(context)
         return
     if context.landing_requested:
         reason = f"the vehicle is heard again, still in {mode}: its landing was requested before"

@@ -24,6 +24,13 @@ _LARGEST_DRIFT = 3.0
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after hold mode is shown, s; then the climb counts as stopped."""
 
+_SMALLEST_RISE = 0.3
+"""A vehicle that has risen less than this has not left the ground, m: the estimate drifts."""
+
+_LIFT_OFF_TIME = 10.0
+"""Time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full thrust
+meanwhile."""
+
 _GROUND_FLAG_TIME = 5.0
 """Longest time for which a vehicle at its height may be reported on the ground, s. Its motors may
 need some seconds to spool up, and the height may read 1.5 m on the ground."""
@@ -88,6 +95,7 @@ class _Climb:
 
     def __init__(self, context: FlightContext, height: float) -> None:
         self._context, self._height = context, height
+        self._began = asyncio.get_running_loop().time()
         self._has_begun = False
         self._held_at: float | None = None
         self._high_on_ground_from: float | None = None
@@ -108,6 +116,7 @@ class _Climb:
                 f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
             )
+        self._require_lift_off()
         is_near_height = height > self._height - MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
             raise self._jump(height) or FlightEnded(
@@ -127,6 +136,22 @@ class _Climb:
             self._held_at = now
         return self._held_at is not None and now - self._held_at > _ARRIVAL_TIME
 
+    def _require_lift_off(self) -> None:
+        """Raise `FlightEnded` if the vehicle still stands though it should have taken off."""
+        elapsed, climbed = asyncio.get_running_loop().time() - self._began, self._climbed()
+        if elapsed > _LIFT_OFF_TIME and climbed is not None and climbed < _SMALLEST_RISE:
+            raise FlightEnded(
+                f"the vehicle has not left the ground {_LIFT_OFF_TIME:g} s after the take-off was "
+                "commanded: check motors, propellers, weight and battery"
+            )
+
+    def _climbed(self) -> float | None:
+        """Climb since the take-off command, m, without jumps of home or of the estimate."""
+        motion = self._context.guidance_loop.motion
+        if motion is None or self._start_down is None:
+            return None
+        return self._start_down - motion.position_ned[2]
+
     def _require_leaving_ground(self, height: float) -> None:
         """Raise `FlightEnded` if the vehicle is reported high, and on the ground, for too long."""
         now = asyncio.get_running_loop().time()
@@ -141,10 +166,9 @@ class _Climb:
 
     def _jump(self, height: float) -> FlightEnded | None:
         """The end of the flight if a jump explains the wrong `height` above home (m)."""
-        motion = self._context.guidance_loop.motion
-        if motion is None or self._start_down is None:
+        climbed = self._climbed()
+        if climbed is None:
             return None
-        climbed = self._start_down - motion.position_ned[2]  # without jumps of home or estimate
         too_low = height < self._height
         if too_low and climbed <= self._height - MAX_UNDERSHOOT:
             return None

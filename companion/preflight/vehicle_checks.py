@@ -216,10 +216,10 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
     yield Finding(
         Key.FENCE,
         UNSAFE,
-        f"the vehicle stands at {here.latitude:.5f}, {here.longitude:.5f}, outside "
+        f"the vehicle is at {here.latitude:.5f}, {here.longitude:.5f}, outside "
         "safety.fence_polygon_deg",
         "the flight would end as soon as it began",
-        "carry it inside, or correct the corners: each is [latitude, longitude]",
+        "bring it inside, or correct the corners: each is [latitude, longitude]",
         source,
     )
 

@@ -68,12 +68,15 @@ class ModeState:
         return self.heartbeat is not None and self.heartbeat.system_status in _FAILSAFE_STATES
 
     @property
+    def mode_not_intended(self) -> bool:
+        """Whether CURRENT_MODE tells that a failsafe chose the present mode, not a user."""
+        current = self.current_mode
+        return current is not None and self.mode == current.mode != current.intended
+
+    @property
     def mode_by_failsafe(self) -> bool:
         """Whether a failsafe chose the present mode, as far as the autopilot reports it."""
-        current = self.current_mode
-        if current is None or self.heartbeat_is_newest:
-            return self.failsafe
-        return self.failsafe or current.mode != current.intended
+        return self.failsafe or self.mode_not_intended
 
     def _on_heartbeat(self, message: Message) -> None:
         if message.autopilot == dialect.MAV_AUTOPILOT_INVALID:
@@ -100,7 +103,8 @@ class ModeState:
             return  # the meaning of the mode's number is not known yet
         mode, intended = (
             self.autopilot.mode_name(self._base_mode, number)
-            for number in (message.custom_mode, message.intended_custom_mode)
+            # An intended mode of 0 is unknown (MAVLink), so as if nothing had changed the mode.
+            for number in (message.custom_mode, message.intended_custom_mode or message.custom_mode)
         )
         self.current_mode = CurrentMode(self._clock(), mode, intended)
         self.heartbeat_is_newest = False

@@ -39,7 +39,8 @@ class Vehicle:
 
     def __init__(self, *answers):
         self.answers = list(answers)
-        self.mode, self.mode_by_failsafe, self.sent = Role.OFFBOARD, False, 0
+        self.mode, self.sent = Role.OFFBOARD, 0
+        self.mode_by_failsafe = self.mode_not_intended = False
         self.link = self.autopilot = self.state = self
         self.now = 0.0
         self.replacement_detector = SimpleNamespace(require=lambda: None)

@@ -125,7 +125,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
         record=SimpleNamespace(gap_from=0.0),
         resume=lambda: resumed.append(1),
     )
-    state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False)
+    state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False, mode_not_intended=False)
     autopilot = SimpleNamespace(roles=lambda mode: frozenset({mode}))
     context = SimpleNamespace(
         snapshot_builder=SimpleNamespace(listen=lambda _: None),

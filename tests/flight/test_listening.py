@@ -163,3 +163,19 @@ def test_a_pilot_who_flew_it_elsewhere_unheard_keeps_it(north, up):
         truth = mock.state()
     assert (truth["mode"], truth["armed"]) == ("LOITER", True), summary.events
     assert summary.events[-1][1].endswith("nothing is commanded")
+
+
+def test_a_vehicle_heard_again_after_its_take_off_without_a_position_is_told_to_be_left():
+    """It may have been flown elsewhere; only "waited 10 s … a fresh position" was told."""
+
+    def lose():
+        mock.inject({"kind": "drop", "direction": "both", "duration_s": 4.0})
+        mock.inject({"kind": "stop_telemetry", "messages": ["LOCAL_POSITION_NED"]})
+
+    with mock_vehicle() as mock:
+        summary = fly(mock, None, When("takeoff", lose, after=1.0))
+        assert mock.state()["armed"]
+    assert summary.events[-1][1] == (
+        "the vehicle is heard again, armed in AUTO.LOITER, after 10 s without a fresh position: "
+        "nothing is commanded"
+    )

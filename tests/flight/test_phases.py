@@ -20,7 +20,7 @@ class Vehicle:
     def __init__(self, autopilot, base_mode, custom_mode):
         self.autopilot, self.state = autopilot, self
         self.mode = autopilot.mode_name(base_mode, custom_mode)
-        self.mode_by_failsafe = False
+        self.mode_by_failsafe = self.mode_not_intended = False
 
 
 def phases(autopilot):

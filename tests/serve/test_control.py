@@ -178,6 +178,24 @@ def test_a_station_wins_over_a_client_and_its_stream_is_not_obeyed_any_more(auto
     fly(autopilot, scene)
 
 
+def test_a_geofence_that_acts_as_the_client_releases_is_not_told_as_its_release():
+    text = dialect.MAVLink_statustext_message(5, b"Circle fence breached")
+    breached = bytes(text.pack(dialect.MAVLink(None, 1, 1)))
+
+    async def scene(vehicle, session, script, ground):
+        begin = place(session)
+        await begin_control(session, script, "ardupilot", lambda _: script.local(ALL, begin))
+        script.command(176, 1, 5)  # LOITER
+        vehicle.to_companion = lambda data: [data, breached]
+        vehicle.command(176, 1, 6)  # RTL
+        await stream(1.0, lambda _: script.local(ALL, begin))
+        told = " ".join(script.texts())
+        assert "failsafe took over" in told, told
+        assert "released by the client" not in told
+
+    fly("ardupilot", scene)
+
+
 def test_px4_is_asked_for_offboard_by_the_rules_of_px4_and_the_flight_is_recorded(tmp_path):
     async def scene(vehicle, session, script, ground):
         assert await script.offboard() == REJECTED, "no stream"

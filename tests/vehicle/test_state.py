@@ -133,6 +133,10 @@ def test_a_mode_that_nobody_asked_for_is_a_failsafes(bench):
     bench.take(development.MAVLink_current_mode_message(0, landing, offboard))
     assert bench.state.mode_by_failsafe
     assert not bench.state.failsafe
+    bench.take(px4_heartbeat(landing, 129))  # says the same mode, and not yet the failsafe
+    assert bench.state.mode_by_failsafe
+    bench.take(development.MAVLink_current_mode_message(0, landing, 0))  # 0: unknown
+    assert not bench.state.mode_by_failsafe
 
 
 def test_current_mode_does_not_hide_that_ardupilot_obeys_rates(bench):

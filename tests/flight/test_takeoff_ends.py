@@ -1,0 +1,47 @@
+"""The autopilot, or the vehicle itself, ends the take-off that the program commanded."""
+
+import pytest
+from pymavlink.dialects.v20 import common as dialect
+
+from tests.flight.fly import fly, mock_vehicle
+
+
+def lose_sticks(mock, lost):
+    """A pilot's sticks at rest, until `lost()`: PX4 then holds for COM_FAIL_ACT_T and returns."""
+    due = 0.0
+
+    def send():
+        nonlocal due
+        if lost():
+            mock.after_step.remove(send)
+        elif mock.time >= due:
+            due = mock.time + 0.2
+            mock.transmit(dialect.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0))
+
+    mock.after_step.append(send)
+
+
+@pytest.mark.parametrize("mode", ["TAKEOFF", "OFFBOARD"])
+def test_a_failsafe_that_holds_before_it_returns_is_named_and_not_overruled(mode):
+    """It was told as a stopped climb; just after the takeover its return was cancelled."""
+
+    def lost():
+        state = mock.state()
+        return state["mode"] == mode and state["position"][2] < -1.0
+
+    with mock_vehicle(parameters={"COM_FAIL_ACT_T": 1.0}) as mock:
+        lose_sticks(mock, lost)
+        summary = fly(mock, flight={"takeoff_height_m": 3.0})
+        mock.run(1.5)
+        assert mock.state()["mode"] == "RTL", summary.events
+    assert summary.result == "the autopilot's failsafe took over: mode AUTO.LOITER"
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_vehicle_that_does_not_leave_the_ground_is_told_so_and_stops_its_motors(autopilot):
+    """It got full thrust for flight.takeoff_timeout_s."""
+    with mock_vehicle(autopilot=autopilot, airframe={"thrust_slope_m_s2": 8.0}) as mock:
+        summary = fly(mock)
+        truth = mock.state()
+    assert summary.result.startswith("the vehicle has not left the ground 10 s after")
+    assert (truth["armed"], truth["landed"]) == (False, True), summary.events
