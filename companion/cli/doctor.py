@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -186,7 +187,8 @@ class _DoctorRun:
             )
         finally:
             if undo.path.exists():
-                self.say(f"Undo with: companion doctor --config FILE --undo {undo.path}")
+                path = shlex.quote(str(undo.path))
+                self.say(f"Undo with: companion doctor --config FILE --undo {path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
         _, refusals = _maneuvers(config, evidence.known_drag)
         code = self._report([*refusals, *run_checks(config, evidence), *_response_findings(config)])

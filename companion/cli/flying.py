@@ -1,6 +1,7 @@
 """Shared by all commands that fly: the options, the flight, and its report."""
 
 import argparse
+import shlex
 import shutil
 import sys
 from contextlib import suppress
@@ -72,8 +73,8 @@ def program_command() -> str:
     """The command by which a shell starts this program again."""
     program = Path(sys.argv[0])
     if program.name != "companion":  # `python -m companion`
-        return f"{sys.executable} -m companion"
-    return "companion" if shutil.which("companion") == str(program) else str(program)
+        return f"{shlex.quote(sys.executable)} -m companion"
+    return "companion" if shutil.which("companion") == str(program) else shlex.quote(str(program))
 
 
 def invocation(options: argparse.Namespace) -> Invocation:
@@ -118,7 +119,9 @@ def fly(
     interrupts.raise_interrupt(interrupts.signals_with_default_handler())
     with suppress(OSError):
         console.print(flight_table(summary))
-        console.print(f"Recorded in {folder}", soft_wrap=True)
+        gone = f"Not recorded: {folder} was removed or renamed in flight"
+        recorded = f"Recorded in {folder}" if folder.is_dir() else gone
+        console.print(recorded, soft_wrap=True)
         words = closing_words(summary.as_dict(), invocation)
         console.print(words_text(words), soft_wrap=True)
     if config.recording.report:  # also where nobody reads the console, as after `| head`
@@ -142,7 +145,7 @@ def write_flight_page(folder: Path) -> str:
         reason = reason_of(error)
     except Exception as error:  # The flight is over.
         reason = str(error) or type(error).__name__
-    return f"No report: {reason}; `companion report {folder}` tries again"
+    return f"No report: {reason}; `companion report {shlex.quote(str(folder))}` tries again"
 
 
 def fly_bundled(

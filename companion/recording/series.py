@@ -41,9 +41,8 @@ class SpooledFile:
             OSError: the chunk could not be written completely.
         """
         if self._file is None:
-            self._file = tempfile.TemporaryFile(  # noqa: SIM115  closed when this object goes
-                dir=self._folder, buffering=0
-            )
+            self._file = tempfile.TemporaryFile(dir=self._folder, buffering=0)  # noqa: SIM115
+            weakref.finalize(self, self._file.close)
         if self._file.write(chunk) != len(chunk):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

@@ -1,6 +1,7 @@
 """The report pages of served flights, each written by a separate process."""
 
 import os
+import shlex
 import subprocess
 import sys
 import threading
@@ -37,7 +38,8 @@ class ReportPages:
             try:
                 return f"Report: {self._run_report(folder)}"
             except (OSError, RuntimeError) as error:
-                return f"No report: {error}; `companion report {folder}` tries again"
+                again = f"companion report {shlex.quote(str(folder))}"
+                return f"No report: {error}; `{again}` tries again"
 
     def leave(self) -> None:
         """Write no further page, because the program ends."""

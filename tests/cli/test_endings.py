@@ -146,11 +146,14 @@ def test_a_study_that_is_interrupted_says_which_files_are_complete(monkeypatch, 
         ("/x/companion", "/x/companion", "companion"),
         ("/x/companion", "/y/companion", "/x/companion"),
         ("/x/companion", None, "/x/companion"),
-        ("/x/__main__.py", None, f"{sys.executable} -m companion"),
+        ("/x y/companion", None, "'/x y/companion'"),
+        ("/x/__main__.py", None, "'/my env/python' -m companion"),
     ],
 )
 def test_the_next_command_names_the_program_as_it_was_called(monkeypatch, program, found, name):
+    """In quotes where the shell needs them."""
     monkeypatch.setattr(sys, "argv", [program])
+    monkeypatch.setattr(sys, "executable", "/my env/python")
     monkeypatch.setattr(flying.shutil, "which", lambda _: found)
     options = argparse.Namespace(typed=("fly",), config="c.yaml")
     assert flying.invocation(options) == (name, ("fly",), "c.yaml")
@@ -160,8 +163,8 @@ def test_the_next_command_names_the_program_as_it_was_called(monkeypatch, progra
     ("error", "said"),
     [
         (MissingExtraError("needs plotly"), "No report: needs plotly"),
-        (ValueError("x"), "No report: x; `companion report f` tries again"),
-        (ValueError(), "No report: ValueError; `companion report f` tries again"),
+        (ValueError("x"), "No report: x; `companion report 'a b'` tries again"),
+        (ValueError(), "No report: ValueError; `companion report 'a b'` tries again"),
     ],
 )
 def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, error, said):
@@ -169,7 +172,7 @@ def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, err
         raise error
 
     monkeypatch.setattr("companion.report.page.write_report", write)
-    assert write_flight_page("f") == said
+    assert write_flight_page("a b") == said
 
 
 def test_a_flight_whose_console_is_closed_gets_its_page(monkeypatch, tmp_path):
@@ -295,8 +298,8 @@ class Beside:
         return "beside", work
 
 
-@pytest.mark.parametrize("beside", [None, Beside()])
-def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside):
+@pytest.mark.parametrize(("beside", "removed"), [(None, False), (Beside(), False), (None, True)])
+def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside, removed):
     ran = []
     session = SimpleNamespace(changes="changes", note="note")
     monkeypatch.setattr(flying, "Session", lambda *_, **__: session)
@@ -309,10 +312,14 @@ def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside):
     console = flying.FlightConsole(file=io.StringIO(), highlight=False)
     config = changed(Config(), {"recording": {"report": False}}, "a test")
     folder = tmp_path / "a [b]"
+    if not removed:
+        folder.mkdir()
     assert flying.fly(config, folder, console, helper=beside) is summary
     flight = ("flight", session)
     assert ran == [flight if beside is None else ("beside", flight)]
-    assert console.file.getvalue() == f"table\nRecorded in {folder}\nwords\n"
+    gone = f"Not recorded: {folder} was removed or renamed in flight"
+    recorded = gone if removed else f"Recorded in {folder}"
+    assert console.file.getvalue() == f"table\n{recorded}\nwords\n"
     if beside is not None:
         assert (beside.changes, beside.note) == ("changes", "note")
 

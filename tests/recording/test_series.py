@@ -120,9 +120,19 @@ def test_a_chunk_that_the_disk_takes_in_part_is_a_full_disk(tmp_path, monkeypatc
         def write(self, chunk):
             return len(chunk) - 1
 
+        def close(self):
+            pass
+
     monkeypatch.setattr(room.tempfile, "TemporaryFile", lambda **_: Full())
     with pytest.raises(OSError, match="No space left"):
         SpooledFile(tmp_path).append(b"12345678")
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_file_that_goes_with_its_series_leaves_no_warning(tmp_path):
+    """Under `python -W error` a flight ended with "Exception ignored ... unclosed file"."""
+    SpooledFile(tmp_path).append(b"12345678")
+    gc.collect()
 
 
 def test_a_row_cut_off_at_the_end_of_a_file_is_left_out(tmp_path):
