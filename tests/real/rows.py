@@ -10,6 +10,7 @@ from math import hypot
 
 from pymavlink.dialects.v20 import common
 
+from tests.real import lost_transmitter
 from tests.real.lost_control import lost_in_takeoff, own_fence
 from tests.real.next_flights import left_by_failsafe, left_by_ladder
 from tests.real.outcome import figures
@@ -211,6 +212,8 @@ ROWS = {
     "link_lost_on_circle": lambda vehicle: link_lost(vehicle, "circle"),
     "lost_in_takeoff": lost_in_takeoff,
     "own_fence": own_fence,
+    "transmitter_in_climb": lost_transmitter.lost_in_climb,
+    "transmitter_in_control": lost_transmitter.lost_in_control,
     "battery": battery,
     "pilot": pilot,
     "no_gps": no_gps,

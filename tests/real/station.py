@@ -105,6 +105,10 @@ class Station:
             0, 1, 1, _ONLY_RATES, (1.0, 0.0, 0.0, 0.0), *rates, thrust
         )
 
+    def send_sticks(self) -> None:
+        """Send the sticks of a pilot who does not touch them."""
+        self._links[0].mav.manual_control_send(1, 0, 0, 500, 0, 0)
+
     def set_parameter(self, name: str, value: float) -> None:
         """Set a parameter, whatever its type; PX4 wants the bytes of an integer as they are."""
         self._kinds.pop(name, None)
