@@ -28,8 +28,11 @@ _SMALLEST_RISE = 0.3
 """A vehicle that has risen less than this has not left the ground, m: the estimate drifts."""
 
 _LIFT_OFF_TIME = 10.0
-"""Time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full thrust
-meanwhile."""
+"""Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
+thrust meanwhile."""
+
+_LIFT_OFF_FRACTION = 0.25
+"""Part of flight.takeoff_timeout_s allowed to leave the ground: some motors spool up for 10 s."""
 
 _GROUND_FLAG_TIME = 5.0
 """Longest time for which a vehicle at its height may be reported on the ground, s. Its motors may
@@ -96,6 +99,8 @@ class _Climb:
     def __init__(self, context: FlightContext, height: float) -> None:
         self._context, self._height = context, height
         self._began = asyncio.get_running_loop().time()
+        allowed = _LIFT_OFF_FRACTION * context.config.flight.takeoff_timeout_s
+        self._lift_off_time = max(_LIFT_OFF_TIME, allowed)
         self._has_begun = False
         self._held_at: float | None = None
         self._high_on_ground_from: float | None = None
@@ -139,10 +144,11 @@ class _Climb:
     def _require_lift_off(self) -> None:
         """Raise `FlightEnded` if the vehicle still stands though it should have taken off."""
         elapsed, climbed = asyncio.get_running_loop().time() - self._began, self._climbed()
-        if elapsed > _LIFT_OFF_TIME and climbed is not None and climbed < _SMALLEST_RISE:
+        if elapsed > self._lift_off_time and climbed is not None and climbed < _SMALLEST_RISE:
             raise FlightEnded(
-                f"the vehicle has not left the ground {_LIFT_OFF_TIME:g} s after the take-off was "
-                "commanded: check motors, propellers, weight and battery"
+                f"the vehicle has not left the ground {self._lift_off_time:g} s after the take-off "
+                "was commanded: check motors, propellers, weight and battery; motors that spool up "
+                "slowly need a longer flight.takeoff_timeout_s"
             )
 
     def _climbed(self) -> float | None:
