@@ -170,8 +170,8 @@ async def land(context: FlightContext) -> None:
             await context.until(touched_down)
     except TimeoutError:
         raise FlightEnded(
-            f"waited {allowed:g} s for {context.detail}: if the vehicle stands with its motors "
-            "turning, disarm it by transmitter or ground station"
+            f"waited {allowed:g} s for {context.detail}: watch it land, and if it stands with its "
+            "motors turning, disarm it by transmitter or ground station"
         ) from None
 
 
@@ -198,7 +198,7 @@ async def disarm(context: FlightContext) -> None:
     except TimeoutError:
         await context.until(
             lambda: disarmed() or context.ground.touched_down,
-            "the vehicle to touch down: it still reports that it flies",
+            "the autopilot to report that the vehicle stands on the ground",
         )
         if context.armed():
             context.detail = "the autopilot to accept disarming"

@@ -54,7 +54,8 @@ async def check_unless_flying(context: FlightContext) -> None:
 async def wait_for_handover(context: FlightContext) -> None:
     """Wait until the vehicle flies high enough, and its pilot lets the autopilot hold it.
 
-    A vehicle that still takes off or climbs is not held yet.
+    A vehicle that still takes off or climbs is not held yet; one that holds by a failsafe, as after
+    an offboard loss, was not handed over.
     """
     state, ready = context.link.state, context.link.autopilot.ready_mode
     lowest = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
@@ -68,8 +69,9 @@ async def wait_for_handover(context: FlightContext) -> None:
             height = "unknown" if state.height is None else f"{state.height:.1f} m"
             context.detail = f"a height of {lowest:.1f} m (flight.takeoff_height_m), now {height}"
             return False
-        if state.mode != ready:
-            context.detail = f"the pilot to switch to {ready}, now {state.mode}"
+        if state.mode != ready or state.mode_not_intended:
+            by_failsafe = " by the autopilot's failsafe" if state.mode_not_intended else ""
+            context.detail = f"the pilot to switch to {ready}, now {state.mode}{by_failsafe}"
             return False
         context.detail = "the vehicle to keep its height"
         return climb_has_ended(context)

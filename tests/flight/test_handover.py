@@ -11,7 +11,8 @@ from companion.config.files import changed, load, shipped
 from companion.files.yaml_file import ConfigError
 from companion.testing import connect, run
 from tests.flight.airborne import ARM, CUSTOM_MODE, GUIDED, HEIGHT, SET_MODE, TAKEOFF, in_the_air
-from tests.flight.fly import QuickVehicle, quick_flight
+from tests.flight.fly import QuickVehicle, fly, quick_flight
+from tests.flight.others import When
 
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 HELD = ("LOITER", "BRAKE")
@@ -151,3 +152,25 @@ def test_a_program_takes_over_what_another_one_left_in_the_air(autopilot):
     assert summary.result == "ok", summary.events
     assert moved == [pytest.approx(2.0, abs=0.2)]
     assert mock.state()["landed"]
+
+
+def test_after_an_offboard_loss_it_waits_until_the_pilot_commands_hold():
+    """A killed or unheard program left it in the failsafe's hold: the takeover was refused."""
+    mock = QuickVehicle("px4", parameters={"COM_OBL_RC_ACT": 5})
+    lost = {"kind": "drop", "direction": "both", "duration_s": 11.0}
+    lose = When("maneuvers", lambda: mock.inject(lost), after=1.0)
+    fly(mock, None, lose, hover={"duration_s": 9.0})
+    state = mock.state()
+    assert (state["mode"], state["intended_mode"]) == ("LOITER", "OFFBOARD")
+    waits = []
+
+    class Pilot(When):
+        def waiting(self, name, detail, elapsed, timeout):
+            waits.append(detail)
+            super().waiting(name, detail, elapsed, timeout)
+
+    pilot = Pilot("hand over", lambda: hold(mock), after=2.0)
+    summary = testing.fly(handed_over("px4", takeoff_height_m=2.0), mock, None, pilot)
+    assert summary.result == "ok", summary.events
+    wait = "the pilot to switch to AUTO.LOITER, now AUTO.LOITER by the autopilot's failsafe"
+    assert wait in waits
