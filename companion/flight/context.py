@@ -4,8 +4,11 @@ import asyncio
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from math import degrees
 from typing import Any
 
+from companion.attitude import is_unit
+from companion.attitude.kinematics import tilt_angle
 from companion.config import Config
 from companion.config.known_drag import KnownDrag
 from companion.control.control_loop import ControlLoop
@@ -41,6 +44,9 @@ _SHORTEST_STALL = 0.2
 _MAX_STALLED_WAITS = 3
 """After so many waits with a stall, a heartbeat counts as fresh: a computer that always stalls must
 still be able to hand back."""
+
+_ATTITUDE_AGE = 1.0
+"""Largest age of the attitude that tells how the vehicle lies, s."""
 
 _HEARTBEAT_ID = 0.0
 """Message id of HEARTBEAT, as a float for the command that requests a message."""
@@ -180,6 +186,13 @@ class FlightContext:
     def fresh_position(self) -> LocalPosition | None:
         """The newest position, or None if it is stale."""
         return self.guidance_loop.fresh_position()
+
+    def tilt(self) -> float | None:
+        """Tilt of the vehicle, °; None if its attitude is stale or no unit quaternion."""
+        sample, now = self.loop.resets.newest_attitude, asyncio.get_running_loop().time()
+        if sample is None or now - sample.received > _ATTITUDE_AGE or not is_unit(sample.q):
+            return None
+        return degrees(tilt_angle(sample.q[1], sample.q[2]))
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

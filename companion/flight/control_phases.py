@@ -5,8 +5,6 @@ from collections import deque
 from collections.abc import Callable
 from math import degrees
 
-from companion.attitude import is_unit
-from companion.attitude.kinematics import tilt_angle
 from companion.flight.commands import (
     command_if_ours,
     leave_offboard,
@@ -28,9 +26,6 @@ _FALLING_SPEED = 2.5
 
 _UPRIGHT_TILT = 45.0
 """Largest tilt of a vehicle that stands after a landing, °; no vehicle lands on a steeper slope."""
-
-_ATTITUDE_AGE = 1.0
-"""Largest age of the attitude that tells how the vehicle lies, s."""
 
 _MIN_HOLDING_TILT = 5.0
 """Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
@@ -220,11 +215,8 @@ def _require_not_falling(context: FlightContext) -> None:
 
 def _require_upright(context: FlightContext) -> None:
     """Raise `FlightEnded` if the vehicle that has landed lies on its side or on its back."""
-    sample, now = context.loop.resets.newest_attitude, asyncio.get_running_loop().time()
-    if sample is None or now - sample.received > _ATTITUDE_AGE or not is_unit(sample.q):
-        return
-    tilt = degrees(tilt_angle(sample.q[1], sample.q[2]))
-    if tilt > _UPRIGHT_TILT:
+    tilt = context.tilt()
+    if tilt is not None and tilt > _UPRIGHT_TILT:
         raise FlightEnded(
             f"the vehicle lies tilted by {tilt:.0f}° after the landing: it tipped over or crashed"
         )

@@ -27,6 +27,10 @@ _ARRIVAL_TIME = 2.0
 _SMALLEST_RISE = 0.3
 """A vehicle that has risen less than this has not left the ground, m: the estimate drifts."""
 
+_TIPPED_TILT = 60.0
+"""A vehicle on the ground that tilts more has tipped over, °; PX4's failure detector, too, acts at
+60°."""
+
 _LIFT_OFF_TIME = 10.0
 """Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
 thrust meanwhile."""
@@ -142,9 +146,16 @@ class _Climb:
         return self._held_at is not None and now - self._held_at > _ARRIVAL_TIME
 
     def _require_lift_off(self) -> None:
-        """Raise `FlightEnded` if the vehicle still stands though it should have taken off."""
+        """Raise `FlightEnded` if the vehicle tips over, or still stands after the time allowed."""
         elapsed, climbed = asyncio.get_running_loop().time() - self._began, self._climbed()
-        if elapsed > self._lift_off_time and climbed is not None and climbed < _SMALLEST_RISE:
+        if climbed is None or climbed >= _SMALLEST_RISE:
+            return
+        tilt = self._context.tilt()
+        if tilt is not None and tilt > _TIPPED_TILT:
+            raise FlightEnded(
+                f"the vehicle tilts by {tilt:.0f}° on the ground: it tipped over in the take-off"
+            )
+        if elapsed > self._lift_off_time:
             raise FlightEnded(
                 f"the vehicle has not left the ground {self._lift_off_time:g} s after the take-off "
                 "was commanded: check motors, propellers, weight and battery; motors that spool up "

@@ -4,6 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from tests.flight.fly import fly, mock_vehicle
+from tests.flight.others import When
 
 
 def lose_sticks(mock, lost):
@@ -52,3 +53,32 @@ def test_motors_that_spool_up_slowly_are_waited_for():
     with mock_vehicle(parameters={"COM_SPOOLUP_TIME": 11.0, "COM_DISARM_PRFLT": 20.0}) as mock:
         summary = fly(mock, flight={"takeoff_timeout_s": 60.0})
     assert summary.result == "ok", summary.events
+
+
+def lie_on_its_side(mock):
+    """From here on the attitude tells a roll of 90°."""
+    parser, packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
+
+    def changed(data):
+        for message in parser.parse_buffer(data):
+            if message.get_type() != "ATTITUDE_QUATERNION":
+                yield bytes(message.get_msgbuf())
+                continue
+            message.q1, message.q2, message.q3, message.q4 = 0.5**0.5, 0.5**0.5, 0.0, 0.0
+            packer.seq = message.get_seq()
+            yield bytes(message.pack(packer))
+
+    mock.to_companion = changed
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_a_vehicle_that_tips_over_in_the_take_off_is_stopped_at_once(autopilot):
+    """It was told 10 s later that it had not left the ground, with its motors at full thrust."""
+    with mock_vehicle(autopilot=autopilot, airframe={"thrust_slope_m_s2": 8.0}) as mock:
+        observer = When("takeoff", lambda: lie_on_its_side(mock), after=1.0)
+        summary = fly(mock, None, observer)
+        truth = mock.state()
+    assert summary.result == (
+        "the vehicle tilts by 90° on the ground: it tipped over in the take-off"
+    )
+    assert (truth["armed"], truth["landed"]) == (False, True), summary.events
