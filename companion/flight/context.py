@@ -4,7 +4,6 @@ import asyncio
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import degrees
 from typing import Any
 
 from companion.attitude import is_unit
@@ -188,11 +187,11 @@ class FlightContext:
         return self.guidance_loop.fresh_position()
 
     def tilt(self) -> float | None:
-        """Tilt of the vehicle, °; None if its attitude is stale or no unit quaternion."""
+        """Tilt of the vehicle, rad; None if its attitude is stale or no unit quaternion."""
         sample, now = self.loop.resets.newest_attitude, asyncio.get_running_loop().time()
         if sample is None or now - sample.received > _ATTITUDE_AGE or not is_unit(sample.q):
             return None
-        return degrees(tilt_angle(sample.q[1], sample.q[2]))
+        return tilt_angle(sample.q[1], sample.q[2])
 
     def armed(self) -> bool:
         """Whether the autopilot says that it is armed."""

@@ -3,7 +3,7 @@
 import asyncio
 from collections import deque
 from collections.abc import Callable
-from math import degrees
+from math import degrees, radians
 
 from companion.flight.commands import (
     command_if_ours,
@@ -24,8 +24,8 @@ _SELF_DISARM_TIMEOUT = 8.0
 _FALLING_SPEED = 2.5
 """Speed downward, m/s, at which a disarmed vehicle falls: one that has landed stands still."""
 
-_UPRIGHT_TILT = 45.0
-"""Largest tilt of a vehicle that stands after a landing, °; no vehicle lands on a steeper slope."""
+_UPRIGHT_TILT = radians(45.0)
+"""Largest tilt of a vehicle that stands after a landing, rad; no slope to land on is steeper."""
 
 _MIN_HOLDING_TILT = 5.0
 """Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
@@ -218,7 +218,8 @@ def _require_upright(context: FlightContext) -> None:
     tilt = context.tilt()
     if tilt is not None and tilt > _UPRIGHT_TILT:
         raise FlightEnded(
-            f"the vehicle lies tilted by {tilt:.0f}° after the landing: it tipped over or crashed"
+            f"the vehicle lies tilted by {degrees(tilt):.0f}° after the landing: it tipped over or "
+            "crashed"
         )
 
 

@@ -7,7 +7,6 @@ from math import degrees, hypot, inf, nan
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from companion.attitude.kinematics import tilt_angle
 from companion.control.loop_record import LoopRecord
 from companion.flight.context import FlightContext
 from companion.flight.phase import Phase
@@ -22,7 +21,7 @@ _STATUS_PERIOD = 0.1
 _RATE_WINDOW = 1.0
 """Time over which the rate of setpoints is counted, s."""
 _MAX_TELEMETRY_AGE = 1.0
-"""Age above which a position or attitude counts as unknown, s."""
+"""Age above which a position counts as unknown, s."""
 
 
 class FlightStatus(NamedTuple):
@@ -132,7 +131,7 @@ class StatusReporter:
             self.takeoff = now
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
         self._status_rows.record(now)
-        vehicle_time, tilt = context.loop.record.last_vehicle_time, self._tilt(now)
+        vehicle_time, tilt = context.loop.record.last_vehicle_time, context.tilt()
         row = (
             None if vehicle_time == -inf else vehicle_time,
             self._height(now),
@@ -160,7 +159,7 @@ class StatusReporter:
             maneuver_duration=None if maneuver is None else maneuver.duration,
             height=self._height(now),
             speed=self._speed(now),
-            tilt=self._tilt(now),
+            tilt=context.tilt(),
             tracking_error=self._tracking_error(),
             setpoint_rate=self._setpoint_rate(now, record),
             latency=1e-9 * record.latency_ns if self.real_time and context.loop.on else None,
@@ -191,12 +190,6 @@ class StatusReporter:
     def _speed(self, now: float) -> float | None:
         position = self._position(now)
         return None if position is None else hypot(*position.velocity_ned)
-
-    def _tilt(self, now: float) -> float | None:
-        sample = self._context.loop.resets.newest_attitude
-        if sample is None or now - sample.received > _MAX_TELEMETRY_AGE:
-            return None
-        return tilt_angle(sample.q[1], sample.q[2])
 
     def _tracking_error(self) -> float | None:
         loop = self._context.loop

@@ -1,7 +1,7 @@
 """The phase in which the autopilot takes off."""
 
 import asyncio
-from math import dist
+from math import degrees, dist, radians
 
 from companion.flight.commands import command_if_ours, in_role, require_role
 from companion.flight.context import FlightContext
@@ -27,9 +27,9 @@ _ARRIVAL_TIME = 2.0
 _SMALLEST_RISE = 0.3
 """A vehicle that has risen less than this has not left the ground, m: the estimate drifts."""
 
-_TIPPED_TILT = 60.0
-"""A vehicle on the ground that tilts more has tipped over, °; PX4's failure detector, too, acts at
-60°."""
+_TIPPED_TILT = radians(60.0)
+"""A vehicle on the ground that tilts more has tipped over, rad; PX4's failure detector acts there,
+too."""
 
 _LIFT_OFF_TIME = 10.0
 """Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
@@ -153,7 +153,8 @@ class _Climb:
         tilt = self._context.tilt()
         if tilt is not None and tilt > _TIPPED_TILT:
             raise FlightEnded(
-                f"the vehicle tilts by {tilt:.0f}° on the ground: it tipped over in the take-off"
+                f"the vehicle tilts by {degrees(tilt):.0f}° on the ground: it tipped over in the "
+                "take-off"
             )
         if elapsed > self._lift_off_time:
             raise FlightEnded(
