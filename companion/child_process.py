@@ -16,12 +16,18 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def end_with_parent() -> None:
+def end_with_parent(parent_pid: int) -> None:
     """Have the kernel kill this process when its parent ends (Linux only).
 
     A parent that is killed cannot end its children, and these would wait for work for ever.
+
+    Args:
+        parent_pid: process id of the parent. The kernel does not tell of a parent that ended
+            earlier, as while this process imported its modules; then this process ends at once.
     """
     _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent_pid:
+        signal.raise_signal(signal.SIGKILL)
 
 
 @contextmanager

@@ -1,8 +1,10 @@
 """A process that runs one of the programs that are measured."""
 
+import os
 import subprocess
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 from companion.child_process import end_with_parent
@@ -32,7 +34,7 @@ class BenchmarkedProgram:
             [sys.executable, "-m", module, str(self.port), *arguments],
             stdout=subprocess.DEVNULL,
             stderr=self._error_output,
-            preexec_fn=end_with_parent,  # noqa: PLW1509  the benchmark has one thread
+            preexec_fn=partial(end_with_parent, os.getpid()),  # noqa: PLW1509  the benchmark has one thread
         )
 
     def check_running(self) -> None:

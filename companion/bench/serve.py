@@ -6,10 +6,12 @@ The second forwards everything to three clients that read all, and to a fourth t
 """
 
 import json
+import os
 import signal
 import subprocess
 import sys
 from contextlib import ExitStack, closing
+from functools import partial
 from typing import Any
 
 from pymavlink.dialects.v20 import common as dialect
@@ -88,7 +90,7 @@ def _start_clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,  # Ctrl-C ends the benchmark, and that ends the clients
-        preexec_fn=end_with_parent,  # noqa: PLW1509  the benchmark has one thread
+        preexec_fn=partial(end_with_parent, os.getpid()),  # noqa: PLW1509  the benchmark has one thread
     )
     stack.callback(process.communicate)
     stack.callback(process.kill)

@@ -37,6 +37,7 @@ from companion.campaign.report.results import Results
 from companion.campaign.unit import cases_per_unit, check_cases, unit_ranges
 from companion.child_process import usable_cores
 from companion.files.yaml_file import ConfigError
+from companion.program_command import program_command
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -175,7 +176,7 @@ class _Run:
             documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
             say(f"{documented_count} of {faulty_count} flights with a fault ended as documented.")
         say(f"The results are in {self._folder}. Write their report with")
-        say(f"  companion campaign report {shlex.quote(str(self._folder))}")
+        say(f"  {program_command()} campaign report {shlex.quote(str(self._folder))}")
         return FAILED if errors else DONE
 
     def _report_stop(self, why: str) -> int:
@@ -186,7 +187,7 @@ class _Run:
         description = folder.read_description(self._folder)
         units = unit_ranges(description.cases, description.unit)
         finished_cases = sum(len(units[number]) for number in store.finished_units(self._folder))
-        command = f"companion campaign {shlex.quote(str(self._folder))}"
+        command = f"{program_command()} campaign {shlex.quote(str(self._folder))}"
         if self._options.scheduler:
             command += f" --scheduler {self._options.scheduler}"
         self._console.print(

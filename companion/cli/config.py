@@ -6,7 +6,6 @@ from pathlib import Path
 from shlex import quote
 
 from companion.cli.exit_codes import EXIT_OK
-from companion.cli.flying import program_command
 from companion.cli.tool_options import STARTING_FILES
 from companion.config import Config
 from companion.config.files import json_schema, load, shipped, with_assignments
@@ -21,6 +20,7 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.guidance.follow import Follow
+from companion.program_command import program_command
 
 
 def show(options: argparse.Namespace) -> int:

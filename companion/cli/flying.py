@@ -1,9 +1,9 @@
 """Shared by all commands that fly: the options, the flight, and its report."""
 
 import argparse
+import asyncio
 import shlex
 import shutil
-import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from companion.flight.session import Session
 from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.live.helper import Helper
 from companion.mavlink.errors import EndpointError, SigningError
+from companion.program_command import program_command
 from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.folder import flight_folder
@@ -69,14 +70,6 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     return flown_config
 
 
-def program_command() -> str:
-    """The command by which a shell starts this program again."""
-    program = Path(sys.argv[0])
-    if program.name != "companion":  # `python -m companion`
-        return f"{shlex.quote(sys.executable)} -m companion"
-    return "companion" if shutil.which("companion") == str(program) else shlex.quote(str(program))
-
-
 def invocation(options: argparse.Namespace) -> Invocation:
     """The command line of this run, for messages."""
     config = None if options.config is None else str(options.config)
@@ -112,6 +105,10 @@ def fly(
         summary = run(flight, in_lockstep=config.link.lockstep)
     except (EndpointError, RealtimeError, SigningError):
         shutil.rmtree(folder)  # nothing was flown, so there is nothing to keep
+        raise
+    except (asyncio.CancelledError, KeyboardInterrupt):
+        with suppress(OSError):
+            folder.rmdir()  # if it is empty, nothing was recorded
         raise
     finally:
         observer.close()

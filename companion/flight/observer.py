@@ -6,6 +6,9 @@ from typing import Protocol
 from companion.flight.status import FlightStatus
 from companion.recording.recorder import FlightRecorder
 
+_LONGEST_CALL_S = 0.2
+"""A call of an observer that takes longer is told once, s; the flight stands still meanwhile."""
+
 
 class Observer(Protocol):
     """Receives the events of a flight in order; every method must return at once."""
@@ -76,7 +79,7 @@ class EventRecorder:
 
     A fault in the other observer must not cost control of the vehicle. After an exception in its
     method `status`, the other observer receives no more states, but still phases and events. After
-    any other exception it receives nothing more.
+    any other exception it receives nothing more. A slow observer is told once.
 
     Attributes:
         phases: (begin in s on our clock, name) of each phase.
@@ -101,6 +104,7 @@ class EventRecorder:
         self.file = file
         self._observer = observer
         self._clock = clock
+        self._slowness_told = False
 
     def phase(self, name: str, waits_for: str) -> None:
         """Keep, record and pass on the phase."""
@@ -121,7 +125,7 @@ class EventRecorder:
 
     def status(self, status: FlightStatus) -> None:
         """Pass the state on; if the observer raises, the caller must pass on no more states."""
-        self._observer.status(status)
+        self._call(lambda observer: observer.status(status))
 
     def event(self, time: float, text: str) -> None:
         """Record the event and pass it on."""
@@ -130,7 +134,21 @@ class EventRecorder:
 
     def _tell(self, tell: Callable[[Observer], None]) -> None:
         try:
-            tell(self._observer)
+            self._call(tell)
         except Exception as error:
             self._observer = SilentObserver()
             self.note(f"the observer of this flight failed and gets no more messages: {error!r}")
+
+    def _call(self, tell: Callable[[Observer], None]) -> None:
+        began = self._clock()
+        try:
+            tell(self._observer)
+        except SystemExit as error:  # would end the event loop of the flight
+            raise RuntimeError(repr(error)) from error
+        elapsed = self._clock() - began
+        if elapsed > _LONGEST_CALL_S and not self._slowness_told:
+            self._slowness_told = True
+            self.note(
+                f"the observer of this flight took {elapsed:.1f} s for one message: meanwhile no "
+                "setpoint is sent and nothing is supervised; let it return at once"
+            )

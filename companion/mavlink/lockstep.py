@@ -11,7 +11,9 @@ import os
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
+from contextlib import closing
 from contextvars import Context
+from functools import partial
 from typing import Any, Protocol, TypeVar, TypeVarTuple
 
 from companion.mavlink.loop import HotSelector, LinkEventLoop, ReadyKeys
@@ -210,5 +212,6 @@ def run(main: Coroutine[Any, Any, T]) -> T:
     """Run `main` like `asyncio.run`, in vehicle time."""
     clock = _BeaconClock()
     selector = _SteppingSelector(clock)
-    with asyncio.Runner(loop_factory=lambda: LockstepEventLoop(clock, selector)) as runner:
+    make_loop = partial(LockstepEventLoop, clock, selector)
+    with closing(main), asyncio.Runner(loop_factory=make_loop) as runner:
         return runner.run(main)

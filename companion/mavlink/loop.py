@@ -10,6 +10,7 @@ import asyncio
 import select
 import selectors
 from collections.abc import Callable, Coroutine
+from contextlib import closing
 from math import ceil
 from typing import Any, TypeVar
 
@@ -94,5 +95,9 @@ def run(main: Coroutine[Any, Any, T]) -> T:
     The objects that exist now are frozen, so that the garbage collector does not walk through them
     in the middle of a control step.
     """
-    with frozen_objects(), asyncio.Runner(loop_factory=LinkEventLoop) as runner:
+    with (
+        closing(main),  # Ctrl-C before it begins would leave a warning that nobody awaited it
+        frozen_objects(),
+        asyncio.Runner(loop_factory=LinkEventLoop) as runner,
+    ):
         return runner.run(main)

@@ -1,5 +1,6 @@
 """Runs studies in worker processes; each process runs one study at a time."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -55,7 +56,7 @@ def run_in_workers(
     """
     context = get_context("spawn")
     channels = _Channels(context.SimpleQueue(), context.Event())
-    pool = ProcessPoolExecutor(workers, context, _start_worker, (channels,))
+    pool = ProcessPoolExecutor(workers, context, _start_worker, (channels, os.getpid()))
     try:
         with interrupts_blocked():
             futures = {
@@ -86,9 +87,9 @@ def _forward_ticks(
             future.result()  # raises the study's exception
 
 
-def _start_worker(channels: _Channels) -> None:
+def _start_worker(channels: _Channels, parent_pid: int) -> None:
     """Store the channels when a worker process starts."""
-    end_with_parent()
+    end_with_parent(parent_pid)
     _worker_channels.append(channels)
 
 

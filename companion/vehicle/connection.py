@@ -126,7 +126,8 @@ def _refusal_message(opening: str, stats: LinkStats) -> str | None:
     if stats.unclaimed:
         return (
             f"{opening}, but {stats.unclaimed} other frames with the vehicle's ids; let the "
-            "autopilot send HEARTBEAT on this link, because only its sender counts as the vehicle"
+            "autopilot send HEARTBEAT on this link, because only its sender counts as the vehicle; "
+            "if it is the mock vehicle in lockstep, set link.lockstep: true"
         )
     if stats.ignored_foreign:
         source = "/".join(map(str, min(stats.foreign_sources)))

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -48,7 +49,7 @@ class Processes:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                preexec_fn=end_with_parent,  # noqa: PLW1509  pytest may be killed, too
+                preexec_fn=partial(end_with_parent, os.getpid()),  # noqa: PLW1509  pytest may be killed, too
             )
         return self.running[name]
 

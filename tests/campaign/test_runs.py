@@ -15,6 +15,7 @@ from companion.campaign.engine import Progress
 from companion.campaign.versions import VersionError, _version, versions
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError
+from companion.program_command import program_command
 from tests.campaign.test_campaign_file import load, written
 
 TILT = {"limits.max_tilt_deg": [20, 25, 30]}
@@ -51,14 +52,14 @@ def test_a_unit_that_is_given_up_is_told_and_can_be_gone_on_with(
     assert "not flown: unit 1 (cases 1 to 1): RuntimeError: [oops]\n" in told
     assert (
         "1 unit was given up; the results of 2 of 3 flights are kept. Continue with\n"
-        f"  companion campaign '{out}' --scheduler tcp://192.0.2.1:8786\n"
+        f"  {program_command()} campaign '{out}' --scheduler tcp://192.0.2.1:8786\n"
     ) in told
     monkeypatch.setattr(unit, "fly_case", row_of)
     assert main(["campaign", str(out)]) == 0
     told = capsys.readouterr().out
     assert "3 of 3 flights were good.\n" in told
     assert f"The results are in {out}. Write their report with\n" in told
-    assert f"  companion campaign report '{out}'\n" in told
+    assert f"  {program_command()} campaign report '{out}'\n" in told
 
 
 @pytest.mark.parametrize("error", [ConfigError("a case is wrong"), VersionError("the worker is")])

@@ -31,6 +31,7 @@ from companion.config.files import changed, load
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
 from companion.identification import BadFitError, FitQuality, SecondOrderFit
+from companion.program_command import program_command
 from companion.recording.learned_file import LearnedFile
 from tests.campaign.test_campaign_tune import FILE, Proposal, campaign, row_of
 from tests.identification.test_fragment import PITCH, ROLL, VEHICLE
@@ -96,7 +97,7 @@ def test_what_ends_a_search_early_is_told(tmp_path, quick, monkeypatch, capsys, 
     assert tune(tmp_path, out) == code
     told = capsys.readouterr()
     assert said in told.out + told.err
-    again = f"  companion campaign tune {tmp_path / 'tuned.yaml'} --out '{out}'\n"
+    again = f"  {program_command()} campaign tune {tmp_path / 'tuned.yaml'} --out '{out}'\n"
     assert (again in told.out) == (code == 1)
 
 
@@ -154,7 +155,10 @@ def test_a_disk_that_fills_during_the_search_ends_it_and_shows_the_best_so_far(
     told = capsys.readouterr()
     assert "Traceback" not in told.err
     assert f"{out / 'tune.db'}: cannot be used: database or disk is full" in told.out
-    assert "; the candidates so far are kept. Continue with\n  companion campaign tune" in told.out
+    assert (
+        f"; the candidates so far are kept. Continue with\n  {program_command()} campaign tune"
+        in told.out
+    )
     assert "# The best candidate so far, not checked on unseen flights, RMS 0." in told.out
     assert "\nplanner:\n  gain_per_s: " in told.out
 

@@ -4,6 +4,7 @@ import argparse
 import asyncio
 import contextlib
 import errno
+import inspect
 import io
 import json
 import os
@@ -21,11 +22,13 @@ from companion.cli import serve as serving
 from companion.cli.flying import write_flight_page
 from companion.cli.main import main
 from companion.cli.run import run
+from companion.cli.terminal import FlightConsole
 from companion.cli.text_streams import _transliterated
 from companion.config import Config
 from companion.config.files import changed, load, shipped
 from companion.extras import MissingExtraError
 from companion.files.yaml_file import ConfigError
+from companion.mavlink import loop
 from companion.mavlink.errors import LinkError
 from companion.mavlink.loop import run as run_loop
 
@@ -62,6 +65,26 @@ def test_each_error_is_one_sentence_and_a_code(capsys, error, code, said, debug)
         assert told.startswith("Traceback")
         told = told[told.index("companion: ") :]
     assert told == ("" if said is None else f"companion: {said}\n")
+
+
+def test_ctrl_c_before_the_flight_begins_leaves_no_folder_and_no_warning(tmp_path, monkeypatch):
+    started = []
+
+    def interrupted():
+        raise KeyboardInterrupt
+
+    def fly_interruptibly(session):
+        started.append(session.fly())
+        return started[0]
+
+    monkeypatch.setattr(loop, "frozen_objects", interrupted)
+    monkeypatch.setattr(flying, "fly_interruptibly", fly_interruptibly)
+    folder = tmp_path / "flight"
+    folder.mkdir()
+    with pytest.raises(KeyboardInterrupt):
+        flying.fly(Config(), folder, FlightConsole())
+    assert not folder.exists()
+    assert inspect.getcoroutinestate(started[0]) == inspect.CORO_CLOSED
 
 
 class _ClosedPipe(io.StringIO):

@@ -1,5 +1,9 @@
 """Studies in worker processes: the outcomes, the progress, an error, and the same files."""
 
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -29,6 +33,12 @@ def test_outcomes_keep_their_order_and_every_part_is_told():
 def test_an_error_in_a_worker_ends_the_run(study, message):
     with pytest.raises(OSError, match=message):
         run_in_workers(study, {"first": 1, "second": 1}, 1, lambda *_: None)
+
+
+@pytest.mark.parametrize(("parent", "code"), [(os.getpid(), 0), (1, -signal.SIGKILL)])
+def test_a_worker_whose_parent_was_killed_while_it_started_ends_too(parent, code):
+    work = f"from companion.child_process import end_with_parent as end; end({parent})"
+    assert subprocess.run([sys.executable, "-c", work], check=False).returncode == code
 
 
 def test_the_number_of_workers_is_checked(capsys):

@@ -40,6 +40,7 @@ from companion.campaign.tune.writing import (
 from companion.extras import require
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
+from companion.program_command import program_command
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -78,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
                 return _check_and_write(campaign, tune, search_folder, fly, results, console)
         except (KeyboardInterrupt, ClusterError, StorageError) as error:
             why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-            command = f"companion campaign tune {shlex.quote(str(options.file))}"
+            command = f"{program_command()} campaign tune {shlex.quote(str(options.file))}"
             command += f" --out {shlex.quote(str(search_folder))}"
             console.print(f"{why}; the candidates so far are kept. Continue with\n  {command}")
             return FAILED

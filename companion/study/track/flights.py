@@ -1,5 +1,6 @@
 """The flights of the study `track`: the mock vehicle follows trajectories in lockstep."""
 
+import os
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -79,7 +80,8 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> TrackedFlights:
     core_count = usable_cores()
     futures: dict[Task, Future[TrackedFlight]] = {}
     workers = min(core_count, len(tasks))
-    with ProcessPoolExecutor(workers, get_context("spawn"), end_with_parent) as pool:
+    context = get_context("spawn")
+    with ProcessPoolExecutor(workers, context, end_with_parent, (os.getpid(),)) as pool:
         for task in tasks:
             _await_free_core(list(futures.values()), core_count)
             tick(str(task))

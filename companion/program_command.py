@@ -1,0 +1,14 @@
+"""How a user starts this program again, for the commands that messages suggest."""
+
+import shlex
+import shutil
+import sys
+from pathlib import Path
+
+
+def program_command() -> str:
+    """The command by which a shell starts this program again."""
+    program = Path(sys.argv[0])
+    if program.name != "companion":  # `python -m companion`
+        return f"{shlex.quote(sys.executable)} -m companion"
+    return "companion" if shutil.which("companion") == str(program) else shlex.quote(str(program))
