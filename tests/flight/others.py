@@ -1,5 +1,7 @@
 """What others do while a flight is on its way, at a certain phase."""
 
+from pymavlink.dialects.v20 import common as dialect
+
 from companion.flight.observer import SilentObserver
 
 
@@ -22,3 +24,21 @@ class When(SilentObserver):
         if name == self.wanted and self.action is not None:
             action, self.action = self.action, None
             action()
+
+
+def change_messages(mock, names, change):
+    """From here on `change` changes each message of these names that is sent, in place."""
+    parser, packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
+
+    def changed(data):
+        sent = b""
+        for message in parser.parse_buffer(data) or ():
+            if message.get_type() not in names:
+                sent += message.get_msgbuf()
+                continue
+            change(message)
+            packer.seq = message.get_seq()
+            sent += message.pack(packer)
+        return [bytes(sent)] if sent else []
+
+    mock.to_companion = changed

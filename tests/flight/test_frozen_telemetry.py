@@ -4,12 +4,11 @@ from math import acos, cos, degrees, sin
 from types import SimpleNamespace
 
 import pytest
-from pymavlink.dialects.v20 import common as dialect
 
 from companion.attitude import BodyRates
 from companion.safety.frozen_telemetry import FrozenTelemetry
 from tests.flight.fly import fly, mock_vehicle
-from tests.flight.others import When
+from tests.flight.others import When, change_messages
 
 ATTITUDE = ("ATTITUDE_QUATERNION", ("q1", "q2", "q3", "q4"))
 HORIZONTAL = ("LOCAL_POSITION_NED", ("x", "y"))
@@ -18,26 +17,15 @@ VELOCITY = ("LOCAL_POSITION_NED", ("vx", "vy", "vz"))
 POSITION = ("LOCAL_POSITION_NED", ("x", "y", "z", "vx", "vy", "vz"))
 
 
-class Frozen:
-    """Repeats the first numbers of a message for ever; the time stamps go on."""
+def freeze(mock, name, fields):
+    """The first numbers of a message are repeated for ever; the time stamps go on."""
+    kept = {}
 
-    def __init__(self, mock, name, fields):
-        self._name, self._fields, self._kept = name, fields, None
-        self._parser, self._packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
-        mock.to_companion = self._datagram
+    def repeat(message):
+        for field in fields:
+            setattr(message, field, kept.setdefault(field, getattr(message, field)))
 
-    def _datagram(self, data):
-        sent = b""
-        for message in self._parser.parse_buffer(data) or ():
-            if message.get_type() != self._name:
-                sent += message.get_msgbuf()
-                continue
-            self._kept = self._kept or [getattr(message, field) for field in self._fields]
-            for field, value in zip(self._fields, self._kept, strict=True):
-                setattr(message, field, value)
-            self._packer.seq = message.get_seq()
-            sent += message.pack(self._packer)
-        return [bytes(sent)] if sent else []
+    change_messages(mock, {name}, repeat)
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
@@ -64,7 +52,7 @@ def test_a_vehicle_is_not_flown_by_telemetry_that_stands_still(autopilot, name, 
     wind = {"speed_m_s": 3.0, "gust_m_s": 1.0}
     with mock_vehicle(autopilot=autopilot, wind=wind) as mock:
         mock.after_step.append(look)
-        observer = When("maneuvers", lambda: Frozen(mock, name, fields), after=1.0)
+        observer = When("maneuvers", lambda: freeze(mock, name, fields), after=1.0)
         summary = fly(
             mock, None, observer, flight={"takeoff_height_m": 6.0}, hover={"duration_s": 10.0}
         )

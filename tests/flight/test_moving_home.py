@@ -1,30 +1,11 @@
 """Home is set elsewhere in flight, or the ground on which the vehicle stands moves."""
 
 import pytest
-from pymavlink.dialects.v20 import common as dialect
 
 from tests.flight.fly import fly, mock_vehicle
-from tests.flight.others import When
+from tests.flight.others import When, change_messages
 
-
-class Changed:
-    """Changes the messages that a mock vehicle sends, as `change` does in place."""
-
-    def __init__(self, mock, change):
-        self._change = change
-        self._parser, self._packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
-        mock.to_companion = self._datagram
-
-    def _datagram(self, data):
-        sent = b""
-        for message in self._parser.parse_buffer(data) or ():
-            if message.get_type() in ("HOME_POSITION", "LOCAL_POSITION_NED"):
-                self._change(message)
-                self._packer.seq = message.get_seq()
-                sent += message.pack(self._packer)
-            else:
-                sent += message.get_msgbuf()
-        return [bytes(sent)] if sent else []
+PLACES = ("HOME_POSITION", "LOCAL_POSITION_NED")
 
 
 @pytest.mark.parametrize(
@@ -47,7 +28,7 @@ def test_home_that_is_set_elsewhere_in_flight_leads_to_the_ground(phase, higher,
         moved = higher
 
     with mock_vehicle() as mock:
-        Changed(mock, change)
+        change_messages(mock, PLACES, change)
         summary = fly(mock, None, When(phase, move, after=0.3))
         truth = mock.state()
     assert summary.result.endswith(result), summary.events
@@ -68,7 +49,7 @@ def test_a_height_that_jumps_in_the_take_off_is_named_and_the_vehicle_lands(jump
         jump = -3.0 if jumping == "HOME_POSITION" else 3.0
 
     with mock_vehicle() as mock:
-        Changed(mock, change)
+        change_messages(mock, PLACES, change)
         at = When("takeoff", lambda: mock.at(mock.time + 0.8, begin_jump))
         summary = fly(mock, None, at, flight={"takeoff_height_m": 4.0})
         truth = mock.state()
@@ -92,7 +73,7 @@ def test_a_home_that_is_set_far_below_in_the_climb_is_named():
         moved = 50.0
 
     with mock_vehicle() as mock:
-        Changed(mock, change)
+        change_messages(mock, PLACES, change)
         summary = fly(mock, None, When("takeoff", move, after=1.0))
         truth = mock.state()
     assert summary.result.startswith("after a climb of "), summary.events
@@ -134,7 +115,7 @@ def test_a_take_off_from_a_boat_that_moves_is_flown():
                 message.x += 2.0 * mock.time
                 message.vx += 2.0
 
-        Changed(mock, change)
+        change_messages(mock, PLACES, change)
         summary = fly(mock)
         truth = mock.state()
     assert summary.result == "ok", summary.events

@@ -4,7 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import common as dialect
 
 from tests.flight.fly import fly, mock_vehicle
-from tests.flight.others import When
+from tests.flight.others import When, change_messages
 
 
 def lose_sticks(mock, lost):
@@ -57,18 +57,11 @@ def test_motors_that_spool_up_slowly_are_waited_for():
 
 def lie_on_its_side(mock):
     """From here on the attitude tells a roll of 90°."""
-    parser, packer = dialect.MAVLink(None), dialect.MAVLink(None, 1, 1)
 
-    def changed(data):
-        for message in parser.parse_buffer(data):
-            if message.get_type() != "ATTITUDE_QUATERNION":
-                yield bytes(message.get_msgbuf())
-                continue
-            message.q1, message.q2, message.q3, message.q4 = 0.5**0.5, 0.5**0.5, 0.0, 0.0
-            packer.seq = message.get_seq()
-            yield bytes(message.pack(packer))
+    def roll(message):
+        message.q1, message.q2, message.q3, message.q4 = 0.5**0.5, 0.5**0.5, 0.0, 0.0
 
-    mock.to_companion = changed
+    change_messages(mock, {"ATTITUDE_QUATERNION"}, roll)
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
