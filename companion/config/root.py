@@ -96,6 +96,7 @@ class Config(Section):
             safety.fence_polygon_deg,
             safety.braking_m_s2,
             safety.reaction_s,
+            tilt_acceleration=limits.max_horizontal_acceleration,
         )
 
     @model_validator(mode="after")

@@ -47,7 +47,8 @@ class SafetyConfig(Section):
     """Fence polygon: corners [latitude, longitude]. Set fence_polygon_m or fence_polygon_deg, not
     both; neither: no polygon."""
     braking_m_s2: Annotated[float, Field(ge=0.1, le=20.0)] = 2.5
-    """Assumed braking deceleration: the vehicle brakes in time to stay inside the fence."""
+    """Assumed braking deceleration: the vehicle brakes in time to stay inside the fence. If
+    limits.max_tilt_deg and the estimated wind leave less, the program counts on less."""
     reaction_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
     """Assumed delay before the vehicle brakes at the fence; it may still accelerate meanwhile."""
     fence_action: Ending = "land"

@@ -9,7 +9,13 @@ from companion.control.command_maker import CommandMaker
 from companion.control.flown_source import FlownSource
 from companion.control.hover_learning import HoverLearning
 from companion.guidance import GRAVITY, VehicleMotion
-from companion.guidance.braking import AssumedBraking, Braking, brake, brake_upwind
+from companion.guidance.braking import (
+    AssumedBraking,
+    Braking,
+    acceleration_beside_wind,
+    brake,
+    brake_upwind,
+)
 from companion.guidance.reference import NorthEast
 
 
@@ -40,9 +46,11 @@ class Hold:
         """
         if self._flown_source.remaining_braking_time(now) > 0.0:
             return  # it goes on braking: a new beginning would stop it further away
-        motion = self._maker.guidance_input(now).now
-        deceleration = GRAVITY * tan(self._largest_tilt())
-        self._flown_source.hold(brake(now, motion, heading, deceleration, self._assumed_braking))
+        inputs = self._maker.guidance_input(now)
+        motion, (north, east, _) = inputs.now, inputs.now.velocity_ned
+        by_tilt = GRAVITY * tan(self._largest_tilt())
+        acceleration = acceleration_beside_wind(by_tilt, (north, east), inputs.disturbance)
+        self._flown_source.hold(brake(now, motion, heading, acceleration, self._assumed_braking))
 
     def move_upwind(self, now: float, wind: NorthEast) -> None:
         """Also move upwind by the drift of the autopilot that will take over; see `brake_upwind`.

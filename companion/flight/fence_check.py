@@ -2,7 +2,7 @@
 
 `Fence.breach_at_stopping_point` judges each moment of the reference with the monitor's formula.
 `TRACKING_MARGIN` allows for the tracking error. A vehicle that follows an accepted reference within
-this margin triggers no monitor.
+this margin triggers no monitor, unless wind leaves less tilt for braking than the monitor assumes.
 """
 
 from dataclasses import dataclass, replace

@@ -18,6 +18,11 @@ _DRIFT_TIME_SQUARED = 0.47
 """Distance by which PX4 drifts when it takes over a vehicle that leans against wind, per
 acceleration by the wind, s². PX4 in simulation drifted by 1.40 and 1.42 m at 3.0 m/s² and was
 farthest after 3 s. It grows if MPC_XY_P, MPC_XY_VEL_P_ACC or MPC_XY_VEL_I_ACC is smaller."""
+_PEAK = 1.5
+"""Peak deceleration of a smooth stop (`Braking`), per mean deceleration."""
+_LEAST_ACCELERATION = 0.3
+"""Acceleration that still counts as available in wind that uses up the tilt, m/s²: the stopping
+distance stays finite."""
 _NOTICE_TIME = 0.1
 """Time within which the fence's monitor and guidance notice a breach, s."""
 
@@ -27,11 +32,41 @@ class AssumedBraking(NamedTuple):
 
     Attributes:
         reaction: delay before the vehicle brakes, s (`safety.reaction_s`).
-        deceleration: constant deceleration after this delay, m/s² (`safety.braking_m_s2`).
+        deceleration: constant deceleration after this delay, m/s² (`safety.braking_m_s2`), if the
+            tilt allows it; see `mean_deceleration`.
     """
 
     reaction: float
     deceleration: float
+
+
+def acceleration_beside_wind(largest: float, velocity: NorthEast, wind: NorthEast) -> float:
+    """Largest acceleration against the motion that the tilt leaves beside the wind, m/s².
+
+    The tilt balances the wind's part across the motion first. Wind from ahead helps.
+
+    Args:
+        largest: largest horizontal acceleration by tilt, m/s².
+        velocity: velocity north and east, m/s.
+        wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
+    """
+    speed = hypot(*velocity)
+    if speed == 0.0:
+        return max(largest - hypot(*wind), _LEAST_ACCELERATION)
+    along = (wind[0] * velocity[0] + wind[1] * velocity[1]) / speed
+    across = (wind[0] * velocity[1] - wind[1] * velocity[0]) / speed
+    left = sqrt(max(0.0, largest * largest - across * across))
+    return max(left - along, _LEAST_ACCELERATION)
+
+
+def mean_deceleration(assumed: float, acceleration: float) -> float:
+    """Mean deceleration of the hardest stop, m/s².
+
+    Args:
+        assumed: deceleration that is assumed if the tilt allows it, m/s².
+        acceleration: largest acceleration against the motion, m/s².
+    """
+    return min(assumed, acceleration / _PEAK)
 
 
 def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> float:
@@ -42,15 +77,13 @@ def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> 
 
     Args:
         speed: horizontal speed, m/s.
-        acceleration: largest horizontal acceleration, m/s²; 0 if the thrust allows no tilt.
+        acceleration: largest acceleration against the motion, m/s²; positive.
         assumed: what the monitor of the fence assumes.
     """
     if speed < _REST_SPEED:
         return 0.0
     reaction = max(0.0, assumed.reaction - _NOTICE_TIME)
-    longest_time = 2.0 * reaction + speed / assumed.deceleration
-    if acceleration <= 0.0:
-        return longest_time
+    longest_time = 2.0 * reaction + speed / mean_deceleration(assumed.deceleration, acceleration)
     smooth_time = max(
         speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _LARGEST_JERK)
     )
@@ -194,7 +227,7 @@ def brake(
         now: event-loop time, s.
         motion: motion of the vehicle.
         heading: the heading to keep, rad.
-        acceleration: largest horizontal acceleration, m/s².
+        acceleration: largest acceleration against the motion, m/s².
         assumed: what the monitor of the fence assumes.
     """
     speed = hypot(motion.velocity_ned[0], motion.velocity_ned[1])

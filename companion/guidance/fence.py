@@ -6,7 +6,8 @@ from functools import lru_cache
 from math import cos, hypot, inf, pi, radians, remainder, sin
 from typing import Any, NamedTuple
 
-from companion.guidance.reference import Vector
+from companion.guidance.braking import acceleration_beside_wind, mean_deceleration
+from companion.guidance.reference import NorthEast, Vector
 
 Corner = tuple[float, float]
 """A corner of a polygon: (north, east) in m, or (latitude, longitude) in degrees."""
@@ -72,9 +73,11 @@ class Fence:
         floor: smallest height above home, m.
         polygon: corners, m north and east of where control began; empty: only the cylinder.
         places: corners as (latitude, longitude) in degrees, instead of `polygon`.
-        deceleration: deceleration that the vehicle certainly reaches, m/s².
+        deceleration: deceleration that the vehicle reaches if its tilt allows it, m/s².
         reaction: assumed delay before the vehicle brakes, s.
         estimate_delay: delay of the estimated horizontal motion behind the true one, s.
+        tilt_acceleration: largest horizontal acceleration by tilt, m/s². It limits horizontal
+            braking, and the wind uses a part of it.
     """
 
     radius: float
@@ -85,6 +88,7 @@ class Fence:
     deceleration: float
     reaction: float
     estimate_delay: float = 0.0
+    tilt_acceleration: float = inf
 
     @property
     def walls(self) -> "Fence":
@@ -133,23 +137,30 @@ class Fence:
         return None
 
     def stopping_point(
-        self, offset: Components, velocity: Components, acceleration: tuple[Any, Any] = (0.0, 0.0)
+        self,
+        offset: Components,
+        velocity: Components,
+        acceleration: tuple[Any, Any] = (0.0, 0.0),
+        wind: NorthEast | None = None,
     ) -> Components:
         """Where the vehicle stops if it brakes now, m NED from where control began.
 
         From a horizontal or vertical velocity v, the vehicle stops after v·t + v²/(2b). b is the
-        deceleration. t is the reaction time; horizontally, `estimate_delay` is added to it. A
-        horizontal acceleration a that makes the vehicle faster is assumed to last for t; the
-        vehicle then stops after v·t + a·t²/2 + (v + a·t)²/(2b). An acceleration that brakes is
-        ignored, because it may end at any moment.
+        deceleration; horizontally, `tilt_acceleration` and the wind may leave less. t is the
+        reaction time; horizontally, `estimate_delay` is added to it. A horizontal acceleration a
+        that makes the vehicle faster is assumed to last for t; the vehicle then stops after
+        v·t + a·t²/2 + (v + a·t)²/(2b). An acceleration that brakes is ignored, because it may end
+        at any moment.
 
         Args:
             offset: position of the vehicle relative to where control began, m NED; numbers, or
                 arrays of them.
             velocity: velocity, m/s NED; numbers, or arrays of them.
             acceleration: acceleration north and east, m/s²; numbers, or arrays of them.
+            wind: acceleration by the wind of a vehicle at rest, m/s², north and east; only for
+                motions in numbers. None: no wind.
         """
-        (north, east, down), twice_deceleration = velocity, 2.0 * self.deceleration
+        north, east, down = velocity
         reaction = self.reaction + self.estimate_delay
         dv_north, dv_east = reaction * acceleration[0], reaction * acceleration[1]
         # The square of the speed after the reaction time, minus the square of the present speed.
@@ -158,11 +169,14 @@ class Fence:
         dv_north, dv_east = is_faster * dv_north, is_faster * dv_east
         later_north, later_east = north + dv_north, east + dv_east
         later_speed = (later_north * later_north + later_east * later_east) ** 0.5
-        half_braking_time = later_speed / twice_deceleration
+        available = self.tilt_acceleration
+        if wind is not None:
+            available = acceleration_beside_wind(available, (later_north, later_east), wind)
+        half_braking_time = 0.5 * later_speed / mean_deceleration(self.deceleration, available)
         return (
             offset[0] + reaction * (north + 0.5 * dv_north) + half_braking_time * later_north,
             offset[1] + reaction * (east + 0.5 * dv_east) + half_braking_time * later_east,
-            offset[2] + (self.reaction + abs(down) / twice_deceleration) * down,
+            offset[2] + (self.reaction + 0.5 * abs(down) / self.deceleration) * down,
         )
 
     def breach_at_stopping_point(
@@ -172,13 +186,14 @@ class Fence:
         height: float | None,
         origin: Place | None,
         margin: float = 0.0,
-        acceleration: tuple[float, float] = (0.0, 0.0),
+        acceleration: NorthEast = (0.0, 0.0),
+        wind: NorthEast | None = None,
     ) -> Breach | None:
         """The breach at the place where the vehicle would stop; None: it would stop inside.
 
         The arguments are those of `stopping_point` and `breach`; `height` is the present height.
         """
-        stop = self.stopping_point(offset, velocity, acceleration)
+        stop = self.stopping_point(offset, velocity, acceleration, wind)
         descent = stop[2] - offset[2]
         return self.breach(stop, None if height is None else height - descent, origin, margin)
 

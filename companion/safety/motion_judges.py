@@ -3,8 +3,8 @@
 The docstring of each judge states its breach.
 
 The judge `braking` acts before the vehicle leaves the fence. It judges where the vehicle would stop
-with the deceleration `safety.braking_m_s2`, if it still accelerates for the reaction time
-(`Fence.stopping_point`).
+with the deceleration `safety.braking_m_s2`, or with what tilt limit and wind leave of it, if it
+still accelerates for the reaction time (`Fence.stopping_point`).
 """
 
 from math import degrees, hypot
@@ -115,7 +115,12 @@ def braking(fence: Fence) -> Judge:
         if offset is None or fence.breach(offset, height, motion.origin) is not None:
             return None
         breach = fence.breach_at_stopping_point(
-            offset, velocity, height, motion.origin, acceleration=motion.acceleration
+            offset,
+            velocity,
+            height,
+            motion.origin,
+            acceleration=motion.acceleration,
+            wind=motion.wind,
         )
         return None if breach is None else f"braking now would end {breach}"
 

@@ -164,6 +164,7 @@ class SnapshotBuilder:
             None if idle else loop.record.thrust,
             self._fence_place,
             guidance_loop.acceleration,
+            guidance_loop.estimate.disturbance,
             guidance_loop.remaining_braking_time > 0.0,
         )
 

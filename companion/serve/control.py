@@ -3,6 +3,7 @@
 import asyncio
 
 from companion.config import Config
+from companion.flight.commands import in_role
 from companion.mavlink.framing import Frame
 from companion.preflight.session import wanted_rates
 from companion.serve.component import Component
@@ -120,14 +121,13 @@ class ServedControl:
         Setpoints alone begin a flight only in the air, in ArduPilot's GUIDED. A refused program
         gets the reason.
         """
-        autopilot, state = self._link.autopilot, self._link.state
-        if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
+        if self._link.autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
             return False
         if not self._flights.may_retry:
             return False
-        if state.mode is None or Role.READY not in autopilot.roles(state.mode):
+        if not in_role(self._link, Role.READY):
             return False
-        if not state.flying:
+        if not self._link.state.flying:
             self._component.answer(
                 program.client, "take off first: setpoints are flown only in the air"
             )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from companion.config import Config
 from companion.guidance.fence import Breach, Fence, FenceCentre
-from companion.guidance.reference import Reference, Vector, VehicleMotion, minus
+from companion.guidance.reference import NorthEast, Reference, Vector, VehicleMotion, minus
 from companion.safety.table import fence_of
 from companion.serve.setpoints.motion import VERTICAL_ACCELERATION
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
@@ -48,6 +48,7 @@ class FenceGuard:
         centre: returns the centre of the fence in the frame without estimator resets; None: unknown
             yet.
         height: returns the height above home, m; None: unknown.
+        wind: returns the acceleration by the wind of a vehicle at rest, m/s², north and east.
         tell: called with a sentence when the vehicle is stopped.
     """
 
@@ -56,12 +57,13 @@ class FenceGuard:
         config: Config,
         centre: Callable[[], FenceCentre | None],
         height: Callable[[], float | None],
+        wind: Callable[[], NorthEast],
         tell: Callable[[str], None],
     ) -> None:
         fence, acceleration = fence_of(config), config.serve.max_acceleration_m_s2
         self._wall = _Side(fence.walls, acceleration)
         self._levels = _Side(fence.levels, min(acceleration, VERTICAL_ACCELERATION))
-        self._centre, self._height, self._tell = centre, height, tell
+        self._centre, self._height, self._wind, self._tell = centre, height, wind, tell
         self._stopped_at = -inf
 
     def inside(
@@ -79,7 +81,7 @@ class FenceGuard:
         if centre is None:
             return request
         home_down = None if height is None else actual.position_ned[2] + height
-        frame = _FenceFrame(centre, home_down)
+        frame = _FenceFrame(centre, home_down, self._wind())
         north, east, _ = reference.acceleration_ned
         flown = _State(reference.position_ned, reference.velocity_ned, (north, east))
         states = flown, _State(*actual, (0.0, 0.0))
@@ -109,6 +111,8 @@ class _FenceFrame(NamedTuple):
     centre: FenceCentre
     home_down: float | None
     """Coordinate down of home, m; None: unknown."""
+    wind: NorthEast
+    """Acceleration by the wind of a vehicle at rest, m/s², north and east."""
 
     def breach(self, fence: Fence, position: Vector, margin: float) -> Breach | None:
         """The breach of a place, NED in the frame of `centre`."""
@@ -118,7 +122,7 @@ class _FenceFrame(NamedTuple):
         """The breach where the vehicle would stop from a state."""
         offset, height = self._arguments(state.position)
         return fence.breach_at_stopping_point(
-            offset, state.velocity, height, self.centre.place, margin, state.acceleration
+            offset, state.velocity, height, self.centre.place, margin, state.acceleration, self.wind
         )
 
     def _arguments(self, position: Vector) -> tuple[Vector, float | None]:

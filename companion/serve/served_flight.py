@@ -104,6 +104,7 @@ class ServedFlight:
             changes.wanted_config,
             context.snapshot_builder.flown_fence_centre,
             lambda: link.state.height,
+            lambda: context.guidance_loop.estimate.disturbance,
             self._tell_alarm,
         )
         self._assembled.context.fence_centre = fence_centre

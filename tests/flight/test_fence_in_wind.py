@@ -15,14 +15,12 @@ from tests.flight.fly import QuickVehicle, quick_flight
 RADIUS = 8.0
 
 
-@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-def test_the_landing_does_not_drift_out_of_the_fence(autopilot):
-    """PX4 begins its landing level: it drifted out by 1.1 m where the hold did not move upwind."""
-    vehicle = QuickVehicle(autopilot, wind={"speed_m_s": 3.0, "from_deg": 180.0})
-    config = quick_flight(
-        autopilot, {"limits": {"fence_radius_m": RADIUS}, "flight": {"takeoff_height_m": 5.0}}
-    )
-    distance = {"OFFBOARD": [0.0], "GUIDED": [0.0], "LAND": [0.0]}
+def farthest_downwind(autopilot, wind, max_tilt):
+    """A program flies downwind until the fence ends it; the largest distance in each mode, m."""
+    vehicle = QuickVehicle(autopilot, wind={"speed_m_s": wind, "from_deg": 180.0})
+    limits = {"fence_radius_m": RADIUS, "max_tilt_deg": max_tilt}
+    config = quick_flight(autopilot, {"limits": limits, "flight": {"takeoff_height_m": 5.0}})
+    distance = {"LAND": [0.0]}
 
     async def flown():
         async with testing.connect(config, vehicle) as connected:
@@ -43,8 +41,21 @@ def test_the_landing_does_not_drift_out_of_the_fence(autopilot):
     with pytest.raises(FlightEnded, match="braking now would end"):
         testing.run(vehicle, flown())
     assert vehicle.state()["on_ground"]
-    assert RADIUS - 1.5 < max(distance["LAND"]) < RADIUS
-    assert RADIUS - 1.5 < max(distance["OFFBOARD"] + distance["GUIDED"]) < RADIUS
+    return {mode: max(distances) for mode, distances in distance.items()}
+
+
+@pytest.mark.parametrize(("autopilot", "control"), [("px4", "OFFBOARD"), ("ardupilot", "GUIDED")])
+def test_the_landing_does_not_drift_out_of_the_fence(autopilot, control):
+    """PX4 begins its landing level: it drifted out by 1.1 m where the hold did not move upwind."""
+    farthest = farthest_downwind(autopilot, 3.0, 35.0)
+    assert RADIUS - 1.5 < farthest["LAND"] < RADIUS
+    assert RADIUS - 1.5 < farthest[control] < RADIUS
+
+
+@pytest.mark.parametrize(("wind", "max_tilt"), [(6.0, 35.0), (3.0, 20.0)])
+def test_a_wind_that_needs_most_of_the_tilt_does_not_blow_it_out_of_the_fence(wind, max_tilt):
+    """The vehicle left it by 0.9 m, braking as if all of the tilt were free."""
+    assert max(farthest_downwind("px4", wind, max_tilt).values()) < RADIUS
 
 
 @pytest.mark.parametrize(

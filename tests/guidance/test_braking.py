@@ -4,17 +4,19 @@ from math import hypot
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from companion.guidance import VehicleMotion
 from companion.guidance.braking import (
     AssumedBraking,
     Braking,
+    acceleration_beside_wind,
     brake,
     brake_upwind,
     braking_time,
     drift,
+    mean_deceleration,
 )
 
 HERE, BEGUN, HEADING = (3.0, -2.0, -5.0), 100.0, 0.7
@@ -49,7 +51,8 @@ def test_it_stops_within_what_the_monitor_of_the_fence_assumes(
 ):
     duration = braking_time(speed, acceleration, AssumedBraking(reaction, deceleration))
     braking = Braking(BEGUN, VehicleMotion(HERE, (0.0, speed, 0.0)), HEADING, duration)
-    assumed = speed * max(0.0, reaction - 0.1) + speed**2 / (2.0 * deceleration)
+    mean = mean_deceleration(deceleration, acceleration)
+    assumed = speed * max(0.0, reaction - 0.1) + speed**2 / (2.0 * mean)
     assert 0.0 < braking.stopping_point[1] - HERE[1] <= assumed + 1e-9
 
 
@@ -60,8 +63,36 @@ def test_a_vehicle_at_rest_is_held_where_it_is():
     assert braking.at(BEGUN + 1.0).position_ned == HERE
 
 
-def test_a_vehicle_whose_thrust_allows_no_tilt_brakes_as_the_monitor_of_the_fence_assumes():
-    assert braking_time(5.0, 0.0, AssumedBraking(0.3, 2.5)) == pytest.approx(2.0 * 0.2 + 5.0 / 2.5)
+@given(speed=st.floats(0.5, 15.0), acceleration=st.floats(0.3, 10.0))
+def test_no_stop_needs_more_than_the_largest_acceleration(speed, acceleration):
+    duration = braking_time(speed, acceleration, AssumedBraking(0.1, 20.0))
+    braking = Braking(BEGUN, VehicleMotion(HERE, (0.0, speed, 0.0)), HEADING, duration)
+    peak = max(-braking.at(BEGUN + duration * k / 100).acceleration_ned[1] for k in range(101))
+    assert peak <= acceleration * 1.001
+
+
+@given(
+    largest=st.floats(1.0, 8.0),
+    velocity=st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)),
+    wind=st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0)),
+)
+def test_beside_the_wind_the_tilt_leaves_what_a_search_over_its_directions_finds(
+    largest, velocity, wind
+):
+    """The search: of all accelerations by tilt, those that leave none across the motion."""
+    speed = hypot(*velocity)
+    assume(speed > 0.1)
+    along, across = np.array(velocity) / speed, np.array((-velocity[1], velocity[0])) / speed
+    angles = np.linspace(0.0, 2.0 * np.pi, 20001)
+    sums = largest * np.column_stack((np.cos(angles), np.sin(angles))) + wind
+    straight = np.abs(sums @ across) < 2.0 * largest * np.pi / 20000
+    assume(straight.any())
+    found = max(np.max(-(sums @ along)[straight]), 0.3)
+    assert acceleration_beside_wind(largest, velocity, wind) == pytest.approx(found, abs=0.05)
+
+
+def test_at_rest_the_wind_counts_as_if_the_vehicle_moved_along_it():
+    assert acceleration_beside_wind(5.0, (0.0, 0.0), (3.0, 0.0)) == 2.0
 
 
 @pytest.mark.parametrize("velocity", [(3.0, 4.0, -2.0), (5.0, 0.0, 1.0), (0.0, -5.0, 0.0)])

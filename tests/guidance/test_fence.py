@@ -147,6 +147,18 @@ def test_an_acceleration_lasts_for_the_reaction_time_and_one_that_brakes_does_no
     assert several[0].tolist() == pytest.approx([faster[0], fence.stopping_point(still, way)[0]])
 
 
+def test_a_small_tilt_limit_and_wind_lengthen_the_stop():
+    fence = Fence(50.0, 30.0, 1.0, (), (), 2.5, 0.3, tilt_acceleration=3.0)
+    still, way = (0.0, 0.0, 0.0), (2.0, 0.0, -1.0)
+    north, _, down = fence.stopping_point(still, way)
+    assert north == pytest.approx(2.0 * 0.3 + 4.0 / (2.0 * 3.0 / 1.5))
+    assert down == pytest.approx(-(0.3 + 1.0 / 5.0)), "the tilt is not needed to stop a climb"
+    downwind, _, _ = fence.stopping_point(still, way, wind=(1.5, 0.0))
+    assert downwind == pytest.approx(2.0 * 0.3 + 4.0 / (2.0 * 1.5 / 1.5))
+    upwind, _, _ = fence.stopping_point(still, way, wind=(-1.5, 0.0))
+    assert upwind == pytest.approx(2.0 * 0.3 + 4.0 / (2.0 * 2.5)), "at most the assumed one"
+
+
 def test_where_it_would_stop_is_judged_with_its_height_there():
     sinking = ((0.0, 0.0, -5.0), (0.0, 0.0, 2.0))  # 2 m further down
     assert FENCE.breach_at_stopping_point(*sinking, 4.0, HOME) is None

@@ -61,6 +61,7 @@ class Flight:
         self.guidance = SimpleNamespace(
             motion=Motions(self.course.position_ned, self.course.velocity),
             acceleration=(0.0, 0.0),
+            estimate=SimpleNamespace(disturbance=(0.0, 0.0)),
             tracking_error=0.9,
             remaining_braking_time=0.0,
             command_not_finite=False,
@@ -111,6 +112,7 @@ def test_the_autopilots_words_are_passed_on(flight):
 def test_motion_is_seen_from_where_control_began(flight):
     flight.guidance.motion = Motions((7.0, -9.0, -3.0), (1.0, 2.0, 0.5))
     flight.guidance.acceleration, flight.guidance.remaining_braking_time = (0.3, -0.4), 0.1
+    flight.guidance.estimate.disturbance = (0.5, -0.6)
     assert flight.snapshot().motion == Motion(
         q=Q,
         body_rates=(0.1, 0.2, 0.3),
@@ -121,6 +123,7 @@ def test_motion_is_seen_from_where_control_began(flight):
         thrust=0.45,
         origin=Place(47.0, 8.0),
         acceleration=(0.3, -0.4),
+        wind=(0.5, -0.6),
         moves_to_hold=True,
     )
 

@@ -66,11 +66,11 @@ def test_a_client_that_flies_to_the_fence_is_stopped_and_stays_in_control(autopi
     assert seen["back"] < 10.0
 
 
-def guard(told=None, height=5.0, **safety):
+def guard(told=None, height=5.0, wind=(0.0, 0.0), **safety):
     config = changed(Config(), {"safety": safety}, "the test")
     centre = FenceCentre((0.0, 0.0, -5.0), None)
     tell = (lambda _: None) if told is None else told.append
-    return FenceGuard(config, lambda: centre, lambda: height, tell)
+    return FenceGuard(config, lambda: centre, lambda: height, lambda: wind, tell)
 
 
 def asked(guard, velocity, position=(0.0, 0.0, -5.0), flown=(0.0, 0.0, 0.0), now=0.0):
