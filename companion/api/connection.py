@@ -1,7 +1,7 @@
 """Connect a program to a vehicle, and run it."""
 
 import asyncio
-from collections.abc import AsyncGenerator, Coroutine, Mapping, Sequence
+from collections.abc import AsyncGenerator, Coroutine, Mapping
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -19,11 +19,9 @@ from companion.api.state import ConnectedFlight, NewestState
 from companion.api.vehicle import Vehicle
 from companion.config import Config
 from companion.config.files import changed, load
-from companion.flight.context import FlightContext
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, SilentObserver, decline_landing
-from companion.flight.phase import Phase
-from companion.flight.phases import hand_back_phase
+from companion.flight.phases import HAND_BACK
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
 from companion.recording.folder import flight_folder, own_folder
@@ -219,12 +217,9 @@ async def _end_flight(program: ProgramPlan) -> None:
     if program.busy:
         program.interrupt("the program ended before its request was completed")
     elif not program.is_over:
-        await program.request(_ending_phases, ends_flight=True)
-
-
-def _ending_phases(context: FlightContext) -> Sequence[Phase]:
-    """The phases that end the flight: hand back in the air, none on the ground."""
-    return (hand_back_phase(),) if context.loop.offboard_active else ()
+        await program.request(
+            lambda context: (HAND_BACK,) if context.loop.offboard_active else (), ends_flight=True
+        )
 
 
 async def _end_lost_flight(session: Session, program: ProgramPlan) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from companion.flight.context import FlightContext
 from companion.flight.phase import Phase
-from companion.flight.phases import opening_phases, program_phase
+from companion.flight.phases import control_phase, opening_phases
 from companion.guidance import ManeuverSequence
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import FlightEnded
@@ -152,7 +152,7 @@ class ProgramPlan:
 
     def _waiting_phase(self, context: FlightContext) -> Phase:
         if context.loop.offboard_active:
-            return program_phase("hold", _NEXT_CALL, self._next_request, inf)
+            return control_phase("hold", _NEXT_CALL, self._next_request, inf)
         return Phase("stand by", _NEXT_CALL, self._next_request, inf)
 
     async def _next_request(self, context: FlightContext) -> None:
@@ -162,11 +162,9 @@ class ProgramPlan:
             await self._new_request.wait()
 
 
-def unless_disarmed(
-    phases: Callable[[], Sequence[Phase]],
-) -> Callable[[FlightContext], Sequence[Phase]]:
-    """The given phases, but none for a disarmed vehicle, whose mode then stays."""
-    return lambda context: () if context.link.state.armed is False else phases()
+def unless_disarmed(phases: Sequence[Phase]) -> Callable[[FlightContext], Sequence[Phase]]:
+    """Return the phases for `ProgramPlan.request`; none if the vehicle is disarmed."""
+    return lambda context: () if context.link.state.armed is False else phases
 
 
 def flight_ended(result: str) -> FlightEnded:

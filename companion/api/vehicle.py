@@ -21,10 +21,10 @@ from companion.flight.maneuver_checks import (
 )
 from companion.flight.phase import Phase
 from companion.flight.phases import (
-    hand_back_phase,
+    HAND_BACK,
+    LANDING_PHASES,
+    control_phase,
     handover_phases,
-    landing_phases,
-    program_phase,
     takeoff_phases,
 )
 from companion.guidance import Maneuver, ManeuverSequence, Pose
@@ -187,7 +187,7 @@ class Vehicle:
             name, self._flight.context.config.deadman.target_stale, _START_TIMEOUT
         )
         work = partial(fly_commanded, commands=source)
-        phase = program_phase("control", f"{name} to end its control", work)
+        phase = control_phase("control", f"{name} to end its control", work)
         control_end = self._request(lambda _: (phase,))
         async with program_control(self._flight, source, control_end) as control:
             yield control
@@ -197,11 +197,11 @@ class Vehicle:
 
         A disarmed vehicle is left as it is: a program may land in its `finally`.
         """
-        await self._request(unless_disarmed(landing_phases), ends_flight=True)
+        await self._request(unless_disarmed(LANDING_PHASES), ends_flight=True)
 
     async def hand_back(self) -> None:
         """Let the autopilot hold the vehicle, unless it is disarmed; the flight ends."""
-        await self._request(unless_disarmed(lambda: (hand_back_phase(),)), ends_flight=True)
+        await self._request(unless_disarmed((HAND_BACK,)), ends_flight=True)
 
     def _request(
         self, phases: Callable[[FlightContext], Sequence[Phase]], *, ends_flight: bool = False
@@ -217,7 +217,7 @@ class Vehicle:
         sequence = ManeuverSequence((maneuver,))
         work = partial(fly_maneuvers, sequence=sequence)
         await self._request(
-            lambda _: (program_phase("maneuvers", "the maneuver to end", work, sequence.duration),)
+            lambda _: (control_phase("maneuvers", "the maneuver to end", work, sequence.duration),)
         )
 
     def _require_followable(self, maneuver: Maneuver) -> None:

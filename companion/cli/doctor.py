@@ -21,7 +21,7 @@ from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
 from companion.flight.maneuvers import configured_maneuvers
-from companion.flight.opening import open_link
+from companion.flight.opening import make_link
 from companion.flight.start_checks import check_link, require_backend
 from companion.guidance import ManeuverSequence
 from companion.mavlink.errors import LinkLost, LinkTimeout
@@ -137,7 +137,7 @@ class _DoctorRun:
         return code
 
     def _make_link(self, notice: Notice) -> Link:
-        return open_link(self._config, None, notice)
+        return make_link(self._config, None, notice)
 
     def report_interrupt(self) -> int:
         """Report Ctrl-C, and which parameters were set before it; return the exit code."""

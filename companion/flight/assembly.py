@@ -168,7 +168,7 @@ def _reporter(
     *,
     real_time: bool,
 ) -> StatusReporter:
-    """Make the reporter of the flight's state. If no observer uses states, it shows none."""
+    """Make the reporter of the flight's state, which shows nothing if the observer ignores it."""
 
     def phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began

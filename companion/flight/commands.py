@@ -21,7 +21,7 @@ effect later than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
 _TEXT_TIME = 0.3
-"""A text that says why the mode changed comes at most this long before or after the mode, s."""
+"""Largest time between a change of mode and the autopilot's text that says why, s."""
 _BY_FAILSAFE = "the autopilot's failsafe took over"
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
@@ -66,11 +66,15 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
 
 
 class ModeTaken(FlightEnded):
-    """A mode that is not ours, and that the autopilot does not report as a failsafe's."""
+    """The vehicle is in a mode that is not ours, and the autopilot reports no failsafe."""
 
 
 async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
-    """Release control, and name the autopilot's geofence if only a text says that it acted."""
+    """Return the end of a flight with its cause: a geofence may have changed the mode.
+
+    An autopilot may report this failsafe only in a text. Control is released before the wait for
+    that text.
+    """
     if not isinstance(ended, ModeTaken | ControlReleased):
         return ended
     state, fence_text = context.link.state, context.link.autopilot.fence_text

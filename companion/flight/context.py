@@ -41,11 +41,11 @@ _SHORTEST_STALL = 0.2
 """A heartbeat is not fresh if the stalls of this program while waiting for it add up to this, s."""
 
 _MAX_STALLED_WAITS = 3
-"""After so many waits with a stall, a heartbeat counts as fresh: a computer that always stalls must
-still be able to hand back."""
+"""After this number of waits with a stall, a heartbeat counts as fresh: a computer that always
+stalls must still be able to hand back."""
 
 _ATTITUDE_AGE = 1.0
-"""Largest age of the attitude that tells how the vehicle lies, s."""
+"""Largest age of the attitude from which the tilt is computed, s."""
 
 _HEARTBEAT_ID = 0.0
 """Message id of HEARTBEAT, as a float for the command that requests a message."""
@@ -80,11 +80,11 @@ class FlightContext:
     """Whether the flight must disarm the vehicle on the ground, because we commanded arming or
     take-off."""
     took_off_from: NorthEast | None = None
-    """Where the vehicle stood when we commanded the take-off, m; None: we did not, or it was taken
-    over or began to land since. A vehicle that is lost meanwhile and heard again must land, because
-    it would hover without end."""
+    """Where the vehicle stood when we commanded the take-off, m; None: we commanded none, or the
+    vehicle was taken over or began to land since. A vehicle whose link is lost before that would
+    hover without end, so it must land when it is heard again."""
     landing_requested: bool = False
-    """Whether the landing has begun or was to begin; a vehicle lost meanwhile must still land."""
+    """Whether a landing was requested; a vehicle whose link is lost after that must still land."""
     fence_centre: FenceCentre | None = None
     """Centre of the fence in an earlier flight, if the vehicle has not been disarmed since; None:
     the fence is centred where control begins."""
@@ -155,7 +155,7 @@ class FlightContext:
         async def ask() -> None:
             nonlocal fresh_from
             with suppress(LinkError):
-                for _ in range(2):  # PX4 sends it before its answer, so the second one is fresh
+                for _ in range(2):  # PX4 sends the first heartbeat before its answer
                     await self.link.command(
                         dialect.MAV_CMD_REQUEST_MESSAGE, _HEARTBEAT_ID, retries=0
                     )

@@ -10,7 +10,7 @@ from companion.flight.commands import with_cause
 from companion.flight.context import FlightContext, cancel
 from companion.flight.observer import Observer
 from companion.flight.phase import Phase
-from companion.flight.phases import exit_phases, ground_phases
+from companion.flight.phases import EXIT_PHASES, ground_phases
 from companion.flight.plan import Plan
 from companion.flight.vehicle_identity import ChecksVoid
 from companion.flight.watch import Watch
@@ -143,7 +143,7 @@ class Flight:
                     raise self._interruption from void
             except FlightEnded:
                 raise
-            except Exception as error:  # of the plan: the vehicle must not be left to nobody
+            except Exception as error:  # of the plan: the exit must still be flown
                 raise FlightEnded(fault_message(error, self._usual_exit())) from error
             else:
                 return
@@ -201,7 +201,7 @@ class Flight:
         self.note(exit_.value)
         self._end_future = self._new_end_future()
         try:
-            for phase in exit_phases(exit_):
+            for phase in EXIT_PHASES[exit_]:
                 await self._fly(phase)
         except FlightEnded as ended:
             next_exit = ended.exit or self._usual_exit()

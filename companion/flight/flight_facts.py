@@ -123,7 +123,7 @@ def _early_end(
     flight, began = assembled.flight, assembled.flight.began
     if flight.failed_in is None or result == "ok":
         return None
-    # There is no such event if the user left the flight.
+    # No event has this text if the user left the flight.
     time = next((at for at, text in flight.events if text == result), now - began)
     phase, name, maneuver_elapsed = flight.failed_in.name, None, None
     if phase == "maneuvers":

@@ -24,8 +24,8 @@ _REPETITION_PAUSE = 1.0
 a refusal may have ended by then."""
 
 _PILOT_WARNING_TIME = 10.0
-"""Time for which the vehicle may not have begun to land before its pilot is warned, s; also the
-time between two warnings."""
+"""Time after which the pilot of a vehicle that has not begun to land is warned, s; also the time
+between two warnings."""
 
 _PILOT_WARNING = "Companion: it does not land. Switch its mode!"
 """Text for the pilot's ground station; it fits into one STATUSTEXT."""
@@ -73,7 +73,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     """
     require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
     refusal_noted = False
-    patience = _Patience(context)
+    time_limit = _LandingTimeLimit(context)
 
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
@@ -83,7 +83,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         if isinstance(error, CommandRefused) and not refusal_noted:
             refusal_noted = True
             context.note(f"{error}; the landing is requested again every second")
-        patience.check()
+        time_limit.check()
         was_offboard = in_role(context.link, Role.OFFBOARD)
         await asyncio.sleep(_REPETITION_PAUSE)
         if was_offboard and not landing():
@@ -94,8 +94,8 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 
 
-class _Patience:
-    """Judges how long a vehicle that does not begin to land is asked to, and warns its pilot."""
+class _LandingTimeLimit:
+    """Limits the time for which the landing is commanded again, and warns the pilot."""
 
     def __init__(self, context: FlightContext) -> None:
         self._context, self._clock = context, asyncio.get_running_loop().time
@@ -191,6 +191,6 @@ def stop_moving(context: FlightContext) -> None:
     try:
         context.loop.restart_planner()  # the estimator may have been reset
         context.guidance_loop.hold_here()
-    except Exception as error:  # the exit must go on whatever fails in guidance
+    except Exception as error:  # the exit must go on, even if guidance fails
         context.note(fault_message(error))
         context.end_stream()

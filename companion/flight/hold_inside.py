@@ -1,4 +1,4 @@
-"""A hold near the fence, from which the autopilot's landing does not drift out of it."""
+"""Holds the vehicle where the autopilot's landing will not drift out of the fence."""
 
 from companion.flight.context import FlightContext
 from companion.guidance.braking import drift
@@ -12,7 +12,7 @@ position and wind have errors."""
 
 
 def brake_inside_fence(context: FlightContext) -> None:
-    """Give up what is flown, brake and hold; upwind, if the landing would drift out of the fence.
+    """End the maneuver, brake, and hold; hold further upwind if the landing would leave the fence.
 
     PX4 begins its own modes level, so a vehicle that leans against the wind drifts downwind first.
     """
@@ -29,7 +29,7 @@ def brake_inside_fence(context: FlightContext) -> None:
 def only_upwind_is_inside(
     fence: Fence, origin: Place | None, stop: Vector, wind: NorthEast
 ) -> bool:
-    """Whether the drift would leave the fence from where the vehicle stops, but not from upwind.
+    """Whether the landing would drift out of the fence, but not if it began further upwind.
 
     Args:
         fence: the fence; its ceiling and floor are not used.

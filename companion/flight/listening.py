@@ -4,7 +4,7 @@ import asyncio
 
 from companion.flight.commands import ask_to_hold, in_role, require_role, requiring_roles
 from companion.flight.context import FlightContext
-from companion.flight.takeoff import ends_takeoff
+from companion.flight.takeoff import is_in_our_takeoff
 from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
@@ -58,7 +58,7 @@ async def _hold_if_ours(context: FlightContext) -> None:
     context.detail = "its heartbeat"
     await context.fresh_heartbeat()  # only now, because a request during the silence is lost
     mode = context.link.state.mode
-    lost_in_takeoff = context.armed() and await ends_takeoff(context)
+    lost_in_takeoff = context.armed() and await is_in_our_takeoff(context)
     if not (_obeys(context) or lost_in_takeoff):
         _note_left_alone(context)
         return

@@ -89,7 +89,7 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
 def slowed_from(
     config: Config, trajectory: Trajectory, begin: Vector, drag: KnownDrag
 ) -> Trajectory:
-    """The trajectory slowed down where it breaks a limit from the present place.
+    """The trajectory from the present place, slowed down where it breaks a limit.
 
     Arguments as in `require_followable`.
 
@@ -153,7 +153,7 @@ def _predicted_motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
     turns = 8 if isinstance(part, Doublets) else 1
     for k in range(turns):
         heading = tau * k / turns
-        # A flight checks its maneuvers several times. `Follow` remembers where it began: not kept.
+        # Cached, because a flight checks its maneuvers several times. A `Follow` is not hashable.
         if isinstance(part, Hashable):
             yield _cached_motion(part, heading, drag)
         else:

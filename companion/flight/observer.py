@@ -7,7 +7,7 @@ from companion.flight.status import FlightStatus
 from companion.recording.recorder import FlightRecorder
 
 _LONGEST_CALL_S = 0.2
-"""A call of an observer that takes longer is told once, s; the flight stands still meanwhile."""
+"""A longer call of an observer is reported once, s; the flight stands still meanwhile."""
 
 
 class Observer(Protocol):
@@ -79,7 +79,7 @@ class EventRecorder:
 
     A fault in the other observer must not cost control of the vehicle. After an exception in its
     method `status`, the other observer receives no more states, but still phases and events. After
-    any other exception it receives nothing more. A slow observer is told once.
+    any other exception it receives nothing more. A slow observer is reported once.
 
     Attributes:
         phases: (begin in s on our clock, name) of each phase.
@@ -104,7 +104,7 @@ class EventRecorder:
         self.file = file
         self._observer = observer
         self._clock = clock
-        self._slowness_told = False
+        self._slow_call_reported = False
 
     def phase(self, name: str, waits_for: str) -> None:
         """Keep, record and pass on the phase."""
@@ -146,8 +146,8 @@ class EventRecorder:
         except SystemExit as error:  # would end the event loop of the flight
             raise RuntimeError(repr(error)) from error
         elapsed = self._clock() - began
-        if elapsed > _LONGEST_CALL_S and not self._slowness_told:
-            self._slowness_told = True
+        if elapsed > _LONGEST_CALL_S and not self._slow_call_reported:
+            self._slow_call_reported = True
             self.note(
                 f"the observer of this flight took {elapsed:.1f} s for one message: meanwhile no "
                 "setpoint is sent and nothing is supervised; let it return at once"

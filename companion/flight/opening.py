@@ -1,4 +1,4 @@
-"""Makes, from the configuration, the link and the real-time settings of a session."""
+"""Makes the link and the real-time settings of a session from the configuration."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def link_settings(config: Config) -> LinkSettings:
     )
 
 
-def open_link(
+def make_link(
     config: Config, tap: Tap | None, notice: Notice, opener: OpenTransport = open_transport
 ) -> Link:
     """Make the link of `link.backend`, not yet open; see `Link` for the other arguments.

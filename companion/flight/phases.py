@@ -1,5 +1,6 @@
 """The table of phases: order, timeouts, allowed modes, and the exit if a phase fails."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
 
@@ -20,6 +21,46 @@ _COMMAND_TIMEOUT = 10.0
 _TAKEOVER_TIMEOUT = 15.0
 """Timeout for the takeover with its preflight checks, s; a lossy link delays their parameters."""
 
+HAND_BACK = Phase(
+    "hand back",
+    "the autopilot to hold",
+    control_phases.hand_back,
+    _COMMAND_TIMEOUT,
+    Exit.LAND,
+    allowed_roles=ROLES_BEFORE_LANDING,
+)
+"""The phase in which the autopilot holds by itself and our setpoints stop."""
+
+_LAND = Phase(
+    "land", "touchdown", control_phases.land, inf, allowed_roles=ROLES_BEFORE_LANDING | {Role.LAND}
+)
+"""The phase of the landing; its work limits the time to begin, and the time to touch down. A
+vehicle that would drift without our setpoints is held beyond the time limit."""
+
+_DISARM = Phase("disarm", "the motors to stop", control_phases.disarm, 20.0)
+
+_UNDO_ARMING = Phase(
+    "disarm", "the motors to stop", preflight_phases.undo_arming, _COMMAND_TIMEOUT, Exit.LAND
+)
+"""The phase of the exit that disarms. If it fails, the vehicle lands, because an autopilot that
+refuses to disarm is in the air."""
+
+_LISTEN = Phase("listen", "the vehicle to be heard and to hold", listening.hold_when_heard, inf)
+"""The phase after a lost link; its work limits the time to hear the vehicle, and to hold."""
+
+LANDING_PHASES = HAND_BACK, _LAND, _DISARM
+"""The phases from our control back to the ground."""
+
+EXIT_PHASES: Mapping[Exit, tuple[Phase, ...]] = {
+    Exit.LEAVE: (),
+    Exit.LISTEN: (_LISTEN,),
+    Exit.RELEASE: (),
+    Exit.DISARM: (_UNDO_ARMING,),
+    Exit.HOLD: (HAND_BACK,),
+    Exit.LAND: (_LAND, _DISARM),
+}
+"""The phases that the flight runs for each exit."""
+
 
 def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
     """The phases before arming, in order: they connect, request telemetry and check.
@@ -34,7 +75,7 @@ def ground_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 
 def opening_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """As `ground_phases`, but a vehicle in the air is checked later, by `handover_phases`."""
+    """Like `ground_phases`, but a vehicle that already flies is checked in `handover_phases`."""
     connect, checks = ground_phases(config)
     return connect, replace(checks, work=takeover.check_unless_flying)
 
@@ -43,13 +84,13 @@ def flight_phases(
     config: FlightConfig, maneuver_duration: float, autopilot: Autopilot
 ) -> tuple[Phase, ...]:
     """The phases after the ground phases, in the autopilot's order; `maneuver_duration` in s."""
-    maneuvers = program_phase(
+    maneuvers = control_phase(
         "maneuvers", "the maneuver to end", control_phases.maneuvers, maneuver_duration
     )
     if config.take_over:
-        return (*handover_phases(config), maneuvers, hand_back_phase())
+        return (*handover_phases(config), maneuvers, HAND_BACK)
     landed = replace(maneuvers, on_failure=Exit.LAND)
-    return (*takeoff_phases(config, autopilot), landed, *landing_phases())
+    return (*takeoff_phases(config, autopilot), landed, *LANDING_PHASES)
 
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
@@ -123,11 +164,11 @@ def _takeover(on_failure: Exit) -> Phase:
     )
 
 
-def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) -> Phase:
-    """A phase that a user's program asked for while the autopilot obeys our rates.
+def control_phase(name: str, waits_for: str, work: Work, duration: float = inf) -> Phase:
+    """A phase in which the autopilot obeys our rates, such as the maneuvers.
 
-    If it fails, the vehicle is handed back and holds; after some breaches of the safety monitors it
-    lands.
+    If the phase fails, the vehicle is handed back and holds. After some breaches of the safety
+    monitors the vehicle lands.
 
     Args:
         name: shown to the user.
@@ -144,70 +185,3 @@ def program_phase(name: str, waits_for: str, work: Work, duration: float = inf) 
         allowed_roles=_OFFBOARD_ROLES,
         monitored=True,
     )
-
-
-def landing_phases() -> tuple[Phase, ...]:
-    """The phases from our control back to the ground."""
-    return hand_back_phase(), _land(), _disarm()
-
-
-def exit_phases(exit_: Exit) -> tuple[Phase, ...]:
-    """The phases that the flight runs for an exit."""
-    return {
-        Exit.LEAVE: (),
-        Exit.LISTEN: (_listen(),),
-        Exit.RELEASE: (),
-        Exit.DISARM: (_undo_arming(),),
-        Exit.HOLD: (hand_back_phase(),),
-        Exit.LAND: (_land(), _disarm()),
-    }[exit_]
-
-
-def hand_back_phase() -> Phase:
-    """The phase in which the autopilot holds by itself and our setpoints stop."""
-    return Phase(
-        "hand back",
-        "the autopilot to hold",
-        control_phases.hand_back,
-        _COMMAND_TIMEOUT,
-        Exit.LAND,
-        allowed_roles=ROLES_BEFORE_LANDING,
-    )
-
-
-def _listen() -> Phase:
-    """The phase after a lost link; its work limits the time to hear, and the time to hold."""
-    return Phase(
-        "listen",
-        "the vehicle to be heard and to hold",
-        listening.hold_when_heard,
-        inf,
-    )
-
-
-def _land() -> Phase:
-    """The phase of the landing; its work limits the time to begin it, and the time to touch down.
-
-    A vehicle that would drift without us is not left because the time is over.
-    """
-    return Phase(
-        "land",
-        "touchdown",
-        control_phases.land,
-        inf,
-        allowed_roles=ROLES_BEFORE_LANDING | {Role.LAND},
-    )
-
-
-def _undo_arming() -> Phase:
-    """The phase of the exit that disarms.
-
-    If it fails, the vehicle lands, because an autopilot that refuses to disarm is in the air.
-    """
-    return Phase(
-        "disarm", "the motors to stop", preflight_phases.undo_arming, _COMMAND_TIMEOUT, Exit.LAND
-    )
-
-
-def _disarm() -> Phase:
-    return Phase("disarm", "the motors to stop", control_phases.disarm, 20.0)

@@ -11,11 +11,11 @@ from companion.flight.control_phases import fly_commanded
 from companion.flight.maneuvers import configured_maneuvers
 from companion.flight.phase import Phase
 from companion.flight.phases import (
+    HAND_BACK,
+    control_phase,
     flight_phases,
     ground_phases,
-    hand_back_phase,
     opening_phases,
-    program_phase,
     takeoff_for_client_phases,
     takeover_phases,
 )
@@ -83,5 +83,5 @@ class TakeoverPlan:
         for phase in first_phases(config):
             yield phase
         work = partial(fly_commanded, commands=self._source)
-        yield program_phase("control", f"{self._source.name} to end its control", work)
-        yield hand_back_phase()
+        yield control_phase("control", f"{self._source.name} to end its control", work)
+        yield HAND_BACK

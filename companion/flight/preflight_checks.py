@@ -7,7 +7,7 @@ from math import inf
 
 from companion.config import Config
 from companion.config.known_drag import KnownDrag
-from companion.flight.rate_requester import too_rare
+from companion.flight.rate_requester import low_rate_text
 from companion.flight.vehicle_identity import ReplacementDetector
 from companion.guidance import ManeuverSequence
 from companion.preflight.all_checks import blocking_findings, run_checks, unsafe_findings
@@ -87,7 +87,7 @@ class PreflightChecks:
         before = evidence = self._evidence
         if evidence is None or self._clock() - self._gathered_at > _MAX_EVIDENCE_AGE:
             evidence = await self._gather(stage, before)
-            if self._lowered(evidence):
+            if self._report_low_rates(evidence):
                 await self.ask_for_telemetry()
                 evidence = await self._gather(stage, before)
             self._evidence, self._gathered_at = evidence, self._clock()
@@ -108,20 +108,20 @@ class PreflightChecks:
             earlier_survey=None if before is None else before.survey,
         )
 
-    def _lowered(self, evidence: Evidence) -> bool:
-        """Whether attitude or position comes too rarely; say so.
+    def _report_low_rates(self, evidence: Evidence) -> bool:
+        """Report attitude or position that comes too rarely; return whether one of them does.
 
-        A ground station that connects after the telemetry was requested lowers its rates.
+        A ground station that connects after the telemetry was requested lowers the rates.
         """
         streams = evidence.streams
-        lowered = [
+        low = [
             name
             for name, (_, minimum) in minimum_rates(self._config.link).items()
             if name in streams and streams[name].achieved < minimum
         ]
-        for name in lowered:
-            self.note(too_rare(name, streams[name].requested))
-        return bool(lowered)
+        for name in low:
+            self.note(low_rate_text(name, streams[name].requested))
+        return bool(low)
 
     def on_parameter(self, name: str, value: float) -> None:
         """Warn if a station sets a checked parameter of the armed vehicle to an unsafe value.

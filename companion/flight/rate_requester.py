@@ -1,4 +1,4 @@
-"""Requests again what another station has slowed down or stopped: attitude, position, statuses."""
+"""Requests attitude, position or a status again if another station has lowered its rate."""
 
 import asyncio
 from collections.abc import Callable
@@ -16,13 +16,13 @@ _REQUEST_PERIOD = 5.0
 """Shortest time between two requests for one message, s; a rate that stays low ends the flight
 sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
 _HEARD_AGE = 0.2
-"""A status is requested only while positions are newer than this, s: a silent link lacks all."""
+"""A status is requested only while positions are newer than this, s: else the link is silent."""
 _COUNTING_TIME = 0.1
 """Time over which `set_rates` counts messages, s; the counts are not used."""
 
 
-def too_rare(message: str, rate: float) -> str:
-    """Says that a message comes too rarely, and that `rate` (Hz) is requested again."""
+def low_rate_text(message: str, rate: float) -> str:
+    """The event that a message comes too rarely, and that `rate` (Hz) is requested again."""
     return f"{message} comes too rarely: requesting {rate:g} Hz again"
 
 
@@ -47,7 +47,7 @@ class RateRequester:
         """Request each message whose rate is too low at `now`, our clock, s."""
         wanted = self._link_config
         answers, positions = health.answer_rate, health.position_rate
-        # One later gap may be any other disturbance; a lowered rate makes a second one at once.
+        # After a request, one more gap may have another cause; a low rate causes two at once.
         accepted_gaps = 1 if "ATTITUDE_QUATERNION" in self._tasks else 0
         is_slow = answers is not None and answers < wanted.min_attitude_rate_hz
         if is_slow or health.gaps > accepted_gaps:
@@ -59,7 +59,7 @@ class RateRequester:
         if now - self._requested_at.get(message, -inf) < _REQUEST_PERIOD:
             return
         self._requested_at[message] = now
-        self.note(too_rare(message, rate))
+        self.note(low_rate_text(message, rate))
         self._tasks[message] = asyncio.create_task(self._request_rate(message, rate))
 
     def check_statuses(self, now: float, heartbeat_limit: float) -> None:

@@ -11,7 +11,7 @@ from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.flight import AskLanding, Flight
 from companion.flight.flight_files import FlightFiles
 from companion.flight.observer import Observer
-from companion.flight.opening import open_link, realtime_settings
+from companion.flight.opening import make_link, realtime_settings
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
 from companion.recording.closing_words import LEFT_BY_USER
@@ -99,7 +99,7 @@ class Session:
         settings = realtime_settings(self._config, environment)
         with realtime.request_settings(settings) as grants, record:
             recorder, opener = record.recorder(self._observer), environment.open_transport
-            async with open_link(self._config, record.tap, self.note, opener) as link:
+            async with make_link(self._config, record.tap, self.note, opener) as link:
                 self._assembled = assemble(
                     self._config,
                     link,

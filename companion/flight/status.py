@@ -132,15 +132,15 @@ class StatusReporter:
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
         self._status_rows.record(now)
         vehicle_time, tilt = context.loop.record.last_vehicle_time, context.tilt()
-        row = (
+        values = (
             None if vehicle_time == -inf else vehicle_time,
             self._height(now),
             self._speed(now),
             None if tilt is None else degrees(tilt),
             self._tracking_error(),
         )
-        finite_row = (nan if value is None else value for value in row)
-        self._trace.add_motion(now, (now - self._began, *finite_row))
+        row = (nan if value is None else value for value in values)
+        self._trace.add_motion(now, (now - self._began, *row))
 
     def status(self) -> FlightStatus:
         """The present state."""

@@ -19,7 +19,7 @@ _MAX_OVERSHOOT = 3.0
 """A climb has failed this far above the commanded height, m; PX4 overshoots by some tenths."""
 
 _LARGEST_DRIFT = 3.0
-"""A vehicle further away from where it stood was not only carried by the wind in its climb, m."""
+"""Largest distance by which wind carries a vehicle in its climb, m; else somebody flew it away."""
 
 _ARRIVAL_TIME = 2.0
 """Time allowed to reach altitude after hold mode is shown, s; then the climb counts as stopped."""
@@ -78,10 +78,10 @@ async def takeoff(context: FlightContext) -> None:
     await context.until(climb.is_over)
 
 
-async def ends_takeoff(context: FlightContext) -> bool:
-    """Whether a vehicle that we did not hear is in its take-off, or holds at its height after it.
+async def is_in_our_takeoff(context: FlightContext) -> bool:
+    """Whether a vehicle that is heard again takes off for us, or holds at the take-off height.
 
-    A vehicle that holds lower was stopped by somebody else; one that is elsewhere was flown there.
+    If the vehicle holds lower or elsewhere, somebody else has stopped it or flown it there.
     """
     state, place = context.link.state, context.took_off_from
     if place is None:

@@ -30,7 +30,7 @@ _BRAKING_TIME = 5.0
 """Time for the autopilot to brake to `_LARGEST_HELD_SPEED` and to limits.max_tilt_deg, s."""
 
 _HOVER_LEARNING_TIME = 3.0
-"""Time to learn from the autopilot's thrust that the vehicle can be held by ours, s."""
+"""Time allowed to learn the hover thrust from the autopilot's thrust, s."""
 
 _SETTLE_TIME = 1.0
 """Time of holding in offboard before the maneuvers begin, s: the takeover must not disturb them."""
@@ -45,7 +45,7 @@ async def check_unless_flying(context: FlightContext) -> None:
     if context.armed():
         context.replacement_detector.begin()
         await request_telemetry(context)
-        await _landed_or_flying(context)
+        await _wait_for_landed_state(context)
         if context.link.state.flying:
             return
     await checks(context)
@@ -111,7 +111,7 @@ async def _check_stage(
     context.replacement_detector.begin()
     context.replacement_detector.note_arming()
     await request_telemetry(context)
-    await _landed_or_flying(context)
+    await _wait_for_landed_state(context)
     require(context)
     await context.next_position()
     evidence = await judge_vehicle(context, stage)
@@ -119,7 +119,7 @@ async def _check_stage(
     require(context)
 
 
-async def _landed_or_flying(context: FlightContext) -> None:
+async def _wait_for_landed_state(context: FlightContext) -> None:
     state = context.link.state
     await context.until(
         lambda: state.landed or state.flying, "the vehicle to report landed or flying"
@@ -176,7 +176,8 @@ async def _require_learned_hover(context: FlightContext) -> None:
     """Wait until the hover thrust that guidance would use holds the vehicle.
 
     Raises:
-        FlightEnded: the hover thrust is too far from the configured one, or below our smallest.
+        FlightEnded: the hover thrust is too far from the configured one, or our smallest thrust
+            carries nearly the whole weight.
     """
     learning = context.guidance_loop.learning
     try:

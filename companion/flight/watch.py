@@ -54,7 +54,7 @@ class Watch:
             FlightEnded: the phase must end; contains the reason and the exit.
         """
         now = self._clock()
-        self._context.snapshot_builder.listen(now)
+        self._context.snapshot_builder.read_counters(now)
         self._context.ground.update()
         self._context.replacement_detector.update()
         self._context.replacement_detector.require()
@@ -137,14 +137,14 @@ class Watch:
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
     def _judge_heartbeat(self, now: float, *, monitored: bool) -> None:
-        """Judge the age of the mode and of the heartbeat at `now`, the time of this judgement.
+        """Judge the age of the mode and of the heartbeat at `now`, s on our clock.
 
         Stalls of this program count as age only in a monitored phase while the autopilot obeys us:
         heartbeats that came during a stall are read after it, and a stall must end neither a
         take-off nor a landing. After a gap no setpoint is sent before the mode is confirmed.
         """
         state, loop = self._context.link.state, self._context.loop
-        # While taking over, it may obey the first setpoint although no heartbeat has told so.
+        # In a takeover the autopilot may obey a setpoint before a heartbeat reports the new mode.
         in_control = loop.offboard_active or loop.taking_over or self._stopped_in_control
         climbs_alone = self._context.took_off_from is not None
         exit_ = Exit.LISTEN if in_control or climbs_alone else Exit.RELEASE

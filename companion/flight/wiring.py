@@ -20,12 +20,12 @@ from companion.vehicle.state import VehicleState
 async def connected(
     assembled: AssembledFlight, *beside: Coroutine[Any, Any, None]
 ) -> AsyncIterator[None]:
-    """Connect the flight to its link, and report its state, while the block runs it; then end both.
+    """Connect the flight to its link and report its state while the block runs the flight.
 
     Only one flight at a time may be connected to a link.
 
-    `beside`: more to run meanwhile; an exception in it, or in the reporter, is noted as an event
-    and does not end the flight.
+    `beside`: coroutines to run meanwhile. An exception in one of them, or in the reporter, is noted
+    as an event and does not end the flight.
     """
 
     async def run_guarded(work: Coroutine[Any, Any, None]) -> None:

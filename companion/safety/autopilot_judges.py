@@ -80,14 +80,13 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset in the last 30 s: a warning only, as references move with a reset."""
+    """The estimator was reset in the last 30 s; the references move with each reset."""
     resets = snapshot.resets
     if resets.recent_count == 0:
         return None
     return (
         f"the estimator was reset: {resets.position_shift:.1f} m and "
-        f"{degrees(resets.heading_shift):.0f}° of "
-        "heading in total; the references moved with it"
+        f"{degrees(resets.heading_shift):.0f}° of heading in total; the references moved with it"
     )
 
 

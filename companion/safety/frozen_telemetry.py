@@ -6,18 +6,18 @@ from companion.attitude import BodyRates
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _MIN_REPETITIONS = 10
-"""Smallest number of looks in a row, each with a newer message, that show the same numbers."""
+"""Smallest number of newer messages in a row that repeat the same numbers."""
 _MAX_TURN = 0.05
 """Largest turn that setpoints command while the attitude repeats itself, rad."""
-_MAX_WAY = 0.02
-"""Largest way by the reported speed while the position repeats itself, m: to and fro add up, since
-each of them must change the numbers."""
+_MAX_DISTANCE = 0.02
+"""Largest distance flown by the reported speed while the position repeats itself, m. Distances in
+opposite directions add up, because each one must change the numbers."""
 _POSITION_TIME = 0.5
 """Shortest time for which a position must repeat itself, s: an estimate may be made at 5 Hz."""
 _MAX_DRIFT = 0.05
-"""Largest way by which the position departs from the velocity that repeats itself, m."""
-_LONGEST_LOOK_INTERVAL = 0.1
-"""Of a longer time between two looks, only this much counts, s."""
+"""Largest distance of the position from where the repeated velocity would have led, m."""
+_LONGEST_INTERVAL = 0.1
+"""A longer interval between two checks counts as this time, s."""
 
 
 class _Repetition:
@@ -45,22 +45,22 @@ class _Repetition:
 
 
 class _Axis:
-    """Compares position and velocity along one axis, each of which may stand still alone."""
+    """Compares position and velocity along one axis; each of the two may repeat itself alone."""
 
     def __init__(self) -> None:
         self._position, self._velocity = _Repetition(), _Repetition()
         self._newest = nan
-        self._start = self._way = self._taken_at = 0.0
+        self._start = self._distance = self._taken_at = 0.0
 
     def take(self, now: float, received: float, position: float, velocity: float) -> str | None:
         """Take the newest position (m) and velocity (m/s); return what is frozen, or None."""
         moved, self._newest = position != self._newest, position
         if self._position.take(now, received, position):
-            self._way += abs(velocity) * (now - self._taken_at)
+            self._distance += abs(velocity) * (now - self._taken_at)
             self._taken_at = now
         elif moved:
-            self._way, self._taken_at = 0.0, now
-        if self._position.is_long(now - self._position.since) and self._way > _MAX_WAY:
+            self._distance, self._taken_at = 0.0, now
+        if self._position.is_long(now - self._position.since) and self._distance > _MAX_DISTANCE:
             return "LOCAL_POSITION_NED repeats one position, although it reports a speed"
         # Only positions that move count: a simulated vehicle at rest may repeat both.
         if not moved:
@@ -76,7 +76,7 @@ class _Axis:
 
 
 class FrozenTelemetry:
-    """Compares attitude, position and velocity with what they must do: we fly by them alone.
+    """Finds an attitude, position or velocity that repeats itself although it must change.
 
     An estimator's numbers change with each message, by the noise of its sensors. Numbers that
     repeat to the last bit count as frozen only if they contradict themselves: the setpoints turn
@@ -91,7 +91,7 @@ class FrozenTelemetry:
         """Note that control begins at `now`, s of event-loop time: forget what was before."""
         self._attitude = _Repetition()
         self._axes = _Axis(), _Axis(), _Axis()
-        self._turn, self._looked_at = 0.0, now
+        self._turn, self._checked_at = 0.0, now
 
     def find_frozen(
         self,
@@ -108,8 +108,8 @@ class FrozenTelemetry:
             rates: body rates of the newest setpoint, rad/s.
             position: the newest position.
         """
-        elapsed = min(now - self._looked_at, _LONGEST_LOOK_INTERVAL)
-        self._looked_at = now
+        elapsed = min(now - self._checked_at, _LONGEST_INTERVAL)
+        self._checked_at = now
         if sample is not None:
             if self._attitude.take(now, sample.received, sample.q):
                 self._turn += hypot(*rates) * elapsed

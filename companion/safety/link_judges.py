@@ -4,7 +4,7 @@ The docstring of each judge states its breach.
 """
 
 from companion.control.loop_record import Unanswered
-from companion.safety.monitor import Judge, minimum_with_hysteresis, with_hysteresis
+from companion.safety.monitor import Judge, above, below
 from companion.safety.snapshot import UNHEARD_S, Control, Snapshot
 
 _STALL_SHARE = 0.5
@@ -34,8 +34,10 @@ def silence(limit: float, *, heard: bool, planner: str = "auto", guidance: str =
 def _silence_cause(now: float, control: Control, limit: float, planner: str, guidance: str) -> str:
     if control.stall_time > _STALL_SHARE * (now - control.last_answer):
         # Data that came during the stall were read late, so they only seem old.
-        still = control.stall_time
-        return f"this program did not run for {still:.1f} s (computer overloaded or suspended)"
+        return (
+            f"this program did not run for {control.stall_time:.1f} s (computer overloaded or "
+            "suspended)"
+        )
     if now - control.last_sample > limit:
         if control.attitude_not_finite:
             return "the vehicle's attitude is not finite (NaN or infinity)"
@@ -70,53 +72,44 @@ def clock_changed(snapshot: Snapshot, _: bool) -> str | None:
 
 def loss(max_share: float) -> Judge:
     """More than the share `max_share` of the vehicle's frames is lost."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        lost_share = snapshot.health.lost_share
-        if lost_share is None or lost_share <= with_hysteresis(max_share, raised):
-            return None
-        return (
-            f"{100 * lost_share:.0f} % of the vehicle's frames are lost, more than "
+    return above(
+        max_share,
+        lambda snapshot: snapshot.health.lost_share,
+        lambda share: (
+            f"{100 * share:.0f} % of the vehicle's frames are lost, more than "
             f"safety.max_loss = {max_share:g} ({100 * max_share:g} %)"
-        )
-
-    return judge
+        ),
+    )
 
 
 def round_trip(max_seconds: float) -> Judge:
     """The round trip of TIMESYNC takes longer than `max_seconds`, s."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        seconds = snapshot.health.round_trip
-        if seconds is None or seconds <= with_hysteresis(max_seconds, raised):
-            return None
-        return (
+    return above(
+        max_seconds,
+        lambda snapshot: snapshot.health.round_trip,
+        lambda seconds: (
             f"the link's round trip takes {1e3 * seconds:.0f} ms, longer than "
             f"safety.max_round_trip_ms = {1e3 * max_seconds:.0f}"
-        )
-
-    return judge
+        ),
+    )
 
 
 def late_setpoints(max_sample_age: float) -> Judge:
     """Every probe answered in the last 0.7 s had a round trip over 1.5 times `max_sample_age`, s.
 
-    `max_sample_age` is the largest age of a sample that is answered. If setpoints take that long to
-    reach the vehicle, too, its attitude oscillates more and more, but all telemetry looks good.
+    `max_sample_age` is the largest age of a sample that is answered. If setpoints take as long to
+    reach the vehicle, its attitude oscillates more and more, although all telemetry looks good.
     """
     max_seconds = 1.5 * max_sample_age
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        seconds = snapshot.health.uplink.round_trip
-        if seconds is None or seconds <= with_hysteresis(max_seconds, raised):
-            return None
-        return (
+    return above(
+        max_seconds,
+        lambda snapshot: snapshot.health.uplink.round_trip,
+        lambda seconds: (
             f"setpoints reach the vehicle too late: the link's round trip takes "
             f"{1e3 * seconds:.0f} ms, longer than 1.5 · deadman.telemetry_stale_ms = "
             f"{1e3 * max_seconds:.0f}"
-        )
-
-    return judge
+        ),
+    )
 
 
 def lost_setpoints(max_unanswered: int) -> Judge:
@@ -170,32 +163,26 @@ def frozen(snapshot: Snapshot, _: bool) -> str | None:
 
 def deadlines(max_share: float) -> Judge:
     """More than the share `max_share` of the setpoints misses deadman.deadline_ms."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        missed_share = snapshot.health.missed_share
-        if missed_share is None or missed_share <= with_hysteresis(max_share, raised):
-            return None
-        return (
-            f"{100 * missed_share:.0f} % of the setpoints miss deadman.deadline_ms, more than "
+    return above(
+        max_share,
+        lambda snapshot: snapshot.health.missed_share,
+        lambda share: (
+            f"{100 * share:.0f} % of the setpoints miss deadman.deadline_ms, more than "
             f"safety.max_missed = {max_share:g} ({100 * max_share:g} %)"
-        )
-
-    return judge
+        ),
+    )
 
 
 def starvation(max_share: float) -> Judge:
     """CPU starvation: our timer lost more than the share `max_share` of the last second."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        starved_share = snapshot.health.starved_share
-        if starved_share is None or starved_share <= with_hysteresis(max_share, raised):
-            return None
-        return (
-            f"CPU starvation: the program's timer lost {100 * starved_share:.0f} % of the last "
-            f"second, more than safety.max_starved = {max_share:g} ({100 * max_share:g} %)"
-        )
-
-    return judge
+    return above(
+        max_share,
+        lambda snapshot: snapshot.health.starved_share,
+        lambda share: (
+            f"CPU starvation: the program's timer lost {100 * share:.0f} % of the last second, "
+            f"more than safety.max_starved = {max_share:g} ({100 * max_share:g} %)"
+        ),
+    )
 
 
 def gaps(max_gaps: int) -> Judge:
@@ -215,25 +202,21 @@ def gaps(max_gaps: int) -> Judge:
 
 def answer_rate(min_rate: float) -> Judge:
     """The effective rate of setpoints (`IntervalSums`) is below `min_rate` Hz."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        rate = snapshot.health.answer_rate
-        if rate is None or rate >= minimum_with_hysteresis(min_rate, raised):
-            return None
-        return (
+    return below(
+        min_rate,
+        lambda snapshot: snapshot.health.answer_rate,
+        lambda rate: (
             f"setpoints are sent at {rate:.0f} Hz, below link.min_attitude_rate_hz = {min_rate:g}"
-        )
-
-    return judge
+        ),
+    )
 
 
 def position_rate(min_rate: float) -> Judge:
     """Positions come at less than `min_rate` Hz."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        rate = snapshot.health.position_rate
-        if rate is None or rate >= minimum_with_hysteresis(min_rate, raised):
-            return None
-        return f"positions come at {rate:.0f} Hz, below link.min_position_rate_hz = {min_rate:g}"
-
-    return judge
+    return below(
+        min_rate,
+        lambda snapshot: snapshot.health.position_rate,
+        lambda rate: (
+            f"positions come at {rate:.0f} Hz, below link.min_position_rate_hz = {min_rate:g}"
+        ),
+    )

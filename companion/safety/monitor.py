@@ -8,10 +8,10 @@ from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
 """Returns the breach in words, or None. The flag tells whether the alarm is already raised; most
-judges with a limit then use `with_hysteresis`, so that the alarm does not toggle at the limit.
+judges with a limit then use a milder one, so that the alarm does not toggle at the limit.
 """
 
-HYSTERESIS = 0.9
+_HYSTERESIS = 0.9
 """A raised alarm ends only below this share of an upper limit, or above a lower limit divided by
 this share.
 """
@@ -19,12 +19,45 @@ this share.
 
 def with_hysteresis(limit: float, raised: bool) -> float:
     """The upper limit to use: `limit`, or 90 % of it while the alarm is raised."""
-    return HYSTERESIS * limit if raised else limit
+    return _HYSTERESIS * limit if raised else limit
 
 
-def minimum_with_hysteresis(limit: float, raised: bool) -> float:
-    """The lower limit to use: `limit`, or `limit` / 0.9 while the alarm is raised."""
-    return limit * (1.0 / HYSTERESIS) if raised else limit
+def above(
+    limit: float,
+    value_in: Callable[[Snapshot], float | None],
+    breach_of: Callable[[float], str],
+) -> Judge:
+    """A judge whose breach is a value above `limit`, with hysteresis.
+
+    Args:
+        limit: the largest value that is no breach.
+        value_in: returns the value in a snapshot; None, unknown, is no breach.
+        breach_of: returns the breach in words for a value.
+    """
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        value = value_in(snapshot)
+        if value is None or value <= with_hysteresis(limit, raised):
+            return None
+        return breach_of(value)
+
+    return judge
+
+
+def below(
+    limit: float,
+    value_in: Callable[[Snapshot], float | None],
+    breach_of: Callable[[float], str],
+) -> Judge:
+    """A judge whose breach is a value below `limit`, with hysteresis; arguments as for `above`."""
+
+    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+        value = value_in(snapshot)
+        if value is None or value >= (limit * (1.0 / _HYSTERESIS) if raised else limit):
+            return None
+        return breach_of(value)
+
+    return judge
 
 
 @dataclass(frozen=True, slots=True)

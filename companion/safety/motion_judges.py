@@ -11,70 +11,60 @@ from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
 from companion.guidance.fence import Fence
-from companion.safety.monitor import Judge, with_hysteresis
+from companion.safety.monitor import Judge, above
 from companion.safety.snapshot import Snapshot
 
 
 def tilt(limit: float) -> Judge:
     """The thrust axis tilts more than `limit`, rad."""
 
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+    def angle(snapshot: Snapshot) -> float | None:
         q = snapshot.motion.q
-        if q is None:
-            return None
-        angle = tilt_angle(q[1], q[2])
-        if angle <= with_hysteresis(limit, raised):
-            return None
-        return (
+        return None if q is None else tilt_angle(q[1], q[2])
+
+    return above(
+        limit,
+        angle,
+        lambda angle: (
             f"the vehicle tilts by {degrees(angle):.0f}°, more than limits.max_tilt_deg + "
             f"safety.tilt_margin_deg = {degrees(limit):.0f}"
-        )
-
-    return judge
+        ),
+    )
 
 
 def body_rate(limit: float) -> Judge:
     """The magnitude of the body rates exceeds `limit`, rad/s."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        rate = hypot(*snapshot.motion.body_rates)
-        if rate <= with_hysteresis(limit, raised):
-            return None
-        return (
+    return above(
+        limit,
+        lambda snapshot: hypot(*snapshot.motion.body_rates),
+        lambda rate: (
             f"the vehicle turns at {degrees(rate):.0f}°/s, faster than "
             f"safety.max_body_rate_deg_s = {degrees(limit):.0f}"
-        )
-
-    return judge
+        ),
+    )
 
 
 def speed(limit: float) -> Judge:
     """The vehicle moves faster than `limit`, m/s."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        velocity = hypot(*snapshot.motion.velocity)
-        if velocity <= with_hysteresis(limit, raised):
-            return None
-        return (
-            f"the vehicle flies at {velocity:.1f} m/s, faster than safety.max_speed_m_s = {limit:g}"
-        )
-
-    return judge
+    return above(
+        limit,
+        lambda snapshot: hypot(*snapshot.motion.velocity),
+        lambda speed: (
+            f"the vehicle flies at {speed:.1f} m/s, faster than safety.max_speed_m_s = {limit:g}"
+        ),
+    )
 
 
 def tracking(limit: float) -> Judge:
     """The vehicle is farther than `limit` from its reference, m."""
-
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
-        error = snapshot.motion.tracking_error
-        if error is None or error <= with_hysteresis(limit, raised):
-            return None
-        return (
+    return above(
+        limit,
+        lambda snapshot: snapshot.motion.tracking_error,
+        lambda error: (
             f"the vehicle is {error:.1f} m from its reference, more than "
             f"safety.max_tracking_error_m = {limit:g}"
-        )
-
-    return judge
+        ),
+    )
 
 
 def thrust(lowest: float, highest: float) -> Judge:

@@ -93,7 +93,7 @@ class GuardedJudge:
         self._judging_time = 0.0
 
     def judge(self, snapshot: Snapshot, raised: bool) -> str | None:
-        """What the judge returns; None from its first fault on."""
+        """The breach that the judge reports; None after its first fault."""
         if self.fault is not None:
             return None
         began = perf_counter()

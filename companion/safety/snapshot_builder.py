@@ -84,14 +84,14 @@ class SnapshotBuilder:
         self._frozen.begin(now)
 
     def flown_fence_centre(self) -> FenceCentre | None:
-        """Centre of the fence in the frame without estimator resets; None as `fence_centre`."""
+        """Centre of the fence in the frame without estimator resets; None: see `fence_centre`."""
         if self.fence_centre_ned is None:
             return None
         return FenceCentre(self.fence_centre_ned, self._fence_place)
 
     @property
     def fence_centre(self) -> FenceCentre | None:
-        """Centre of the fence in the autopilot's frame; None before control or without position."""
+        """Centre of the fence in the autopilot's frame; None: no position, or no control yet."""
         if self.fence_centre_ned is None:
             return None
         to_autopilot_frame = minus((0.0, 0.0, 0.0), self._loop.resets.position_shift)
@@ -99,11 +99,11 @@ class SnapshotBuilder:
 
     def long_silence(self, now: float) -> float | None:
         """Silence of the vehicle at `now`, s; None if it is not longer than `UNHEARD_S`."""
-        self.listen(now)
+        self.read_counters(now)
         silence = now - self._heard_at
         return silence if silence > UNHEARD_S else None
 
-    def listen(self, now: float) -> None:
+    def read_counters(self, now: float) -> None:
         """Read the counters at `now`; the watch calls this at least 50 times a second."""
         frames = self._link.stats.frames
         if frames != self._frames_heard:
@@ -112,7 +112,7 @@ class SnapshotBuilder:
         self.counters.read(now)
 
     def snapshot(self, now: float) -> Snapshot:
-        """The snapshot at `now`, s of event-loop time; call `listen` before."""
+        """The snapshot at `now`, s of event-loop time; call `read_counters` before."""
         state, loop, clock = self._link.state, self._loop, self._link.clock
         record = loop.record
         refused_at = self._link.stats.non_finite_at

@@ -12,7 +12,7 @@ from companion.flight.changes import Changes
 from companion.flight.context import cancel
 from companion.flight.environment import THIS_COMPUTER, Environment
 from companion.flight.observer import Observer, SilentObserver
-from companion.flight.opening import open_link, realtime_settings
+from companion.flight.opening import make_link, realtime_settings
 from companion.flight.wiring import StateLogger
 from companion.mavlink.errors import LinkError
 from companion.mavlink.framing import Frame
@@ -98,7 +98,7 @@ class ServeSession:
 
     async def _run_with_link(self) -> dict[str, Any]:
         config, opener = self._config, self._environment.open_transport
-        async with open_link(config, self.records, self._note, opener) as link:
+        async with make_link(config, self.records, self._note, opener) as link:
             self._log_state(link)
             link.clock.on_event = self._note
             async with Network(link, config.serve.clients, self._note) as network:

@@ -373,14 +373,14 @@ def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
 
 def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(monkeypatch):
     """The newest heartbeat is a tenth of a second old, and we know better only if we ask."""
-    hand_back = control_phases.hand_back
+    hand_over = control_phases.hand_over_to_hold
 
     async def taking(context):
         mock.take_over("POSCTL")
         await asyncio.sleep(0.01)  # faults begin with the vehicle's next step
-        await hand_back(context)
+        await hand_over(context)
 
-    monkeypatch.setattr(control_phases, "hand_back", taking)
+    monkeypatch.setattr(control_phases, "hand_over_to_hold", taking)
     with mock_vehicle() as mock:
         summary = fly(mock)
         assert mock.state()["mode"] == "POSCTL"

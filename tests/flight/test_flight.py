@@ -28,10 +28,8 @@ class Bench:
         self.plan = SimpleNamespace(phases=phases)
         monkeypatch.setattr("companion.flight.flight.ground_phases", lambda _: (first,))
         landing = (self.phase("land"),)
-        monkeypatch.setattr(
-            "companion.flight.flight.exit_phases",
-            lambda exit_: landing if exit_ is Exit.LAND else (),
-        )
+        exits = dict.fromkeys(Exit, ()) | {Exit.LAND: landing}
+        monkeypatch.setattr("companion.flight.flight.EXIT_PHASES", exits)
         self.context = SimpleNamespace(
             config=SimpleNamespace(flight=None),
             link=SimpleNamespace(autopilot=None, state=SimpleNamespace(forget=lambda: None)),

@@ -6,7 +6,7 @@ import yaml
 
 from companion.config.files import load
 from companion.files import bounded_yaml
-from companion.flight.opening import open_link
+from companion.flight.opening import make_link
 from companion.mavlink.transport.opening import open_transport
 from companion.preflight.session import open_session
 from companion.vehicle.parameter_rules import CheckResult
@@ -65,7 +65,7 @@ async def met(config, opener=open_transport):
     """A vehicle that was heard."""
 
     def link(notice):
-        return open_link(config, None, notice, opener)
+        return make_link(config, None, notice, opener)
 
     async with open_session(config, link) as vehicle:
         assert await vehicle.wait_for_vehicle() == []

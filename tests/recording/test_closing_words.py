@@ -7,7 +7,7 @@ import pytest
 
 from companion.config import Config
 from companion.config.flight import FlightConfig
-from companion.flight.phases import Exit, exit_phases, flight_phases, ground_phases
+from companion.flight.phases import EXIT_PHASES, flight_phases, ground_phases
 from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.measurements.verdict import LOST_ROWS, checks, is_good
 from companion.recording.what_to_do import ADVICE_BY_MONITOR, ADVICE_BY_PHASE
@@ -381,8 +381,8 @@ def test_every_monitor_and_every_phase_has_its_advice():
     phases = [*ground_phases(config)]
     for autopilot in AUTOPILOTS:
         phases += flight_phases(config, 1.0, autopilot)
-    for way in Exit:
-        phases += exit_phases(way)
+    for ending in EXIT_PHASES.values():
+        phases += ending
     assert {phase.name for phase in phases} <= set(ADVICE_BY_PHASE)
 
 

@@ -73,7 +73,7 @@ class Flight:
 
     def listen(self, *times):
         for now in times:
-            self.builder.listen(now)
+            self.builder.read_counters(now)
 
     def snapshot(self, now=10.0):
         return self.builder.snapshot(now)
