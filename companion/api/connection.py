@@ -13,7 +13,7 @@ from companion.api.program import (
     ProgramPlan,
     failure_words,
     flight_ended,
-    mark_error_as_heard,
+    mark_error_retrieved,
 )
 from companion.api.state import ConnectedFlight, NewestState
 from companion.api.vehicle import Vehicle
@@ -65,18 +65,17 @@ async def connect(
         RealtimeError: the system refused a required `realtime` setting; nothing was sent.
     """
     flown_config = as_config(config)
-    overrides: dict[str, dict[str, Any]] = {"link": {}, "flight": {}}
-    if endpoint is not None:
-        overrides["link"]["endpoint"] = endpoint
-    if arm is not None:
-        overrides["flight"]["arm"] = arm
+    overrides: dict[str, dict[str, Any]] = {
+        "link": {} if endpoint is None else {"endpoint": endpoint},
+        "flight": {} if arm is None else {"arm": arm},
+    }
     flown_config = changed(changed(flown_config, changes or {}, "changes"), overrides, "connect")
-    records = (
+    flown_folder = (
         flight_folder(flown_config.recording.directory)
         if folder is None
         else own_folder(Path(folder))
     )
-    async with connect_configured(flown_config, records, observer) as vehicle:
+    async with connect_configured(flown_config, flown_folder, observer) as vehicle:
         yield vehicle
 
 
@@ -109,7 +108,7 @@ async def connect_configured(
         session, program = await loop.start(_make_session(config, folder, observer, environment))
         loop.register_end(partial(_end_lost_flight, session, program))
         flight = loop.start(_fly(session, program))
-        flight.add_done_callback(mark_error_as_heard)
+        flight.add_done_callback(mark_error_retrieved)
         try:
             with on_ctrl_c(loop, session.interrupt):
                 async with _connected_vehicle(loop, session, program, flight) as vehicle:

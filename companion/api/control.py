@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 from math import inf, isnan
 
 from companion.api.commanded import checked_copy
-from companion.api.program import failure_words, mark_error_as_heard
+from companion.api.program import failure_words, mark_error_retrieved
 from companion.api.state import ConnectedFlight, State
 from companion.attitude import BodyRates, Coefficients
 from companion.guidance.finite import finite_vector
@@ -29,8 +29,11 @@ class Control:
 
     Consecutive commands may be at most `deadman.target_stale_ms` apart. If commands stop, the
     autopilot holds the vehicle and control ends. Frames are world NED and body FRD, in SI units.
-    `Vehicle.control` makes it; `source` receives the references, and `control_end` is done when
-    control has ended.
+
+    Args:
+        flight: the flight of the `Vehicle` whose method `control` makes this object.
+        source: receives the references.
+        control_end: done when control has ended.
     """
 
     def __init__(
@@ -190,7 +193,7 @@ async def program_control(
     Raises:
         FlightEnded: the flight ended before control began, or control ended early.
     """
-    control_end.add_done_callback(mark_error_as_heard)
+    control_end.add_done_callback(mark_error_retrieved)
     try:
         while source.pose is None:  # guidance does not fly it yet
             done, _ = await asyncio.wait({control_end}, timeout=0.01)

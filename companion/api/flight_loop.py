@@ -1,12 +1,10 @@
 """The event loop in which a program's flight runs: a loop in its own thread, or the program's.
 
-The flight runs in the program's loop if the vehicle's time waits for the program, as in lockstep.
-
 With a thread for the flight, a program that computes, blocks or never yields delays only its own
 commands. The flight continues to answer attitude samples with setpoints, notices the missing
 commands, and hands the vehicle back.
 
-`OwnThreadLoop` and `SharedLoop` have the same methods, for the program's loop to call.
+The program calls the methods of `OwnThreadLoop` or `SharedLoop`, which are the same, from its loop.
 """
 
 import asyncio
@@ -37,7 +35,7 @@ _CHECK_PERIOD = 0.1
 class SharedLoop:
     """Runs the flight in the program's own loop, if the vehicle's time waits for the program.
 
-    It waits in lockstep, and when `companion.testing` runs it on a virtual clock.
+    The vehicle's time waits in lockstep, and on the virtual clock of `companion.testing`.
 
     Attributes:
         time: the clock of the flight: a function that returns s.

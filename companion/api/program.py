@@ -172,14 +172,14 @@ def flight_ended(result: str) -> FlightEnded:
     return FlightEnded("the flight is over" if result == "ok" else result)
 
 
-def mark_error_as_heard(ended: asyncio.Future[Any]) -> None:
-    """Done-callback: asyncio does not warn of an error that the program gets by its own call."""
+def mark_error_retrieved(ended: asyncio.Future[Any]) -> None:
+    """Done-callback: no warning of asyncio, because the program gets the error by another call."""
     if not ended.cancelled():
         ended.exception()
 
 
 def failure_words(name: str, error: BaseException) -> str:
-    """Say that the program or task `name` was cancelled or dropped, or which error it raised."""
+    """How the program `name` failed: cancelled, dropped, or by an error, as a clause."""
     if isinstance(error, asyncio.CancelledError):
         return f"{name} was cancelled"
     if isinstance(error, GeneratorExit):  # as when the cell of a notebook runs once more

@@ -26,7 +26,7 @@ def straight_path(
 
     Args:
         config: its limits bound the usual speed.
-        to: the end, from the beginning, m NED.
+        to: end of the line relative to its start, m NED.
         heading: rad; None: the vehicle keeps its heading.
         speed: largest speed, m/s; None: the usual one.
         acceleration: largest acceleration, m/s².

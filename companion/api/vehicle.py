@@ -166,7 +166,9 @@ class Vehicle:
                 trajectory = await call_in_thread(checked_trajectory, trajectory)
         if slow_down:
             config, drag = self._flight.context.config, self._flight.context.known_drag
-            trajectory = await call_in_thread(slowed_from, config, trajectory, self._begin(), drag)
+            trajectory = await call_in_thread(
+                slowed_from, config, trajectory, self._trajectory_start(), drag
+            )
         await self._fly(Follow(trajectory, self._flight.context.config.limits.max_yaw_rate))
 
     @asynccontextmanager
@@ -212,20 +214,18 @@ class Vehicle:
         )
 
     async def _fly(self, maneuver: Maneuver) -> None:
-        self._held_pose()  # raises if the vehicle is not under our control
-        await call_in_thread(self._require_followable, maneuver)
+        context, start = self._flight.context, self._trajectory_start()
+        await call_in_thread(
+            require_followable, context.config, maneuver, start, context.known_drag
+        )
         sequence = ManeuverSequence((maneuver,))
         work = partial(fly_maneuvers, sequence=sequence)
         await self._request(
             lambda _: (control_phase("maneuvers", "the maneuver to end", work, sequence.duration),)
         )
 
-    def _require_followable(self, maneuver: Maneuver) -> None:
-        context = self._flight.context
-        require_followable(context.config, maneuver, self._begin(), context.known_drag)
-
-    def _begin(self) -> Vector:
-        """Where the vehicle is held, relative to the centre of the fence, m NED."""
+    def _trajectory_start(self) -> Vector:
+        """Where the next trajectory begins, relative to the centre of the fence, m NED."""
         centre = self._flight.context.snapshot_builder.fence_centre_ned or (0.0, 0.0, 0.0)
         return minus(self._held_pose().position_ned, centre)
 

@@ -16,13 +16,13 @@ from companion.guidance.linear import Guidance
 
 @dataclass(eq=False)
 class CommandMaker:
-    """Asks guidance or predictive control for a command; limits its tilt so that height is held."""
+    """Asks guidance or predictive control for a command, and limits the tilt of its target."""
 
     guidance: Guidance
     """Makes targets from references."""
     _flown_source: FlownSource
     _estimate: MotionEstimate
-    """Provides the state of the vehicle; is given the commanded vertical thrust."""
+    """Provides the state of the vehicle, and needs the commanded vertical thrust."""
     _learning: HoverLearning
     """Provides the largest tilt and the thrust limits."""
     _period: float

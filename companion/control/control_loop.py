@@ -33,8 +33,8 @@ SendSetpoint = Callable[[int, BodyRates, float], bool]
 In lockstep the link keeps setpoints until the step ends, and sends only the last one of a step."""
 
 _MISFIT_REASONS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
-_END_THE_STREAM = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
-"""`end_stream` releases control after a sample with one of these outcomes: None (the sample was
+_FINAL_OUTCOMES = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
+"""After `end_stream`, the loop releases control at one of these outcomes: None (the sample was
 answered), or a reason for which no later sample can be answered either."""
 
 
@@ -43,7 +43,7 @@ class ControlLoop:
 
     After a gap in the setpoints the autopilot may have left offboard, and PX4 would enter offboard
     again on the next setpoint. So after a gap while `taking_over` or `offboard_active`, the loop
-    requests offboard and sends nothing until `resume`.
+    calls `ask_mode` and sends nothing until `resume`.
 
     Attributes:
         command: the newest command, written by guidance; None before the first and after
@@ -82,7 +82,7 @@ class ControlLoop:
         self._clock = clock
         self._clock_ns = clock_ns
         self._deadlines = deadlines
-        self._last_command: GuidanceCommand | None = None
+        self._final_command: GuidanceCommand | None = None
         self._recorder = SampleRecorder(trace, self.planner, limits, hover_thrust.limits, clock)
 
     def retune(self, constants: Constants, limits: Limits) -> None:
@@ -118,7 +118,7 @@ class ControlLoop:
         if not self.on:
             return
         record.samples += 1
-        command = self._last_command or self.command
+        command = self._final_command or self.command
         reason: Unanswered | None
         if not self.is_same_vehicle():
             reason = Unanswered.ANOTHER_VEHICLE
@@ -137,11 +137,11 @@ class ControlLoop:
         record.reason = reason
         if reason is not None:
             record.unanswered[reason] += 1
-        if self._last_command is not None and reason in _END_THE_STREAM:
+        if self._final_command is not None and reason in _FINAL_OUTCOMES:
             self.release()
 
     def _after_gap(self, now: float) -> bool:
-        """Whether setpoints wait for `resume` after a gap; at a new gap, request offboard."""
+        """Whether setpoints wait for `resume` after a gap; at a new gap, ask for the mode."""
         if not (self.offboard_active or self.taking_over):
             return False
         gap = now - self.record.gap_from
@@ -210,7 +210,7 @@ class ControlLoop:
 
     def release(self) -> None:
         """Send nothing from here on."""
-        self._last_command = None
+        self._final_command = None
         self.on = self.offboard_active = self.taking_over = False
 
     def end_stream(self) -> None:
@@ -219,7 +219,7 @@ class ControlLoop:
         If offboard is not active, or there is no command, send nothing more.
         """
         if self.on and self.offboard_active and self.command is not None:
-            self._last_command = self._last_command or self.command.without_turning()
+            self._final_command = self._final_command or self.command.without_turning()
         else:
             self.release()
         self._recorder.action("stop_turning")

@@ -135,14 +135,14 @@ class EstimatorResets:
 
 
 def _attitude_jump(
-    before: AttitudeSample, now: AttitudeSample, predicted: Quaternion, dt: float
+    before: AttitudeSample, after: AttitudeSample, predicted: Quaternion, dt: float
 ) -> tuple[float, float, float]:
     """Jump of the heading, jump of the thrust axis, and the threshold for both; rad."""
     p, q, r = before.body_rates
-    new_p, new_q, new_r = now.body_rates
+    new_p, new_q, new_r = after.body_rates
     w, x, y, z = predicted
-    a, b, c, d = now.q
-    # now ⊗ predicted⁻¹: the unexplained rotation, about world axes.
+    a, b, c, d = after.q
+    # after.q ⊗ predicted⁻¹: the unexplained rotation, about world axes.
     r_w = a * w + b * x + c * y + d * z
     r_x = -a * x + b * w - c * z + d * y
     r_y = -a * y + b * z + c * w - d * x

@@ -63,15 +63,15 @@ class ExpectedResponse:
             if time < _NOTICEABLE_SHARE * self.time_constant
         )
         tilt = degrees(asin(self.coefficient))
-        told = [
+        clauses = [
             f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
             f"expected to have a time constant of {self.time_constant:.2f} s",
             f"{self.limited_by} limits it most ({changes})",
         ]
         shortest = self.shortest_time_constant
         if shortest is not None:
-            told.append(f"with the largest sensible gain and no rate limit: {shortest:.2f} s")
-        return told
+            clauses.append(f"with the largest sensible gain and no rate limit: {shortest:.2f} s")
+        return clauses
 
     def sentence(self) -> str:
         """A message for the user: time constant, its main cause, and the effect of each cause."""
@@ -106,16 +106,16 @@ def _gain_sentence(gain: float, largest: float) -> str:
 def expected_response(config: Config) -> ExpectedResponse:
     """Predict the response by a linear model of planner and rate loop with the tilt rate limit."""
     step_size, response = 2.0 * config.steps.coefficient, tilt_response(config)
-    speed = _largest_coefficient_rate(config)
+    max_rate = _largest_coefficient_rate(config)
     gain, largest = config.planner.gain_per_s, sensible_gain(config)
     time_constants_without = {
-        _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step_size, speed),
+        _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step_size, max_rate),
         _RATE_LIMIT_KEY: response.step_time(step_size),
-        **_without_rate_loop_delays(config, response, speed),
+        **_without_rate_loop_delays(config, response, max_rate),
     }
     return ExpectedResponse(
         config.steps.coefficient,
-        response.step_time(step_size, speed),
+        response.step_time(step_size, max_rate),
         time_constants_without,
         gain,
         None if largest == inf else largest,
@@ -124,7 +124,7 @@ def expected_response(config: Config) -> ExpectedResponse:
 
 
 def _without_rate_loop_delays(
-    config: Config, response: InnerResponse, speed: float
+    config: Config, response: InnerResponse, max_rate: float
 ) -> dict[str, float]:
     """Time constants (s) without the rate loop's lag, and without its dead time; empty: unknown."""
     if not config.vehicle.response_known:
@@ -133,8 +133,8 @@ def _without_rate_loop_delays(
     updates = {"lag_ms": 0.0, "pitch_lag_ms": None, "damping": None, "pitch_damping": None}
     without_lag = config.model_copy(update={"vehicle": config.vehicle.model_copy(update=updates)})
     return {
-        _LAG_CAUSE: tilt_response(without_lag).step_time(step_size, speed),
-        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step_size, speed),
+        _LAG_CAUSE: tilt_response(without_lag).step_time(step_size, max_rate),
+        _DEAD_TIME_CAUSE: replace(response, dead_time=0.0).step_time(step_size, max_rate),
     }
 
 

@@ -11,7 +11,7 @@ from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 
 _REJOINED_DISTANCE = 1.0
-"""Distance from the reference below which the vehicle counts as returned after open loop, m."""
+"""Distance from the reference at which the vehicle has returned to it after open loop, m."""
 _RETURN_TIME = 10.0
 """Time allowed to return to the reference after open loop, s; a return over 10 m takes 4 s."""
 
@@ -45,7 +45,7 @@ class FlownSource:
         self.source: Source | None = None
         self.begun_at: float | None = None
         self.braking: Braking | BrakingUpwind | None = None
-        self._returning_since: float | None = None  # inf: still off the reference
+        self._returning_since: float | None = None  # s; inf: still in open loop
 
     def clear(self) -> None:
         """Fly no source and hold no pose."""

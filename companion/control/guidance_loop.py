@@ -35,7 +35,7 @@ class GuidanceLoop:
 
     Attributes:
         flown_source: the held pose and the source that is flown from it.
-        bound_to_hold: True after `give_up`: from then on no source may be flown.
+        gave_up: True after `give_up`: from then on no source may be flown.
         motion: motion of the vehicle at the last step, without resets, or None.
         command_not_finite: True if guidance returned NaN or infinity at the last step.
         acceleration: horizontal acceleration of the vehicle at the last step, m/s², NED.
@@ -65,7 +65,7 @@ class GuidanceLoop:
         clock: Callable[[], float],
     ) -> None:
         self.flown_source = FlownSource()
-        self.bound_to_hold = False
+        self.gave_up = False
         self.command_not_finite = False
         self.motion: VehicleMotion | None = None
         self.acceleration: NorthEast = (0.0, 0.0)
@@ -125,11 +125,11 @@ class GuidanceLoop:
         """Brake and hold, and never fly a source again; raises as `hold_here`."""
         now = self._clock()
         self.recorder.action(now, "give_up")
-        self.bound_to_hold = True
+        self.gave_up = True
         self.hold.begin(now, self._heading())
 
     def move_upwind(self) -> None:
-        """End the hold upwind of where it would end; see `Hold.move_upwind`."""
+        """Move the place of the hold upwind; see `Hold.move_upwind`."""
         now = self._clock()
         self.recorder.action(now, "move_upwind")
         self.hold.move_upwind(now, self.estimate.disturbance)
@@ -142,7 +142,7 @@ class GuidanceLoop:
         Raises:
             RuntimeError: no pose is held and no position has come yet.
         """
-        if self.bound_to_hold:
+        if self.gave_up:
             return
         now = self._clock()
         self.recorder.action(now, "follow")
@@ -202,8 +202,8 @@ class GuidanceLoop:
         if position is None:
             self.learning.hover_thrust.pause()
             return None
-        # While offboard is active, a landed flag must not lead to zero thrust, which would make it
-        # true; the safety monitors judge it.
+        # While offboard is active, a wrong landed flag must not lead to zero thrust: the vehicle
+        # would fall. The safety monitors judge the flag.
         standing = standing and not self._loop.offboard_active
         if standing:
             self.learning.hover_thrust.on_ground()

@@ -62,7 +62,7 @@ class StepFrame:
 
     ArduPilot takes body rates along an attitude target that stays in the estimator's frame, so the
     vehicle follows each correction: it turns about the vertical, and when tilted its thrust axis
-    turns, too. The rates of such an autopilot get the rotation of this frame added.
+    turns, too. For this autopilot, the rotation of the frame is added to the body rates.
 
     Attributes:
         frame: this frame at present; it converts from the estimator's frame. Targets of open-loop

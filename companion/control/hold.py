@@ -45,7 +45,7 @@ class Hold:
             RuntimeError: no position has come yet.
         """
         if self._flown_source.remaining_braking_time(now) > 0.0:
-            return  # it goes on braking: a new beginning would stop it further away
+            return  # a new braking would stop the vehicle further away
         inputs = self._maker.guidance_input(now)
         motion, (north, east, _) = inputs.now, inputs.now.velocity_ned
         by_tilt = GRAVITY * tan(self._largest_tilt())
@@ -53,9 +53,9 @@ class Hold:
         self._flown_source.hold(brake(now, motion, heading, acceleration, self._assumed_braking))
 
     def move_upwind(self, now: float, wind: NorthEast) -> None:
-        """Also move upwind by the drift of the autopilot that will take over; see `brake_upwind`.
+        """Move the hold upwind by the drift to expect from the autopilot; see `brake_upwind`.
 
-        Nothing changes if no hold has begun, or if it moves upwind already.
+        Nothing changes if no hold has begun, or if the hold moves upwind already.
         """
         braking = self._flown_source.braking
         if isinstance(braking, Braking):

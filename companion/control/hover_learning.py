@@ -82,7 +82,7 @@ class HoverLearning:
     def takeover_refusal(self) -> str | None:
         """Why a vehicle with this hover thrust would climb or fall away in our control; else None.
 
-        Known only where the autopilot reports its own thrust.
+        A refusal is possible only if the autopilot reports its own thrust.
         """
         thrust = self.hover_thrust
         measured, learned, (lowest, _) = thrust.measured_hover, thrust.learned_hover, thrust.limits

@@ -46,7 +46,7 @@ def planner(config: Config) -> Planner:
         return make(name)
     law = plugin("planner.name", plugins.PLANNERS, name)
     try:
-        # A planner may remember the trial, so the one that flies is another.
+        # A planner may remember the trial, so another instance flies.
         trial_planner, flight_planner = (PluginPlanner(make(law), limits) for _ in range(2))
     except Exception as error:
         raise ConfigError(f"planner.name: {name} cannot be made: {error!r}") from error

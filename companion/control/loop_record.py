@@ -33,7 +33,7 @@ class Unanswered(Enum):
 
     @classmethod
     def of(cls, error: AttitudeError) -> "Unanswered":
-        """Whether the attitude could not be used, or the planner did not answer it."""
+        """The reason for a planner's error: an invalid attitude, or invalid rates."""
         if isinstance(error, InvalidQuaternionError | InvalidBodyRatesError):
             return cls.INVALID_ATTITUDE
         return cls.INVALID_RATES
@@ -45,11 +45,7 @@ class Unanswered(Enum):
 
     @property
     def is_refusal(self) -> bool:
-        """Whether the data were fresh, but no valid setpoint could be computed or sent.
-
-        The other reasons: sample or command is missing, stale or out of order, offboard is not
-        confirmed after a gap, or the sample may come from another vehicle.
-        """
+        """Whether the data were fresh, but no valid setpoint could be computed or sent."""
         return self in _REFUSALS
 
 
@@ -158,10 +154,7 @@ class LoopRecord:
 
     @property
     def stale_count(self) -> int:
-        """Number of samples not answered because data were stale, missing or out of order.
-
-        Every reason counts that is not a refusal (`Unanswered.is_refusal`).
-        """
+        """Number of samples not answered for a reason that is no refusal, such as stale data."""
         return sum(n for reason, n in self.unanswered.items() if not reason.is_refusal)
 
     @property

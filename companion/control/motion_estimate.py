@@ -196,7 +196,7 @@ class MotionEstimate:
         )
 
     def _drag_mismatch(self) -> tuple[float, float, float] | None:
-        """Largest speed, m/s, and learned and assumed drag there, 1/s; None: they are near."""
+        """Largest speed, m/s, and learned and assumed drag there, 1/s; None: they differ little."""
         speed = self.drag.top_speed
         learned = self.drag.drag.per_velocity(speed)
         assumed = self.drag.prior_drag.per_velocity(speed)
@@ -204,11 +204,11 @@ class MotionEstimate:
             return None
         return speed, learned, assumed
 
-    def _learn_drag(self, before: LocalPosition, now: LocalPosition, slope: NorthEast) -> None:
-        dt = now.vehicle_time - before.vehicle_time
+    def _learn_drag(self, before: LocalPosition, after: LocalPosition, slope: NorthEast) -> None:
+        dt = after.vehicle_time - before.vehicle_time
         if not 0.0 < dt < _LONGEST_POSITION_GAP:
             return
-        old, new = before.velocity_ned, now.velocity_ned
+        old, new = before.velocity_ned, after.velocity_ned
         north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
         # The measured acceleration gives the actual thrust, which differs from the commanded one.
         vertical_thrust = GRAVITY - down

@@ -60,7 +60,7 @@ def make_guidance(config: Config) -> Guidance:
         return LinearGuidance(settings)
     factory = plugin("guidance.kind", plugins.GUIDANCE, kind)
     try:
-        # Guidance may remember the trial, so the one that flies is another.
+        # Guidance may remember the trial, so another instance flies.
         trial_guidance, flight_guidance = factory(settings), factory(settings)
     except Exception as error:
         raise ConfigError(f"guidance.kind: {kind} cannot be made: {error!r}") from error
@@ -85,7 +85,7 @@ def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float])
         finite = all(map(isfinite, numbers))
     except (Exception, SystemExit) as error:
         raise ConfigError(
-            f"guidance.kind: {kind} cannot be flown: {error!r}; guidance is a class as "
+            f"guidance.kind: {kind} cannot be flown: {error!r}; guidance must have the methods of "
             "companion.guidance.linear.Guidance"
         ) from error
     if not finite:

@@ -37,11 +37,11 @@ class RateLag:
         self._products = 0.0
         self._squares = _HALF_LEARNED_SQUARES
 
-    def mean(self, before: Vector, now: Vector, dt: float) -> Vector:
+    def mean(self, before: Vector, after: Vector, dt: float) -> Vector:
         """The mean body rates between two samples `dt` s apart, corrected for the lag, rad/s."""
         ahead = self.seconds / dt
         p, q, r = before
-        new_p, new_q, new_r = now
+        new_p, new_q, new_r = after
         return (
             0.5 * (p + new_p) + ahead * (new_p - p),
             0.5 * (q + new_q) + ahead * (new_q - q),
@@ -49,18 +49,18 @@ class RateLag:
         )
 
     def learn(
-        self, before: Vector, now: Vector, predicted: Quaternion, measured: Quaternion
+        self, before: Vector, after: Vector, predicted: Quaternion, measured: Quaternion
     ) -> None:
         """Learn from the difference between a measured attitude and the predicted one.
 
         Args:
             before: body rates of the previous sample, rad/s.
-            now: body rates of this sample, rad/s.
+            after: body rates of this sample, rad/s.
             predicted: attitude of this sample, predicted from the previous one with `mean`.
             measured: measured attitude of this sample.
         """
         _, x, y, _ = body_error(predicted, measured)
-        p, q = now[0] - before[0], now[1] - before[1]
+        p, q = after[0] - before[0], after[1] - before[1]
         square = p * p + q * q
         self._products += 2.0 * (x * p + y * q) + self.seconds * square
         self._squares += square

@@ -28,11 +28,9 @@ _HALF_ROOT = sqrt(0.5)
 _MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EVERY, _PATHS_EVERY, _BODY_EVERY = 2, 5, 10
-"""Every how many drawings a point is added to the paths, the paths are sent, and the body is sent.
-With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows.
-
-Everything is sent again and again, because a viewer may join late or jump in the recording.
-"""
+"""Number of drawings per point that is added to the paths, per message with the paths, and per
+message with the body. With guidance at 50 Hz there are ten drawings a second; each sends the thrust
+arrows. Paths and body are repeated, because a viewer may join late or jump in the recording."""
 _GAP_NS = 1_000_000_000
 """A pause longer than this between two drawings starts new paths, ns."""
 _METRES_PER_M_S2 = 0.1

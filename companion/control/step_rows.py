@@ -27,6 +27,7 @@ class StepFlags(NamedTuple):
     """State of the vehicle at a guidance step."""
 
     fresh: bool
+    """Whether the position is fresh."""
     standing: bool
     """Whether the vehicle stands on the ground."""
     may_idle: bool

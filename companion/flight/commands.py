@@ -28,7 +28,7 @@ _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 IsDone = Callable[[], bool]
 """Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
 RequireOurs = Callable[[], None]
-"""Raises `FlightEnded` if we must not command the vehicle; for example `requiring_roles`."""
+"""Raises `FlightEnded` if we must not command the vehicle; most call `require_role`."""
 
 
 def roles_of(link: Link) -> frozenset[Role]:
@@ -86,11 +86,6 @@ async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
     if not any(fence_text in each.text for each in state.texts if each.time >= since):
         return ended
     return FlightEnded(f"{_BY_FAILSAFE}: mode {mode}", ended.exit)
-
-
-def requiring_roles(link: Link, allowed: Set[Role]) -> RequireOurs:
-    """A `RequireOurs` that calls `require_role` with these roles."""
-    return lambda: require_role(link, allowed)
 
 
 async def command_if_ours(

@@ -135,8 +135,8 @@ class FlightContext:
 
         After a stall of this program, queued frames look new, so a heartbeat is requested. The
         heartbeat after the answer is fresh; without an answer, a heartbeat after
-        `_BACKLOG_DRAIN_TIME` is fresh. If this program stalls meanwhile, the answer may be queued
-        as well, and a pilot may have taken over since: then this function waits again.
+        `_BACKLOG_DRAIN_TIME` is fresh. If this program stalls during the wait, the answer may have
+        been queued, too, so this function waits again.
         """
         # The watch reads these counters on each heartbeat, so before the wait below ends.
         counters, now = self.snapshot_builder.counters, asyncio.get_running_loop().time
@@ -176,10 +176,8 @@ class FlightContext:
 
     async def next_position(self) -> LocalPosition:
         """The newest position, or the next one if there is no fresh one."""
-        position = self.fresh_position()
-        while position is None:
+        while (position := self.fresh_position()) is None:
             await self.until(lambda: self.fresh_position() is not None, "a fresh position")
-            position = self.fresh_position()
         return position
 
     def fresh_position(self) -> LocalPosition | None:

@@ -22,7 +22,7 @@ _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
 _FALLING_SPEED = 2.5
-"""Speed downward, m/s, at which a disarmed vehicle falls: one that has landed stands still."""
+"""Downward speed above which a disarmed vehicle is falling, m/s; a landed one stands still."""
 
 _UPRIGHT_TILT = radians(45.0)
 """Largest tilt of a vehicle that stands after a landing, rad; no slope to land on is steeper."""

@@ -1,4 +1,4 @@
-"""What a flight uses of the computer that it runs on; tests replace it."""
+"""The parts of the computer that a flight uses; tests replace them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from companion.recording.mcap_file.batch import SendBatch
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """What a flight uses of its computer: sockets, clock, settings of the operating system.
+    """The parts of the computer that a flight uses: sockets, clock, operating system.
 
     The defaults are those of a real flight. `companion.testing` replaces all of them: its flights
     use no sockets and no wall clock.

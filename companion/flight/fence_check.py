@@ -45,16 +45,17 @@ class FenceCheck:
         zeros = np.zeros_like(motion.velocity)
         still = replace(motion, velocity=zeros, acceleration=zeros)
         worst_at_rest = self._worst_breach(still)
-        time, breach = worst if worst_at_rest is None else worst_at_rest
-        begin = self._begin_time(motion if worst_at_rest is None else still, time)
         slowing_helps = worst_at_rest is None
+        time, breach = worst_at_rest or worst
+        begin = self._begin_time(motion if slowing_helps else still, time)
         text, remedy = _breach_text(breach, begin, slowing_helps), _remedy(slowing_helps)
         return Violation(breach.limit, begin, time, text, remedy, slowing_helps=slowing_helps)
 
     def _worst_breach(self, motion: Motion) -> tuple[float, Breach] | None:
         """The worst breach and its time, s."""
+        north, east, _ = columns(motion.acceleration)
         stopping_point = self.fence.stopping_point(
-            columns(motion.position), columns(motion.velocity), _horizontal(motion.acceleration)
+            columns(motion.position), columns(motion.velocity), (north, east)
         )
         stops = np.stack(stopping_point, axis=1)
         breaches = [
@@ -123,10 +124,6 @@ def _remedy(slowing_helps: bool) -> str:
             "fly it more slowly (--slow-down finds how much for a trajectory), or widen the fence"
         )
     return "shrink it or widen the fence"
-
-
-def _horizontal(vectors: Floats) -> tuple[Floats, Floats]:
-    return vectors[:, 0], vectors[:, 1]
 
 
 def _vector(row: Floats) -> Vector:

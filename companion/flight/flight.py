@@ -211,7 +211,7 @@ class Flight:
             await self._fly_exit(next_exit)
 
     async def _user_wants_landing(self) -> bool:
-        """Ask the user whether to land; False if the flight is ended meanwhile, as by a pilot."""
+        """Ask the user whether to land; False if the flight ends before the answer."""
         self._asking_landing = True
         try:
             return bool(await self._run_until_end(self._ask_landing(), inf))
@@ -235,7 +235,7 @@ class Flight:
             judge(self.phase)
         except FlightEnded as ended:
             self.end(ended)
-        except Exception as error:  # the watch goes on, because an exit needs it, too
+        except Exception as error:  # the watch goes on: an exit needs it
             self.fail(error)
 
     async def _report_progress(self) -> None:

@@ -9,7 +9,7 @@ from companion.flight.commands import (
     ask_to_hold,
     change_mode,
     in_role,
-    requiring_roles,
+    require_role,
 )
 from companion.flight.context import FlightContext, cancel
 from companion.mavlink.commands import Command
@@ -33,8 +33,6 @@ _PILOT_WARNING = "Companion: it does not land. Switch its mode!"
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 """Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
 
-_OFFBOARD_OR_LAND = frozenset({Role.OFFBOARD, Role.LAND})
-
 _PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
 """Called with the error of a mode command: raises it, or returns `require_ours` for the retry."""
 
@@ -46,7 +44,9 @@ async def hand_over_to_hold(context: FlightContext) -> None:
         FlightEnded: somebody else has the vehicle.
         CommandRefused: the autopilot refused.
     """
-    require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING)
+
+    def require_ours() -> None:
+        require_role(context.link, ROLES_BEFORE_LANDING)
 
     def holding() -> bool:
         return in_role(context.link, Role.HOLD)
@@ -65,15 +65,20 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     Before each repetition, a vehicle that still obeys us is asked to hold: ArduPilot would not hold
     its position after our last setpoint. If others command a hold meanwhile, they keep control.
 
-    The time allowed is `flight.landing_timeout_s`. A vehicle that obeys us and would drift without
-    us is held and asked for longer, until somebody takes it over.
+    The time allowed is `flight.landing_timeout_s`. After this time, a vehicle that would drift
+    without our setpoints is still held and asked to land, until somebody takes it over.
 
     Raises:
         FlightEnded: somebody else has the vehicle, or the time allowed is over.
     """
-    require_ours = requiring_roles(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
     refusal_noted = False
     time_limit = _LandingTimeLimit(context)
+
+    def require_ours() -> None:
+        require_role(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
+
+    def require_offboard() -> None:
+        require_role(context.link, {Role.OFFBOARD, Role.LAND})
 
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
@@ -88,8 +93,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         await asyncio.sleep(_REPETITION_PAUSE)
         if was_offboard and not landing():
             await _hold_meanwhile(context, landing)
-        is_offboard = in_role(context.link, Role.OFFBOARD)
-        return requiring_roles(context.link, _OFFBOARD_OR_LAND) if is_offboard else require_ours
+        return require_offboard if in_role(context.link, Role.OFFBOARD) else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 
@@ -174,7 +178,7 @@ async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
     Control is not released if the command fails or the autopilot has begun to land.
     """
     try:
-        await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
+        await ask_to_hold(context, lambda: require_role(context.link, {Role.OFFBOARD}))
     except (CommandRefused, CommandTimeout, LinkLost):
         return
     except FlightEnded:

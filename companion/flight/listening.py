@@ -2,7 +2,7 @@
 
 import asyncio
 
-from companion.flight.commands import ask_to_hold, in_role, require_role, requiring_roles
+from companion.flight.commands import ask_to_hold, in_role, require_role
 from companion.flight.context import FlightContext
 from companion.flight.takeoff import is_in_our_takeoff
 from companion.mavlink.errors import CommandRefused, CommandTimeout, LinkLost
@@ -71,7 +71,7 @@ async def _hold_if_ours(context: FlightContext) -> None:
     context.detail = "its report that it holds"
     while True:
         try:
-            await ask_to_hold(context, requiring_roles(context.link, {Role.OFFBOARD}))
+            await ask_to_hold(context, lambda: require_role(context.link, {Role.OFFBOARD}))
         except CommandRefused as error:  # without setpoints it would drift, so it must land
             await context.fresh_heartbeat()
             require_role(context.link, {Role.OFFBOARD})  # a pilot may have taken over meanwhile

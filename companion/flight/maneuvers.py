@@ -33,7 +33,7 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
 
 
 def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
-    """A copy of the sequence, to begin anew: a `Follow` remembers the pose where it began."""
+    """A copy of the sequence that has not begun: a `Follow` stores the pose where it began."""
     return ManeuverSequence(
         [
             replace(part, _with_turn=None, _pose=None) if isinstance(part, Follow) else part

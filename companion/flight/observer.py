@@ -7,7 +7,7 @@ from companion.flight.status import FlightStatus
 from companion.recording.recorder import FlightRecorder
 
 _LONGEST_CALL_S = 0.2
-"""A longer call of an observer is reported once, s; the flight stands still meanwhile."""
+"""Longest call of an observer that is not reported, s; the flight stands still during a call."""
 
 
 class Observer(Protocol):
@@ -70,7 +70,7 @@ class SeveralObservers:
 
 
 async def decline_landing() -> bool:
-    """Answer no to the question whether to land, where nobody can answer; the vehicle holds."""
+    """Answer that the vehicle shall not land but hold, because nobody can be asked."""
     return False
 
 

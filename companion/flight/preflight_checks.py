@@ -35,8 +35,8 @@ class PreflightChecks:
     newest status of the vehicle, and rates and parameters that are at most a second old.
 
     Attributes:
-        note: called once with each message on what does not block the flight: warnings, accepted
-            unsafe findings, and rates that were not granted.
+        note: called once with each message that does not end the flight: warnings, accepted unsafe
+            findings, and rates that were not granted.
         drag_of: called with the vehicle's identity; returns what is known of its drag.
 
     Args:

@@ -22,7 +22,7 @@ _COUNTING_TIME = 0.1
 
 
 def low_rate_text(message: str, rate: float) -> str:
-    """The event that a message comes too rarely, and that `rate` (Hz) is requested again."""
+    """The text of an event: a message comes too rarely, and `rate` (Hz) is requested again."""
     return f"{message} comes too rarely: requesting {rate:g} Hz again"
 
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
-from companion.flight.commands import change_mode, in_role, require_role, requiring_roles
+from companion.flight.commands import change_mode, in_role, require_role
 from companion.flight.context import FlightContext
 from companion.flight.preflight_phases import (
     checks,
@@ -92,7 +92,7 @@ async def check_airborne(context: FlightContext) -> None:
 async def check_armed_on_ground(context: FlightContext) -> None:
     """Check a vehicle that somebody else armed on the ground; only request telemetry.
 
-    The newest heartbeat may be older than the arming, so this first waits for one that shows it.
+    The newest heartbeat may be older than the arming, so this function waits for one that shows it.
 
     Raises:
         FlightEnded: the vehicle is not armed on the ground, or a finding blocks the take-off.
@@ -216,9 +216,12 @@ async def _take_over(context: FlightContext) -> None:
         context.loop.on = True
         await context.until(lambda: in_role(context.link, Role.OFFBOARD))
         return
-    require_ours = requiring_roles(context.link, {Role.READY})
-    command = autopilot.set_mode(autopilot.offboard_mode)
-    await change_mode(context, command, require_ours, lambda: in_role(context.link, Role.OFFBOARD))
+    await change_mode(
+        context,
+        autopilot.set_mode(autopilot.offboard_mode),
+        lambda: require_role(context.link, {Role.READY}),
+        lambda: in_role(context.link, Role.OFFBOARD),
+    )
 
 
 def _has_flight_command(context: FlightContext) -> bool:

@@ -60,11 +60,11 @@ def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> 
 
 def _tightest_limit(trajectory: Trajectory, part: SlowedPart, reserve: float) -> str:
     north, east, down = trajectory.at(part.time).position
-    kept_back = ""
+    reserve_text = ""
     if reserve and part.limit == TILT_LIMIT:
-        kept_back = f" (less flight.slow_down_reserve_m_s2: {reserve:g})"
+        reserve_text = f" (less flight.slow_down_reserve_m_s2: {reserve:g})"
     return (
-        f"{part.limit or 'a limit'}{kept_back} at {part.time:.1f} s "
+        f"{part.limit or 'a limit'}{reserve_text} at {part.time:.1f} s "
         f"({north:.1f} m north, {east:.1f} m east, {0.0 - down:.1f} m up)"
     )
 

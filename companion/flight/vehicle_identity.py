@@ -37,7 +37,7 @@ class ReplacementDetector:
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
-        self._begun = self._committed = False
+        self._begun = self._arming_noted = False
         self._peers = self._restarts = 0
         self.uid: str | None = None
         self._other_uid: str | None = None
@@ -46,8 +46,8 @@ class ReplacementDetector:
         self._silence = self._long_silence = 0.0
 
     def begin(self) -> None:
-        """Begin to watch: from now on, every frame must come from one vehicle."""
-        self._begun, self._committed = True, False
+        """Begin to watch: from now on, all frames must come from the same vehicle."""
+        self._begun, self._arming_noted = True, False
         self.uid = self._other_uid = None
         self._peers, self._restarts = self._link.stats.peers, self._link.clock.restart_count
         self._frames, self._updated_at = self._link.stats.frames, self._clock()
@@ -58,7 +58,7 @@ class ReplacementDetector:
 
         From then on, only the watch and the safety monitors judge silence.
         """
-        self._committed, self._long_silence = True, 0.0
+        self._arming_noted, self._long_silence = True, 0.0
 
     def update(self) -> None:
         """Measure the silence; the watch calls this 50 times a second."""
@@ -67,7 +67,7 @@ class ReplacementDetector:
         if frames == self._frames:
             self._silence += min(interval, _LONGEST_UPDATE_INTERVAL)
             return
-        if self._silence > LONGEST_SILENCE and not self._committed:
+        if self._silence > LONGEST_SILENCE and not self._arming_noted:
             self._long_silence = self._silence
         self._frames, self._silence = frames, 0.0
 
@@ -86,7 +86,7 @@ class ReplacementDetector:
             and self._restarts == self._link.clock.restart_count
             and self._other_uid is None
             and not self._long_silence
-            and (self._silence <= LONGEST_SILENCE or self._committed)
+            and (self._silence <= LONGEST_SILENCE or self._arming_noted)
         ) or not self._begun
 
     def require(self) -> None:
@@ -98,7 +98,7 @@ class ReplacementDetector:
         """
         if self.is_same_vehicle or (reason := self._sign_of_replacement()) is None:
             return
-        if self._committed:
+        if self._arming_noted:
             raise FlightEnded(reason, Exit.RELEASE)
         raise ChecksVoid(reason)
 
@@ -183,8 +183,8 @@ class DragMemory:
         """After the flight, save the learned drag if the flight had enough motion to learn it.
 
         Returns:
-            Whether the vehicle's next flight begins with it: it was saved, and no drag is
-            configured, which would take precedence.
+            Whether the vehicle's next flight begins with the learned drag: it was saved, and no
+            configured drag takes precedence.
         """
         if self._file is None or not self._estimate.certain:
             return False

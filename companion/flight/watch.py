@@ -60,7 +60,7 @@ class Watch:
         self._context.replacement_detector.require()
         in_control = phase.monitored and self._context.loop.offboard_active
         if in_control and self._context.link.state.armed is False:
-            self._judge_snapshot(now)  # ArduPilot's mode changes, too, but nobody took over
+            self._judge_snapshot(now)  # first: ArduPilot also changes its mode then
         if phase.allowed_roles:
             require_role(self._context.link, phase.allowed_roles, self._context.released_by())
         if in_control:

@@ -18,13 +18,13 @@ from companion.vehicle.state import VehicleState
 
 @asynccontextmanager
 async def connected(
-    assembled: AssembledFlight, *beside: Coroutine[Any, Any, None]
+    assembled: AssembledFlight, *works: Coroutine[Any, Any, None]
 ) -> AsyncIterator[None]:
     """Connect the flight to its link and report its state while the block runs the flight.
 
     Only one flight at a time may be connected to a link.
 
-    `beside`: coroutines to run meanwhile. An exception in one of them, or in the reporter, is noted
+    `works`: coroutines to run meanwhile. An exception in one of them, or in the reporter, is noted
     as an event and does not end the flight.
     """
 
@@ -36,8 +36,8 @@ async def connected(
 
     try:
         with _callbacks(assembled):
-            works = assembled.reporter.run(), *beside
-            tasks = [asyncio.create_task(run_guarded(work)) for work in works]
+            all_works = assembled.reporter.run(), *works
+            tasks = [asyncio.create_task(run_guarded(work)) for work in all_works]
             try:
                 yield
             finally:

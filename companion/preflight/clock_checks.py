@@ -6,11 +6,8 @@ from math import inf
 from companion.attitude import PLANNER_NAMES
 from companion.config import Config
 from companion.preflight.evidence import Evidence
-from companion.preflight.finding import Finding, Key
+from companion.preflight.finding import INEFFECTIVE, SAFE, UNSAFE, Finding, Key
 from companion.vehicle.clock_estimates import MOST_DRIFT
-from companion.vehicle.parameter_rules import CheckResult
-
-SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _UNSAFE_NOT_NEWER_SHARE = 0.2
 """Unsafe above this share of samples whose stamp is not later than that of the sample before."""
@@ -83,7 +80,7 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.CLOCK,
             UNSAFE,
             samples.clock_change,
-            "in flight, the program would give control back",
+            "in flight, the program would hand the vehicle back",
             "restart the autopilot and check again; if it recurs, look for a second source of "
             "ATTITUDE_QUATERNION",
             source,
@@ -96,7 +93,7 @@ def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
             else INEFFECTIVE,
             f"{samples.not_newer_count} of {samples.sample_count} samples are stamped no later "
             "than the one before",
-            "they are not answered, and if that lasts, control is given back",
+            "they are not answered, and if that lasts, the vehicle is handed back",
             "send attitude over one link only; restart the autopilot if its clock stands still",
             source,
         )

@@ -10,12 +10,9 @@ from companion.config import Config
 from companion.config.guidance import AUTO
 from companion.config.suspect_values import suspect_values
 from companion.preflight.evidence import Evidence
-from companion.preflight.finding import Finding, Key
+from companion.preflight.finding import INEFFECTIVE, SAFE, UNSAFE, Finding, Key
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes
-from companion.vehicle.parameter_rules import CheckResult
 from companion.vehicle.registry import AUTOPILOTS
-
-SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 
 def planner(config: Config, _: Evidence) -> Iterator[Finding]:
@@ -129,8 +126,8 @@ def unknown_accept_entries(config: Config, _: Evidence) -> Iterator[Finding]:
 def _newest_dead_times(config: Config, uid: str | None) -> tuple[Path | None, dict[str, float]]:
     """Folder of the newest comparable flight, and the dead times in s that it measured, by axis.
 
-    A flight counts if vehicle (hardware id), planner and gain are the same. All vehicles without an
-    id count as the same. Without such a flight: None and no dead times.
+    A flight is comparable if vehicle (hardware id), planner and gain are the same; all vehicles
+    without an id count as the same. None and no dead times: there is no comparable flight.
     """
     wanted_flight = uid, config.planner_name, config.planner.gain_per_s
     for summary in sorted(config.recording.directory.glob("*/summary.json"), reverse=True):

@@ -11,6 +11,9 @@ from typing import NamedTuple
 
 from companion.vehicle.parameter_rules import CheckResult
 
+SAFE, UNSAFE = CheckResult.SAFE, CheckResult.UNSAFE
+INEFFECTIVE, NOT_READY = CheckResult.INEFFECTIVE, CheckResult.NOT_READY
+
 
 class Key(StrEnum):
     """Names of the findings that are not about one parameter, as `flight.accept` uses them."""

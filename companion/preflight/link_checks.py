@@ -7,10 +7,8 @@ from companion.mavlink.peer import PEER_NOTICE
 from companion.mavlink.stats import TOLERABLE_LOSS
 from companion.preflight import clock_checks
 from companion.preflight.evidence import Evidence
-from companion.preflight.finding import Finding, Key
+from companion.preflight.finding import INEFFECTIVE, SAFE, UNSAFE, Finding, Key
 from companion.vehicle.parameter_rules import CheckResult
-
-SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _UNSAFE_LOSS_SHARE = 0.2
 _MAX_DAMAGED_SHARE = 0.01
@@ -110,7 +108,7 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def signing(_: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether both sides sign with the same key or not at all, and who claims to be the peer."""
+    """Notices about signatures, and about other senders than the vehicle."""
     yield from signing_findings(evidence.link.notices)
 
 

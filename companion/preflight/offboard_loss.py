@@ -111,10 +111,10 @@ def worst_reach(
 
 
 def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str | None:
-    """The breach of the fence at a place that the vehicle can reach after the setpoints stop.
+    """The breach of the fence where the vehicle can be carried, as the end of a sentence, or None.
 
-    It is the end of a sentence; `None`: none. `offset`: position when the setpoints stop, relative
-    to where control began, m NED. `reached`: how far the vehicle can be carried from there.
+    `offset`: position when the setpoints stop, relative to where control began, m NED. `reached`:
+    how far the vehicle can be carried from there.
     """
     north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
     distance = hypot(north, east)
@@ -156,25 +156,17 @@ def _motions(
             thrust_after = path_thrust(
                 reference_after.acceleration_ned, reference_after.velocity_ned, drag
             )
-            thrust_rate = tuple(
+            north_rate, east_rate, down_rate = (
                 (b - a) / _DERIVATIVE_STEP for a, b in zip(thrust, thrust_after, strict=True)
             )
-            thrust_magnitude = hypot(*thrust)
-            tilt = (thrust[0] / thrust_magnitude, thrust[1] / thrust_magnitude)
-            yield (
-                time,
-                MotionAtLoss(
-                    offset, velocity, thrust, (thrust_rate[0], thrust_rate[1], thrust_rate[2])
-                ),
-            )
+            magnitude = hypot(*thrust)
+            tilt = (thrust[0] / magnitude, thrust[1] / magnitude)
+            yield time, MotionAtLoss(offset, velocity, thrust, (north_rate, east_rate, down_rate))
             continue
         rates, tilt_after = _tilt_step(reference, tilt, gain, period)
         thrust = tilted_thrust(*tilt)
-        thrust_rate_north, thrust_rate_east = (hypot(*thrust) * rate for rate in rates)
-        yield (
-            time,
-            MotionAtLoss(offset, velocity, thrust, (thrust_rate_north, thrust_rate_east, 0.0)),
-        )
+        north_rate, east_rate = (hypot(*thrust) * rate for rate in rates)
+        yield time, MotionAtLoss(offset, velocity, thrust, (north_rate, east_rate, 0.0))
         tilt = tilt_after
         north, east, _ = tilted_thrust(*tilt)
         drag_deceleration = drag.deceleration(velocity)

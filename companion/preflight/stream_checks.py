@@ -5,11 +5,8 @@ from collections.abc import Iterator
 from companion.config import Config
 from companion.config.computer import LinkConfig
 from companion.preflight.evidence import Evidence
-from companion.preflight.finding import Finding, Key
-from companion.vehicle.parameter_rules import CheckResult
+from companion.preflight.finding import INEFFECTIVE, SAFE, UNSAFE, Finding, Key
 from companion.vehicle.streams import StreamRate
-
-SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
 _MIN_RATE_SHARE = 0.7
 """Smallest accepted share of the requested rate; PX4 sends 197 Hz of 250 requested (measured)."""

@@ -6,12 +6,8 @@ from companion.config import Config
 from companion.guidance.fence import Place, height_in_words, inside, local_polygon
 from companion.mavlink.messages import dialect
 from companion.preflight.evidence import Evidence, Stage
-from companion.preflight.finding import Finding, Key
-from companion.vehicle.parameter_rules import CheckResult
+from companion.preflight.finding import INEFFECTIVE, NOT_READY, SAFE, UNSAFE, Finding, Key
 from companion.vehicle.state import GROUND_HEIGHT, VehicleState
-
-SAFE, UNSAFE, INEFFECTIVE = CheckResult.SAFE, CheckResult.UNSAFE, CheckResult.INEFFECTIVE
-NOT_READY = CheckResult.NOT_READY
 
 _MAX_UNUSABLE_SHARE = 0.01
 """Largest share of unusable attitude samples that damaged messages can explain."""
@@ -174,7 +170,7 @@ def attitude(_: Config, evidence: Evidence) -> Iterator[Finding]:
             Key.ATTITUDE,
             UNSAFE if unusable > _MAX_UNUSABLE_SHARE * count else INEFFECTIVE,
             f"{unusable} of {count} attitude samples are no unit quaternion of finite numbers",
-            "they are not answered, and if that lasts, control is given back",
+            "they are not answered, and if that lasts, the vehicle is handed back",
             "wait until the estimator has settled; if this goes on, do not fly",
             "ATTITUDE_QUATERNION",
         )

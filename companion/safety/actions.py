@@ -105,7 +105,7 @@ class ControlReleased(FlightEnded):
 def fault_message(error: Exception, exit_: Exit = Exit.LEAVE) -> str:
     """The message for an unexpected exception: a fault of this program or of user code.
 
-    `exit_`: what the flight does with the vehicle because of it.
+    `exit_`: what the flight does with the vehicle after the exception.
     """
     if not isinstance(error, UserCodeError):
         return f"internal error: {error!r}"

@@ -35,8 +35,8 @@ class CounterWindow:
     """The readings of the counters over the last second.
 
     Args:
-        real_time: whether deadlines and stalls count; in lockstep they do not: the vehicle waits,
-            and event-loop time jumps only where the vehicle is gone.
+        real_time: whether deadlines and stalls count; in lockstep they do not, because the vehicle
+            waits for this program.
     """
 
     def __init__(self, link: Link, record: LoopRecord, *, real_time: bool) -> None:

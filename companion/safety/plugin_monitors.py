@@ -46,7 +46,9 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
     except (plugins.PluginError, UserCodeError) as error:
         raise ConfigError(f"{setting}: {error}") from error
     if not isinstance(monitor, Monitor):
-        raise ConfigError(f"{setting} made no companion.safety.monitor.Monitor but {monitor!r}")
+        raise ConfigError(
+            f"{setting} must make a companion.safety.monitor.Monitor, not {monitor!r}"
+        )
     if monitor.action not in _ACTIONS or monitor.then not in _AFTER_HOLD:
         raise ConfigError(
             f"{setting}: its action must be WARN, HOLD, HAND_BACK or LAND, and "

@@ -107,7 +107,7 @@ class Health(NamedTuple):
     """Number of reports of the last 5 s in which the autopilot obeyed another program's setpoint
     (`SetpointEcho`)."""
     any_foreign_report: bool = False
-    """Whether there was such a report since control began."""
+    """Whether `foreign_reports` was above 0 at any time since control began."""
     frozen: str | None = None
     """Which telemetry repeats itself although it must change (`FrozenTelemetry`), in words."""
 

@@ -23,7 +23,7 @@ from companion.safety.snapshot import (
 from companion.vehicle.link import Link
 
 _MAX_PLACE_AGE = 1.0
-"""Largest age of the GLOBAL_POSITION_INT that tells where control begins, s."""
+"""Largest age of the GLOBAL_POSITION_INT that gives the place where control begins, s."""
 _GAP_COUNTING_TIME = 5.0
 """Time over which gaps in the setpoints are counted, s."""
 _RESET_COUNTING_TIME = 30.0

@@ -108,7 +108,7 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of the link and of this computer."""
     safety = config.safety
     link, computer = Action(safety.link_action), Action(safety.computer_action)
-    trip = link_judges.round_trip(safety.max_round_trip)
+    round_trip = link_judges.round_trip(safety.max_round_trip)
     answers = link_judges.answer_rate(config.link.min_attitude_rate_hz)
     positions = link_judges.position_rate(config.link.min_position_rate_hz)
     late = link_judges.late_setpoints(config.deadman.telemetry_stale)
@@ -123,12 +123,12 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
         Monitor("late setpoints", late, _HAND_BACK, stream=StreamEffect.ENDS),
         Monitor("lost setpoints", lost, _HAND_BACK, stream=StreamEffect.ENDS),
         # In a mode of the pilot the autopilot reports its own setpoints; `lasts` leaves time for
-        # the requested heartbeat, which tells the mode.
+        # the requested heartbeat, which contains the mode.
         Monitor("foreign setpoints", foreign, _HAND_BACK, lasts=0.3),
         # `lasts` lets a change of the mode, or the row above, end control first.
         Monitor("rare setpoint", link_judges.rare_foreign_setpoint, Action.WARN, lasts=1.0),
         Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
-        Monitor("round trip", trip, link, lasts=5.0, calm=5.0),
+        Monitor("round trip", round_trip, link, lasts=5.0, calm=5.0),
         # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.
         Monitor("deadlines", link_judges.deadlines(safety.max_missed), computer, lasts=1.5),
         Monitor("starvation", link_judges.starvation(safety.max_starved), computer, lasts=1.5),

@@ -95,7 +95,7 @@ def session(
     flown_config = config_in_memory(config, vehicle)
     return Session(
         flown_config,
-        _made(folder),
+        _made_folder(folder),
         observer or SilentObserver(),
         ask_landing or decline_landing,
         environment=environment,
@@ -155,11 +155,13 @@ async def connect(
             "connect flies on the vehicle's clock: call it inside run(vehicle, main())"
         )
     flown_config = config_in_memory(config, vehicle)
-    async with connect_configured(flown_config, _made(folder), observer, environment) as connected:
+    async with connect_configured(
+        flown_config, _made_folder(folder), observer, environment
+    ) as connected:
         yield connected
 
 
-def _made(folder: Path | str | None) -> Path | None:
+def _made_folder(folder: Path | str | None) -> Path | None:
     """The folder of a flight, made if it does not exist."""
     if folder is None:
         return None

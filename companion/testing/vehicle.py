@@ -80,7 +80,7 @@ class MockVehicle:
             lockstep = {"enabled": lockstep}
         autopilot_key = {} if autopilot is None else {"autopilot": autopilot}
         lockstep_key = {"lockstep": {"enabled": True, **lockstep}}
-        # Without a socket, telemetry for a ground station would be built for nobody.
+        # Without a socket, nothing receives telemetry for a ground station, so none is made.
         overrides = {**autopilot_key, **settings, **lockstep_key, "gcs_port": 0}
         all_settings = load_settings(config, overrides, "MockVehicle")
         self.autopilot: str = all_settings.autopilot
@@ -207,9 +207,9 @@ class MockVehicle:
         return self._relayed(self._exchange.outgoing(self._simulation.companion))
 
     def begin(self) -> list[bytes]:
-        """Boot; return the first datagrams of the vehicle. Later calls do nothing.
+        """Boot; return the vehicle's first datagrams (the first beacon in lockstep). Call it once.
 
-        In lockstep that is the first beacon.
+        A later call does nothing.
         """
         if self._has_begun:
             return []

@@ -35,7 +35,7 @@ class VirtualClock:
 
 
 class World(Protocol):
-    """What is outside the program: delivers datagrams, and moves the clock if the program waits."""
+    """The vehicle and the wire to it: delivers datagrams, and moves the clock."""
 
     def deliver_due(self) -> object:
         """Deliver the datagrams that arrive at the present time."""

@@ -221,7 +221,7 @@ def test_a_command_tells_when_it_was_made_and_where_its_target_moves():
 def test_what_a_phase_tells_guidance():
     bench, elsewhere = Bench(), (0.0, 4.0, -5.0)
     guidance = bench.guidance_loop
-    assert (guidance.bound_to_hold, guidance.hold.give_up_reason) == (False, None)
+    assert (guidance.gave_up, guidance.hold.give_up_reason) == (False, None)
     source = guidance.flown_source.source
     bench.fly(IN_HOLD, elsewhere)
     assert guidance.motion_now().position_ned == pytest.approx(elsewhere, abs=0.01)
@@ -239,7 +239,7 @@ def test_what_a_phase_tells_guidance():
     guidance.follow(source)  # from the held pose
     assert guidance.flown_source.pose.position_ned == HERE
     guidance.give_up()
-    assert guidance.bound_to_hold is True
+    assert guidance.gave_up is True
     guidance.follow(source)
     assert guidance.flown_source.source is None
     assert guidance.flown_source.pose.position_ned == pytest.approx(elsewhere, abs=0.01)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.commands import change_mode, command_if_ours, requiring_roles
+from companion.flight.commands import change_mode, command_if_ours, require_role
 from companion.mavlink.commands import Command
 from companion.mavlink.errors import CommandRefused, CommandTimeout, CommandUnfinished
 from companion.safety.actions import Exit, FlightEnded
@@ -72,7 +72,7 @@ def run(vehicle, work=command_if_ours):
         work(
             vehicle,
             LAND,
-            requiring_roles(vehicle, {Role.OFFBOARD, Role.LAND}),
+            lambda: require_role(vehicle, {Role.OFFBOARD, Role.LAND}),
             lambda: vehicle.mode is Role.LAND,
         )
     )
