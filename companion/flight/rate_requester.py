@@ -13,8 +13,8 @@ from companion.vehicle.records import MAX_TELEMETRY_AGE
 _REQUEST_SHARE = 0.5
 """A status is requested again at this share of the age from which it counts as unknown."""
 _REQUEST_PERIOD = 5.0
-"""Shortest time between two requests for one message, s; a rate that stays low ends the flight
-sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
+"""Shortest time between two requests for one message, s. If the rate stays low, monitors end the
+flight sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
 _HEARD_AGE = 0.2
 """A status is requested only while positions are newer than this, s: else the link is silent."""
 _COUNTING_TIME = 0.1

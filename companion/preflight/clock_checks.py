@@ -37,15 +37,13 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
     is_stale = sample_age > stale_after
     yield Finding(
         Key.AGE,
-        UNSAFE if is_stale else SAFE,
+        UNSAFE,
         f"attitude is {1e3 * sample_age:.1f} ms old when it arrives"
         + (f", more than deadman.telemetry_stale_ms = {1e3 * stale_after:g}" if is_stale else ""),
-        "such samples would not be answered" if is_stale else "",
-        "find what delays the messages: a busy computer, a router, a full queue, a slow link"
-        if is_stale
-        else "",
+        "such samples would not be answered",
+        "find what delays the messages: a busy computer, a router, a full queue, a slow link",
         "TIMESYNC and ATTITUDE_QUATERNION time_boot_ms",
-    )
+    ).safe_unless(is_stale)
 
 
 def round_trip(config: Config, seconds: float) -> Finding:
@@ -119,9 +117,9 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
         )
     return Finding(
         Key.CLOCK,
-        UNSAFE if too_slow else INEFFECTIVE if differs else SAFE,
+        UNSAFE if too_slow else INEFFECTIVE,
         f"the vehicle's clock runs {rate:.3f} times as fast as ours",
-        because if differs else "",
-        "run a simulation at the speed of real time, or in lockstep" if differs else "",
+        because,
+        "run a simulation at the speed of real time, or in lockstep",
         source,
-    )
+    ).safe_unless(differs)

@@ -5,7 +5,7 @@ key `link.streams.MESSAGE`, or that of the limit that the rate does not reach:
 `link.min_attitude_rate_hz` or `link.min_position_rate_hz`. All other keys are in `Key`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -93,6 +93,10 @@ class Finding:
     """Source of the fact: a MAVLink message, a reference, a measurement."""
     change: ParameterChange | None = None
     """The parameter change that would fix the problem; `None`: no such change."""
+
+    def safe_unless(self, problem: bool) -> "Finding":
+        """This finding if there is a problem; else a safe one, of the same fact and source."""
+        return self if problem else replace(self, result=SAFE, because="", fix="")
 
     def sentence(self) -> str:
         """The finding without its source, for the user."""

@@ -7,7 +7,7 @@ from companion.mavlink.peer import PEER_NOTICE
 from companion.mavlink.stats import TOLERABLE_LOSS
 from companion.preflight import clock_checks
 from companion.preflight.evidence import Evidence
-from companion.preflight.finding import INEFFECTIVE, SAFE, UNSAFE, Finding, Key
+from companion.preflight.finding import INEFFECTIVE, UNSAFE, Finding, Key
 from companion.vehicle.parameter_rules import CheckResult
 
 _UNSAFE_LOSS_SHARE = 0.2
@@ -18,20 +18,14 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Check the link for lost messages, damaged messages and reconnects."""
     link = evidence.link
     share = link.loss
-    result = (
-        UNSAFE if share > _UNSAFE_LOSS_SHARE else INEFFECTIVE if share > TOLERABLE_LOSS else SAFE
-    )
-    is_lossy = result is not SAFE
     yield Finding(
         Key.LOSS,
-        result,
+        UNSAFE if share > _UNSAFE_LOSS_SHARE else INEFFECTIVE,
         f"{100.0 * share:.1f} % of the vehicle's messages are lost",
-        "our setpoints are lost, too, and we see the pilot's mode changes late" if is_lossy else "",
-        "lower link.attitude_rate_hz and link.position_rate_hz, or use a better link"
-        if is_lossy
-        else "",
+        "our setpoints are lost, too, and we see the pilot's mode changes late",
+        "lower link.attitude_rate_hz and link.position_rate_hz, or use a better link",
         "gaps in MAVLink sequence numbers",
-    )
+    ).safe_unless(share > TOLERABLE_LOSS)
     if link.damaged_count > _MAX_DAMAGED_SHARE * max(1, link.frame_count):
         yield Finding(
             Key.DAMAGE,
@@ -85,15 +79,14 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
         )
     else:
         yield clock_checks.round_trip(config, round_trip)
-        uneven = jitter > 0.5 * stale
         yield Finding(
             Key.JITTER,
-            INEFFECTIVE if uneven else SAFE,
+            INEFFECTIVE,
             f"the round trip varies by {1e3 * jitter:.1f} ms",
-            "the planner assumes a constant dead time" if uneven else "",
-            "find what delays the messages: a router, Wi-Fi, a busy computer" if uneven else "",
+            "the planner assumes a constant dead time",
+            "find what delays the messages: a router, Wi-Fi, a busy computer",
             "TIMESYNC",
-        )
+        ).safe_unless(jitter > 0.5 * stale)
     samples = evidence.samples
     if samples.longest_pause > stale:
         yield Finding(

@@ -7,9 +7,8 @@ from companion.safety.actions import Action, StreamEffect
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
-"""Returns the breach in words, or None. The flag tells whether the alarm is already raised; most
-judges with a limit then use a milder one, so that the alarm does not toggle at the limit.
-"""
+"""Returns the breach in words, or None. The flag: whether the alarm is already raised; judges that
+`above` and `below` make then have hysteresis, so that the alarm does not toggle at the limit."""
 
 _HYSTERESIS = 0.9
 """A raised alarm ends only below this share of an upper limit, or above a lower limit divided by

@@ -13,7 +13,7 @@ _STEPS_PER_ROW = 5
 
 
 class TruthRecorder:
-    """Records the true motion of a vehicle from its creation on, by `MockVehicle.after_step`."""
+    """Records the true motion of a vehicle; `MockVehicle.after_step` calls it."""
 
     def __init__(self, vehicle: MockVehicle) -> None:
         self._vehicle, self._steps = vehicle, 0

@@ -207,10 +207,7 @@ class MockVehicle:
         return self._relayed(self._exchange.outgoing(self._simulation.companion))
 
     def begin(self) -> list[bytes]:
-        """Boot; return the vehicle's first datagrams (the first beacon in lockstep). Call it once.
-
-        A later call does nothing.
-        """
+        """Boot, unless done before; return the first datagrams (in lockstep the first beacon)."""
         if self._has_begun:
             return []
         self._has_begun = True
