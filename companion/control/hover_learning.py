@@ -15,7 +15,8 @@ _MAX_THRUST_AGE = 0.3
 """Largest age of an ATTITUDE_TARGET whose thrust is used, s; PX4 sends it at 10 Hz."""
 
 _BEYOND_LEARNING_SHARE = 0.1
-"""Largest relative excess of the measured hover thrust over the limit of learning at takeover."""
+"""Largest relative difference at takeover between the measured hover thrust and the learned one,
+which `thrust.correction_limit` bounds."""
 
 _LARGEST_IDLE_SHARE = 0.9
 """Largest share of the weight that the smallest thrust may carry: the rest is for descending."""

@@ -20,7 +20,7 @@ from companion.vehicle.link import Link
 
 ShortText = Annotated[str, Field(max_length=100)]
 LARGEST_FLOAT32 = 3.4028234e38
-"""Largest finite 32-bit float, which is what PARAM_SET carries."""
+"""Largest finite 32-bit float, the type of the value in PARAM_SET."""
 
 
 class Undo(Section):
