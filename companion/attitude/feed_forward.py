@@ -30,8 +30,6 @@ class AxisLead:
         plan_delay: larger dead time of roll and pitch minus that of this axis, s.
     """
 
-    __slots__ = ("_heading_change", "_index", "_lag", "_plan", "_plan_delay", "_plans", "_sigma")
-
     def __init__(
         self, index: int, axis: AxisResponse, plan_delay: float, plans: PlanHistory
     ) -> None:
@@ -115,19 +113,19 @@ class FeedForward:
             min(axis.acceleration for axis in tilt),
             max(axis.sigma for axis in tilt),
         )
-        self._heading = HeadingModel(constants, yaw)
-        self._body = YawModel(yaw)
+        self._heading_model = HeadingModel(constants, yaw)
+        self._yaw_model = YawModel(yaw)
         self.plans = PlanHistory(dead_time, yaw.dead_time, longest_period)
         self._roll = AxisLead(ROLL, roll, dead_time - roll.dead_time, self.plans)
         self._pitch = AxisLead(PITCH, pitch, dead_time - pitch.dead_time, self.plans)
         self._max_yaw_rate = constants.max_yaw_rate
-        self._still_rate = 0.0
+        self._heading_hold_rate = 0.0
 
     def retune(self, constants: Constants) -> None:
         """Use these gains and limits from the next sample on; the planned motion continues."""
         self._max_yaw_rate = constants.max_yaw_rate
         self._model.retune(constants, model_lag(constants.gain, self.lag))
-        self._heading.retune(constants)
+        self._heading_model.retune(constants)
 
     def start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
         """Start the plan at `q`, a unit quaternion with a tilt below the recovery angle.
@@ -146,16 +144,16 @@ class FeedForward:
         heading = heading_of(sqrt(a_squared), w, z) + yaw_dead_time * turn_rate
         model = self._model
         model.start_at(c, Coefficients(north, east))
-        self._heading.start_at(heading, turn_rate)
-        self._body.start(yaw_rate)
+        self._heading_model.start_at(heading, turn_rate)
+        self._yaw_model.start(yaw_rate)
         self.target_frame.forget()
-        x, y, self._still_rate = model.rates()
+        x, y, self._heading_hold_rate = model.rates()
         plans = self.plans
         plans.time = 0.0
         plans.tilt.start(
             0.0,
-            PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._still_rate),
-            PlannedTilt(north, east, self._still_rate, 0.0, 0.0, 0.0, 0.0, 0.0),
+            PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._heading_hold_rate),
+            PlannedTilt(north, east, self._heading_hold_rate, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
         plans.yaw.start(
             0.0, PlannedYaw(heading, 0.0, yaw_rate), PlannedYaw(turn_rate, yaw_rate, 0.0)
@@ -175,27 +173,28 @@ class FeedForward:
             yaw_feedback: feedback to add to the yaw rate, rad/s.
             dt: time by which the plan advances, s.
         """
-        last_still_rate, last_turn_rate = self._still_rate, self._heading.turn_rate
-        self._model.advance(target, dt)
-        self._heading.advance(target, dt)
-        x, y, still_rate = self._model.rates()
-        turn_rate = self._heading.turn_rate
+        model, heading_model, yaw_model = self._model, self._heading_model, self._yaw_model
+        last_hold_rate, last_turn_rate = self._heading_hold_rate, heading_model.turn_rate
+        model.advance(target, dt)
+        heading_model.advance(target, dt)
+        x, y, hold_rate = model.rates()
+        turn_rate = heading_model.turn_rate
         yaw = (
-            0.5 * (last_still_rate + still_rate + last_turn_rate + turn_rate)
-            + self.yaw.lag / dt * (still_rate - last_still_rate + turn_rate - last_turn_rate)
+            0.5 * (last_hold_rate + hold_rate + last_turn_rate + turn_rate)
+            + self.yaw.lag / dt * (hold_rate - last_hold_rate + turn_rate - last_turn_rate)
             + yaw_feedback
         )
         yaw = clamp(yaw, self._max_yaw_rate)
-        self._body.advance(yaw, dt)
-        self._still_rate = still_rate
-        mean_still_rate = 0.5 * (last_still_rate + still_rate)
-        self.target_frame.advance(yaw, mean_still_rate, dt)
-        model, body, plans = self._model, self._body, self.plans
-        still_angle = plans.tilt.newest.still_angle + mean_still_rate * dt
+        yaw_model.advance(yaw, dt)
+        self._heading_hold_rate = hold_rate
+        mean_hold_rate = 0.5 * (last_hold_rate + hold_rate)
+        self.target_frame.advance(yaw, mean_hold_rate, dt)
+        plans = self.plans
+        hold_angle = plans.tilt.newest.heading_hold_angle + mean_hold_rate * dt
         slopes = model.rate_slopes(x, y)
         plans.add(
             dt,
-            PlannedTilt(model.north, model.east, still_angle, x, y, *slopes, still_rate),
-            PlannedYaw(self._heading.heading, body.yaw_angle, body.rate),
+            PlannedTilt(model.north, model.east, hold_angle, x, y, *slopes, hold_rate),
+            PlannedYaw(heading_model.heading, yaw_model.yaw_angle, yaw_model.rate),
         )
         return self._roll.command(dt, start_heading), self._pitch.command(dt, start_heading), yaw

@@ -38,14 +38,13 @@ def first_order(
         cosine = cos_recovery
         a_squared = max(a_squared, SMALLEST_A * SMALLEST_A)
     a = sqrt(a_squared)
-    inverse_product = 1.0 / (
-        a_squared * cosine
-    )  # one division instead of two: divisions cost a batch the most
+    # One division instead of two: divisions take the most time in a batch.
+    inverse_product = 1.0 / (a_squared * cosine)
     inverse_a_squared = inverse_product * cosine
     weighted_gain = weight * gain
     e_x = weighted_gain * (east - 2.0 * ax)
     e_y = -weighted_gain * (north + 2.0 * ay)
-    roll, pitch, still_rate = speed_to_rates(
+    roll, pitch, heading_hold_rate = speed_to_rates(
         w, z, ax, ay, inverse_a_squared, inverse_product * a_squared, e_x, e_y
     )
     if weight < 1.0:
@@ -54,13 +53,12 @@ def first_order(
         pitch += (1.0 - weight) * level_pitch
     excess = rate_weight * (roll * roll + pitch * pitch)
     if speed_weight > 0.0:
-        speed_excess = speed_weight * (e_x * e_x + e_y * e_y)
-        excess = max(excess, speed_excess)
+        excess = max(excess, speed_weight * (e_x * e_x + e_y * e_y))
     if excess > 1.0:
         scale = 1.0 / sqrt(excess)
         roll *= scale
         pitch *= scale
-        still_rate *= scale
+        heading_hold_rate *= scale
     heading_error = wrap_difference(heading - heading_of(a, w, z))
-    yaw = weight * (yaw_gain * heading_error + heading_rate) + still_rate
+    yaw = weight * (yaw_gain * heading_error + heading_rate) + heading_hold_rate
     return roll, pitch, clamp(yaw, max_yaw_rate)

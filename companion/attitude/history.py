@@ -26,21 +26,21 @@ class PlannedTilt(NamedTuple):
 
     Attributes:
         north, east: planned coefficients: horizontal components of the thrust's direction.
-        still_angle: integral of `still_rate` (below) since the start, rad.
+        heading_hold_angle: integral of `heading_hold_rate` (below) since the start, rad.
         x_rate, y_rate: planned roll and pitch rate at heading 0, rad/s.
         x_slope, y_slope: derivatives of `x_rate` and `y_rate`, rad/s².
-        still_rate: yaw rate that keeps the heading constant while the tilt changes, rad/s (R_z in
-            the paper).
+        heading_hold_rate: yaw rate that keeps the heading constant while the tilt changes, rad/s
+            (R_z in the paper).
     """
 
     north: float
     east: float
-    still_angle: float
+    heading_hold_angle: float
     x_rate: float
     y_rate: float
     x_slope: float
     y_slope: float
-    still_rate: float
+    heading_hold_rate: float
 
 
 class PlannedYaw(NamedTuple):
@@ -66,8 +66,6 @@ class History(Generic[Row]):
     Args:
         max_delay: the longest delay that is looked up, s.
     """
-
-    __slots__ = ("_max_delay", "_rows", "_times")
 
     def __init__(self, max_delay: float) -> None:
         self._max_delay = max_delay
@@ -131,16 +129,6 @@ class PlanHistory:
         yaw: the plan of the heading.
     """
 
-    __slots__ = (
-        "_dead_time",
-        "_heading_change",
-        "_heading_change_plan",
-        "_yaw_dead_time",
-        "tilt",
-        "time",
-        "yaw",
-    )
-
     def __init__(self, dead_time: float, yaw_dead_time: float, longest_period: float) -> None:
         self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
         max_delay = max(dead_time, yaw_dead_time) + longest_period
@@ -164,14 +152,15 @@ class PlanHistory:
     def predicted_heading_change(self, planned_for: float, plan: PlannedTilt) -> HeadingChange:
         """The heading change when `plan`, made for the time `planned_for` (s), takes effect.
 
-        The heading turns at the body's yaw rate minus the yaw rate that keeps the heading still.
+        The heading turns at the body's yaw rate minus `heading_hold_rate`.
         """
-        # Both axes and the attitude target ask for the newest plan.
+        # Cached, because both axes and `TargetFrame` ask for the newest plan.
         if plan is not self._heading_change_plan:
             effect_time = planned_for + self._dead_time
-            body_plan = self.yaw.at(effect_time - self._yaw_dead_time)
+            yaw_plan = self.yaw.at(effect_time - self._yaw_dead_time)
             self._heading_change = HeadingChange(
-                body_plan.body_yaw - plan.still_angle, body_plan.body_yaw_rate - plan.still_rate
+                yaw_plan.body_yaw - plan.heading_hold_angle,
+                yaw_plan.body_yaw_rate - plan.heading_hold_rate,
             )
             self._heading_change_plan = plan
         return self._heading_change
@@ -199,8 +188,6 @@ class SampleHold:
         period: expected sample period, s; 0 before the first sample.
         plan_dt: time by which the plan advances, s.
     """
-
-    __slots__ = ("_lateness_share", "_pitch", "_roll", "lateness", "period", "plan_dt")
 
     def __init__(self) -> None:
         self.restart()

@@ -51,7 +51,7 @@ def speed_to_rates(
     e_x: float,
     e_y: float,
 ) -> tuple[float, float, float]:
-    """Body rates (rad/s) that give d(2ax)/dt = e_x, d(2ay)/dt = e_y and keep the heading still.
+    """Body rates (rad/s) that give d(2ax)/dt = e_x, d(2ay)/dt = e_y and hold the heading.
 
     Equations 21 to 24 with their common term (y·e_x − x·e_y) factored out, then equation 28.
     `inverse_a_squared` is 1/a². `inverse_cos_tilt` is 1/cos(tilt); the caller may bound it near 90°
@@ -86,23 +86,23 @@ def rates_to_speed(
     """Speed of the coefficients (north, east; 1/s) and of the heading (rad/s) at given body rates.
 
     The inverse of `speed_to_rates`. At body rates ω (rad/s) the thrust axis −R·e_z moves with
-    −R·(ω × e_z). The heading turns at the yaw rate minus the yaw rate that keeps the heading still.
+    −R·(ω × e_z). The heading turns at the yaw rate minus the yaw rate that holds the heading.
     """
     north = 2.0 * (x * y - w * z) * roll_rate - (1.0 - 2.0 * (y * y + z * z)) * pitch_rate
     east = (1.0 - 2.0 * (x * x + z * z)) * roll_rate - 2.0 * (x * y + w * z) * pitch_rate
     a_squared, ax, ay = half_tilt_products(w, x, y, z)
     inverse_a_squared = 1.0 / a_squared
-    _, _, still_rate = speed_to_rates(
+    _, _, heading_hold_rate = speed_to_rates(
         w, z, ax, ay, inverse_a_squared, 1.0 / (2.0 * a_squared - 1.0), east, -north
     )
-    return north, east, yaw_rate - still_rate
+    return north, east, yaw_rate - heading_hold_rate
 
 
 def heading_of(a: float, w: float, z: float) -> float:
     """Tilt-yaw heading 2·atan2(z, w) in rad, in [−π, π]; a² = w² + z², a > 0.
 
-    It is equal for q and −q, but a half turn may be −π for one and π for the other. The half-angle
-    formula keeps the argument of the arctangent between −1 and 1.
+    The heading of q and −q is equal, but a half turn may be −π for one and π for the other. The
+    half-angle formula keeps the argument of the arctangent between −1 and 1.
     """
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
 
@@ -110,8 +110,8 @@ def heading_of(a: float, w: float, z: float) -> float:
 def law_weight(cosine: float, cos_recovery: float, slope: float) -> float:
     """Weight of the law beyond the recovery angle; the rest is the weight of the rotation to level.
 
-    It falls smoothly from 1 at the recovery angle to 0 at `limits.RECOVERY_BLEND_ANGLE` (10°) more
-    tilt. Below the recovery angle only the law acts, and this formula is not valid. `cosine` is
+    The weight falls smoothly from 1 at the recovery angle to 0 at 10° more tilt
+    (`limits.RECOVERY_BLEND_ANGLE`). The formula is not valid below the recovery angle. `cosine` is
     cos(tilt), `slope` is `Constants.recovery_slope`.
     """
     blend = 1.0 + slope * (cosine - cos_recovery)

@@ -132,18 +132,18 @@ class ModelFollowingPlanner:
         self._sample_hold.note_sample(dt)
         tilt_plan, yaw_plan = forward.plans.in_effect(self._sample_hold.lateness)
         self.plan_in_effect = tilt_plan
-        speed_north, speed_east, turn = self._feedback(tilt_plan, yaw_plan, north, east, heading)
+        v_north, v_east, turn_rate = self._feedback(tilt_plan, yaw_plan, north, east, heading)
         feedback_roll, feedback_pitch, feedback_yaw = speed_to_rates(
-            w, z, ax, ay, 1.0 / a_squared, 1.0 / cosine, speed_east, -speed_north
+            w, z, ax, ay, 1.0 / a_squared, 1.0 / cosine, v_east, -v_north
         )
-        if plausible is not None:  # an unpredicted yaw rate lasts until these rates take effect
+        if plausible is not None:  # an unpredicted yaw rate is assumed to last this long
             unpredicted_yaw_rate = plausible.yaw - yaw_plan.body_yaw_rate
             heading += (forward.dead_time + forward.lag) * unpredicted_yaw_rate
-        heading += tilt_plan.still_angle - yaw_plan.body_yaw
-        lead = forward.target_frame.lead(heading, forward.plans)
-        roll, pitch, yaw = self._advance(target, heading, feedback_yaw + turn)
+        start_heading = heading + tilt_plan.heading_hold_angle - yaw_plan.body_yaw
+        lead = forward.target_frame.lead(start_heading, forward.plans)
+        roll, pitch, yaw = self._advance(target, start_heading, feedback_yaw + turn_rate)
         roll, pitch = self._sample_hold.rates(roll, pitch)
-        lead = 0.5 * (lead + forward.target_frame.lead(heading, forward.plans))
+        lead = 0.5 * (lead + forward.target_frame.lead(start_heading, forward.plans))
         roll, pitch = roll + feedback_roll, pitch + feedback_pitch
         roll, pitch = rotate_to_heading(cos(lead), sin(lead), roll, pitch)
         return BodyRates(

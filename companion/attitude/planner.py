@@ -63,8 +63,6 @@ class LawPlanner:
         constants: gains and limits of the law.
     """
 
-    __slots__ = ("_last_target", "_limited_target", "constants", "law")
-
     def __init__(self, law: Law, constants: Constants) -> None:
         self.law = law
         self.constants = constants
@@ -92,7 +90,7 @@ class LawPlanner:
     def retune(self, constants: Constants) -> None:
         """Use other gains and limits from the next sample on."""
         self.constants = constants
-        self._last_target = _NO_TARGET  # was limited by the constants before
+        self._last_target = _NO_TARGET  # it was limited by the old constants
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
         """Do nothing: the law sends rates along the axes of the body."""

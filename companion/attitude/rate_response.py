@@ -9,8 +9,8 @@ _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
 
 FIRST_ORDER_LAG_SHARE = 0.63
-"""Ratio of two lags: that of the first-order model closest to PX4's second-order response, and that
-of the response itself. The rest of the response's lag acts nearly like a dead time."""
+"""Lag of the first-order model closest to PX4's second-order response, as a share of the lag of
+that response. The rest of that lag acts nearly like a dead time."""
 SHARE_OF_LARGEST_GAIN = 0.25
 """Largest feedback gain, as a share of the largest stable gain: a gain margin of 4."""
 
@@ -123,7 +123,7 @@ def largest_gain(lag: float, dead_time: float, sigma: float = 0.0) -> float:
         return inf
     low, high = 0.0, 0.5 * pi / dead_time if dead_time > 0.0 else inf
     if sigma > 0.0:
-        high = min(high, 1.0 / sqrt(sigma))  # there the lag alone gives that phase
+        high = min(high, 1.0 / sqrt(sigma))  # there the phase of the lag alone is −90°
     for _ in range(60):
         middle = 0.5 * (low + high)
         if middle * dead_time + atan2(middle * lag, 1.0 - sigma * middle * middle) < 0.5 * pi:

@@ -83,15 +83,11 @@ class SecondOrderReference:
         root_squared = self.frequency * self.frequency * (1.0 - self.damping * self.damping)
         if root_squared > 0.0:
             root, decay_factor = sqrt(root_squared), exp(-decay_rate * dt)
-            even_part, odd_part = (
-                decay_factor * cos(root * dt),
-                decay_factor * sin(root * dt) / root,
-            )
+            even_part = decay_factor * cos(root * dt)
+            odd_part = decay_factor * sin(root * dt) / root
         elif root_squared < 0.0:
             root = sqrt(-root_squared)
-            slow_decay = exp(
-                (root - decay_rate) * dt
-            )  # the slower of the two: nothing here overflows
+            slow_decay = exp((root - decay_rate) * dt)  # the slower exponential cannot overflow
             even_part = 0.5 * slow_decay * (1.0 + exp(-2.0 * root * dt))
             odd_part = -0.5 * slow_decay * expm1(-2.0 * root * dt) / root
         else:
@@ -110,10 +106,9 @@ def first_order_step(rate: float, command: float, lag: float, dt: float) -> tupl
 
     `rate` is r at the start; `lag` and `dt` are in s.
     """
-    decay_factor = exp(-dt / lag)
-    return command * dt + (rate - command) * lag * (1.0 - decay_factor), command + (
-        rate - command
-    ) * decay_factor
+    decay_factor, difference = exp(-dt / lag), rate - command
+    integral = command * dt + difference * lag * (1.0 - decay_factor)
+    return integral, command + difference * decay_factor
 
 
 def lag_step(
@@ -143,8 +138,6 @@ class Lag:
         lag: τ, s.
         sigma: σ, s²; 0 makes it first order.
     """
-
-    __slots__ = ("_lag", "_model", "_sigma")
 
     def __init__(self, lag: float, sigma: float = 0.0) -> None:
         self._lag, self._sigma = lag, sigma

@@ -31,9 +31,7 @@ def rates_along(
     the heading.
     """
     cosine = sqrt(1.0 - north * north - east * east)
-    a_squared = (
-        0.5 + 0.5 * cosine
-    )  # a² of equation 9; at heading 0, a·x and a·y are half coefficients
+    a_squared = 0.5 + 0.5 * cosine  # equation 9; at heading 0, a·x and a·y are half coefficients
     return speed_to_rates(
         sqrt(a_squared),
         0.0,
@@ -89,24 +87,6 @@ class ReferenceModel:
         speed_north, speed_east: speed of the coefficients, 1/s.
     """
 
-    __slots__ = (
-        "_acceleration",
-        "_braking_lead",
-        "_constants",
-        "_lag",
-        "_sigma",
-        "_slew_limit",
-        "_slope_east",
-        "_slope_north",
-        "_tilt_rate_weight",
-        "_v_east",
-        "_v_north",
-        "east",
-        "north",
-        "speed_east",
-        "speed_north",
-    )
-
     def __init__(
         self,
         constants: Constants,
@@ -126,7 +106,7 @@ class ReferenceModel:
         self._acceleration = self._slew_limit
         if self._sigma > 0.0 and constants.max_tilt_rate < inf:
             self._acceleration = min(self._slew_limit, _LARGEST_RATE_CHANGE / lag)
-        # Near the target v falls by p·v a second.
+        # Near the target v falls by p·v per second, which must stay within the slew limit.
         largest_v = self._acceleration / constants.gain
         self._tilt_rate_weight = max(constants.tilt_rate_weight, largest_v**-2)
 

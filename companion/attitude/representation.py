@@ -127,7 +127,7 @@ def limited_target(target: Target, max_norm: float) -> Target:
             too large.
     """
     try:
-        if not isinstance(target, Target):  # a plain tuple will do
+        if not isinstance(target, Target):  # a plain tuple is accepted
             target = Target(*target)
         north, east, heading, heading_rate = target
         square = 0.0 + north * north + east * east  # an int too large for a float raises

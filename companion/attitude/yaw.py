@@ -22,8 +22,6 @@ class HeadingModel:
         turn_rate: ψ̇, rad/s.
     """
 
-    __slots__ = ("_acceleration", "_gain", "_lag", "_max_rate", "_v", "heading", "turn_rate")
-
     def __init__(self, constants: Constants, yaw: AxisResponse) -> None:
         self._lag = yaw.lag
         self._acceleration = yaw.acceleration
@@ -33,8 +31,8 @@ class HeadingModel:
     def retune(self, constants: Constants) -> None:
         """Use other gains and limits; the planned heading continues."""
         self._gain = constants.yaw_gain
-        # Near the target v falls by k·v a second.
         self._max_rate = constants.max_yaw_rate
+        # Near the target v falls by k·v per second, which must stay within the slew limit.
         if self._gain > 0.0:
             self._max_rate = min(self._max_rate, self._acceleration / self._gain)
 
@@ -60,8 +58,6 @@ class YawModel:
         yaw_angle: yaw angle since the start, rad: the integral of `rate`.
     """
 
-    __slots__ = ("_acceleration", "_lag", "_slewed_rate", "rate", "yaw_angle")
-
     def __init__(self, response: AxisResponse) -> None:
         self._lag = response.lag
         self._acceleration = response.acceleration
@@ -78,7 +74,7 @@ class YawModel:
         slewed_rate = self._slewed_rate = (
             previous + clamp(command - previous, max_change) if max_change < inf else command
         )
-        # Uses the aim at the end of the sample: at most half a sample early.
+        # Uses the slewed rate at the end of the sample, which is at most half a sample early.
         turn, self.rate = first_order_step(self.rate, slewed_rate, self._lag, dt)
         self.yaw_angle += turn
 
@@ -104,18 +100,6 @@ class TargetFrame:
     since then.
     """
 
-    __slots__ = (
-        "_acceleration",
-        "_delay",
-        "_heading_offset",
-        "_lead_time",
-        "_reported_at",
-        "_slewed_rate",
-        "_time",
-        "_times",
-        "_turns",
-    )
-
     def __init__(self, response: RateLoopResponse) -> None:
         self._acceleration = response.yaw.acceleration
         self._lead_time = response.lead_time
@@ -140,10 +124,10 @@ class TargetFrame:
         self._reported_at = self._time - age
         self._heading_offset = heading - self._turn_until(self._reported_at - self._delay)
 
-    def advance(self, yaw_rate: float, still_rate: float, dt: float) -> None:
+    def advance(self, yaw_rate: float, heading_hold_rate: float, dt: float) -> None:
         """Advance by `dt` seconds in which `yaw_rate` (rad/s) is sent.
 
-        `still_rate` is the part of `yaw_rate` that keeps the heading still.
+        `heading_hold_rate` is the part of `yaw_rate` that holds the heading.
         """
         if self._reported_at == -inf:
             return  # no attitude target was received, so there is no heading to advance
@@ -151,7 +135,7 @@ class TargetFrame:
         self._time += dt
         times = self._times
         times.append(self._time)
-        self._turns.append(self._turns[-1] + (self._slewed_rate - still_rate) * dt)
+        self._turns.append(self._turns[-1] + (self._slewed_rate - heading_hold_rate) * dt)
         if (
             len(times) > _ROWS_PER_DROP
             and times[_ROWS_PER_DROP] < self._time - OLDEST_ATTITUDE_TARGET - self._delay

@@ -26,9 +26,6 @@ Compiling costs 2 to 3 s once in a process, including the import of numba. A ste
 about 4 µs.
 """
 
-_COMPONENTS = 4
-"""Components of a quaternion."""
-
 _BLOCK_SIZE = 336
 """Number of vehicles that are advanced together; their data then fits the first-level cache."""
 
@@ -64,9 +61,9 @@ def rates(
         q: (4, n) attitudes w, x, y, z, body → world.
         targets: (4, n) coefficients north and east, heading in rad, heading rate in rad/s.
         dt: the sample period, s; positive and finite.
-        compiled: True: numba. False: Python. None: numba, if installed, from `COMPILE_FROM` steps
-            in this call on, for a law that is a function at the top of a module. In a loop of your
-            own pass True.
+        compiled: True: numba. False: Python. None: numba if it is installed, this call has at least
+            `COMPILE_FROM` steps, and the law is a function at the top of a module. In a loop of
+            your own pass True.
 
     Returns:
         (3, n) roll, pitch, yaw in rad/s, body FRD. The results of numba and Python differ by about
@@ -142,7 +139,7 @@ def coefficients(q: ArrayLike) -> Array:
         ValueError: the last dimension but one does not have four components.
     """
     quaternions = np.asarray(q, dtype=np.float64)
-    if quaternions.ndim < 2 or quaternions.shape[-2] != _COMPONENTS:
+    if quaternions.ndim < 2 or quaternions.shape[-2] != 4:
         raise ValueError(f"q must have the shape (..., 4, n), not {quaternions.shape}")
     _, ax, ay = half_tilt_products(*np.moveaxis(quaternions, -2, 0))
     return np.stack([-2.0 * np.asarray(ay), 2.0 * np.asarray(ax)], axis=-2)
@@ -218,7 +215,7 @@ def _final_attitudes(
     block_size = _CACHE_LINE * max(1, ceil(q.shape[1] / blocks / _CACHE_LINE))
     for begin in range(0, q.shape[1], block_size):
         block = slice(begin, min(begin + block_size, q.shape[1]))
-        even_q, odd_q, block_targets, block_rates = _work_space(block.stop - block.start)
+        even_q, odd_q, block_targets, block_rates = _aligned_arrays(block.stop - block.start)
         even_q[...] = q[:, block]
         block_targets[...] = targets[:, block]
         loops.advance(even_q, odd_q, block_targets, block_rates, dt, planner.constants, steps)
@@ -226,7 +223,7 @@ def _final_attitudes(
     return final_q
 
 
-def _work_space(count: int) -> tuple[Array, Array, Array, Array]:
+def _aligned_arrays(count: int) -> tuple[Array, Array, Array, Array]:
     """Three arrays (4, count) and one (3, count) in one block that starts on a cache line.
 
     Separate or unaligned arrays make a step up to a quarter slower.

@@ -35,9 +35,8 @@ class Loops(NamedTuple):
     apply: _Apply
     """(q, targets, rates, dt, constants): fills rates (3, n)."""
     advance: Callable[[Array, Array, Array, Array, float, Constants, int], None]
-    """(q, spare, targets, rates, dt, constants, steps): advances q in place. q (4, n) holds the
-    attitudes of even steps, spare (4, n) those of odd steps.
-    """
+    """(even_q, odd_q, targets, rates, dt, constants, steps): advances the attitudes. even_q (4, n)
+    holds those at the start and after even steps, odd_q (4, n) those after odd steps."""
     record: Callable[[Array, Array, Array, float, Constants], None]
     """(q, targets, rates, dt, constants): fills q (steps + 1, 4, n) from q[0] on, and rates
     (steps, 3, n)."""
@@ -114,8 +113,8 @@ def _sample_loops(
     """
 
     def advance(
-        q: Array,
-        spare: Array,
+        even_q: Array,
+        odd_q: Array,
         targets: Array,
         rates: Array,
         dt: float,
@@ -123,13 +122,13 @@ def _sample_loops(
         steps: int,
     ) -> None:
         for _ in range(steps // 2):
-            apply(q, targets, rates, dt, constants)
-            rotate_all(q, rates, spare, dt)
-            apply(spare, targets, rates, dt, constants)
-            rotate_all(spare, rates, q, dt)
+            apply(even_q, targets, rates, dt, constants)
+            rotate_all(even_q, rates, odd_q, dt)
+            apply(odd_q, targets, rates, dt, constants)
+            rotate_all(odd_q, rates, even_q, dt)
         if steps % 2:
-            apply(q, targets, rates, dt, constants)
-            rotate_all(q, rates, spare, dt)
+            apply(even_q, targets, rates, dt, constants)
+            rotate_all(even_q, rates, odd_q, dt)
 
     def record(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         for k in range(rates.shape[0]):

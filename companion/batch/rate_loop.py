@@ -69,12 +69,12 @@ def fly_steps(
     """
     require("numba", "study", "a compiled batch")
     coefficients, commanded_rates = np.empty((len(targets), 2)), np.empty((len(targets), 3))
-    loops, delays = _rate_loop_arrays(axes)
+    responses, delays = _response_arrays(axes)
     fly = _compiled(planner.law)
     q = fly(
         start,
         targets,
-        loops,
+        responses,
         delays,
         planner.constants,
         steps_per_sample,
@@ -84,8 +84,8 @@ def fly_steps(
     return StepFlight(coefficients, targets[:, :2], commanded_rates, q)
 
 
-def _rate_loop_arrays(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
-    """The rate loop of a vehicle as arrays for `fly`.
+def _response_arrays(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.int64]]:
+    """The responses of the axes as the arrays `responses` and `delays` of `fly`.
 
     Returns:
         (3, 7), for each axis: lag (s) and σ (s²) of `Lag`, largest change of the acting command per
@@ -113,7 +113,7 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
     def fly(
         q: Quaternion,
         targets: Array,
-        loops: Array,
+        responses: Array,
         delays: NDArray[np.int64],
         constants: Constants,
         steps: int,
@@ -136,9 +136,10 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
                 commands[slot, 0], commands[slot, 1], commands[slot, 2] = roll, pitch, yaw
                 for axis in range(3):
                     delayed = commands[(k + length - delays[axis]) % length, axis]
-                    lag, sigma, slew = loops[axis, 0], loops[axis, 1], loops[axis, 2]
+                    response = responses[axis]
+                    lag, sigma, slew = response[0], response[1], response[2]
                     slewed[axis] += limit(delayed - slewed[axis], slew)
-                    transition = loops[axis, 3], loops[axis, 4], loops[axis, 5], loops[axis, 6]
+                    transition = response[3], response[4], response[5], response[6]
                     angle, actual[axis], slopes[axis] = lag_response(
                         actual[axis], slopes[axis], slewed[axis], dt, lag, sigma, transition
                     )
