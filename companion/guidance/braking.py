@@ -17,7 +17,7 @@ _UPWIND_PEAK_ACCELERATION = 1.5
 _DRIFT_TIME_SQUARED = 0.47
 """Distance by which PX4 drifts when it takes over a vehicle that leans against wind, per
 acceleration by the wind, s². PX4 in simulation drifted by 1.40 and 1.42 m at 3.0 m/s² and was
-farthest after 3 s. It grows if MPC_XY_P, MPC_XY_VEL_P_ACC or MPC_XY_VEL_I_ACC is smaller."""
+farthest after 3 s. The drift grows if MPC_XY_P, MPC_XY_VEL_P_ACC or MPC_XY_VEL_I_ACC is smaller."""
 _PEAK = 1.5
 """Peak deceleration of a smooth stop (`Braking`), per mean deceleration."""
 _LEAST_ACCELERATION = 0.3
@@ -193,7 +193,7 @@ class BrakingUpwind(NamedTuple):
 def drift(wind: NorthEast) -> NorthEast:
     """How far the vehicle drifts downwind after the autopilot takes over, m north and east.
 
-    Its modes begin level, without the tilt that balances the wind (`Autopilot.forgets_lean`).
+    The autopilot begins level, without the tilt that balances the wind (`Autopilot.forgets_lean`).
 
     Args:
         wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
@@ -202,7 +202,7 @@ def drift(wind: NorthEast) -> NorthEast:
 
 
 def brake_upwind(now: float, braking: Braking, wind: NorthEast) -> BrakingUpwind | Braking:
-    """The same braking, and from now on a move upwind by the `drift` to expect.
+    """Add to a braking a move upwind that begins now, as far as the expected `drift`.
 
     Args:
         now: event-loop time, s.

@@ -35,12 +35,13 @@ class ClimbBias:
             down: vertical position, m, positive down.
             speed: vertical speed, m/s, positive down.
         """
-        dt, before, mean = time - self._time, self._down, 0.5 * (self._speed + speed)
+        dt, last_down = time - self._time, self._down
+        mean_speed = 0.5 * (self._speed + speed)
         self._time, self._speed = time, speed
-        if before is None or not 0.0 < dt < _LONGEST_GAP:
+        if last_down is None or not 0.0 < dt < _LONGEST_GAP:
             self._down = down
             return speed - self.bias
-        predicted = before + dt * (mean - self.bias)
+        predicted = last_down + dt * (mean_speed - self.bias)
         error = down - predicted
         self._down = predicted + min(2.0 * _FILTER_BANDWIDTH * dt, 1.0) * error
         self.bias = clamp(self.bias - _FILTER_BANDWIDTH**2 * dt * error, _LARGEST_BIAS)

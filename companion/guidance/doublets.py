@@ -103,13 +103,13 @@ class Doublets:
     def _doublets(self) -> tuple[_Doublet, ...]:
         tilt, yaw = self.tilt_rate, self.yaw_rate
         rates = [
-            _Doublet(step, BodyRates(*(size * rate for rate in axis)))
+            _Doublet(step, BodyRates(*(share * rate for rate in axis)))
             for step, axis in (
                 (self.tilt_step_time, (tilt, 0.0, 0.0)),
                 (self.tilt_step_time, (0.0, tilt, 0.0)),
                 (self.yaw_step_time, (0.0, 0.0, yaw)),
             )
-            for size in (_FIRST_DOUBLET_SHARE, 1.0)
+            for share in (_FIRST_DOUBLET_SHARE, 1.0)
         ]
         climb = _Doublet(self.climb_step_time, climb_acceleration=self.climb_acceleration)
         return *rates, *(_CLIMB_COUNT * [climb])

@@ -126,20 +126,22 @@ class DragEstimate:
         for wind in (2, 3):
             self._covariance[wind, wind] += span * _WIND_CHANGE**2
         for axis in (0, 1):
-            row = np.zeros(5)
-            row[0] = -self._displacement[axis] / span
-            row[1] = -self._speed_times_velocity[axis] / span
-            row[2 + axis] = 1.0
-            row[4] = -self._along_axes[axis] / span
-            spread = self._covariance @ row
-            variance = float(row @ spread) + _MEASUREMENT_DEVIATION**2
+            observation = np.zeros(5)
+            observation[0] = -self._displacement[axis] / span
+            observation[1] = -self._speed_times_velocity[axis] / span
+            observation[2 + axis] = 1.0
+            observation[4] = -self._along_axes[axis] / span
+            cross_covariance = self._covariance @ observation
+            variance = float(observation @ cross_covariance) + _MEASUREMENT_DEVIATION**2
             limit = _CLAMP_DEVIATIONS * sqrt(variance)
-            innovation = clamp(self._residual[axis] / span - float(row @ self._state), limit)
-            gain = spread / variance
+            innovation = clamp(
+                self._residual[axis] / span - float(observation @ self._state), limit
+            )
+            gain = cross_covariance / variance
             self._innovation_sum += innovation * innovation / variance
             self._measurements += 1
             self._state = self._state + gain * innovation
-            self._covariance = self._covariance - np.outer(gain, spread)
+            self._covariance = self._covariance - np.outer(gain, cross_covariance)
         self.drag = self._drag_within_bounds()
 
     def _drag_within_bounds(self) -> Drag:

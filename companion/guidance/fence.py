@@ -123,11 +123,11 @@ class Fence:
             return Breach("safety.fence_polygon_deg", "but needed by", where, 0.0)
         corners = local_polygon(self.places, origin) if origin and self.places else self.polygon
         if corners:
-            by = -distance_inside(north, east, corners) if margin else 0.0
-            if by > -margin or not inside(north, east, corners):
+            outside = -distance_inside(north, east, corners) if margin else 0.0
+            if outside > -margin or not inside(north, east, corners):
                 key = "safety.fence_polygon_deg" if self.places else "safety.fence_polygon_m"
                 where = f"{north:.1f} m north and {east:.1f} m east of where control began"
-                return Breach(key, "outside", where, by)
+                return Breach(key, "outside", where, outside)
         if -down > self.ceiling - margin:
             where = f"{0.0 - down:.1f} m above where control began"
             return Breach("limits.fence_ceiling_m", "above", where, -down - self.ceiling)
@@ -216,10 +216,10 @@ def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> flo
     for (n0, e0), (n1, e1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
         along_north, along_east = n1 - n0, e1 - e0
         square = along_north * along_north + along_east * along_east
-        across = (north - n0) * along_north + (east - e0) * along_east
-        share = min(max(across / square, 0.0), 1.0) if square > 0.0 else 0.0
-        gap = hypot(north - n0 - share * along_north, east - e0 - share * along_east)
-        nearest = min(nearest, gap)
+        projection = (north - n0) * along_north + (east - e0) * along_east
+        share = min(max(projection / square, 0.0), 1.0) if square > 0.0 else 0.0
+        distance = hypot(north - n0 - share * along_north, east - e0 - share * along_east)
+        nearest = min(nearest, distance)
     return nearest if inside(north, east, polygon) else -nearest
 
 

@@ -63,8 +63,8 @@ class HoverThrust:
             self._curve.share(settings.hover), settings.correction_limit, settings.correction_time
         )
         self._window_start: tuple[float, float] | None = None
-        self._sum = 0.0
-        self._count = 0
+        self._share_sum = 0.0
+        self._share_count = 0
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -129,11 +129,11 @@ class HoverThrust:
 
     def note_thrust(self, normalised: float, q: Quaternion) -> None:
         """Note a normalised thrust that the vehicle follows, and the vehicle's attitude `q`."""
-        vertical = self._curve.share(normalised) * self._battery.factor
+        vertical_share = self._curve.share(normalised) * self._battery.factor
         if not self._settings.tilt_compensated:
-            vertical *= cos_tilt(q[1], q[2])
-        self._sum += vertical
-        self._count += 1
+            vertical_share *= cos_tilt(q[1], q[2])
+        self._share_sum += vertical_share
+        self._share_count += 1
 
     def observe(self, time: float, velocity_down: float) -> None:
         """Learn the hover thrust from a vertical velocity (m/s, down) at a vehicle time (s)."""
@@ -144,13 +144,14 @@ class HoverThrust:
         span = time - began
         if 0.0 <= span < SHORTEST_WINDOW:
             return
-        if span <= _LONGEST_WINDOW and self._count:
+        if span <= _LONGEST_WINDOW and self._share_count:
             velocity = 0.5 * (before + velocity_down)
             acceleration = (velocity_down - before) / span
             measured = GRAVITY - acceleration - self._settings.drag * velocity
             if _PLAUSIBLE_THRUST[0] <= measured <= _PLAUSIBLE_THRUST[1]:
                 extra_variance = (_DRAG_DEVIATION * velocity) ** 2
-                self._filter.learn(span, self._sum / self._count, measured, extra_variance)
+                mean_share = self._share_sum / self._share_count
+                self._filter.learn(span, mean_share, measured, extra_variance)
         self._begin_window(time, velocity_down)
 
     def pause(self) -> None:
@@ -174,5 +175,5 @@ class HoverThrust:
 
     def _begin_window(self, time: float, velocity_down: float) -> None:
         self._window_start = (time, velocity_down)
-        self._sum = 0.0
-        self._count = 0
+        self._share_sum = 0.0
+        self._share_count = 0

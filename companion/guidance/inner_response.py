@@ -65,23 +65,23 @@ class InnerResponse:
         for k in range(_MOST_STEPS):
             if c >= _COVERED_SHARE * step_size:
                 return k * _INTEGRATION_STEP + (self.dead_time if self.follows_model else 0.0)
-            # Without a model, the error of now takes effect one dead time later.
+            # Without a model, the present error takes effect one dead time later.
             speeds.append(min(self.gain * (step_size - c), max_speed))
-            wanted = speeds.popleft()
-            moved, speed = first_order_step(
-                speed, wanted, max(self.lag, _INTEGRATION_STEP), _INTEGRATION_STEP
+            change, speed = first_order_step(
+                speed, speeds.popleft(), max(self.lag, _INTEGRATION_STEP), _INTEGRATION_STEP
             )
-            c += moved
+            c += change
         return inf
 
     def target(self, path: CoefficientPath, time: float) -> Coefficients:
         """The target at `time` that makes the coefficients follow `path` without error."""
-        effect = time + self.dead_time  # when the target takes effect
-        before, then, after = path(effect - _PATH_STEP), path(effect), path(effect + _PATH_STEP)
-        measured = then if self.follows_model or self.dead_time == 0.0 else path(time)
+        effect_time = time + self.dead_time
+        before, then, after = (path(effect_time + dt) for dt in (-_PATH_STEP, 0.0, _PATH_STEP))
+        # The planner compares the target with its model at `effect_time`, or measures at `time`.
+        compared = then if self.follows_model or self.dead_time == 0.0 else path(time)
         return Coefficients(
-            measured.north + self._lead(before.north, then.north, after.north),
-            measured.east + self._lead(before.east, then.east, after.east),
+            compared.north + self._lead(before.north, then.north, after.north),
+            compared.east + self._lead(before.east, then.east, after.east),
         )
 
     def heading_target(self, heading: Callable[[float], float], time: float) -> tuple[float, float]:
@@ -94,22 +94,26 @@ class InnerResponse:
             heading: the wanted heading as a function of event-loop time, rad.
             time: s of event-loop time.
         """
-        effect = time + self.dead_time  # when the target takes effect
-        then = heading(effect)
-        before = then - wrap_angle(then - heading(effect - _PATH_STEP))
-        after = then + wrap_angle(heading(effect + _PATH_STEP) - then)
-        rate = 0.5 * (after - before) / _PATH_STEP
-        measured = then if self.follows_model else heading(time)
+        effect_time = time + self.dead_time
+        then = heading(effect_time)
+        before = then - wrap_angle(then - heading(effect_time - _PATH_STEP))
+        after = then + wrap_angle(heading(effect_time + _PATH_STEP) - then)
+        rate, acceleration = _derivatives(before, then, after)
+        compared = then if self.follows_model else heading(time)
         if self.gain == 0.0:
-            return measured, rate
-        acceleration = (after - 2.0 * then + before) / (_PATH_STEP * _PATH_STEP)
-        return measured + self.lag * acceleration / self.gain, rate
+            return compared, rate
+        return compared + self.lag * acceleration / self.gain, rate
 
     def _lead(self, before: float, then: float, after: float) -> float:
-        """(ċ + lag·c̈)/gain from central differences of three coefficients."""
-        speed = 0.5 * (after - before) / _PATH_STEP
-        acceleration = (after - 2.0 * then + before) / (_PATH_STEP * _PATH_STEP)
+        """(ċ + lag·c̈)/gain from three values of a coefficient, `_PATH_STEP` apart."""
+        speed, acceleration = _derivatives(before, then, after)
         return (speed + self.lag * acceleration) / self.gain
+
+
+def _derivatives(before: float, then: float, after: float) -> tuple[float, float]:
+    """First and second derivative by central differences of three values, `_PATH_STEP` apart."""
+    first = 0.5 * (after - before) / _PATH_STEP
+    return first, (after - 2.0 * then + before) / (_PATH_STEP * _PATH_STEP)
 
 
 IMMEDIATE = InnerResponse(gain=inf, lag=0.0, dead_time=0.0, follows_model=True)

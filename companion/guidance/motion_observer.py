@@ -7,7 +7,7 @@ from math import exp
 from typing import NamedTuple
 
 from companion.attitude.history import locate_time
-from companion.guidance.reference import NorthEast, Vector, VehicleMotion, clamp_length, rotate
+from companion.guidance.reference import NorthEast, VehicleMotion, clamp_length, rotate
 
 _LARGEST_PULL_TIMES_STEP = 0.5
 """Largest product of `ObserverSettings.pull` and the time between two measurements: with a larger
@@ -132,7 +132,9 @@ class MotionObserver:
             position[axis] = p + gains.position * position_error
             velocity[axis] = v + gains.velocity * error
             estimated[axis] = disturbance[axis] + gains.disturbance * error
-        self._motion = VehicleMotion(_vector(position), _vector(velocity))
+        self._motion = VehicleMotion(
+            (position[0], position[1], position[2]), (velocity[0], velocity[1], velocity[2])
+        )
         self.disturbance = clamp_length(estimated[0], estimated[1], settings.largest_disturbance)
 
     def rotate_disturbance(self, angle: float) -> None:
@@ -163,11 +165,6 @@ class MotionObserver:
             ),
             (v_north + dt * a_north, v_east + dt * a_east, v_down),
         )
-
-
-def _vector(values: list[float]) -> Vector:
-    north, east, down = values
-    return north, east, down
 
 
 _KEPT_ATTITUDES = 200

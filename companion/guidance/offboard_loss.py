@@ -107,14 +107,14 @@ class _HeldMotion(NamedTuple):
     tilt: float
 
 
-def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
+def reach(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> Reach:
     """How far the vehicle can move if the setpoints end at this motion."""
-    held = _held_motion(at_loss, loss)
+    held = _held_motion(at_loss, failsafe)
     specific_thrust = hypot(*at_loss.thrust)
     speed = hypot(*held.velocity[:2])
     largest_speed = speed + held.feedback_speed
-    stop = _stopping_distance(speed, held.tilt, specific_thrust, loss)
-    farthest_stop = _stopping_distance(largest_speed, held.tilt, specific_thrust, loss)
+    stop = _stopping_distance(speed, held.tilt, specific_thrust, failsafe)
+    farthest_stop = _stopping_distance(largest_speed, held.tilt, specific_thrust, failsafe)
     north, east = (
         displacement + (stop * component / speed if speed > 0.0 else 0.0)
         for displacement, component in zip(held.displacement[:2], held.velocity[:2], strict=True)
@@ -134,32 +134,32 @@ def reach(at_loss: MotionAtLoss, loss: LossFailsafe) -> Reach:
     )
 
 
-def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldMotion:
+def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
     """Integrate the motion while the autopilot holds rates and thrust."""
-    duration = loss.hold_time + _FAILSAFE_DELAY
+    duration = failsafe.hold_time + _FAILSAFE_DELAY
     step = duration / _INTEGRATION_STEPS
     specific_thrust = hypot(*at_loss.thrust)
-    axis: Vector = _scaled(at_loss.thrust, 1.0 / specific_thrust)
+    axis = _scaled(at_loss.thrust, 1.0 / specific_thrust)
     axial = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
-    lateral: Vector = _plus_scaled(at_loss.thrust_rate, axis, -axial)
+    lateral = _plus_scaled(at_loss.thrust_rate, axis, -axial)
     rate = hypot(*lateral) / specific_thrust
     direction = _scaled(lateral, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
-    rate = min(rate, loss.max_tilt_rate)
-    feedback = min(_FEEDBACK_RATE, loss.max_tilt_rate)
+    rate = min(rate, failsafe.max_tilt_rate)
+    feedback = min(_FEEDBACK_RATE, failsafe.max_tilt_rate)
     displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     feedback_displacement = feedback_speed = greatest_height = 0.0
     for index in range(_INTEGRATION_STEPS):
         angle = rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), direction, sin(angle))
         velocity = _plus_scaled(
-            _after_drag(velocity, loss.drag, step), thrust, specific_thrust * step
+            _after_drag(velocity, failsafe.drag, step), thrust, specific_thrust * step
         )
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
         displacement = _plus_scaled(displacement, velocity, step)
         # The acceleration by a thrust axis that feedback has turned by this angle.
         feedback_angle = min(pi, feedback * (index + 0.5) * step)
         acceleration = 2.0 * specific_thrust * sin(0.5 * feedback_angle)
-        feedback_speed += (acceleration - loss.drag.linear * feedback_speed) * step
+        feedback_speed += (acceleration - failsafe.drag.linear * feedback_speed) * step
         feedback_displacement += feedback_speed * step
         greatest_height = max(greatest_height, -displacement[2])
     tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback * duration
@@ -174,14 +174,14 @@ def _held_motion(at_loss: MotionAtLoss, loss: LossFailsafe) -> _HeldMotion:
 
 
 def _stopping_distance(
-    speed: float, tilt: float, specific_thrust: float, loss: LossFailsafe
+    speed: float, tilt: float, specific_thrust: float, failsafe: LossFailsafe
 ) -> float:
     """Horizontal distance from the end of the held rates to the stop, m."""
-    if loss.brakes:
-        return float(loss.fence.stopping_point((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
+    if failsafe.brakes:
+        return float(failsafe.fence.stopping_point((0.0, 0.0, 0.0), (speed, 0.0, 0.0))[0])
     level_time = _level_time(tilt)
     speed += specific_thrust * sin(min(tilt, 0.5 * pi)) * level_time
-    return speed * level_time + speed / max(loss.drag.linear, _SMALLEST_DRAG)
+    return speed * level_time + speed / max(failsafe.drag.linear, _SMALLEST_DRAG)
 
 
 def _fall_distance(held: _HeldMotion, specific_thrust: float) -> float:
@@ -196,7 +196,7 @@ def _fall_distance(held: _HeldMotion, specific_thrust: float) -> float:
 
 
 def _level_time(tilt: float) -> float:
-    """Time until the autopilot has levelled the vehicle, s, with the delay before it begins."""
+    """Time until the autopilot has levelled the vehicle, s, including the failsafe's delay."""
     return _FAILSAFE_DELAY + tilt / _LEVELLING_RATE
 
 

@@ -6,8 +6,8 @@ from math import exp, hypot, sqrt
 from companion.guidance.reference import NorthEast, VehicleMotion, clamp_length
 
 _SHORTEST_GAP = 0.0005
-"""Two positions nearer in time are not compared, s: their stamps are in ms, and nothing is divided
-by a time of almost zero."""
+"""Shortest time between two positions that are compared, s: time stamps are in whole ms, and two
+positions with the same stamp give no velocity."""
 _LONGEST_GAP = 0.5
 """Longest time between two positions from which a correction is computed, s."""
 _LONGEST_FILTER_TIME = 0.1
@@ -72,11 +72,11 @@ class PositionCorrection:
         """Forget the correction, because the estimate has jumped."""
         self._time = 0.0
         self._before: VehicleMotion | None = None
-        self._raw: NorthEast = (0.0, 0.0)
-        self._filtered: NorthEast = (0.0, 0.0)
+        self._newest_r: NorthEast = (0.0, 0.0)
+        self._filtered_r: NorthEast = (0.0, 0.0)
         self._correction: NorthEast = (0.0, 0.0)
         self._noise = 0.0
-        self._moving = 0.0
+        self._motion_share = 0.0
 
     @property
     def trust(self) -> float:
@@ -85,7 +85,7 @@ class PositionCorrection:
         It is 0 if they are noisy or rounded, or if the vehicle is at rest.
         """
         smoothness = (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)
-        return min(max(0.0, smoothness), 1.0) * self._moving
+        return min(max(0.0, smoothness), 1.0) * self._motion_share
 
     def corrected_motion(self, time: float, measured: VehicleMotion) -> VehicleMotion:
         """A measured motion with its horizontal position corrected.
@@ -97,11 +97,11 @@ class PositionCorrection:
         settings = self._settings
         before, dt = self._before, time - self._time
         self._time, self._before = time, measured
-        self._moving = min(
+        self._motion_share = min(
             hypot(measured.velocity_ned[0], measured.velocity_ned[1]) / _MOVING_SPEED, 1.0
         )
         if before is None or not _SHORTEST_GAP < dt < _LONGEST_GAP:
-            self._raw = self._filtered = self._correction = (0.0, 0.0)
+            self._newest_r = self._filtered_r = self._correction = (0.0, 0.0)
         else:
             self._filter_unexplained_velocity(before, measured, dt)
         (north, east, down), velocity = measured
@@ -126,27 +126,27 @@ class PositionCorrection:
             raw[axis] = (p_now[axis] - p_before[axis]) / dt - explained
         kept_share = exp(-dt / self._filter_time(raw, dt))
         change = clamp_length(
-            raw[0] - self._filtered[0], raw[1] - self._filtered[1], _LARGEST_CHANGE
+            raw[0] - self._filtered_r[0], raw[1] - self._filtered_r[1], _LARGEST_CHANGE
         )
         for axis in (0, 1):
-            filtered[axis] = self._filtered[axis] + (1.0 - kept_share) * change[axis]
+            filtered[axis] = self._filtered_r[axis] + (1.0 - kept_share) * change[axis]
             wanted = settings.estimator_time * filtered[axis]
             correction[axis] = wanted + kept_share * (self._correction[axis] - wanted)
-        self._raw = raw[0], raw[1]
+        self._newest_r = raw[0], raw[1]
         largest = (
             settings.largest_correction / settings.estimator_time
             if settings.estimator_time > 0.0
             else 0.0
         )
-        self._filtered = clamp_length(filtered[0], filtered[1], largest)
+        self._filtered_r = clamp_length(filtered[0], filtered[1], largest)
         self._correction = clamp_length(correction[0], correction[1], settings.largest_correction)
 
     def _filter_time(self, raw: list[float], dt: float) -> float:
         """Time constant of the low-pass filters, s, for the new value `raw` of r and its noise."""
-        change = hypot(raw[0] - self._raw[0], raw[1] - self._raw[1])
+        change = hypot(raw[0] - self._newest_r[0], raw[1] - self._newest_r[1])
         kept_share = exp(-dt / _NOISE_TIME)
         self._noise = change * change + kept_share * (self._noise - change * change)
         shortest = self._settings.filter_time
         longest = max(shortest, _LONGEST_FILTER_TIME)
         filter_time = min(shortest + _FILTER_TIME_PER_NOISE * sqrt(self._noise), longest)
-        return (2.0 - self._moving) * filter_time
+        return (2.0 - self._motion_share) * filter_time

@@ -47,10 +47,10 @@ def predict(
     for time in maneuver.check_times():
         reference = maneuver.at(time, start)
         midway = maneuver.at(0.5 * (before + time), start)
-        moment = PredictedMotion(
+        motion = PredictedMotion(
             time, reference.position_ned, reference.velocity_ned, reference.acceleration_ned
         )
-        yield moment if midway.closed_loop else open_loop.advance(moment, midway, time - before)
+        yield motion if midway.closed_loop else open_loop.advance(motion, midway, time - before)
         if reference.closed_loop:
             open_loop = _OpenLoop(heading, drag)
         before = time
@@ -65,12 +65,12 @@ class _OpenLoop:
         self._roll = self._pitch = 0.0
 
     def advance(
-        self, moment: PredictedMotion, reference: Reference, duration: float
+        self, motion: PredictedMotion, reference: Reference, duration: float
     ) -> PredictedMotion:
         """Integrate the commands of `reference` over `duration` s.
 
         Returns:
-            `moment`, with the integrated motion as its horizontal motion.
+            `motion`, with the integrated motion as its horizontal motion.
         """
         (north, east), (v_north, v_east) = self._offset, self._velocity
         by_tilt = self._acceleration(reference, duration)
@@ -81,10 +81,10 @@ class _OpenLoop:
             east + duration * (v_east + 0.5 * duration * a_east),
         )
         self._velocity = v_north + duration * a_north, v_east + duration * a_east
-        return moment._replace(
-            offset=(*self._offset, moment.offset[2]),
-            velocity=(*self._velocity, moment.velocity[2]),
-            acceleration=(*by_tilt, moment.acceleration[2]),
+        return motion._replace(
+            offset=(*self._offset, motion.offset[2]),
+            velocity=(*self._velocity, motion.velocity[2]),
+            acceleration=(*by_tilt, motion.acceleration[2]),
         )
 
     def _acceleration(self, reference: Reference, duration: float) -> NorthEast:

@@ -115,8 +115,8 @@ class CommandedSource:
         self._newest: Reference | None = None
         self._given_at = 0.0
         self._jerk = _NO_JERK
-        self._base: Reference | None = None
-        self._base_at = 0.0
+        self._earlier: Reference | None = None
+        self._earlier_at = 0.0
         self._ended = False
         self.failure: str | None = None
 
@@ -134,7 +134,7 @@ class CommandedSource:
                 an earlier reference; 0 for the first reference, after a jump of the acceleration,
                 and if the two are commanded in different ways (`_loops_closed`).
         """
-        self._require_fresh(now)
+        self._check_age(now)
         self._jerk = self._jerk_towards(reference, now) if jerk_ned is None else jerk_ned
         self._newest, self._given_at = reference, now
 
@@ -144,10 +144,10 @@ class CommandedSource:
         If this reference comes less than `_SHORTEST_JERK_TIME` after the earlier one, the last jerk
         is returned.
         """
-        before, elapsed = self._base, now - self._base_at
+        before, elapsed = self._earlier, now - self._earlier_at
         if before is not None and elapsed < _SHORTEST_JERK_TIME:
             return self._jerk if _loops_closed(before) == _loops_closed(reference) else _NO_JERK
-        self._base, self._base_at = reference, now
+        self._earlier, self._earlier_at = reference, now
         if before is None or _loops_closed(before) != _loops_closed(reference):
             return _NO_JERK
         old, new = before.acceleration_ned, reference.acceleration_ned
@@ -163,7 +163,7 @@ class CommandedSource:
 
         If the newest reference is too old, the present position is held.
         """
-        self._require_fresh(now)
+        self._check_age(now)
         newest, given_at, jerk = self._newest, self._given_at, self._jerk
         if newest is not None and self.failure is None:
             return lambda time: extrapolated_reference(newest, jerk, time - given_at)
@@ -179,7 +179,7 @@ class CommandedSource:
         heading = 0.0 if self._newest is None else self._newest.heading
         return Reference(motion.position_ned, heading=heading)
 
-    def _require_fresh(self, now: float) -> None:
+    def _check_age(self, now: float) -> None:
         """Note a failure if the newest reference is too old, or the first one is overdue."""
         allowed = self._begins_within if self._newest is None else self._max_age
         if self.failure is None and not self._ended and now - self._given_at > allowed:

@@ -67,11 +67,11 @@ class ThrustFilter:
         self.measured_gain = GRAVITY / hover
         self._bounds = self.measured_gain / (1.0 + limit), self.measured_gain * (1.0 + limit)
         self._first_variance = (_FIRST_DEVIATION * self.measured_gain) ** 2
-        # In the steady state of ẋ = noise the filter is a low pass of this time constant.
-        self._drift = _USUAL_NOISE * SHORTEST_WINDOW / (time_constant * hover) ** 2
+        # With this process noise the steady-state filter is a low pass of `time_constant`.
+        self._process_noise = _USUAL_NOISE * SHORTEST_WINDOW / (time_constant * hover) ** 2
         self._variance = self._first_variance
         self._noise = _FIRST_NOISE
-        self._rejections = 0.0
+        self._filtered_rejection = 0.0
 
     @property
     def gain(self) -> float:
@@ -90,19 +90,22 @@ class ThrustFilter:
             extra_variance: variance to add to the learned variance of the measurements, (m/s²)².
         """
         self._variance = min(
-            self._variance + self._drift * duration, max(self._variance, self._first_variance)
+            self._variance + self._process_noise * duration,
+            max(self._variance, self._first_variance),
         )
         innovation = specific_thrust - self.measured_gain * share
         expected = share * share * self._variance + self._noise + extra_variance
         ratio = innovation * innovation / (_GATE_DEVIATIONS * _GATE_DEVIATIONS * expected)
         new_weight = min(1.0, duration / _REJECTION_TIME)
-        self._rejections += new_weight * (copysign(min(ratio, 1.0), innovation) - self._rejections)
+        self._filtered_rejection += new_weight * (
+            copysign(min(ratio, 1.0), innovation) - self._filtered_rejection
+        )
         if ratio > 1.0:
-            if abs(self._rejections) > _LASTING_REJECTION:
+            if abs(self._filtered_rejection) > _LASTING_REJECTION:
                 self._variance = max(
                     self._first_variance, self._variance_to_accept(innovation, share)
                 )
-                self._rejections = 0.0
+                self._filtered_rejection = 0.0
             return
         kalman_gain = self._variance * share / expected
         self.measured_gain += kalman_gain * innovation

@@ -201,9 +201,8 @@ def _require_derivatives(
             worst = int(np.argmax(errors))
             raise TrajectoryError(
                 f"the {quantity.name} is not the derivative of the positions: at "
-                f"{times[worst]:.2f} s it is off by {errors[worst]:.1f} {quantity.unit}. Is it in "
-                f"another frame, or with gravity? Leave out the columns of the {quantity.name}, "
-                "and it is computed"
+                f"{times[worst]:.2f} s it is off by {errors[worst]:.1f} {quantity.unit}; check its "
+                "frame, and that it excludes gravity, or leave its columns out"
             )
 
 

@@ -84,14 +84,14 @@ def minimum_snap(
     Raises:
         numpy.linalg.LinAlgError: the fixed and observed values do not determine the spline.
     """
-    # Time is counted in mean spans: the entries, powers of spans up to the seventh, stay near 1.
-    unit = float((knots[-1] - knots[0]) / (knots.size - 1))
-    spans = np.diff(knots) / unit
-    equations = _smoothness_equations(spans, stiffness / unit**7, fixed.states.shape[2])
+    # In units of the mean span, the entries (powers of spans up to the seventh) stay near 1.
+    mean_span = float((knots[-1] - knots[0]) / (knots.size - 1))
+    spans = np.diff(knots) / mean_span
+    equations = _smoothness_equations(spans, stiffness / mean_span**7, fixed.states.shape[2])
     for observed in observations:
-        _add_observations(equations, knots, spans, unit, observed)
-    scale = unit ** np.arange(STATE_SIZE)
-    states = _cheapest_states(equations, fixed.states * scale[:, None], fixed.mask)
+        _add_observations(equations, knots, spans, mean_span, observed)
+    scale = mean_span ** np.arange(STATE_SIZE)
+    states = _optimal_states(equations, fixed.states * scale[:, None], fixed.mask)
     return SepticSpline(knots, states / scale[:, None])
 
 
@@ -101,9 +101,10 @@ def _smoothness_equations(spans: Floats, stiffness: float, series: int) -> _Equa
     # Snap of uᵏ is k!/(k−4)!·uᵏ⁻⁴, and ∫ uᵐ over a piece is 1/(m + 1).
     snap = np.array([24.0, 120.0, 360.0, 840.0])
     energy = np.outer(snap, snap) / (powers[:, None] + powers + 1.0)
-    unit = COEFFICIENTS_FROM_ENDS[STATE_SIZE:].T @ energy @ COEFFICIENTS_FROM_ENDS[STATE_SIZE:]
+    high = COEFFICIENTS_FROM_ENDS[STATE_SIZE:]  # coefficients of u⁴ to u⁷
+    block = high.T @ energy @ high
     ends = spans[:, None] ** np.tile(powers, 2)
-    blocks = stiffness * unit * ends[:, :, None] * ends[:, None, :] / spans[:, None, None] ** 7
+    blocks = stiffness * block * ends[:, :, None] * ends[:, None, :] / spans[:, None, None] ** 7
     diagonal = np.zeros((spans.size + 1, STATE_SIZE, STATE_SIZE))
     diagonal[:-1] += blocks[:, :STATE_SIZE, :STATE_SIZE]
     diagonal[1:] += blocks[:, STATE_SIZE:, STATE_SIZE:]
@@ -115,15 +116,15 @@ def _smoothness_equations(spans: Floats, stiffness: float, series: int) -> _Equa
 
 
 def _add_observations(
-    equations: _Equations, knots: Floats, spans: Floats, unit: float, observed: Observations
+    equations: _Equations, knots: Floats, spans: Floats, mean_span: float, observed: Observations
 ) -> None:
     """Add half the gradient of the weighted squares of the residuals."""
     piece = np.clip(np.searchsorted(knots, observed.times, side="right") - 1, 0, spans.size - 1)
     span = spans[piece]
-    fractions = (observed.times - knots[piece]) / (span * unit)
+    fractions = (observed.times - knots[piece]) / (span * mean_span)
     ends = span[:, None] ** np.tile(np.arange(STATE_SIZE), 2)
     rows = derivative_rows(fractions, observed.derivative) @ COEFFICIENTS_FROM_ENDS * ends
-    rows /= (span[:, None] * unit) ** observed.derivative
+    rows /= (span[:, None] * mean_span) ** observed.derivative
     weighted = rows * observed.weights[:, None]
     squares = weighted[:, :, None] * rows[:, None, :]
     moments = weighted[:, :, None] * observed.values[:, None, :]
@@ -134,7 +135,7 @@ def _add_observations(
     np.add.at(equations.right, piece + 1, moments[:, STATE_SIZE:])
 
 
-def _cheapest_states(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
+def _optimal_states(equations: _Equations, states: Floats, mask: NDArray[np.bool_]) -> Floats:
     """The states (k, 4, n) of smallest cost that equal `states` where `mask` is true."""
     fixed = np.where(mask[:, :, None], states, 0.0)
     diagonal, upper, right = equations

@@ -127,7 +127,7 @@ def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str,
     for k in range(_COMPARED_TIMES):
         time = max(trajectory.duration * (k * _GOLDEN_RATIO % 1.0), _DIFFERENCE_STEP)
         before, now, after = (
-            _sample(trajectory, time + by) for by in (-_DIFFERENCE_STEP, 0.0, _DIFFERENCE_STEP)
+            _sample(trajectory, time + step) for step in (-_DIFFERENCE_STEP, 0.0, _DIFFERENCE_STEP)
         )
         change = np.subtract(getattr(after, quantity), getattr(before, quantity)) / (
             2.0 * _DIFFERENCE_STEP
@@ -137,7 +137,7 @@ def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str,
         if np.linalg.norm(change - reported) > _ALLOWED_ERROR + _ALLOWED_SHARE * size:
             raise TrajectoryError(
                 f"at {time:.2f} s its {quantity} changes by {size:.2f} {unit}, but its {derivative}"
-                f" is {np.linalg.norm(reported):.2f} {unit}: they must fit in size and direction"
+                f" is {np.linalg.norm(reported):.2f} {unit}: they must agree in size and direction"
             )
 
 

@@ -20,7 +20,7 @@ LARGEST_SPEED = 100.0
 """Largest speed or velocity component that a file may hold, m/s."""
 
 SMALLEST_DISTANCE = 1e-3
-"""Points closer together than this are the same point, m."""
+"""Points closer together than this count as the same point, m."""
 
 
 class TrajectoryError(ValueError):

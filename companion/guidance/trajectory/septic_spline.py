@@ -49,8 +49,8 @@ class SepticSpline:
         ends = np.concatenate(
             (states[:-1] * scale[:, :, None], states[1:] * scale[:, :, None]), axis=1
         )
-        unit = np.einsum("ij,kjn->kni", COEFFICIENTS_FROM_ENDS, ends)
-        pieces = unit / (spans[:, None, None] ** np.arange(_POLYNOMIAL_DEGREE + 1))
+        scaled_pieces = np.einsum("ij,kjn->kni", COEFFICIENTS_FROM_ENDS, ends)
+        pieces = scaled_pieces / (spans[:, None, None] ** np.arange(_POLYNOMIAL_DEGREE + 1))
         self._arrays = knots, pieces
         self._knots: list[float] = knots.tolist()
         self._pieces: list[list[list[float]]] = pieces.tolist()

@@ -63,17 +63,17 @@ class SlowerTime:
     the smallest and the largest of the piece's four coefficients.
 
     Attributes:
-        length: duration of the original trajectory, s.
+        original_duration: duration of the original trajectory, s.
         coefficients: B-spline coefficients of w, three more than there are pieces. Equal
             coefficients stretch time evenly.
     """
 
-    length: float
+    original_duration: float
     coefficients: tuple[float, ...]
 
     @cached_property
     def _pieces(self) -> list[_Piece]:
-        """The pieces; a flight asks for several times at each sample."""
+        """The pieces, cached because a flight reads them several times in each sample."""
         c = self.coefficients
         return list(itertools.starmap(_spline_piece, zip(c, c[1:], c[2:], c[3:], strict=False)))
 
@@ -91,7 +91,7 @@ class SlowerTime:
     @property
     def _piece_duration(self) -> float:
         """Original time of one piece, s."""
-        return self.length / (len(self.coefficients) - 3)
+        return self.original_duration / (len(self.coefficients) - 3)
 
     @property
     def duration(self) -> float:

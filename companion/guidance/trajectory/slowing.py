@@ -148,25 +148,25 @@ def _denser_times(times: Floats) -> Floats:
     """Check times, evenly spaced times, and times that fill long gaps (laps without checks)."""
     gaps = np.diff(times)
     median_gap = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
-    length = float(times[-1])
-    parts = [times, np.linspace(0.0, length, int(length / _moment_step(length)) + 2)]
+    duration = float(times[-1])
+    parts = [times, np.linspace(0.0, duration, int(duration / _moment_step(duration)) + 2)]
     for k in np.flatnonzero(gaps > _LONG_GAP_FACTOR * median_gap):
         count = min(int(gaps[k] / (_FILL_STEP_GAPS * median_gap)), _MOST_MOMENTS)
         parts.append(np.linspace(times[k], times[k + 1], count + 1))
     return np.unique(np.concatenate(parts))
 
 
-def _moment_step(length: float) -> float:
-    """Largest step between the times at which a trajectory of `length` seconds is checked, s."""
-    return max(_SHORTEST_STEP, length / _EVEN_MOMENTS)
+def _moment_step(duration: float) -> float:
+    """Largest step between the times at which a trajectory of `duration` s is checked, s."""
+    return max(_SHORTEST_STEP, duration / _EVEN_MOMENTS)
 
 
-def _best_law(motion: Motion, length: float, envelope: Envelope) -> SlowerTime | None:
+def _best_law(motion: Motion, duration: float, envelope: Envelope) -> SlowerTime | None:
     """The time law by which the flight is shortest; None: none was found that keeps the limits."""
     needed = _needed_factors(motion, envelope)
-    shortest = _MOMENTS_PER_PIECE * _moment_step(length)
-    durations = [w for w in _PIECE_DURATIONS if w >= shortest and length / w >= _FEWEST_PIECES]
-    laws = [_law_with_pieces(motion, needed, length, duration, envelope) for duration in durations]
+    shortest, longest = _MOMENTS_PER_PIECE * _moment_step(duration), duration / _FEWEST_PIECES
+    pieces = [piece for piece in _PIECE_DURATIONS if shortest <= piece <= longest]
+    laws = [_law_with_pieces(motion, needed, duration, piece, envelope) for piece in pieces]
     return min((law for law in laws if law), key=lambda law: law.duration, default=None)
 
 
@@ -188,16 +188,16 @@ def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
 
 
 def _law_with_pieces(
-    motion: Motion, needed: Floats, length: float, piece_duration: float, envelope: Envelope
+    motion: Motion, needed: Floats, duration: float, piece_duration: float, envelope: Envelope
 ) -> SlowerTime | None:
     """A stretch factor of at least `needed` (m,); pieces of `piece_duration` s. None: not found."""
-    count = int(np.ceil(length / piece_duration))
-    piece = np.clip((motion.times * (count / length)).astype(int), 0, count - 1)
+    count = int(np.ceil(duration / piece_duration))
+    piece = np.clip((motion.times * (count / duration)).astype(int), 0, count - 1)
     needed_by_piece = np.ones(count)
     np.maximum.at(needed_by_piece, piece, needed)
     coefficients = _largest_of_four(needed_by_piece, 1.0)
     for _ in range(_MOST_ROUNDS):
-        law = SlowerTime(length, tuple(coefficients.tolist()))
+        law = SlowerTime(duration, tuple(coefficients.tolist()))
         if law.duration > LONGEST_DURATION or coefficients.max() > _LARGEST_FACTOR:
             return None
         slower = motion.retimed(*law.stretched(motion.times))

@@ -123,7 +123,7 @@ class HeldHeading:
     """Keeps the heading that the vehicle has at the start, whatever it is."""
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
-        """Both 0: the heading is counted from that at the start, and does not change."""
+        """Both 0: the heading counts from the heading at the start, and does not change."""
         return 0.0, 0.0
 
 
