@@ -59,7 +59,7 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
     The minimum may be a local one. The search ends after 60 steps at the latest.
 
     Args:
-        projection: eliminates the linear unknowns. It is also called up to 1e-4 outside the bounds.
+        projection: eliminates the linear unknowns; also called up to 1e-4 outside the bounds.
         start: (k,), scaled so that a change of 1e-4 is small but has an effect.
         lowest: (k,), lower bounds.
         highest: (k,), upper bounds.

@@ -113,8 +113,8 @@ def make_constants(
         yaw_gain: proportional gain on the heading error, 1/s.
         limits: bounds; see `Limits`.
         recovery_angle: tilt from which the planner rotates towards level, rad; at least
-            `limits.max_tilt`, at most 80°. It is the largest tilt of a target if there is no
-            `limits.max_tilt`.
+            `limits.max_tilt`, at most 80°. Without `limits.max_tilt` this is also the largest tilt
+            of a target.
 
     Raises:
         TypeError: `limits` is not a `Limits`.

@@ -88,8 +88,8 @@ class ModelFollowingPlanner:
         """Note the attitude target of ArduPilot, which applies body rates along the target's axes.
 
         Args:
-            q: attitude target. It is ignored before the plan has started, if it is not a unit
-                quaternion, and if its tilt is beyond the recovery angle.
+            q: attitude target; ignored before the plan has started, if it is not a unit quaternion,
+                and if its tilt is beyond the recovery angle.
             age: time from the attitude target to the newest sample, s.
         """
         if not (self._started and is_unit(q)):

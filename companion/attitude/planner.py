@@ -90,7 +90,7 @@ class LawPlanner:
     def retune(self, constants: Constants) -> None:
         """Use other gains and limits from the next sample on."""
         self.constants = constants
-        self._last_target = _NO_TARGET  # it was limited by the old constants
+        self._last_target = _NO_TARGET  # the old constants limited this target
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
         """Do nothing: the law sends rates along the axes of the body."""
@@ -138,7 +138,7 @@ def make_planner(
         options: further options of that planner. Every planner takes `recovery_angle`, rad; without
             `limits.max_tilt` it is also the largest tilt of a target. `model-following` also needs
             the response of the rate loop (`AxisResponse`): `lag` and `dead_time`, s (0.0 for an
-            immediate one). It also takes `damping` (default None: first order), `acceleration`,
+            immediate one). Optional are `damping` (default None: first order), `acceleration`,
             rad/s² (default None: no limit), and `RateLoopResponse.frame_lead`, s. With the prefix
             `pitch_` or `yaw_` the four values of a response can be given for that axis (default
             None: the value of roll). There is no `yaw_damping`. If `pitch_lag` is given without

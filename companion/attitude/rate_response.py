@@ -20,7 +20,7 @@ class AxisResponse:
     """Response of one axis: dead time, then a slew limit, then a lag of gain 1.
 
     Attributes:
-        lag: τ, s; for a lag of second order 2ζ/ω. It is the delay of a slowly changing command.
+        lag: τ, s, the delay of a slowly changing command; for a lag of second order 2ζ/ω.
         dead_time: time from a sample to the first effect of the rates sent for it, s.
         acceleration: slew limit of the autopilot's rate setpoint, rad/s².
         damping: ζ of a lag of second order; infinite for first order.

@@ -1,7 +1,7 @@
 """The linear models that the coefficients should follow, exact at any sample rate.
 
-Each is the closed-form solution over one sample with a constant target. It has no discretisation
-error, so a deviation from it is a deviation of the vehicle's response.
+Each model is the closed-form solution over one sample with a constant target. The models have no
+discretisation error, so a deviation from them is a deviation of the vehicle's response.
 """
 
 from dataclasses import dataclass

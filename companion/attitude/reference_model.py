@@ -60,8 +60,8 @@ def braking_lead(gain: float, lag: float) -> float:
 def model_response(gain: float, lag: float) -> tuple[float, float]:
     """Gain p' (1/s) and lag τ' (s) of the reference model as τ'·c̈ + ċ = p'·(c_d − c).
 
-    `gain` is p and `lag` is τ of `ReferenceModel`. Its braking lead κ makes p' smaller than p, and
-    τ' smaller than τ.
+    `gain` is p and `lag` is τ of `ReferenceModel`. The model's braking lead κ makes p' smaller than
+    p, and τ' smaller than τ.
     """
     braking_factor = 1.0 + gain * braking_lead(gain, lag)
     return gain / braking_factor, lag / braking_factor

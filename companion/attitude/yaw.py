@@ -145,9 +145,9 @@ class TargetFrame:
     def lead(self, start_heading: float, plans: PlanHistory) -> float:
         """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.
 
-        It is computed from the newest attitude target. If that is missing, older than
-        `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD` from the body, the lead is computed
-        from `RateLoopResponse.lead_time`.
+        The lead is computed from the newest attitude target, or from `RateLoopResponse.lead_time`
+        if that target is missing, older than `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD`
+        from the body.
 
         Args:
             start_heading: see `FeedForward.advance`.

@@ -10,8 +10,9 @@
 Arrays are float64, component first: quaternions (4, n), targets (4, n), body rates (3, n).
 This package contains no control law. With numba (extra `study`) and from `COMPILE_FROM` steps on,
 the functions that a flight calls are compiled, and the processor works on several vehicles in one
-instruction. Otherwise they are called for one vehicle after the other. In a simulation loop of your
-own each call is a few steps, so pass `compiled=True`: 1000 vehicles take 0.2 ms instead of 17 ms.
+instruction. Otherwise the functions are called for one vehicle after the other. In a simulation
+loop of your own, in which each call is a few steps, pass `compiled=True`: 1000 vehicles take 0.2 ms
+instead of 17 ms.
 
     rates         body rates of many vehicles
     advance       attitudes after some samples

@@ -18,7 +18,7 @@ class Compiler:
     """Compiles functions together with everything they call, every call inlined.
 
     The loop around a law is vectorised only if its calls are inlined. A law finds other functions
-    in its module's globals; it is rebuilt with globals that hold the compiled ones.
+    in its module's globals, so a copy of the law is compiled whose globals hold compiled functions.
     """
 
     def __init__(self, substitutes: Substitutes) -> None:

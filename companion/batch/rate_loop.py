@@ -2,8 +2,8 @@
 
 The model has a dead time, a slew limit and a lag for each axis. `companion.batch.loops` steps all
 vehicles together, with an ideal rate loop and the same gains and limits. Here a call flies a single
-vehicle from beginning to end. So each vehicle may have its own limits, gains and rate loop, and the
-memory does not grow with the number of vehicles.
+vehicle from beginning to end. Each vehicle may therefore have its own limits, gains and rate loop,
+and the memory does not grow with the number of vehicles.
 """
 
 from collections.abc import Callable, Sequence

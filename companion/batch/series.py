@@ -1,7 +1,7 @@
 """Elementary functions as polynomials that a compiler can vectorise over many vehicles.
 
 A call of the C library takes one number and prevents vectorising the loop around it. The functions
-here have no branches and are within 5e-15 of the C library on their domains. They add the terms in
+here have no branches and are within 5e-15 of the C library on their domains. Terms are added in
 pairs (Estrin's scheme), because with Horner's scheme each term waits for the one before.
 """
 

@@ -1,7 +1,7 @@
 """Figures of one vehicle's response to steps, compiled.
 
-`companion.recording.measurements.response` measures the same figures in a flight. Here they are
-computed sample by sample; `tests/campaign/test_kinematics.py` compares both.
+`companion.recording.measurements.response` measures the same figures in a flight. This module
+computes them sample by sample; `tests/campaign/test_kinematics.py` compares both.
 """
 
 from functools import cache

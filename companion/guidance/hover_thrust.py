@@ -51,8 +51,8 @@ class ThrustSettings:
 class HoverThrust:
     """Normalised thrust for a wanted vertical acceleration, from a hover thrust that is learned.
 
-    The caller calls `observe` only in the air. It passes to `note_thrust` the thrust setpoint that
-    the vehicle follows: that of `companion` in offboard control, before that the autopilot's.
+    The caller calls `observe` only in the air, and passes to `note_thrust` the thrust setpoint that
+    the vehicle follows: in offboard control that of `companion`, before it the autopilot's.
     """
 
     def __init__(self, settings: ThrustSettings) -> None:

@@ -50,7 +50,7 @@ class InnerResponse:
         return 1.0 / self.gain + self.lag + self.dead_time
 
     def step_time(self, step_size: float, max_speed: float = inf) -> float:
-        """Time from a step of the target until the coefficients cover 63 % of it, s.
+        """Time from a step of the target until the coefficients cover 63 % of the step, s.
 
         Args:
             step_size: size of the step, without unit.

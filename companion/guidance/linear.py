@@ -117,8 +117,8 @@ class Trim:
     """Mean of the planner's target coefficients in the latest pause of the position hold.
 
     In a pause the reference's `horizontal` is `HorizontalMode.ACCELERATION`. The mean balances wind
-    and the error of the estimated attitude. It is added to the coefficients of an open-loop
-    command, so that the vehicle has the commanded acceleration in spite of both.
+    and the error of the estimated attitude. Added to the coefficients of an open-loop command, the
+    mean gives the vehicle the commanded acceleration in spite of both.
     """
 
     def __init__(self) -> None:

@@ -222,8 +222,8 @@ class SlopeHistory:
     def mean(self, start: float, end: float) -> NorthEast:
         """The mean slope between two vehicle times, s.
 
-        Before the first attitude and after the last, the slope is taken as constant. It is `newest`
-        if `end` is not after `start`, or if no attitude is kept.
+        Before the first attitude and after the last, the slope is taken as constant. The result is
+        `newest` if `end` is not after `start`, or if no attitude is kept.
         """
         if not start < end or not self._times:
             return self.newest
@@ -233,8 +233,8 @@ class SlopeHistory:
     def _integral(self, time: float) -> NorthEast:
         """The integral of the slope from the start of the history to `time`.
 
-        Between attitudes it is interpolated linearly; before the first and after the last it is
-        extrapolated linearly.
+        The integral is linear between attitudes, and extrapolated linearly before the first and
+        after the last.
         """
         times, sums = self._times, self._sums
         if time >= times[-1] or len(times) == 1:

@@ -37,7 +37,7 @@ class CorrectionSettings:
     Attributes:
         estimator_time: time constant of the estimator's correction, s: 1/(position gain).
         filter_time: time constant of each of the two low-pass filters while the vehicle moves and
-            its positions are smooth, s, positive; at rest it is twice that.
+            its positions are smooth, s, positive; at rest twice as long.
         largest_correction: largest anticipated correction, m.
         position_delay: delay of the estimator's position that its corrections do not remove, s.
     """
@@ -82,7 +82,7 @@ class PositionCorrection:
     def trust(self) -> float:
         """Trust in the positions, 0 to 1: 1 if they are smooth and the vehicle moves.
 
-        It is 0 if they are noisy or rounded, or if the vehicle is at rest.
+        The trust is 0 if positions are noisy or rounded, or if the vehicle is at rest.
         """
         smoothness = (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)
         return min(max(0.0, smoothness), 1.0) * self._motion_share

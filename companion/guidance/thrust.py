@@ -42,7 +42,7 @@ def predicted_cos_tilt(q: Quaternion, body_rates: BodyRates, ahead: float) -> fl
 def largest_tilt(lift: float, largest_thrust: float) -> float:
     """The tilt, rad, at which the lift needs `TILT_THRUST_SHARE` of the largest thrust.
 
-    It is 0 if the lift needs this share or more without tilt.
+    The tilt is 0 if the lift needs this share or more without tilt.
 
     Args:
         lift: upward component of the specific thrust, m/s².

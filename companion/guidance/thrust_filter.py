@@ -54,8 +54,8 @@ class ThrustFilter:
 
     Args:
         hover: expected share of thrust at hover.
-        limit: limit of `gain`: the share at hover that it implies is at most `hover`·(1 + limit),
-            and at least `hover`/(1 + limit).
+        limit: limit of `gain`: the share at hover, g/gain, is at most `hover`·(1 + limit), and at
+            least `hover`/(1 + limit).
         time_constant: time constant with which a slow change is followed, s; it grows with the
             standard deviation of the measurements.
 
@@ -116,7 +116,8 @@ class ThrustFilter:
     def _variance_to_accept(innovation: float, share: float) -> float:
         """Variance of the state with which the gate accepts this innovation.
 
-        It exceeds the initial one if the configured hover thrust is far off, as 0.5 for 0.13.
+        This variance exceeds the initial one if the configured hover thrust is far off, such as 0.5
+        instead of 0.13.
         """
         return (innovation / (_GATE_DEVIATIONS * share)) ** 2 if share > 0.0 else 0.0
 

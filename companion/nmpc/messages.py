@@ -57,8 +57,8 @@ class Request(NamedTuple):
     start: Start
     inputs: tuple[ControlInput, ...]
     """Latest control inputs, in order of time. They must cover the dead time before `vehicle.time`.
-    Before the first input, it is assumed to have been in effect. Without any input, attitude and
-    vertical speed are assumed to be held."""
+    The first input is assumed to have been in effect before its time, too. Without any input,
+    attitude and vertical speed are assumed to be held."""
 
 
 class Status(IntEnum):

@@ -101,7 +101,7 @@ class Solver:
                 env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
         self.pid = self._process.pid
-        schedule_as_usual(self.pid)  # it computes all the time, so not with real-time priority
+        schedule_as_usual(self.pid)  # without real-time priority, because it always computes
         self.alive = True
 
     @property

@@ -13,7 +13,7 @@ Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Pair = tuple[Coefficient, Coefficient]
 
 MOST_STEPS = 5e6
-"""Largest number of steps in a case. They need about 4 GB of memory; with inner_loop, less."""
+"""Largest number of steps in a case, which need about 4 GB of memory; with inner_loop, less."""
 
 
 class CaseLimits(Section):

@@ -45,8 +45,8 @@ class InnerLoop:
     ) -> LoopFlight:
         """Fly from rest to a target; commanded rates are held until the next planner sample.
 
-        The thrust holds the height at the tilt of each sample (`specific_thrust`, as in flight). It
-        has no effect on the coefficients, but determines at which torque the rotors saturate.
+        The thrust holds the height at the tilt of each sample (`specific_thrust`, as in flight).
+        Thrust has no effect on the coefficients, but on the torque at which the rotors saturate.
 
         Args:
             planner: any planner of `companion.attitude`; it is not reset.
@@ -79,8 +79,8 @@ class InnerLoop:
     def rate_time_63(self) -> float:
         """Time until the roll rate reaches 1 − 1/e (63 %) of a step of its setpoint in hover, s.
 
-        The time includes all delays, and can be compared with 1/p of a planner with gain p.
-        It must be shorter than `ROLL_STEP_S`.
+        The time includes all delays, and can be compared with 1/p of a planner with gain p. The
+        time must be shorter than `ROLL_STEP_S`.
         """
         target_rate = ROLL_STEP.roll * (1.0 - exp(-1.0))
         flight = self.fly(

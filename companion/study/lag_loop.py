@@ -39,19 +39,19 @@ class LagBody:
         decay, mean_decay, (roll, pitch, yaw) = self._decay, self._mean_decay, self.rates
         for _ in range(steps):
             self._delayed.append(commanded_rates)
-            roll_goal, pitch_goal, yaw_goal = self._delayed[0]
+            delayed_roll, delayed_pitch, delayed_yaw = self._delayed[0]
             # The difference of each rate from its delayed command decays.
-            roll, pitch, yaw = roll - roll_goal, pitch - pitch_goal, yaw - yaw_goal
+            roll, pitch, yaw = roll - delayed_roll, pitch - delayed_pitch, yaw - delayed_yaw
             rates = (
-                roll_goal + mean_decay * roll,
-                pitch_goal + mean_decay * pitch,
-                yaw_goal + mean_decay * yaw,
+                delayed_roll + mean_decay * roll,
+                delayed_pitch + mean_decay * pitch,
+                delayed_yaw + mean_decay * yaw,
             )
             self.q = after_constant_rates(self.q, rates, 1.0 / STEP_HZ)
             roll, pitch, yaw = (
-                roll_goal + decay * roll,
-                pitch_goal + decay * pitch,
-                yaw_goal + decay * yaw,
+                delayed_roll + decay * roll,
+                delayed_pitch + decay * pitch,
+                delayed_yaw + decay * yaw,
             )
         self.rates = BodyRates(roll, pitch, yaw)
 

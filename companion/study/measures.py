@@ -30,7 +30,7 @@ def largest_deviation(response: Response, reference: Floats) -> Floats:
 def signed_distance_from_line(response: Response) -> Floats:
     """(samples + 1, headings) distance of the coefficients from the straight line start → target.
 
-    Seen with north up and in the direction of the target, it is positive right of the line.
+    The distance is positive to the right of the direction to the target, seen with north up.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     north, east = (target - start) / np.hypot(*(target - start))

@@ -23,14 +23,14 @@ class Study(NamedTuple):
     summary: str
     """One line for `companion study --help`."""
     module: str
-    """Module that is imported when the study runs. It has `run(tick) -> Outcome` and `PARTS`, the
-    number of times that `run` calls its tick. With `takes_case` it has `prepare(case) -> Job`
-    instead."""
+    """Module that is imported when the study runs. The module has `run(tick) -> Outcome`, and
+    `PARTS`, the number of times that `run` calls its tick; with `takes_case`, it has
+    `prepare(case) -> Job` instead."""
     extra: str = ""
     """Extra of the package that the study needs besides `study`; empty: none."""
     in_all: bool = True
-    """Whether `all` includes the study. Such a study takes seconds, and its files are the same on
-    every computer."""
+    """Whether `all` includes the study: it takes seconds, and its files are the same on every
+    computer."""
     takes_case: bool = False
     """Whether the study reads a case from `--case FILE`."""
     prints_json: bool = False

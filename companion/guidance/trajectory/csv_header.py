@@ -43,8 +43,8 @@ def rows_of(reader: Any, frames: list[str], name: str) -> Iterator[tuple[int, li
         name: the file's name, for error messages.
 
     Raises:
-        TrajectoryError: a comment after the header names a frame. Ignored, it would let the vehicle
-            fly the table in another frame: down instead of up.
+        TrajectoryError: a comment after the header names a frame. If this comment were ignored, the
+            vehicle would fly the table in another frame, such as down instead of up.
     """
     header = True
     for row in reader:

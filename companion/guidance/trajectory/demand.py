@@ -94,7 +94,7 @@ class Demand:
     """Tilt, tilt rate and thrust that a motion needs; each array is (m,).
 
     The rotors must produce the specific thrust f = a + d − g, where d is the deceleration by drag.
-    The body's vertical axis points along f. It turns with the part of ḟ = jerk + ḋ that is
+    The body's vertical axis points along f, and turns with the part of ḟ = jerk + ḋ that is
     perpendicular to f. This is differential flatness as in Faessler, Franchi & Scaramuzza, RA-L
     2018, for drag that is the same along all axes.
 

@@ -104,7 +104,7 @@ class Envelope:
             raise ValueError(f"max_tilt must be in (0, π/2) rad, not {self.max_tilt:g}")
         for name in _NOT_NEGATIVE:
             limit = getattr(self, name)
-            # In this form it refuses NaN, too, which no motion would break.
+            # Written so that NaN is refused too: no motion would exceed a limit of NaN.
             if limit is not None and not limit >= 0.0:
                 raise ValueError(f"{name} must be 0 or more, or None for no limit, not {limit:g}")
 

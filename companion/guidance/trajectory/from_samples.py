@@ -120,7 +120,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     """A smooth trajectory through samples, from rest to rest.
 
     Where the samples begin or end in motion, the trajectory follows them more slowly, by a ramp
-    from or to rest. It then lasts longer than the samples.
+    from or to rest. The trajectory then lasts longer than the samples.
 
     Raises:
         TrajectoryError: velocity or acceleration is not the derivative of the position, the samples

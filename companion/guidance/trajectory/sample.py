@@ -35,8 +35,8 @@ class Sample(NamedTuple):
         velocity: velocity, m/s.
         acceleration: acceleration, m/s².
         jerk: jerk, m/s³.
-        heading: tilt-yaw heading, rad, not wrapped. It counts from north, but from the vehicle's
-            heading at the start if `Trajectory.holds_heading` is true.
+        heading: tilt-yaw heading, rad, not wrapped; from north, or from the vehicle's heading at
+            the start if `Trajectory.holds_heading` is true.
         heading_rate: derivative of the heading, rad/s.
     """
 

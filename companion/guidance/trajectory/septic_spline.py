@@ -30,8 +30,8 @@ def _coefficients_from_ends() -> Floats:
 
 
 COEFFICIENTS_FROM_ENDS = _coefficients_from_ends()
-"""Matrix (8, 8) from the states at both ends of a piece to its coefficients. It is exact: its
-entries are multiples of 1/6."""
+"""Matrix (8, 8) from the states at both ends of a piece to its coefficients. Its entries are
+exact: multiples of 1/6."""
 
 
 class SepticSpline:

@@ -95,9 +95,9 @@ def smoothing_spline(
 ) -> SepticSpline:
     """A smoothing spline through the first and last sample: a low-pass filter without delay.
 
-    It minimises ∫ residual² dt + ∫ snap²/ω⁸ dt with ω = 2π·cutoff; the residual is sample minus
-    spline. Its frequency response, without `derivatives`, is 1/(1 + (f/cutoff)⁸): it attenuates an
-    oscillation at half the cutoff by 0.4 %, at a quarter of it by 0.0015 %.
+    The spline minimises ∫ residual² dt + ∫ snap²/ω⁸ dt with ω = 2π·cutoff; the residual is sample
+    minus spline. Without `derivatives` its frequency response is 1/(1 + (f/cutoff)⁸), which
+    attenuates by 0.4 % at half the cutoff, and by 0.0015 % at a quarter.
 
     Args:
         times: (m,), time of each sample, increasing, s.

@@ -120,7 +120,7 @@ class Heading(Protocol):
 
 
 class HeldHeading:
-    """Keeps the heading that the vehicle has at the start, whatever it is."""
+    """Keeps the heading that the vehicle has at the start."""
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Both 0: the heading counts from the heading at the start, and does not change."""

@@ -13,7 +13,6 @@ from companion.study.lag.flights import (
     EXAMPLE_ERRORS_HZ,
     FINE_ERRORS,
     METHODS,
-    NO_ERROR,
     RATES_HZ,
     SHOWN_RATE_HZ,
     Comparison,
@@ -137,7 +136,7 @@ def _draw_cross_tracks(
         axes.plot(values, cross_tracks, marker=".", **method.line_style)
     axes.fill_between(
         values,
-        [comparison.model_following_scores[NO_ERROR].cross_track for comparison in comparisons],
+        [comparison.cross_track for comparison in comparisons],
         [comparison.worst_cross_track for comparison in comparisons],
         **_SHADE,
         label="model-following, wrong lag and dead time",
@@ -189,12 +188,10 @@ def _draw_errors(axes: Axes, scores: dict[DelayMismatch, Score]) -> None:
 def _draw_inner_loop_errors(axes: Axes, complete: CompleteLoopFlights) -> None:
     comparison = complete.by_rate[SHOWN_RATE_HZ]
     _draw_errors(axes, comparison.model_following_scores)
-    other = comparison.best_other
-    cross_track = comparison.other_scores[other].cross_track
+    cross_track = comparison.best_other_cross_track
     axes.axhline(cross_track, **LIMIT_STYLE)
-    axes.annotate(
-        f"{other.label}, the best of the others", (50, cross_track), ha="right", va="bottom"
-    )
+    label = f"{comparison.best_other.label}, the best of the others"
+    axes.annotate(label, (50, cross_track), ha="right", va="bottom")
     axes.set(
         title=f"Wrong lag and dead time, complete inner loop, {SHOWN_RATE_HZ:.0f} Hz",
         ylim=(0.0, 1.1 * max(cross_track, comparison.worst_cross_track)),

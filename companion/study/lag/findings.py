@@ -2,13 +2,11 @@
 
 from companion.study.lag.flights import (
     MAX_TILT_RATE,
-    NO_ERROR,
     SHOWN_RATE_HZ,
     CompleteLoopFlights,
     DelayMismatch,
     Example,
     Grid,
-    GridCell,
     score,
 )
 from companion.study.measures import largest_tilt_rate
@@ -80,29 +78,21 @@ def _example_findings(example: Example) -> tuple[Finding, Finding, Finding]:
 
 
 def _grid_finding(grid: Grid) -> Finding:
-    def ratio(cell: GridCell) -> float:
-        comparison = grid[cell]
-        return (
-            comparison.model_following_scores[NO_ERROR].cross_track
-            / comparison.other_scores[comparison.best_other].cross_track
-        )
-
-    closest = max(grid, key=ratio)
-    largest = max(
-        comparison.model_following_scores[NO_ERROR].cross_track for comparison in grid.values()
-    )
+    ratios = {cell: each.cross_track / each.best_other_cross_track for cell, each in grid.items()}
+    closest = max(ratios, key=lambda cell: ratios[cell])
+    largest = max(comparison.cross_track for comparison in grid.values())
     return Finding(
         "ours",
         "With the true lag and dead time model-following is the straightest over the whole grid.",
-        ratio(closest) < 1.0,
+        ratios[closest] < 1.0,
         f"Its cross-track is at most {largest:.2g}. Compared with the best other method it is"
-        f" largest at {closest}: {ratio(closest):.2g} times as much.",
+        f" largest at {closest}: {ratios[closest]:.2g} times as much.",
     )
 
 
 def _wrong_delays_finding(grid: Grid) -> Finding:
     worst_cell = max(grid, key=lambda cell: grid[cell].ratio)
-    comparison, other = grid[worst_cell], grid[worst_cell].best_other
+    comparison = grid[worst_cell]
     worse_cells = [cell for cell, cell_comparison in grid.items() if cell_comparison.ratio >= 1.0]
     where = (
         f", from {min(cell.dead_time_ms for cell in worse_cells)} ms of dead time on"
@@ -116,9 +106,8 @@ def _wrong_delays_finding(grid: Grid) -> Finding:
         not worse_cells,
         f"Worse than the best other method in {len(worse_cells)} of {len(grid)} cells{where}."
         f" The largest ratio is at {worst_cell}, with {comparison.worst_error}:"
-        f" {comparison.worst_cross_track:.2g} against"
-        f" {comparison.other_scores[other].cross_track:.2g} of"
-        f" {other.label}.",
+        f" {comparison.worst_cross_track:.2g} against {comparison.best_other_cross_track:.2g} of"
+        f" {comparison.best_other.label}.",
     )
 
 
@@ -161,11 +150,7 @@ def _complete_loop_findings(
             "ours",
             "With the complete inner loop and transport delay model-following is the straightest"
             " at every sample rate.",
-            all(
-                rate_comparison.model_following_scores[NO_ERROR].cross_track
-                < rate_comparison.other_scores[rate_comparison.best_other].cross_track
-                for rate_comparison in by_rate.values()
-            ),
+            all(each.cross_track < each.best_other_cross_track for each in by_rate.values()),
             f"Cross-track at {SHOWN_RATE_HZ:.0f} Hz {cross_tracks[MODEL_FOLLOWING_METHOD]:.2g};"
             f" first-order {cross_tracks[PROPOSED]:.2g}, quaternion"
             f" {cross_tracks[QUATERNION]:.2g}.",
@@ -176,9 +161,8 @@ def _complete_loop_findings(
             " lag and dead time wrong by up to ±50 %.",
             comparison.ratio < 1.0,
             f"The largest ratio is at {worst_rate:.0f} Hz, with {comparison.worst_error}:"
-            f" {comparison.worst_cross_track:.2g} against"
-            f" {comparison.other_scores[comparison.best_other].cross_track:.2g} of"
-            f" {comparison.best_other.label}.",
+            f" {comparison.worst_cross_track:.2g} against {comparison.best_other_cross_track:.2g}"
+            f" of {comparison.best_other.label}.",
         ),
         Finding(
             "ours",

@@ -27,8 +27,7 @@ MAX_TILT_RATE = pi / 2.0
 """Limit W_M of the tilt rate √(ω_x² + ω_y²) in the flights with a limit, rad/s."""
 
 COMPLETE_LOOP = InnerLoop(transport_delay=0.02)
-SHOWN_RATE_HZ = 250.0
-"""Sample rate of the flights with the complete inner loop that the figure shows, Hz."""
+SHOWN_RATE_HZ = 250.0  # sample rate of the flights with the complete inner loop in the figure
 
 
 class DelayMismatch(NamedTuple):
@@ -48,8 +47,7 @@ class DelayMismatch(NamedTuple):
 
 NO_ERROR = DelayMismatch(0.0, 0.0)
 GRID_ERRORS = (-0.5, 0.0, 0.5)
-FINE_ERRORS = (-0.5, -0.3, 0.0, 0.3, 0.5)
-"""Relative errors of lag and dead time, in the example and with the complete inner loop."""
+FINE_ERRORS = (-0.5, -0.3, 0.0, 0.3, 0.5)  # in the example and with the complete inner loop
 
 
 class RateLoopDelays(NamedTuple):
@@ -95,8 +93,7 @@ class Comparison(NamedTuple):
     other_scores: dict[Method, Score]
     """Score of each method of `LAW_METHODS`."""
     model_following_scores: dict[DelayMismatch, Score]
-    """Score of model-following for each error of its assumed lag and dead time, `NO_ERROR`
-    included."""
+    """Score of model-following for each error of its lag and dead time, also for `NO_ERROR`."""
 
     @property
     def by_method(self) -> dict[Method, Score]:
@@ -107,6 +104,16 @@ class Comparison(NamedTuple):
     def best_other(self) -> Method:
         """The method of `LAW_METHODS` with the smallest cross-track error."""
         return min(self.other_scores, key=lambda method: self.other_scores[method].cross_track)
+
+    @property
+    def best_other_cross_track(self) -> float:
+        """Smallest cross-track error of the methods of `LAW_METHODS`."""
+        return self.other_scores[self.best_other].cross_track
+
+    @property
+    def cross_track(self) -> float:
+        """Cross-track error of model-following with the true lag and dead time."""
+        return self.model_following_scores[NO_ERROR].cross_track
 
     @property
     def worst_error(self) -> DelayMismatch:
@@ -121,24 +128,19 @@ class Comparison(NamedTuple):
 
     @property
     def ratio(self) -> float:
-        """`worst_cross_track` divided by the cross-track error of `best_other`.
-
-        Below 1 model-following is better.
-        """
-        return self.worst_cross_track / self.other_scores[self.best_other].cross_track
+        """`worst_cross_track` / `best_other_cross_track`; below 1 model-following is better."""
+        return self.worst_cross_track / self.best_other_cross_track
 
 
 class GridCell(NamedTuple):
     """Conditions of a comparison in the grid: sample rate, dead time and lag of the rate loop."""
 
-    sample_rate_hz: float
+    rate_hz: float
     dead_time_ms: int
     lag_ms: int
 
     def __str__(self) -> str:
-        return (
-            f"dead time {self.dead_time_ms} ms, lag {self.lag_ms} ms, {self.sample_rate_hz:.0f} Hz"
-        )
+        return f"dead time {self.dead_time_ms} ms, lag {self.lag_ms} ms, {self.rate_hz:.0f} Hz"
 
 
 Grid = dict[GridCell, Comparison]
@@ -152,8 +154,7 @@ class Example(NamedTuple):
     rate_limited_responses: dict[float, Response]
     """Responses of model-following with the limit `MAX_TILT_RATE`, by sample rate (Hz)."""
     model_following_scores: dict[DelayMismatch, Score]
-    """Score of model-following for each error of its assumed lag and dead time, at the sample rate
-    `EXAMPLE_ERRORS_HZ`."""
+    """As `Comparison.model_following_scores`, at the sample rate `EXAMPLE_ERRORS_HZ`."""
 
 
 class CompleteLoopFlights(NamedTuple):
@@ -222,8 +223,7 @@ def _error_pairs(errors: tuple[float, ...]) -> list[DelayMismatch]:
 
 def _delays_of(loop: LagLoop) -> RateLoopDelays:
     """The true lag and dead time of a loop that is the same on every axis."""
-    lag, dead_time = 1e-3 * loop.lag_ms, 1e-3 * loop.dead_time_ms
-    return RateLoopDelays(lag, dead_time, lag, dead_time)
+    return RateLoopDelays(*2 * (1e-3 * loop.lag_ms, 1e-3 * loop.dead_time_ms))
 
 
 def _scores_with_errors(

@@ -146,8 +146,7 @@ def _worst_table(grid: Grid) -> Table:
         flown = {dead_time: grid[GridCell(rate, dead_time, lag)] for dead_time in dead_times}
         worst = {f"worst, {ms} ms": each.worst_cross_track for ms, each in flown.items()}
         best_others = {
-            f"best other, {ms} ms": each.other_scores[each.best_other].cross_track
-            for ms, each in flown.items()
+            f"best other, {ms} ms": each.best_other_cross_track for ms, each in flown.items()
         }
         rows.append({"rate, lag": f"{rate:.0f} Hz, {lag} ms", **worst, **best_others})
     return Table(
@@ -201,7 +200,7 @@ def _grid_series(grid: Grid) -> tuple[Table, Table]:
 
     def conditions(cell: GridCell) -> Row:
         times = {"dead time, ms": cell.dead_time_ms, "lag, ms": cell.lag_ms}
-        return {**times, "rate, Hz": cell.sample_rate_hz}
+        return {**times, "rate, Hz": cell.rate_hz}
 
     return (
         Table(

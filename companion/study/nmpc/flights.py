@@ -44,7 +44,7 @@ _STEPS_PER_SAMPLE = STEP_HZ // _PLANNER_HZ
 class Vehicle:
     """A point mass with drag; model-following commands the body rates that its `LagBody` follows.
 
-    It begins at rest, level, at the origin.
+    The vehicle begins at rest, level, at the origin.
 
     Attributes:
         position: m, NED.

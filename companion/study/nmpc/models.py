@@ -62,15 +62,15 @@ def euler(settings: Settings) -> Model:
     heading = _heading(roll, pitch, yaw)
     translation_rates = translation(state[3:6], control[3], axis, heading, constants, settings)
     derivative = ca.vertcat(translation_rates, rotation_rates)
-    aim = ca.SX.sym("aim", 4)
+    reference = ca.SX.sym("reference", 4)
     return Model(
         state=state,
         control=control,
         constants=constants,
         derivative=derivative,
-        attitude_reference=aim,
-        heading_error=yaw - aim[0],
-        attitude_rate_error=control[0:3] - aim[1:4],
+        attitude_reference=reference,
+        heading_error=yaw - reference[0],
+        attitude_rate_error=control[0:3] - reference[1:4],
         target=_first_order_target(state, derivative, axis[0:2], heading, control[3], settings),
         state_of=lambda motion: (
             *motion[:6],
@@ -98,15 +98,15 @@ def euler_reduced(settings: Settings) -> Model:
     heading = _heading(roll, pitch, yaw)
     translation_rates = translation(state[3:6], control[2], axis, heading, constants, settings)
     derivative = ca.vertcat(translation_rates, control[0:2])
-    aim = ca.SX.sym("aim", 2)
+    reference = ca.SX.sym("reference", 2)
     return Model(
         state=state,
         control=control,
         constants=constants,
         derivative=derivative,
-        attitude_reference=aim,
+        attitude_reference=reference,
         heading_error=ca.SX(0, 1),
-        attitude_rate_error=control[0:2] - aim,
+        attitude_rate_error=control[0:2] - reference,
         target=_first_order_target(state, derivative, axis[0:2], heading, control[2], settings),
         state_of=lambda motion: (
             *motion[:6],
@@ -140,16 +140,16 @@ def quaternion(settings: Settings) -> Model:
     heading = 2.0 * ca.atan2(z, w)
     translation_rates = translation(state[3:6], control[3], axis, heading, constants, settings)
     derivative = ca.vertcat(translation_rates, rotation_rates)
-    aim = ca.SX.sym("aim", 5)
+    reference = ca.SX.sym("reference", 5)
     return Model(
         state=state,
         control=control,
         constants=constants,
         derivative=derivative,
-        attitude_reference=aim,
+        attitude_reference=reference,
         # Twice the sine of half the heading error, which is smooth where an angle would jump.
-        heading_error=2.0 * (z * aim[0] - w * aim[1]) / ca.sqrt(w * w + z * z),
-        attitude_rate_error=control[0:3] - aim[2:5],
+        heading_error=2.0 * (z * reference[0] - w * reference[1]) / ca.sqrt(w * w + z * z),
+        attitude_rate_error=control[0:3] - reference[2:5],
         target=_first_order_target(state, derivative, axis[0:2], heading, control[3], settings),
         state_of=lambda motion: (
             *motion[:6],
@@ -224,11 +224,9 @@ def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
 
 def _heading(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
     """Heading of the tilt-yaw decomposition, 2·atan2(z, w), from Euler angles, rad."""
-    coses, sines = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))  # products
-    half = 0.5 * yaw
-    return 2.0 * ca.atan2(
-        coses * ca.sin(half) - sines * ca.cos(half), coses * ca.cos(half) + sines * ca.sin(half)
-    )
+    cos_product, sin_product = (f(0.5 * roll) * f(0.5 * pitch) for f in (ca.cos, ca.sin))
+    c, s = ca.cos(0.5 * yaw), ca.sin(0.5 * yaw)
+    return 2.0 * ca.atan2(cos_product * s - sin_product * c, cos_product * c + sin_product * s)
 
 
 def _euler_near_heading(north: float, east: float, heading: float) -> tuple[float, float, float]:

@@ -48,7 +48,7 @@ def _printed_quaternion_law(
     """ω = 2p·vec(q_d ⊗ q⁻¹), the quaternion method with the attitude error of section 4.2.
 
     vec(q_d ⊗ q⁻¹) = q ⊗ vec(q⁻¹ ⊗ q_d) ⊗ q⁻¹ is the error in the world frame, a misprint for the
-    error in the body frame. Its use as body rates shows the effect of the misprint.
+    error in the body frame. Used as body rates, this error shows the effect of the misprint.
     """
     w, x, y, z = q
     i, j, k = comparison_laws.quaternion(q, target, dt, constants)

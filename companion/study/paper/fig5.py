@@ -53,9 +53,9 @@ def run(tick: Tick) -> Outcome:
         conditions=(
             "The step of figure 2 through a PI rate loop with feed-forward and saturation, rotor"
             " lag, aerodynamic damping and a rigid body with gyroscopic torque; 8 headings. The"
-            " result depends on the speed of that loop. It is flown with two: the bundled vehicle,"
-            " which responds as measured on a PX4 (a step of the roll rate reaches 63 % after"
-            f" {1e3 * measured.time_63:.0f} ms), and one with all times {QUICK_FACTOR} times"
+            " result depends on the speed of that loop, so two loops are flown: that of the bundled"
+            " vehicle, which responds as measured on a PX4 (a step of the roll rate reaches 63 %"
+            f" after {1e3 * measured.time_63:.0f} ms), and one with all times {QUICK_FACTOR} times"
             f" shorter ({1e3 * quick.time_63:.0f} ms)."
         ),
         figure=_figure(quick, measured, sweep),

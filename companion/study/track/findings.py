@@ -41,7 +41,7 @@ def find(flights: TrackedFlights) -> tuple[Finding, ...]:
             flights,
             "In still air no planner has a smaller position error by telemetry than"
             " model-following.",
-            _rms_error_in_telemetry,
+            lambda flight: flight.telemetry_error.rms,
         ),
         _smallest_error_finding(
             flights,
@@ -52,11 +52,6 @@ def find(flights: TrackedFlights) -> tuple[Finding, ...]:
         *(_lead_finding(flights, wind) for wind in (CALM, WINDY)),
         _required_errors_finding(flights),
     )
-
-
-def _rms_error_in_telemetry(flight: TrackedFlight) -> float:
-    """RMS error of the position that guidance received, m."""
-    return flight.telemetry_error.rms
 
 
 def _smallest_error_finding(
@@ -100,7 +95,7 @@ def _smallest_error_finding(
 def _wind_finding(flights: TrackedFlights) -> Finding:
     pairs = {
         trajectory: tuple(
-            _rms_error_in_telemetry(flights[Task(trajectory, planner, wind=WINDY)])
+            flights[Task(trajectory, planner, wind=WINDY)].telemetry_error.rms
             for planner in (MODEL_FOLLOWING, FIRST_ORDER)
         )
         for trajectory in TRAJECTORIES
@@ -124,9 +119,8 @@ def _lead_finding(flights: TrackedFlights, wind: float) -> Finding:
     ratios = {}
     for trajectory in (CIRCLE_AT_5, EIGHT_AT_5):
         task = Task(trajectory, MODEL_FOLLOWING, LINEAR, wind)
-        ratios[trajectory] = _rms_error_in_telemetry(
-            flights[task._replace(lead=False)]
-        ) / _rms_error_in_telemetry(flights[task])
+        without_lead, with_lead = flights[task._replace(lead=False)], flights[task]
+        ratios[trajectory] = without_lead.telemetry_error.rms / with_lead.telemetry_error.rms
     return Finding(
         "ours",
         f"At 5 m/s in {f'{wind:g} m/s of wind' if wind else 'still air'} the error without lead is"
@@ -137,7 +131,7 @@ def _lead_finding(flights: TrackedFlights, wind: float) -> Finding:
 
 
 def _required_errors_finding(flights: TrackedFlights) -> Finding:
-    errors_m = {task: _rms_error_in_telemetry(flights[task]) for task in _LARGEST_ERRORS_M}
+    errors_m = {task: flights[task].telemetry_error.rms for task in _LARGEST_ERRORS_M}
     errors = (
         f"{task}: {_in_mm(errors_m[task])} of {_in_mm(limit)}"
         for task, limit in _LARGEST_ERRORS_M.items()

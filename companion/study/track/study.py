@@ -57,9 +57,9 @@ def run(tick: Tick) -> Outcome:
             f" north, with gusts of {GUST_SHARE * WINDY:g} m/s (standard deviation, north and"
             " east). All flights have the same seed, so the same noise and the same gusts; with"
             " another seed the differences between planners change by at most 0.2 mm. The error by"
-            " telemetry is that of the position that guidance receives, 10 ms late. In truth the"
-            " vehicle is 10 ms ahead of it, so a planner that lags by 10 ms has a smaller true"
-            " error."
+            " telemetry is that of the position that guidance receives, 10 ms late. The vehicle is"
+            " in truth 10 ms ahead of this position, so a planner that lags by 10 ms has a smaller"
+            " true error."
         ),
         figure=draw_figure(flights),
         caption=CAPTION,
