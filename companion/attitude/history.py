@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 _ROWS_PER_DROP = 64
-"""Number of rows of a `History` that are dropped together when they are older than `max_delay`."""
+"""Number of rows of a `RowHistory` that are dropped together when older than `max_delay`."""
 
 
 def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
@@ -60,7 +60,7 @@ class PlannedYaw(NamedTuple):
 Row = TypeVar("Row", PlannedTilt, PlannedYaw)
 
 
-class History(Generic[Row]):
+class RowHistory(Generic[Row]):
     """Rows of a plan, each for one time; the plan between them is interpolated linearly.
 
     Args:
@@ -133,8 +133,8 @@ class PlanHistory:
         self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
         max_delay = max(dead_time, yaw_dead_time) + longest_period
         self.time = 0.0
-        self.tilt: History[PlannedTilt] = History(max_delay)
-        self.yaw: History[PlannedYaw] = History(max_delay)
+        self.tilt: RowHistory[PlannedTilt] = RowHistory(max_delay)
+        self.yaw: RowHistory[PlannedYaw] = RowHistory(max_delay)
         self._heading_change_plan: PlannedTilt | None = None
         self._heading_change = HeadingChange(0.0, 0.0)  # when `_heading_change_plan` takes effect
 

@@ -8,9 +8,9 @@ import casadi as ca
 
 from companion.nmpc.model import (
     Conditions,
-    Floats,
     Model,
     Motion,
+    Numbers,
     constants_symbols,
     own_constant,
     translation,
@@ -45,7 +45,7 @@ def coefficient_model(settings: Settings) -> Model:
     speeds, commanded_rates = symbols.state[9:11], symbols.commanded_rates(settings)
     longest_target = own_constant(symbols.constants)
 
-    def constants_of(conditions: Conditions, start: Motion) -> Floats:
+    def constants_of(conditions: Conditions, start: Motion) -> Numbers:
         return *conditions, max(sin(settings.max_tilt), hypot(start.north, start.east))
 
     return symbols.model(
@@ -99,7 +99,7 @@ class Symbols:
         *,
         derivative: ca.SX,
         bounded_terms: ca.SX,
-        constants_of: Callable[[Conditions, Motion], Floats],
+        constants_of: Callable[[Conditions, Motion], Numbers],
     ) -> Model:
         """Make the `Model`; the arguments are its terms that these symbols do not determine."""
         attitude_reference, size = ca.SX.sym("attitude_reference", 4), self.state.numel()

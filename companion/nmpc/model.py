@@ -10,7 +10,7 @@ from companion.drag import Drag, axis_drag_deceleration
 from companion.nmpc.reference import Node
 from companion.nmpc.settings import Settings
 
-Floats = Sequence[float]
+Numbers = Sequence[float]
 
 
 class Motion(NamedTuple):
@@ -79,13 +79,13 @@ class Model:
     specific thrust."""
     bounded_terms: ca.SX
     """Terms that must stay between −1 and 1 in every step of the horizon."""
-    state_of: Callable[[Motion], Floats]
+    state_of: Callable[[Motion], Numbers]
     """Function: motion → numbers for `state`."""
-    constants_of: Callable[[Conditions, Motion], Floats]
+    constants_of: Callable[[Conditions, Motion], Numbers]
     """Function: conditions, and motion at the start of the horizon → numbers for `constants`."""
-    attitude_reference_of: Callable[[Node], Floats]
+    attitude_reference_of: Callable[[Node], Numbers]
     """Function: node of the reference → numbers for `attitude_reference`."""
-    control_of: Callable[[Node], Floats]
+    control_of: Callable[[Node], Numbers]
     """Function: node of the reference → the `control` that keeps the vehicle on the reference."""
 
 

@@ -142,7 +142,7 @@ def _bounds_of_constraints(model: Model, settings: Settings) -> tuple[Floats, Fl
     return -upper, upper
 
 
-class Solution(NamedTuple):
+class SolverResult(NamedTuple):
     """Result of one solve."""
 
     unknowns: Floats
@@ -161,7 +161,7 @@ class SqpSolver:
         self._program = transcribe(model, settings)
         self._solver = _sqp_function(self._program, settings.iterations)
 
-    def solve(self, guess: Floats, parameters: Floats) -> Solution:
+    def solve(self, guess: Floats, parameters: Floats) -> SolverResult:
         """Solve from a guess, whose first state is the fixed start of the plan.
 
         Args:
@@ -179,7 +179,7 @@ class SqpSolver:
             ubg=program.g_upper,
         )
         stats = self._solver.stats()
-        return Solution(
+        return SolverResult(
             np.asarray(result["x"], dtype=np.float64).ravel(),
             bool(stats["success"]) or stats["unified_return_status"] == _ITERATION_LIMIT,
             int(stats["iter_count"]),

@@ -21,9 +21,9 @@ from companion.attitude.rotation import attitude_of, euler_angles
 from companion.nmpc.coefficient_model import Symbols, coefficient_model
 from companion.nmpc.model import (
     Conditions,
-    Floats,
     Model,
     Motion,
+    Numbers,
     constants_symbols,
     own_constant,
     translation,
@@ -176,7 +176,7 @@ MODEL_MAKERS: dict[ModelName, Callable[[Settings], Model]] = {
 """The function that makes each model."""
 
 
-def _conditions_only(conditions: Conditions, _start: Motion) -> Floats:
+def _conditions_only(conditions: Conditions, _start: Motion) -> Numbers:
     """The constants of a model that has no other constants than `Conditions`."""
     return conditions
 
