@@ -139,7 +139,7 @@ class ModelFollowingPlanner:
         if plausible is not None:  # an unpredicted yaw rate is assumed to last this long
             unpredicted_yaw_rate = plausible.yaw - yaw_plan.body_yaw_rate
             heading += (forward.dead_time + forward.lag) * unpredicted_yaw_rate
-        start_heading = heading + tilt_plan.heading_hold_angle - yaw_plan.body_yaw
+        start_heading = heading + (tilt_plan.heading_hold_angle - yaw_plan.body_yaw)
         lead = forward.target_frame.lead(start_heading, forward.plans)
         roll, pitch, yaw = self._advance(target, start_heading, feedback_yaw + turn_rate)
         roll, pitch = self._sample_hold.rates(roll, pitch)
