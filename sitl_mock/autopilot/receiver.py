@@ -96,16 +96,8 @@ class Receiver:
         x, y = float(message.x), float(message.y)
         if message.frame in _GLOBAL_FRAMES:
             x, y = (nan if value == 2**31 - 1 else value / 1e7 for value in (x, y))
-        parameters = (
-            message.param1,
-            message.param2,
-            message.param3,
-            message.param4,
-            x,
-            y,
-            message.z,
-        )
-        self._run(Command(message.command, parameters), message, link)
+        first_four = message.param1, message.param2, message.param3, message.param4
+        self._run(Command(message.command, (*first_four, x, y, message.z)), message, link)
 
     def _set_mode(self, message: Message, link: Link) -> None:
         custom_mode = message.custom_mode

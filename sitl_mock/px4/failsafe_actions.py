@@ -132,12 +132,10 @@ class FailsafeActions:
                 intended_mode, next_action.number, delay, cause.number
             )
             self._announce(EventKind.FAILSAFE_HOLD, str(delay), arguments)
-        elif cause.number:
-            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, cause.number)
-            self._announce(EventKind.FAILSAFE, "", arguments)
         else:
-            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, 0)
-            self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
+            kind = EventKind.FAILSAFE if cause.number else EventKind.FAILSAFE_UNNAMED
+            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, cause.number)
+            self._announce(kind, "", arguments)
 
     def act_on_link_loss(self, cause: Cause, parameter: str, lost_at_us: int) -> None:
         """Execute the action that a parameter selects; before RTL or LAND, hold for COM_FAIL_ACT_T.
