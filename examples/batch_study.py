@@ -1,8 +1,8 @@
 """Compare planners without memory at all headings at once: how straight does a step run?
 
 72 vehicles, each at another heading, fly the step of the paper's figure 2. A linear response
-moves the acceleration coefficients on a straight line. Printed: the largest distance from that
-line, at the best and at the worst heading. With numba (extra `study`) large batches are compiled.
+moves the acceleration coefficients on a straight line. The program prints the largest distance from
+this line, at the best and at the worst heading. numba (extra `study`) compiles large batches.
 
 Run: python examples/batch_study.py
 """

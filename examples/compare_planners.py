@@ -1,9 +1,9 @@
 """Compare planners on one vehicle: which one flies straight steps behind a real rate loop?
 
 Each planner flies the corners of the paper's figure 2 on the mock vehicle, whose rate loop is as
-slow as PX4's. Printed: the largest distance from the straight line of a step. In the ideal case of
-`batch_study.py` the paper's law flies straight; here only the planner that knows the rate loop
-does.
+slow as PX4's. The program prints the largest distance from the straight line of a step. In the
+ideal case of `batch_study.py` the paper's law flies straight; here only the planner that predicts
+the rate loop does.
 
 Run: python examples/compare_planners.py
 """

@@ -1,7 +1,7 @@
 """Make a configuration in Python: check it, see what it changes, and write it as a YAML file.
 
-A configuration is checked as a whole, wherever it comes from. A wrong key or value is a
-`ConfigError` whose text says what is wrong, where, and what was probably meant.
+A configuration from any source is checked as a whole. A wrong key or value raises a `ConfigError`
+whose text says what is wrong, where, and what was probably meant.
 
 Run: python examples/configure_in_code.py   (writes indoor.yaml)
 """

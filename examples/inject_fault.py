@@ -1,8 +1,8 @@
 """Inject a fault in flight and see what follows: the GPS fix is lost in a hover.
 
-Program and mock vehicle fly in this process, on the vehicle's own clock: a flight takes a second or
+Program and mock vehicle run in this process, on the vehicle's own clock: a flight takes a second or
 two, opens no socket, and is the same to the bit each time. docs/mock-vehicle.md lists the faults,
-docs/safety.md what must follow from each.
+docs/safety.md the effect of each fault.
 
 Run: python examples/inject_fault.py
 """

@@ -1,8 +1,8 @@
-"""Use the control law in a loop of your own: a rigid body in NumPy, no autopilot, no MAVLink.
+"""Use the control law in your own loop: a rigid body in NumPy, no autopilot, no MAVLink.
 
 The planner gets an attitude and a target, and returns body rates. The vehicle follows the rates
-with a lag of 20 ms. Printed: the acceleration coefficients (horizontal acceleration per specific
-thrust) on their way to the target, beside the first-order model that they should follow.
+with a lag of 20 ms. The program prints the acceleration coefficients (horizontal acceleration per
+specific thrust) during the step, beside the first-order model that they should follow.
 
 Run: python examples/law_in_a_loop.py
 """

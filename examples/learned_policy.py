@@ -1,7 +1,7 @@
 """A policy shaped like a learned one: observations in, body rates out, 50 times a second.
 
-The network here is one linear layer, fitted below to a hand-written controller; put your own
-weights in. The program limits its rates, holds the height, and watches by its safety monitors.
+The network here is one linear layer, fitted below to a hand-written controller; use your own
+weights instead. The program limits its rates and holds the height; the safety monitors are active.
 
 Run: python examples/learned_policy.py
 """

@@ -1,6 +1,6 @@
 """Your own guidance as a coroutine: chase a moving point in wind, by accelerations alone.
 
-This code decides at each attitude sample how to accelerate; the vehicle does so with its known
+This code commands an acceleration at each attitude sample; the vehicle follows with its known
 linear response. If this code stalls or raises, the program holds the vehicle and hands it back. On
 a real vehicle: `companion.connect("configs/px4.yaml")` and `companion.run`.
 

@@ -1,7 +1,7 @@
 """Write a control law of your own, and compare it with the paper's.
 
-This law turns the thrust axis the shortest way to where the target wants it, and leaves the heading
-alone. A law is arithmetic on plain floats: one function flies a vehicle and is mapped over many.
+This law rotates the thrust axis the shortest way to the target, and does not control the heading.
+A law is arithmetic on plain floats, so the same function flies one vehicle or a batch.
 docs/extending.md says how a law gets a name and flies a vehicle.
 
 Run: python examples/own_planner.py

@@ -13,7 +13,7 @@ from companion.guidance.trajectory import Envelope, Sample, slow_down, violation
 
 
 class Hop:
-    """8 m north over a height of 2 m, from rest to rest; NED, relative to where it begins."""
+    """8 m north, with a climb of 2 m on the way, from rest to rest; NED, relative to the start."""
 
     name = "hop"
     holds_heading = True  # the heading at the start; `heading` of a sample is then 0
@@ -25,7 +25,7 @@ class Hop:
         self._axes = [[axis.deriv(k) for axis in (north, Polynomial([0.0]), -up)] for k in range(4)]
 
     def at(self, time: float) -> Sample:
-        """Position, velocity, acceleration and jerk `time` seconds after the beginning."""
+        """Position, velocity, acceleration and jerk `time` seconds after the start."""
         t = min(max(time, 0.0), self.duration)
         return Sample(*(tuple(float(axis(t)) for axis in row) for row in self._axes), 0.0, 0.0)
 

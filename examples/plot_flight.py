@@ -1,7 +1,7 @@
 """Plot what a flight recorded: the position beside its reference, and the tracking error.
 
-`companion plot FOLDER` draws more. Begin here for a figure of your own: `read_flight` returns each
-channel of a flight as a NumPy array with named columns. Needs the extra `plot`.
+`companion plot FOLDER` draws more. For your own figure, start from this program: `read_flight`
+returns each channel of a flight as a NumPy array with named columns. Needs the extra `plot`.
 
 Run: python examples/plot_flight.py [FOLDER]   (writes flight.png)
 """

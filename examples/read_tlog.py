@@ -1,7 +1,7 @@
-"""Read the `.tlog` of a flight with pymavlink: what came how often, the modes, and the texts.
+"""Read the `.tlog` of a flight with pymavlink: message rates, modes and texts.
 
-A `.tlog` holds MAVLink in both directions, each frame behind 8 bytes of its time. MAVProxy and
-QGroundControl replay it; here it is read in Python.
+A `.tlog` holds MAVLink in both directions; 8 bytes of time precede each frame. MAVProxy and
+QGroundControl replay it; this program reads it in Python.
 
 Run: python examples/read_tlog.py [FOLDER]
 """

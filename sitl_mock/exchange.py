@@ -97,10 +97,11 @@ class Exchange:
         )
 
     def repeats_answer(self, messages: list[Message]) -> bool:
-        """Whether a datagram is only a second answer to an earlier beacon, which was sent twice.
+        """Whether a datagram is only a repeated answer to an earlier beacon.
 
-        The number of beacons depends on the wall clock. The link faults draw a random number for
-        each datagram, so a second answer would make the flight depend on the wall clock, too.
+        The companion answers a beacon twice if the server sent the beacon twice, which depends on
+        the wall clock. The link faults draw a random number for each datagram. With the repeated
+        answer, these random numbers would depend on the wall clock.
         """
         now_ms = self._simulation.time_us // 1000
         return (

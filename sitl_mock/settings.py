@@ -7,10 +7,10 @@ import yaml
 from pydantic import ValidationError, ValidationInfo, field_validator, model_validator
 
 from sitl_mock.autopilot.parameters import ParameterRefusedError, ParameterTable
+from sitl_mock.autopilots import AUTOPILOTS
 from sitl_mock.config.section import ConfigError, error_path, explain, suggestion
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.config.yaml_file import Document, FileRefusedError, explain_yaml, load_yaml
-from sitl_mock.personalities import PERSONALITIES
 
 SENSORS_WITH_FILTER = {"position_noise_m": 0.0, "velocity_noise_m_s": 0.0, "position_delay_ms": 0.0}
 """Defaults of ``sensors`` with a navigation filter, whose output is smooth and as recent as the
@@ -26,15 +26,15 @@ class MockSettings(VehicleSettings):
         if not isinstance(section, dict):
             return section
         section = {**section, "sensors": _with_ekf(section)}
-        personality = PERSONALITIES.get(str(section.get("autopilot", "px4")))
-        return section if personality is None else personality.with_defaults(section)
+        autopilot = AUTOPILOTS.get(str(section.get("autopilot", "px4")))
+        return section if autopilot is None else autopilot.with_defaults(section)
 
     @field_validator("parameters")
     @classmethod
     def _known_parameters(
         cls, parameters: dict[str, float], info: ValidationInfo
     ) -> dict[str, float]:
-        known_parameters = PERSONALITIES[info.data.get("autopilot", "px4")].parameters
+        known_parameters = AUTOPILOTS[info.data.get("autopilot", "px4")].parameters
         names = [parameter.name for parameter in known_parameters]
         for name in parameters:
             if name not in names:

@@ -6,16 +6,16 @@ from math import radians
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.faults import FaultEffects, FaultSchedule
+from sitl_mock.autopilot.interface import Autopilot, VehicleParts
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.personality import Personality, VehicleParts
 from sitl_mock.autopilot.receiver import Receiver
 from sitl_mock.autopilot.setpoints import OffboardStream
 from sitl_mock.autopilot.stamp_slips import StampSlips
 from sitl_mock.autopilot.state import State
+from sitl_mock.autopilots import AUTOPILOTS
 from sitl_mock.link.framing import Framer, Message
 from sitl_mock.link.link import Link
 from sitl_mock.link.signing import link_signing
-from sitl_mock.personalities import PERSONALITIES
 from sitl_mock.physics.geodesy import Geodetic
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import Plant, PythonPlant
@@ -46,9 +46,9 @@ class Simulation:
     def __init__(
         self, settings: MockSettings, system_id: int = 1, plant: type[Plant] = PythonPlant
     ) -> None:
-        personality = PERSONALITIES[settings.autopilot]
-        overrides = {personality.system_id_parameter: float(system_id), **settings.parameters}
-        self.parameters = ParameterTable(personality.parameters, overrides)
+        autopilot = AUTOPILOTS[settings.autopilot]
+        overrides = {autopilot.system_id_parameter: float(system_id), **settings.parameters}
+        self.parameters = ParameterTable(autopilot.parameters, overrides)
         home = settings.home
         self.vehicle = Vehicle(
             settings.airframe,
@@ -61,20 +61,20 @@ class Simulation:
             plant=plant,
         )
         self.state = State(self.vehicle.estimate())
-        self.state.mode = self.state.intended_mode = personality.boot_mode
+        self.state.mode = self.state.intended_mode = autopilot.boot_mode
         lockstep = settings.lockstep
         self._slot_us = (
-            lockstep.period_ms * 1000 if lockstep.enabled else personality.slot_period_us(settings)
+            lockstep.period_ms * 1000 if lockstep.enabled else autopilot.slot_period_us(settings)
         )
         self._slot_count = 0
         self._physics_rate_hz = settings.airframe.physics_rate_hz
         self._next_commander_us = 0
         self.stream = OffboardStream()
-        self.companion, self.gcs = _make_links(settings, personality, system_id)
+        self.companion, self.gcs = _make_links(settings, autopilot, system_id)
         self.links = [self.companion] + ([self.gcs] if settings.gcs_port else [])
         signed = settings.signing is not None
         self._beacon_framer = Framer(system_id, 1, signed=signed)
-        self._behaviour = personality.behaviour(
+        self._behaviour = autopilot.behaviour(
             VehicleParts(
                 self.state,
                 self.parameters,
@@ -91,7 +91,7 @@ class Simulation:
         self.effects = FaultEffects(
             self.state, self.vehicle, self.commander, self._behaviour.control, self.links
         )
-        self._receiver = Receiver(self.state, self._behaviour, personality, system_id)
+        self._receiver = Receiver(self.state, self._behaviour, autopilot, system_id)
 
     @property
     def time_us(self) -> int:
@@ -179,17 +179,15 @@ class Simulation:
                     link.send(message)
 
 
-def _make_links(
-    settings: MockSettings, personality: Personality, system_id: int
-) -> tuple[Link, Link]:
+def _make_links(settings: MockSettings, autopilot: Autopilot, system_id: int) -> tuple[Link, Link]:
     signing = settings.signing
 
     def link(name: str) -> Link:
         return Link(
             name,
             Framer(system_id, 1, signed=signing is not None),
-            personality.streams(name, settings),
-            link_signing(signing, name, unsigned_links=personality.unsigned_links),
+            autopilot.streams(name, settings),
+            link_signing(signing, name, unsigned_links=autopilot.unsigned_links),
         )
 
     return link("companion"), link("gcs")

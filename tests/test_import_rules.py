@@ -33,7 +33,7 @@ FORBIDDEN = [
     ("sitl_mock/physics/sensors.py", "sitl_mock.autopilot.state"),
     ("sitl_mock/physics/rotors.py", "sitl_mock.link.framing"),
     ("sitl_mock/settings.py", "sitl_mock.px4.parameters"),
-    ("sitl_mock/autopilot/state.py", "sitl_mock.autopilot.personality"),
+    ("sitl_mock/autopilot/state.py", "sitl_mock.autopilot.interface"),
     ("companion/flight/watch.py", "sitl_mock.physics.rigid_body"),
     ("companion/attitude/limits.py", "companion.guidance"),
     ("companion/guidance/feedback.py", "asyncio"),
@@ -51,7 +51,7 @@ FORBIDDEN = [
 ]
 """File, and what it may not import."""
 
-CIRCLES = {"sitl_mock/autopilot/state.py": ".state -> .personality"}
+CIRCLES = {"sitl_mock/autopilot/state.py": ".state -> .interface"}
 """How the report names the import that closes a circle."""
 
 

@@ -1,4 +1,4 @@
-"""The tests of a planner package: is its planner fit to fly, and is it found by its name?
+"""The tests of a planner package: may the planner fly, and does its name select it?
 
 `mock_vehicle` is a pytest fixture of mavlink-companion.
 """

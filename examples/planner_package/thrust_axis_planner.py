@@ -1,6 +1,6 @@
-"""A planner as a package of its own: `planner: {name: thrust-axis}` flies it.
+"""A planner in a separate package: `planner: {name: thrust-axis}` flies it.
 
-It turns the thrust axis the shortest way to the target, and leaves the heading alone.
+The planner rotates the thrust axis the shortest way to the target; it does not control the heading.
 """
 
 from math import sqrt

@@ -10,7 +10,7 @@ from sitl_mock.autopilot.position_control import (
     PositionGains,
     PositionOutput,
 )
-from sitl_mock.autopilot.state import PositionTargetEcho, State
+from sitl_mock.autopilot.state import PositionTarget, State
 from sitl_mock.physics.quaternion import Quaternion, Vector, yaw
 from sitl_mock.physics.rigid_body import GRAVITY
 
@@ -87,7 +87,7 @@ class PositionHold:
         self.point = (x + STOPPING_S * vx, y + STOPPING_S * vy)
         self.yaw = yaw(estimate.q)
         self.climb_profile.begin(-z, -vz)
-        # A vehicle that leans against the wind goes on leaning: the real one drifts by 0.03 m.
+        # The integrals start at the lean against the wind: a real vehicle drifts by only 0.03 m.
         self._controller.reset((0.0, 0.0) if self._state.landed else lean_acceleration(estimate.q))
 
     def shift(self, yaw_step: float, position_step: Vector) -> None:
@@ -121,7 +121,7 @@ class PositionHold:
         state = self._state
         estimate = state.estimate
         output = self._controller.step(demand, estimate.position_ned, estimate.velocity_ned, dt)
-        state.position_target = PositionTargetEcho(
+        state.position_target = PositionTarget(
             True, demand.position, output.velocity, output.acceleration, demand.yaw
         )
         return output

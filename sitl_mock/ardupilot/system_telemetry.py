@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.ardupilot.boot import Boot
 from sitl_mock.ardupilot.modes import MODE_NUMBERS, base_mode
+from sitl_mock.autopilot.interface import Identity
 from sitl_mock.autopilot.motion_telemetry import Builder
-from sitl_mock.autopilot.personality import Identity
 from sitl_mock.autopilot.state import State
 from sitl_mock.autopilot.system_telemetry import NO_VALUE, SystemTelemetry
 from sitl_mock.link.framing import Message

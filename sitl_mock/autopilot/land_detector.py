@@ -18,7 +18,7 @@ class LandDetector:
     Args:
         hover_thrust: returns the thrust command that hovers, 0..1.
         landed_after_us: contact with low thrust for this time is a landing.
-        is_climbing: returns whether a take-off is under way and has not reached its height.
+        is_taking_off: returns whether a take-off has begun and has not reached its height.
     """
 
     def __init__(
@@ -28,13 +28,13 @@ class LandDetector:
         *,
         hover_thrust: Callable[[], float],
         landed_after_us: int,
-        is_climbing: Callable[[], bool],
+        is_taking_off: Callable[[], bool],
     ) -> None:
         self._state = state
         self._announce = announce
         self._hover_thrust = hover_thrust
         self._landed_after_us = landed_after_us
-        self._is_climbing = is_climbing
+        self._is_taking_off = is_taking_off
         self._resting_since_us = 0
 
     def step(self, *, contact: bool) -> None:
@@ -67,7 +67,7 @@ class LandDetector:
         state = self._state
         if state.landed:
             return Landed.ON_GROUND
-        if self._is_climbing():
+        if self._is_taking_off():
             return Landed.TAKEOFF
         if state.mode is Mode.LAND:
             return Landed.LANDING

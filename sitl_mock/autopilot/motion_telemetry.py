@@ -13,7 +13,7 @@ from sitl_mock.autopilot.setpoints import (
     YAW_IGNORED,
 )
 from sitl_mock.autopilot.stamp_slips import StampSlips
-from sitl_mock.autopilot.state import PositionTargetEcho, State
+from sitl_mock.autopilot.state import PositionTarget, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.geodesy import Geodetic, to_geodetic
 from sitl_mock.physics.quaternion import Vector, euler, to_body, yaw
@@ -215,7 +215,7 @@ class MotionTelemetry:
         return degrees(yaw(self._state.estimate.q)) % 360.0
 
 
-def _type_mask(target: PositionTargetEcho) -> int:
+def _type_mask(target: PositionTarget) -> int:
     """Return the POSITION_TARGET_TYPEMASK of the components that are not controlled."""
     bits = (*POSITION_BITS, *VELOCITY_BITS, *ACCELERATION_BITS, YAW_IGNORED)
     values = (*target.position, *target.velocity, *target.acceleration, target.yaw)

@@ -95,20 +95,16 @@ class ParameterProtocol:
 
     def _send_alone(self, name: str, link: Link) -> None:
         """Send a parameter that is not part of a list."""
-        sends_index = self._encoding.sends_index
-        self._send(
-            name, self._parameters.index_of(name) if sends_index else _NO_INDEX_UNSIGNED, link
+        index = (
+            self._parameters.index_of(name) if self._encoding.sends_index else _NO_INDEX_UNSIGNED
         )
+        self._send(name, index, link)
 
     def _send(self, name: str, index: int, link: Link) -> None:
         value, param_type = self._encoding.to_wire(name, self._parameters[name])
         link.send(
             dialect.MAVLink_param_value_message(
-                name.encode(),
-                value,
-                param_type,
-                len(self._parameters),
-                index,
+                name.encode(), value, param_type, len(self._parameters), index
             )
         )
 

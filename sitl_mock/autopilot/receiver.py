@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.autopilot.commander import DENIED
 from sitl_mock.autopilot.commands import Command
+from sitl_mock.autopilot.interface import Autopilot, Behaviour
 from sitl_mock.autopilot.mission_protocol import MissionProtocol
-from sitl_mock.autopilot.personality import Behaviour, Personality
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
@@ -31,17 +31,17 @@ class Receiver:
     """Calls the handler of every message addressed to this autopilot.
 
     Args:
-        personality: decodes custom modes, and defines which components the autopilot answers for.
+        autopilot: decodes custom modes, and defines which components the autopilot answers for.
     """
 
     def __init__(
-        self, state: State, behaviour: Behaviour, personality: Personality, system_id: int
+        self, state: State, behaviour: Behaviour, autopilot: Autopilot, system_id: int
     ) -> None:
         self.clock_ns: Callable[[], int] = lambda: state.stamp_us * 1000
         """Clock that answers TIMESYNC: vehicle time, ns."""
         self._commander = commander = behaviour.commander
         self._commands = behaviour.commands
-        self._personality = personality
+        self._autopilot = autopilot
         self._system_id = system_id
         self._handlers: dict[str, Callable[[Message, Link], None]] = {
             "SET_ATTITUDE_TARGET": lambda message, _: commander.receive_setpoint(message),
@@ -76,7 +76,7 @@ class Receiver:
         system = getattr(message, "target_system", _BROADCAST)
         component = getattr(message, "target_component", _BROADCAST)
         return system in (_BROADCAST, self._system_id) and (
-            component in (_BROADCAST, _AUTOPILOT_COMPONENT) or self._personality.any_component
+            component in (_BROADCAST, _AUTOPILOT_COMPONENT) or self._autopilot.any_component
         )
 
     def _heartbeat(self, message: Message, link: Link) -> None:
@@ -96,20 +96,12 @@ class Receiver:
         x, y = float(message.x), float(message.y)
         if message.frame in _GLOBAL_FRAMES:
             x, y = (nan if value == 2**31 - 1 else value / 1e7 for value in (x, y))
-        parameters = (
-            message.param1,
-            message.param2,
-            message.param3,
-            message.param4,
-            x,
-            y,
-            message.z,
-        )
-        self._run(Command(message.command, parameters), message, link)
+        first_four = message.param1, message.param2, message.param3, message.param4
+        self._run(Command(message.command, (*first_four, x, y, message.z)), message, link)
 
     def _set_mode(self, message: Message, link: Link) -> None:
         custom_mode = message.custom_mode
-        mode = self._personality.mode_of(custom_mode)
+        mode = self._autopilot.mode_of(custom_mode)
         valid = mode and message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         result = self._commander.request_mode(mode) if mode and valid else DENIED
         self._acknowledge(dialect.MAV_CMD_DO_SET_MODE, result, message, link)

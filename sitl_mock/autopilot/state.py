@@ -47,7 +47,7 @@ class BatteryWarning(IntEnum):
 
 
 @dataclass
-class AttitudeTargetEcho:
+class AttitudeTarget:
     """Setpoint of the attitude and rate controllers, for ATTITUDE_TARGET. rad/s, thrust 0..1."""
 
     q: Quaternion = (1.0, 0.0, 0.0, 0.0)
@@ -56,7 +56,7 @@ class AttitudeTargetEcho:
 
 
 @dataclass
-class PositionTargetEcho:
+class PositionTarget:
     """Setpoint of the position controller, for POSITION_TARGET_LOCAL_NED. NED, SI, yaw in rad."""
 
     active: bool = False
@@ -100,8 +100,8 @@ class State:
     home_q: Quaternion = (1.0, 0.0, 0.0, 0.0)
     home_set_at_us: int = 0
     command: ActuatorCommand = DISARMED_COMMAND
-    attitude_target: AttitudeTargetEcho = field(default_factory=AttitudeTargetEcho)
-    position_target: PositionTargetEcho = field(default_factory=PositionTargetEcho)
+    attitude_target: AttitudeTarget = field(default_factory=AttitudeTarget)
+    position_target: PositionTarget = field(default_factory=PositionTarget)
     height_controlled: bool = False
     """Whether ArduPilot's height controller runs."""
     position_controlled: bool = False

@@ -5,8 +5,8 @@ from math import hypot
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.autopilot.interface import Identity
 from sitl_mock.autopilot.motion_telemetry import Builder, clip
-from sitl_mock.autopilot.personality import Identity
 from sitl_mock.autopilot.state import State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.geodesy import Geodetic, to_geodetic

@@ -11,11 +11,6 @@ _EXAMPLES = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 
 @dataclass(frozen=True)
-class Udp:
-    """UDP; the key ``mock.port`` sets the ports of vehicle and companion."""
-
-
-@dataclass(frozen=True)
 class TcpIn:
     """A TCP port that serves one client."""
 
@@ -30,19 +25,16 @@ class SerialLine:
     path: Path | None
 
 
-EndpointAddress = Udp | TcpIn | SerialLine
-
-
-def parse_endpoint(text: str) -> EndpointAddress:
+def parse_endpoint(text: str) -> TcpIn | SerialLine | None:
     """Read ``udp``, ``tcpin://HOST:PORT``, ``serial://`` or ``serial:///PATH``.
 
-    An empty HOST means 127.0.0.1.
+    An empty HOST means 127.0.0.1. None: UDP, whose ports ``mock.port`` sets.
 
     Raises:
         ValueError: the text is none of these.
     """
     if text == "udp":
-        return Udp()
+        return None
     if text.startswith("serial://"):
         path = text.removeprefix("serial://")
         if not path or path.startswith("/"):

@@ -8,7 +8,6 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.config.section import Finite, Fraction, NonNegative, Positive, Section, suggestion
 
 _MESSAGE_CLASSES = {each.msgname: each for each in dialect.mavlink_map.values()}
-Direction = Literal["to_companion", "from_companion", "both"]
 
 
 def _known_message(name: str) -> str:
@@ -50,7 +49,7 @@ class LinkFault(TimedFault):
     """
 
     kind: Literal["drop", "delay", "duplicate", "reorder", "corrupt"]
-    direction: Direction = "both"
+    direction: Literal["to_companion", "from_companion", "both"] = "both"
     probability: Fraction = 1.0
     """Probability with which the fault affects a datagram."""
     delay_ms: NonNegative = 100.0

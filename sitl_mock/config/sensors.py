@@ -47,8 +47,8 @@ class EkfConfig(Section):
     yaw_time_s: Positive = 15.0
     """Correlation time of the heading error."""
     turn_yaw_ms: Finite = -4.0
-    """Delayed fixes cause a heading error in a turn: minus this time multiplied by the turn rate of
-    the course. The error builds up over seconds, faster at a larger acceleration."""
+    """In a turn, delayed fixes cause a heading error of -``turn_yaw_ms`` times the turn rate of the
+    course. The error builds up over seconds, faster at a larger acceleration."""
     compass_error_deg: Finite = 0.0
     """Heading error that the compass causes without acceleration; an acceleration reduces it."""
     yaw_rate_bias_deg_s: Finite = 0.0
@@ -95,13 +95,14 @@ EKFS: dict[str, EkfConfig | None] = {
         fix_delay_ms=447.0,
         position_late_ms=32.2,
         velocity_late_ms=20.5,
-        # In circles the position's lateness falls by 10 ms and rises again, every 13 to 15 s.
+        # In recorded circles the delay of the position falls by 10 ms, then rises again, every 13
+        # to 15 s.
         fix_slip_ms=12.5,
         position_noise_m=0.005,
         velocity_noise_m_s=0.005,
         tilt_noise_deg=0.006,
-        # The length is 0.14 here, 0.25 to 0.3 in some real flights, and 0.05 to 0.1 in others. So
-        # the height is wrong by as much as in circles at 5 and 8 m/s, where it was 0.25 to 0.3.
+        # Chosen so that the height error equals that of the recorded circles at 5 and 8 m/s. Real
+        # flights had a total tilt of 0.05 to 0.3 degrees; here it is 0.14.
         tilt_bias_deg=(0.12, 0.07),
         yaw_error_deg=0.1,
         turn_yaw_ms=22.7,

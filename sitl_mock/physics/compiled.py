@@ -76,8 +76,8 @@ def _compiled(function: Callable[..., T]) -> Callable[..., T]:
 def _load_and_store(numba_type: Any) -> tuple[Any, Any]:
     """Return compiled functions that load and store a value of a numba type in an array of bytes.
 
-    Law and state stay in such an array, because passing one of them between Python and compiled
-    code costs as much as 20 steps.
+    Constants and state stay in such an array, because passing one of them between Python and
+    compiled code costs as much as 20 steps.
     """
 
     def pointer(context: Any, builder: Any, array_type: Any, array: Any) -> Any:
@@ -108,7 +108,7 @@ _load_sensors, _store_sensors = _load_and_store(numba.typeof(_EXAMPLE_SENSORS))
 
 
 @_compiled
-def _store_start(
+def _store_plant(
     constants_memory: Any, constants: VehicleConstants, state_memory: Any, state: VehicleState
 ) -> None:
     _store_constants(constants_memory, constants)
@@ -172,7 +172,7 @@ class CompiledPlant:
     ) -> None:
         self.constants, self._constants_memory = constants, _memory_for(constants)
         self._state_memory = _memory_for(state)
-        _store_start(self._constants_memory, constants, self._state_memory, state)
+        _store_plant(self._constants_memory, constants, self._state_memory, state)
         self._before_shaping, self._before_rate_loop = (
             np.array(ring) for ring in empty_rings(constants.multirotor)
         )

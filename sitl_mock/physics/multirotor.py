@@ -49,7 +49,7 @@ class Multirotor:
     @property
     def dt(self) -> float:
         """Length of a step, s."""
-        return self.constants.rates.dt
+        return self.constants.rate_loop.dt
 
     @property
     def q(self) -> Quaternion:

@@ -50,7 +50,7 @@ class MultirotorConstants(NamedTuple):
     yaw_torque: float  # N m per throttle difference, about z
     body: Body
     rotors: RotorConstants
-    rates: RateConstants
+    rate_loop: RateConstants
     is_shaping: bool  # whether setpoints are shaped, by `shaping`
     shaping: ShapingConstants
 
@@ -110,14 +110,14 @@ def steady_throttle(constants: MultirotorConstants, specific_thrust: float) -> f
 def initial_actuation(constants: MultirotorConstants, throttle: float) -> Actuation:
     """Return the state of controller and rotors at the start, with rotors at a steady speed."""
     thrust = steady_thrust(constants.rotors, throttle)
-    mixed = allocate(throttle, 0.0, 0.0, 0.0)
-    return mixed, (thrust, thrust, thrust, thrust), ZERO_STATE, INACTIVE_SHAPING
+    allocation = allocate(throttle, 0.0, 0.0, 0.0)
+    return allocation, (thrust, thrust, thrust, thrust), ZERO_STATE, INACTIVE_SHAPING
 
 
 def empty_rings(constants: MultirotorConstants) -> DelayRings:
     """Return ring buffers of zero setpoints, longer than the delays."""
     return DelayRings(
-        [ZERO] * (1 + max(constants.shaping.delays)), [ZERO] * (1 + max(constants.rates.delays))
+        [ZERO] * (1 + max(constants.shaping.delays)), [ZERO] * (1 + max(constants.rate_loop.delays))
     )
 
 
@@ -152,7 +152,7 @@ def drive(
         controlled: whether the rate loop runs; otherwise it idles.
         conditions: battery, wind and attitude error; only the shaping uses the attitude error.
     """
-    mixed, thrusts, axes, shaping = actuation
+    allocation, thrusts, axes, shaping = actuation
     motion, _, angular_acceleration = body
     _, _, _, w, x, y, z, p, q, r = motion
     if constants.is_shaping:
@@ -160,11 +160,11 @@ def drive(
         setpoint, shaping = _shape_setpoint(
             constants, rings, shaping, estimated_q, step, setpoint, controlled
         )
-    setpoint = delay_setpoint(rings.before_rate_loop, constants.rates.delays, step, setpoint)
+    setpoint = delay_setpoint(rings.before_rate_loop, constants.rate_loop.delays, step, setpoint)
     if controlled:
-        _, tilt_saturated, yaw_saturated = mixed
+        _, tilt_saturated, yaw_saturated = allocation
         axes = rate_step(
-            constants.rates,
+            constants.rate_loop,
             axes,
             setpoint,
             (p, q, r),
@@ -174,9 +174,9 @@ def drive(
         )
     else:
         axes = ZERO_STATE
-    mixed = _allocate(constants, axes, throttle)
-    thrusts, wrench = rotor_step(constants.rotors, thrusts, mixed[0], conditions.thrust_factor)
-    return _load(constants, wrench, conditions.wind), (mixed, thrusts, axes, shaping)
+    allocation = _allocate(constants, axes, throttle)
+    thrusts, wrench = rotor_step(constants.rotors, thrusts, allocation[0], conditions.thrust_factor)
+    return _load(constants, wrench, conditions.wind), (allocation, thrusts, axes, shaping)
 
 
 def _shape_setpoint(
@@ -224,7 +224,7 @@ def move(constants: MultirotorConstants, body: Kinematics, load: Load) -> tuple[
     rate_hz = constants.rate_hz
     old_motion = body[0]
     vn, ve, vd, _, _, _, _, p, q, r = old_motion
-    motion, displacement = advance(old_motion, load, constants.body, constants.rates.dt)
+    motion, displacement = advance(old_motion, load, constants.body, constants.rate_loop.dt)
     new_vn, new_ve, new_vd, _, _, _, _, new_p, new_q, new_r = motion
     acceleration = ((new_vn - vn) * rate_hz, (new_ve - ve) * rate_hz, (new_vd - vd) * rate_hz)
     angular_acceleration = ((new_p - p) * rate_hz, (new_q - q) * rate_hz, (new_r - r) * rate_hz)

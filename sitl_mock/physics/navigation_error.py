@@ -19,11 +19,11 @@ TruthHistory = list[TruthRow]
 
 
 class ErrorVectors(NamedTuple):
-    """Estimate minus truth, NED: position (m), velocity (m/s), small rotation of attitude (rad)."""
+    """Estimate minus truth, NED: position (m), velocity (m/s), attitude (small rotation, rad)."""
 
     position: Vector
     velocity: Vector
-    rotation: Vector
+    attitude: Vector
 
 
 class ErrorState(NamedTuple):

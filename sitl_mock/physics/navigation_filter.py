@@ -1,8 +1,9 @@
 """The error of an autopilot's navigation filter, which is smooth and lasts for seconds.
 
-The filter integrates the inertial sensor at a delayed fusion time and corrects itself there by
-satellite fixes. We compute only its error. The error is linear and has a closed form between two
-fixes, so we update it at fixes only. Horizontal vectors are complex numbers, north + j east.
+The filter integrates the inertial sensor at a delayed fusion time, and satellite fixes correct its
+state at this time. We compute only the error of the state. The error is linear and has a closed
+form between two fixes, so we update the error at fixes only. Horizontal vectors are complex
+numbers, north + j east.
 """
 
 from math import exp, radians, sqrt
@@ -66,55 +67,50 @@ class NavigationFilter:
         self._height_random = Random(f"{seed}/height")
         self._slip_phase = Random(f"{seed}/slip").random()
         yaw = self._random.gauss(0.0, radians(config.yaw_error_deg))
-        horizontal, vertical = self._initial(1.0), self._initial(config.vertical_share)
-        place, speed = complex(start[10], start[11]), complex(start[0], start[1])
+        horizontal = self._initial_errors(1.0)
+        vertical = self._initial_errors(config.vertical_share)
+        position, velocity = complex(start[10], start[11]), complex(start[0], start[1])
         noise = self._height_random.gauss(0.0, config.height_noise_m)
         self.state = FilterState(
-            horizontal, vertical, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, place, speed
+            horizontal, vertical, yaw, 0.0, 0.0, noise, 0.0, noise, 0.0, 0.0, position, velocity
         )
 
-    def _initial(self, ratio: float) -> ErrorState:
+    def _initial_errors(self, ratio: float) -> ErrorState:
         """Return the errors after the first fix: the configured noise of a fix times `ratio`."""
-        config, gauss = self._config, self._random.gauss
-        sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
-        noise = (
-            complex(gauss(0.0, sigma_p), gauss(0.0, sigma_p)),
-            complex(gauss(0.0, sigma_v), gauss(0.0, sigma_v)),
-        )
+        noise = self._draw_noise(ratio)
         return ErrorState((*noise, 0j), (0j, 0j), noise)
 
-    def is_due(self, at: float) -> bool:
+    def is_due(self, fusion_time: float) -> bool:
         """Whether a fix is due at a fusion time, s."""
-        return at - self.state.fused_at >= self._period - 1e-9
+        return fusion_time - self.state.fused_at >= self._period - 1e-9
 
-    def advance(self, delayed: TruthRow, at: float, present: TruthRow, now: float) -> None:
+    def advance(self, fused: TruthRow, fused_at: float, present: TruthRow, now: float) -> None:
         """Correct the errors by a fix; the output follows gradually, without a jump.
 
         Args:
-            delayed: the true motion at the fusion time.
-            at: the fusion time, s.
+            fused: the true motion at the fusion time.
+            fused_at: the fusion time, s.
             present: the true motion now.
             now: the present time, s.
         """
         config, constants, state = self._config, self.constants, self.state
-        elapsed = at - state.fused_at
-        velocity = complex(delayed[0], delayed[1])
-        acceleration = complex(delayed[13], delayed[14])
-        errors = propagated_horizontal_errors(constants, state, delayed, elapsed)
+        elapsed = fused_at - state.fused_at
+        velocity = complex(fused[0], fused[1])
+        acceleration = complex(fused[13], fused[14])
+        errors = propagated_horizontal_errors(constants, state, fused, elapsed)
         noise = self._next_noise(state.horizontal.noise, 1.0)
-        slip = config.fix_slip_ms * (0.5 - (at / config.fix_slip_time_s + self._slip_phase) % 1.0)
-        fix_errors = (
-            noise[0] - ((config.position_late_ms + slip) * 1e-3 + constants.lead_time) * velocity,
-            noise[1]
-            - ((config.velocity_late_ms + slip) * 1e-3 + constants.lead_time) * acceleration,
-        )
+        phase = (fused_at / config.fix_slip_time_s + self._slip_phase) % 1.0
+        slip = config.fix_slip_ms * (0.5 - phase)
+        position_late = (config.position_late_ms + slip) * 1e-3 + constants.lead_time
+        velocity_late = (config.velocity_late_ms + slip) * 1e-3 + constants.lead_time
+        fix_errors = noise[0] - position_late * velocity, noise[1] - velocity_late * acceleration
         tilt_noise = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
         horizontal = self._corrected_state(errors, fix_errors, noise, tilt_noise)
         share = config.vertical_share
         noise = self._next_noise(state.vertical.noise, share)
-        errors = propagated_vertical_errors(constants, state, delayed, elapsed)
+        errors = propagated_vertical_errors(constants, state, fused, elapsed)
         vertical = self._corrected_state(errors, noise, noise, share * tilt_noise)
-        noiseless_yaw = self._next_alignment(velocity, acceleration, elapsed)
+        noiseless_yaw = self._noiseless_yaw(velocity, acceleration, elapsed)
         yaw = self._next_yaw_noise() + noiseless_yaw
         pending_yaw_part = pending_correction_share(constants.heading_predictor_ms, state, now)
         pending_yaw = pending_yaw_part * state.pending_yaw + yaw - state.yaw
@@ -129,14 +125,14 @@ class NavigationFilter:
             down_error,
             sink_error,
             height_noise,
-            at,
+            fused_at,
             now,
-            complex(delayed[10], delayed[11]),
+            complex(fused[10], fused[11]),
             velocity,
         )
         self.state = self._without_jump(corrected, present)
 
-    def _without_jump(self, corrected: FilterState, present: TruthRow) -> FilterState:
+    def _without_jump(self, corrected: FilterState, truth: TruthRow) -> FilterState:
         """Return the corrected state with pending corrections that keep the output as it was."""
         constants, state, now = self.constants, self.state, corrected.corrected_at
         since_last_fix, since_this_fix = now - state.fused_at, now - corrected.fused_at
@@ -144,15 +140,15 @@ class NavigationFilter:
         horizontal = _with_pending(
             state.horizontal,
             corrected.horizontal,
-            propagated_horizontal_errors(constants, state, present, since_last_fix),
-            propagated_horizontal_errors(constants, corrected, present, since_this_fix),
+            propagated_horizontal_errors(constants, state, truth, since_last_fix),
+            propagated_horizontal_errors(constants, corrected, truth, since_this_fix),
             pending_part,
         )
         vertical = _with_pending(
             state.vertical,
             corrected.vertical,
-            propagated_vertical_errors(constants, state, present, since_last_fix),
-            propagated_vertical_errors(constants, corrected, present, since_this_fix),
+            propagated_vertical_errors(constants, state, truth, since_last_fix),
+            propagated_vertical_errors(constants, corrected, truth, since_this_fix),
             pending_part,
         )
         return corrected._replace(horizontal=horizontal, vertical=vertical)
@@ -163,7 +159,7 @@ class NavigationFilter:
         sigma = radians(config.yaw_error_deg) * sqrt(1.0 - decay * decay)
         return decay * (self.state.yaw - self.state.noiseless_yaw) + self._random.gauss(0.0, sigma)
 
-    def _next_alignment(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
+    def _noiseless_yaw(self, velocity: complex, acceleration: complex, elapsed: float) -> float:
         """Return the next heading error without its noise, rad.
 
         Without acceleration the heading follows the compass. With a horizontal acceleration it
@@ -200,12 +196,17 @@ class NavigationFilter:
 
     def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
         """Return the noise of the next fix: the configured noise times `ratio`."""
-        config, gauss, decay = self._config, self._random.gauss, self._decay
-        scale = ratio * sqrt(1.0 - decay * decay)
-        sigma_p, sigma_v = config.position_noise_m * scale, config.velocity_noise_m_s * scale
+        decay = self._decay
+        position, velocity = self._draw_noise(ratio * sqrt(1.0 - decay * decay))
+        return decay * noise[0] + position, decay * noise[1] + velocity
+
+    def _draw_noise(self, ratio: float) -> tuple[complex, complex]:
+        """Draw white noise of position and velocity: the configured noise times `ratio`."""
+        config, gauss = self._config, self._random.gauss
+        sigma_p, sigma_v = ratio * config.position_noise_m, ratio * config.velocity_noise_m_s
         return (
-            decay * noise[0] + complex(gauss(0.0, sigma_p), gauss(0.0, sigma_p)),
-            decay * noise[1] + complex(gauss(0.0, sigma_v), gauss(0.0, sigma_v)),
+            complex(gauss(0.0, sigma_p), gauss(0.0, sigma_p)),
+            complex(gauss(0.0, sigma_v), gauss(0.0, sigma_v)),
         )
 
     def _corrected_state(

@@ -109,7 +109,7 @@ def estimate(
     fx, fy, fz = to_body(
         q, (attitude_row[13], attitude_row[14], attitude_row[15] - constants.gravity)
     )
-    attitude_estimate = multiply(state.yaw, rotated_slightly(error.rotation, q))
+    attitude_estimate = multiply(state.yaw, rotated_slightly(error.attitude, q))
     rate_row = history[(steps - constants.rate_delay) % len(history)]
     yaw_rate = rate_row[9] + constants.yaw_rate_bias + noise[5]
     position, velocity, offset = error.position, error.velocity, state.offset
@@ -128,7 +128,7 @@ def estimate(
         ),
         (fx + noise[12], fy + noise[13], fz + noise[14]),
     )
-    return new_estimate, error.rotation
+    return new_estimate, error.attitude
 
 
 class Estimator:
@@ -146,8 +146,8 @@ class Estimator:
     Attributes:
         constants: constants of `estimate`.
         state: errors after the latest fix, and all resets.
-        rotation: small rotation of the attitude by the filter's error at the latest estimate, rad,
-            NED.
+        attitude_error: small rotation from the true to the estimated attitude at the latest
+            estimate, rad, NED.
         reset_counter: estimator resets since boot.
         history_length: steps whose motion an estimate needs, the present one included.
     """
@@ -194,7 +194,7 @@ class Estimator:
         self._make_noise = make_noise
         self._noise: Sequence[float] = ()
         self._noise_used = 0
-        self.rotation: Vector = (0.0, 0.0, 0.0)
+        self.attitude_error: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
 
     def shift(self, *, yaw: float = 0.0, position_ned: Vector = (0.0, 0.0, 0.0)) -> None:

@@ -91,7 +91,7 @@ class Vehicle:
         self._thrust = 0.0  # of all rotors, N
         self._rate_hz = airframe.physics_rate_hz
         self._multirotor = multirotor_constants(airframe, rate_loop or RateLoopConfig())
-        dt = self._multirotor.rates.dt
+        dt = self._multirotor.rate_loop.dt
         self._slow_steps = round(SLOW_STEP_S * self._rate_hz)
         self._slow_dt = self._slow_steps * dt
         self._wind = Wind(wind or WindConfig(), self._slow_dt, seed)
@@ -121,7 +121,7 @@ class Vehicle:
         """The true state after the latest step."""
         _, body, actuation, position, on_ground, crashed, touchdown_speed = self.plant.state
         motion, acceleration, _ = body
-        mix, thrusts, _, _ = actuation
+        allocation, thrusts, _, _ = actuation
         vn, ve, vd, w, x, y, z, p, q, r = motion
         return TruthState(
             self.time,
@@ -134,7 +134,7 @@ class Vehicle:
             crashed,
             touchdown_speed,
             thrusts,
-            mix.throttles,
+            allocation.throttles,
         )
 
     @property
@@ -154,7 +154,7 @@ class Vehicle:
         """Return the autopilot's present estimate; every call draws new noise."""
         estimator, time = self.estimator, self.time
         estimator.correct(time, self.plant.truth_ago)
-        estimate, estimator.rotation = self.plant.estimate(
+        estimate, estimator.attitude_error = self.plant.estimate(
             estimator.constants, estimator.state, time, estimator.draw_noise()
         )
         return estimate
@@ -179,7 +179,7 @@ class Vehicle:
                 self._battery.step(self._thrust, self._slow_dt)
             steps = min(count, self._slow_steps - since_slow_step)
             conditions = Conditions(
-                self._battery.thrust_factor, self._wind.velocity, self.estimator.rotation
+                self._battery.thrust_factor, self._wind.velocity, self.estimator.attitude_error
             )
             outcome = self.plant.advance(command, conditions, steps)
             self.on_ground, self.crashed, self._thrust = outcome

@@ -12,8 +12,9 @@ from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 from sitl_mock.physics.quaternion import Vector
 from sitl_mock.px4.arming import UNARMABLE_MODES, ArmingChecks, AutoDisarm
+from sitl_mock.px4.event_log import Announcer
 from sitl_mock.px4.failsafe import Failsafe
-from sitl_mock.px4.failsafe_actions import AnnounceEvent, FailsafeActions
+from sitl_mock.px4.failsafe_actions import FailsafeActions
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import PILOTED_MODES, POSITION_MODES, custom_mode
 from sitl_mock.px4.setpoints import decode_setpoint
@@ -32,7 +33,7 @@ class Px4Commander:
     _control: Px4ModeControl
     """Begins each mode that is entered."""
     _stream: OffboardStream
-    _announce: AnnounceEvent
+    _announce: Announcer
     _checks: ArmingChecks
     """Finds what forbids arming, and sends the health report."""
     refusal: str | None = field(default=None, init=False)

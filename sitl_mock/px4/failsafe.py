@@ -7,12 +7,12 @@ from pymavlink.dialects.v20 import development as dialect
 from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import BatteryWarning, Mode, State
+from sitl_mock.px4.event_log import Announcer
 from sitl_mock.px4.failsafe_actions import (
     LAND,
     OFFBOARD_ACTIONS,
     POSITION,
     RETURN,
-    AnnounceEvent,
     Cause,
     FailsafeActions,
 )
@@ -42,7 +42,7 @@ class Failsafe:
 
     _state: State
     _parameters: ParameterTable
-    _announce: AnnounceEvent
+    _announce: Announcer
     _actions: FailsafeActions
     _pilot_present: bool = field(default=False, init=False)
     _pilot_optional: bool = field(default=True, init=False)

@@ -4,11 +4,12 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from sitl_mock.autopilot.events import EventKind
 from sitl_mock.autopilot.parameters import ParameterTable
 from sitl_mock.autopilot.state import Mode, State
+from sitl_mock.px4.event_log import Announcer
 from sitl_mock.px4.modes import POSITION_MODES, custom_mode
 
 _ENTER_HOLD_LAYOUT = struct.Struct("<IBHB")
@@ -69,13 +70,6 @@ _DELAYED_CAUSES = frozenset({Cause.PILOT_LOST, Cause.GCS_LOST})
 """Causes whose failsafe may wait in Hold for COM_FAIL_ACT_T before it acts."""
 
 
-class AnnounceEvent(Protocol):
-    """Sends texts and events."""
-
-    def __call__(self, kind: EventKind, detail: str, arguments: bytes = b"", /) -> None:
-        """Announce an event, with a detail for its text and packed arguments."""
-
-
 @dataclass(eq=False)
 class FailsafeActions:
     """Executes the action of the failsafe with the most severe cause."""
@@ -84,7 +78,7 @@ class FailsafeActions:
     """The autopilot's state; ``failsafe`` is written here."""
     _parameters: ParameterTable
     """COM_FAIL_ACT_T, and the parameters that name actions."""
-    _announce: AnnounceEvent
+    _announce: Announcer
     enter: Callable[[Mode], None]
     """Enters a mode and leaves the intended mode as it is."""
     _stop: Callable[[EventKind], None]
@@ -138,12 +132,10 @@ class FailsafeActions:
                 intended_mode, next_action.number, delay, cause.number
             )
             self._announce(EventKind.FAILSAFE_HOLD, str(delay), arguments)
-        elif cause.number:
-            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, cause.number)
-            self._announce(EventKind.FAILSAFE, "", arguments)
         else:
-            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, 0)
-            self._announce(EventKind.FAILSAFE_UNNAMED, "", arguments)
+            kind = EventKind.FAILSAFE if cause.number else EventKind.FAILSAFE_UNNAMED
+            arguments = _ENTER_LAYOUT.pack(intended_mode, action.number, cause.number)
+            self._announce(kind, "", arguments)
 
     def act_on_link_loss(self, cause: Cause, parameter: str, lost_at_us: int) -> None:
         """Execute the action that a parameter selects; before RTL or LAND, hold for COM_FAIL_ACT_T.

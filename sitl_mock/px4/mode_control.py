@@ -10,7 +10,7 @@ from sitl_mock.autopilot.position_control import (
     PositionGains,
 )
 from sitl_mock.autopilot.setpoints import OffboardStream, PositionSetpoint
-from sitl_mock.autopilot.state import NAN_VECTOR, Mode, PositionTargetEcho, State
+from sitl_mock.autopilot.state import NAN_VECTOR, Mode, PositionTarget, State
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, yaw
 from sitl_mock.physics.vehicle import DISARMED_COMMAND, ActuatorCommand
 from sitl_mock.px4.flight_tasks import FlightTasks
@@ -66,7 +66,7 @@ class Px4ModeControl:
         if not state.armed:
             if state.mode is not Mode.OFFBOARD and state.mode not in PILOTED_MODES:
                 yaw_now = yaw(state.estimate.q)
-                state.position_target = PositionTargetEcho(
+                state.position_target = PositionTarget(
                     True, NAN_VECTOR, NAN_VECTOR, DISARMED_ACCELERATION, yaw_now
                 )
             command = DISARMED_COMMAND
@@ -96,7 +96,7 @@ class Px4ModeControl:
         estimate = state.estimate
         position = estimate.position_ned
         output = self._position_controller.step(demand, position, estimate.velocity_ned, dt)
-        state.position_target = PositionTargetEcho(
+        state.position_target = PositionTarget(
             True, demand.position, output.velocity, output.acceleration, demand.yaw
         )
         return self._attitude_command(output.q, 0.0, output.thrust)

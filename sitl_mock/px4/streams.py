@@ -8,6 +8,7 @@ Hz; 250 Hz gave 190 to 235, in steps of 4 and 8 ms; a position at 50 Hz comes in
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from random import Random
 
 SLOT_US = {100: 10_000, 250: 4000, 800: 2500}
@@ -23,17 +24,15 @@ VALUE_PERIOD_US = {LOCAL_POSITION_NED: 8000}
 """Message id -> period of new values, us; without `exact_rates`, no value is sent twice."""
 
 
+@dataclass(eq=False, slots=True)
 class _Stream:
-    __slots__ = ("due_us", "interval_us", "message_id", "sent_us", "status_at_us")
-
-    def __init__(self, message_id: int, interval_us: int, due_us: int) -> None:
-        self.message_id = message_id
-        self.interval_us = interval_us
-        self.due_us = due_us
-        self.sent_us: int | None = None
-        """Vehicle time of the latest slot in which the message was sent, us."""
-        self.status_at_us = -1
-        """Vehicle time of the latest status published before the message was last sent, us."""
+    message_id: int
+    interval_us: int
+    due_us: int
+    sent_us: int | None = None
+    """Vehicle time of the latest slot in which the message was sent, us."""
+    status_at_us: int = -1
+    """Vehicle time of the latest status published before the message was last sent, us."""
 
 
 class Px4Streams:

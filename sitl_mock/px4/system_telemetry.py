@@ -4,8 +4,8 @@ from math import nan
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.autopilot.interface import Identity
 from sitl_mock.autopilot.motion_telemetry import Builder
-from sitl_mock.autopilot.personality import Identity
 from sitl_mock.autopilot.setpoints import AttitudeSetpoint, OffboardStream
 from sitl_mock.autopilot.state import State
 from sitl_mock.autopilot.system_telemetry import NO_VALUE, SystemTelemetry

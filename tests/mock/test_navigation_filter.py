@@ -57,7 +57,7 @@ def errors(config, way, seconds, seed=1):
         if step >= late and navigation.is_due(now - late * DT):
             navigation.advance(way(now - late * DT), now - late * DT, way(now), now)
         error = error_at(navigation.constants, navigation.state, way(now), now)
-        rows.append((now, *error.position, *error.velocity, *error.rotation))
+        rows.append((now, *error.position, *error.velocity, *error.attitude))
     return np.array(rows)[round(SETTLED_S / DT) :]
 
 

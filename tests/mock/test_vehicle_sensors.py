@@ -151,7 +151,7 @@ def test_time_is_the_count_of_steps(rate_hz):
     for step in range(1, 701):
         vehicle.step(ActuatorCommand(False, 0.0, 0.0, 0.0, 0.0))
         assert vehicle.time == step / rate_hz
-    assert vehicle.plant.constants.multirotor.rates.dt == 1 / rate_hz
+    assert vehicle.plant.constants.multirotor.rate_loop.dt == 1 / rate_hz
 
 
 def test_the_step_does_not_change_the_flight():
@@ -161,7 +161,7 @@ def test_the_step_does_not_change_the_flight():
     )
     for vehicle in (coarse, fine):
         for second in (ActuatorCommand(True, 0.0, 0.0, 0.0, 0.6), TURNING):
-            vehicle.step(second, round(1.0 / vehicle.plant.constants.multirotor.rates.dt))
+            vehicle.step(second, round(1.0 / vehicle.plant.constants.multirotor.rate_loop.dt))
     assert coarse.truth.position_ned == pytest.approx(fine.truth.position_ned, abs=5e-3)
     assert coarse.truth.q == pytest.approx(fine.truth.q, abs=2e-3)
 

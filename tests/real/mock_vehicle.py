@@ -55,7 +55,7 @@ class MockInMemory:
     """A mock vehicle for each flight.
 
     Attributes:
-        autopilot: px4 or ardupilot, whose personality it has.
+        autopilot: px4 or ardupilot, whose rules it has.
         flown: the flights.
 
     Args:

@@ -3,7 +3,7 @@
 `--into docs/real-autopilots.md` puts the page between the marks in that file.
 
 Figures are medians over the flights of one kind. `mock` is the truth of the same flight on the mock
-with that autopilot's personality, where it was flown, and `ratio` that of the real one to it.
+with that autopilot's rules, where it was flown, and `ratio` that of the real one to it.
 """
 
 import argparse

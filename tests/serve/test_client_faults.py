@@ -262,7 +262,7 @@ async def clock_jumps(scene):
 
 
 async def another_id(scene):
-    """goes on under another component id"""
+    """changes its component id"""
     await stream(0.5, scene.hover)
     scene.script.packer.srcComponent = 191 - scene.script.packer.srcComponent
     await stream(TIMEOUT - 0.1, lambda _: scene.script.local(ALL, scene.home))
@@ -271,7 +271,7 @@ async def another_id(scene):
 
 
 async def all_kinds(scene):
-    """changes the kind of its setpoints with each of them"""
+    """changes the kind of setpoint every time"""
     level, hover = (1.0, 0.0, 0.0, 0.0), {"px4": 0.49, "ardupilot": 0.364}[scene.autopilot]
     kinds = (
         scene.hover,

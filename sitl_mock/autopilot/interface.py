@@ -1,6 +1,6 @@
 """The interface of a simulated autopilot: everything in which PX4 and ArduPilot differ.
 
-A personality has its own numbers and texts. It builds its `Behaviour` from the parts that every
+An autopilot has its own numbers and texts. It builds its `Behaviour` from the parts that every
 vehicle has (`VehicleParts`).
 """
 
@@ -67,7 +67,7 @@ class Behaviour(NamedTuple):
     """Time for which the position stays valid without GPS, us."""
 
 
-class Personality(Protocol):
+class Autopilot(Protocol):
     """A simulated autopilot, such as PX4: its numbers, and how to build its `Behaviour`."""
 
     boot_mode: Mode

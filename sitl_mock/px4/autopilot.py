@@ -1,4 +1,4 @@
-"""PX4's personality: its numbers and its behaviour (recorded from PX4 main, SIH)."""
+"""The simulated PX4: its numbers and its behaviour (recorded from PX4 main, SIH)."""
 
 from collections.abc import Collection
 from random import Random
@@ -6,11 +6,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import development as dialect
 
+from sitl_mock.autopilot.interface import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import MotionTelemetry
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import BytewiseEncoding
-from sitl_mock.autopilot.personality import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import StreamSchedule
@@ -78,7 +78,7 @@ _GCS_RATES: dict[int, float] = {
 
 
 class Px4:
-    """The PX4 personality."""
+    """The `Autopilot` PX4."""
 
     boot_mode = Mode.LOITER
     any_component = False
@@ -140,7 +140,7 @@ class Px4:
                 announce,
                 hover_thrust=lambda: parameters["MPC_THR_HOVER"],
                 landed_after_us=LANDED_AFTER_US,
-                is_climbing=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
+                is_taking_off=lambda: state.mode is Mode.TAKEOFF and not control.takeoff_reached,
             ),
             builders,
             handlers={

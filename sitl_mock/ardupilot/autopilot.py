@@ -1,4 +1,4 @@
-"""ArduCopter's personality: its numbers and its behaviour (recorded from 4.7.0-dev)."""
+"""The simulated ArduCopter: its numbers and its behaviour (recorded from 4.7.0-dev)."""
 
 from collections.abc import Collection, Iterable
 
@@ -20,11 +20,11 @@ from sitl_mock.ardupilot.streams import ArduPilotStreams
 from sitl_mock.ardupilot.system_telemetry import ArduPilotSystemTelemetry
 from sitl_mock.ardupilot.texts import ArduPilotAnnouncer
 from sitl_mock.autopilot.commands import Commands
+from sitl_mock.autopilot.interface import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.land_detector import LandDetector
 from sitl_mock.autopilot.motion_telemetry import Builder
 from sitl_mock.autopilot.parameter_protocol import ParameterProtocol
 from sitl_mock.autopilot.parameters import FloatEncoding
-from sitl_mock.autopilot.personality import Behaviour, Identity, VehicleParts
 from sitl_mock.autopilot.state import Mode
 from sitl_mock.config.settings import VehicleSettings
 from sitl_mock.link.link import Link, StreamSchedule
@@ -41,7 +41,7 @@ _BOOT_RATES = {dialect.MAVLINK_MSG_ID_HEARTBEAT: 1.0, dialect.MAVLINK_MSG_ID_TIM
 
 
 class ArduPilot:
-    """The ArduPilot personality (ArduCopter)."""
+    """The `Autopilot` ArduPilot (ArduCopter)."""
 
     boot_mode = Mode.STABILIZE
     any_component = True
@@ -104,7 +104,7 @@ class ArduPilot:
                 announce,
                 hover_thrust=control.hover_throttle,
                 landed_after_us=LANDED_AFTER_US,
-                is_climbing=lambda: control.taking_off,
+                is_taking_off=lambda: control.taking_off,
             ),
             builders,
             handlers={"REQUEST_DATA_STREAM": commands.request_data_stream},
