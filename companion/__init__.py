@@ -16,9 +16,9 @@ Fly from Python
     Vehicle       take_off, go_to, follow, hold, control, land, hand_back; `state` and `summary`
     Control       what a coroutine commands: accelerate, follow, tilt, rotate
     State         time, position, velocity, attitude, body rates, heading, height
-    Reference     position, velocity and acceleration that are wanted now
+    Reference     desired position, velocity and acceleration
     Coefficients  north, east: horizontal acceleration per specific thrust
-    FlightEnded   raised when the flight, and with it the program's control, has ended
+    FlightEnded   raised when the flight has ended, so that the program controls nothing
 
 Packages
     companion.attitude, companion.batch, companion.guidance.trajectory, companion.identification,
@@ -27,8 +27,8 @@ Packages
 
 from typing import TYPE_CHECKING
 
-# Without `__all__`: see `companion.attitude`. The names are imported when they are asked for, so
-# that the command line starts quickly.
+# There is no `__all__`, for the reason given in `companion.attitude`. A name is imported only when
+# it is used, so that the command line starts quickly.
 if TYPE_CHECKING:
     from companion.api import Coefficients as Coefficients
     from companion.api import Control as Control

@@ -19,11 +19,11 @@ def usable_cores() -> int:
 def end_with_parent(parent_pid: int) -> None:
     """Have the kernel kill this process when its parent ends (Linux only).
 
-    A parent that is killed cannot end its children, and these would wait for work for ever.
+    A parent that is killed cannot end its children, and they would wait for work for ever.
 
     Args:
-        parent_pid: process id of the parent. The kernel does not tell of a parent that ended
-            earlier, as while this process imported its modules; then this process ends at once.
+        parent_pid: process id of the parent. If the parent has already ended, for example while
+            this process imported its modules, this process ends at once.
     """
     _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent_pid:
@@ -36,7 +36,7 @@ def interrupts_blocked() -> Iterator[None]:
 
     Ctrl-C in a terminal reaches all processes. Only the command acts on it, and ends the workers.
     """
-    resource_tracker.ensure_running()  # started below, it would unblock SIGINT
+    resource_tracker.ensure_running()  # if it started in the block, it would unblock SIGINT
     previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

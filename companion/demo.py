@@ -19,7 +19,7 @@ from companion.mavlink.transport.endpoint import (
 from companion.mavlink.transport.free_port import free_port
 
 _LOCAL_PORT_OFFSET = 40
-"""Number of the mock vehicle's own UDP port minus that of this program's port."""
+"""The mock vehicle's UDP port number minus this program's."""
 
 _READY_LINE = "ready on "
 """First words of the vehicle's output when its ports are open."""
@@ -28,10 +28,10 @@ _START_TIMEOUT = 20.0
 """Time allowed for the vehicle to start, s."""
 
 
-class Wire(NamedTuple):
-    """The UDP, TCP or serial connection between this program and the mock vehicle."""
+class LocalEndpoints(NamedTuple):
+    """The two ends of a UDP, TCP or serial connection on this computer."""
 
-    endpoint: str
+    program: str
     """Endpoint of this program, in the notation of `link.endpoint`."""
     vehicle_arguments: tuple[str, ...]
     """Endpoint of the mock vehicle, as arguments of its command line."""
@@ -42,8 +42,8 @@ class VehicleStoppedError(Exception):
 
 
 @contextmanager
-def wire_like(endpoint: str) -> Iterator[Wire]:
-    """A connection of the same kind as `endpoint` while the block runs: UDP, TCP or serial.
+def local_endpoints(endpoint: str) -> Iterator[LocalEndpoints]:
+    """Free endpoints of the same kind as `endpoint` (UDP, TCP or serial), for the `with` block.
 
     Over TCP the vehicle always listens and the program connects.
 
@@ -54,14 +54,15 @@ def wire_like(endpoint: str) -> Iterator[Wire]:
     match parse_endpoint(endpoint):
         case TcpClient() | TcpServer():
             port = free_port()
-            yield Wire(f"tcp://127.0.0.1:{port}", ("--endpoint", f"tcpin://127.0.0.1:{port}"))
+            vehicle_arguments = ("--endpoint", f"tcpin://127.0.0.1:{port}")
+            yield LocalEndpoints(f"tcp://127.0.0.1:{port}", vehicle_arguments)
         case SerialPort(_, baud):
             with tempfile.TemporaryDirectory(prefix="companion-") as folder:
                 path = Path(folder, "vehicle")
-                yield Wire(f"serial://{path}:{baud}", ("--endpoint", f"serial://{path}"))
+                yield LocalEndpoints(f"serial://{path}:{baud}", ("--endpoint", f"serial://{path}"))
         case _:
             port = free_port(_LOCAL_PORT_OFFSET)
-            yield Wire(f"udpin://127.0.0.1:{port}", ("--port", str(port)))
+            yield LocalEndpoints(f"udpin://127.0.0.1:{port}", ("--port", str(port)))
 
 
 def check_mock(config: Path) -> None:
@@ -77,7 +78,9 @@ def check_mock(config: Path) -> None:
 
 
 @contextmanager
-def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> Iterator[None]:
+def bundled_vehicle(
+    config: Path, endpoints: LocalEndpoints, log: Path, *, lockstep: bool
+) -> Iterator[None]:
     """Run the mock vehicle while the block runs; its output goes to `log`.
 
     The vehicle's process has its own session, so Ctrl-C reaches only this program, which can then
@@ -91,7 +94,7 @@ def bundled_vehicle(config: Path, wire: Wire, log: Path, *, lockstep: bool) -> I
     """
     command = [sys.executable, "-m", "sitl_mock", "--headless", "--config", str(config)]
     # No link for a ground station: its fixed port may be in use.
-    command += ["--end-with-stdin", *wire.vehicle_arguments, "--gcs-port", "0"]
+    command += ["--end-with-stdin", *endpoints.vehicle_arguments, "--gcs-port", "0"]
     command += ["--lockstep"] if lockstep else []
     with log.open("wb") as output:
         process = subprocess.Popen(

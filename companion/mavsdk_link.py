@@ -1,8 +1,8 @@
-"""The link through MAVSDK (`link.backend: mavsdk`): it holds the connection to the vehicle.
+"""The link through MAVSDK (`link.backend: mavsdk`), which holds the connection to the vehicle.
 
 Needs the extra `mavsdk`. MAVSDK forwards frames unchanged between its two connections: one to the
-vehicle, and one of its type `raw` to this process. So each side gets each frame as the other sent
-it, with its time stamp.
+vehicle, and one of its type `raw` to this process. Each side gets each frame as the other side
+sent it, with its time stamp.
 
 MAVSDK sends from a thread of its own, so a frame reaches the kernel 0.1 ms later than if this
 program sends it. MAVSDK does not report whether a frame was sent, and queues frames that a serial
@@ -11,8 +11,8 @@ port or TCP connection cannot take.
 Setpoints are not sent by MAVSDK's offboard plugin. The plugin repeats the last setpoint 20 times a
 second, in its own thread, until it is told to stop, which can be too late. Measured: a process was
 stopped in flight and resumed, and the plugin sent old body rates before any other thread ran. PX4
-was landing by its failsafe; it took them as a request for offboard mode, and obeyed them. So each
-setpoint is one frame of this program, sent once, in answer to a fresh sample.
+was landing in its failsafe, took these rates as a request for offboard mode, and obeyed them. So
+this program sends each setpoint itself: one frame, once, in answer to a fresh sample.
 """
 
 import asyncio

@@ -1,7 +1,7 @@
 """Real-time settings requested from Linux, so that the control loop is not delayed.
 
-A setting applies to the calling thread, which runs the event loop, or to the process. A refusal
-stops no flight unless `realtime.required` is true.
+A setting applies to the calling thread, which runs the event loop, or to the process. A refused
+setting prevents a flight only if `realtime.required` is true.
 """
 
 import ctypes
@@ -15,17 +15,17 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
-_HOW_FIFO = (
+_FIFO_REMEDY = (
     "run companion by docs/companion.service, or allow `rtprio` to its user in "
     "/etc/security/limits.conf"
 )
-_HOW_MEMORY = (
+_MEMORY_REMEDY = (
     "run companion by docs/companion.service, or allow `memlock unlimited` to its user in "
     "/etc/security/limits.conf"
 )
 
 
-def schedule_as_usual(pid: int) -> None:
+def use_normal_scheduler(pid: int) -> None:
     """Give a child process the normal scheduler instead of that of this program."""
     with suppress(ProcessLookupError):  # it has ended already
         os.sched_setscheduler(pid, os.SCHED_OTHER, os.sched_param(0))
@@ -167,7 +167,7 @@ def _set_fifo_priority(priority: int) -> _Undo:
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
-        raise SettingRefused(f"this user lacks the permission; {_HOW_FIFO}") from None
+        raise SettingRefused(f"this user lacks the permission; {_FIFO_REMEDY}") from None
     except OSError as error:
         raise SettingRefused(f"{error.strerror}") from None
     return lambda: os.sched_setscheduler(0, scheduler_before, parameters)
@@ -193,11 +193,11 @@ def _lock_memory() -> _Undo:
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
         # Even if the limit suffices now, an allocation in flight could fail.
-        raise SettingRefused(f"this user may lock only {limit // 1024} KiB; {_HOW_MEMORY}")
+        raise SettingRefused(f"this user may lock only {limit // 1024} KiB; {_MEMORY_REMEDY}")
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
         number = ctypes.get_errno()
         if number in (errno.EPERM, errno.ENOMEM):
-            raise SettingRefused(f"{os.strerror(number)}; {_HOW_MEMORY}")
+            raise SettingRefused(f"{os.strerror(number)}; {_MEMORY_REMEDY}")
         raise SettingRefused(os.strerror(number))
     return libc.munlockall
 

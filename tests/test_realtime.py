@@ -83,7 +83,7 @@ def policies_elsewhere():
         in_a_thread = pool.submit(os.sched_getscheduler, 0).result()
     process = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
     with process:
-        realtime.schedule_as_usual(process.pid)
+        realtime.use_normal_scheduler(process.pid)
         in_a_process = os.sched_getscheduler(process.pid)
         process.communicate(b"\\n")
     return in_a_thread, in_a_process

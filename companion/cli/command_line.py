@@ -177,7 +177,8 @@ def _add_link_options(command: argparse.ArgumentParser) -> None:
     add_flag(
         command,
         "--take-over",
-        "take over a vehicle that its pilot has flown up and holds, like flight.take_over: true",
+        "take over a vehicle that its pilot has flown up and switched to hold, like "
+        "flight.take_over: true",
     )
 
 

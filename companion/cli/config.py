@@ -27,8 +27,8 @@ def show(options: argparse.Namespace) -> int:
     """Print the configuration or some keys as YAML, or the tables or schema of all keys."""
     if options.file and (options.schema or options.markdown or options.diff):
         raise ConfigError(
-            f"leave out {options.file}: --diff has a FILE of its own, and --schema and --markdown "
-            "have none"
+            f"leave out {options.file}: --diff takes its own FILE, and --schema and --markdown "
+            "take none"
         )
     if options.schema:
         text = json_schema()
@@ -95,8 +95,7 @@ def init(options: argparse.Namespace) -> int:
         write_whole(out, own_text.replace(f"configs/{name}", str(out)))
     except OSError as error:
         raise ConfigError(f"--out: cannot write {out}: {error.strerror}") from error
-    out_words = quote(str(out))  # it may have a space
-    print(f"Wrote {out}. Check it with: {program_command()} check-config {out_words}")
+    print(f"Wrote {out}. Check it with: {program_command()} check-config {quote(str(out))}")
     return EXIT_OK
 
 
@@ -133,6 +132,6 @@ def check(options: argparse.Namespace) -> int:
             "`--set flight.maneuvers=[trajectory]`"
         )
     if config.mock is None and not list(changed_keys(config)):
-        print(f"warning: {options.file} changes no default; is it the file that you meant?")
+        print(f"warning: {options.file} changes no default; is this the file that you meant?")
     print(f"{options.file}: ok")
     return EXIT_OK

@@ -5,6 +5,7 @@ import json
 import shlex
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,6 @@ from companion.flight.opening import make_link
 from companion.flight.start_checks import check_link, require_backend
 from companion.guidance import ManeuverSequence
 from companion.mavlink.errors import LinkLost, LinkTimeout
-from companion.mavlink.frame_filter import Notice
 from companion.preflight.all_checks import run_checks
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
@@ -41,7 +41,6 @@ from companion.preflight.parameter_fixes import (
 from companion.preflight.parameter_survey import survey
 from companion.preflight.report import as_dict, findings_lists, outcome_as_dict, outcome_line
 from companion.preflight.session import PreflightSession, open_session, request_identity
-from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
 
 _ANSWERS = {answer.value[0]: answer for answer in Answer}
@@ -93,15 +92,17 @@ def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None
         return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
 
-def _response_findings(config: Config) -> list[Finding]:
-    """The finding on the expected response: whether the gain is too large for the vehicle."""
+def _other_findings(config: Config, evidence: Evidence) -> list[Finding]:
+    """The findings of the checks, and whether the gain is too large for the expected response."""
+    findings = run_checks(config, evidence)
     if config.planner_name not in PLANNER_NAMES:
-        return []
+        return findings
     response = expected_response(config)
     result = CheckResult.INEFFECTIVE if response.gain_is_too_high else CheckResult.SAFE
     source = "planner, rate loop and limits"
     because = f"{response.sentence()}; {hold_sentence(config)}"
-    return [Finding(Key.RESPONSE, result, response.gain_sentence(), because, source=source)]
+    gain_finding = Finding(Key.RESPONSE, result, response.gain_sentence(), because, source=source)
+    return [*findings, gain_finding]
 
 
 class _DoctorRun:
@@ -109,6 +110,7 @@ class _DoctorRun:
 
     def __init__(self, config: Config, console: Console) -> None:
         self._config, self._console = config, console
+        self._make_link = partial(make_link, config, None)
         self._outcomes: list[ChangeOutcome] = []
         self.result: dict[str, Any] = {}
 
@@ -128,16 +130,13 @@ class _DoctorRun:
             except (LinkTimeout, LinkLost) as error:
                 return self._report(vehicle.unanswered_findings(error))
             drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
-            maneuvers, refusals = _maneuvers(config, drag)
+            maneuvers, maneuver_findings = _maneuvers(config, drag)
             evidence = replace(evidence, maneuvers=maneuvers, known_drag=drag)
-            findings = [*refusals, *run_checks(config, evidence), *_response_findings(config)]
+            findings = [*maneuver_findings, *_other_findings(config, evidence)]
             code = self._report(findings)
             if fix:
                 code = await self._fix(vehicle, evidence, findings, without_asking=without_asking)
         return code
-
-    def _make_link(self, notice: Notice) -> Link:
-        return make_link(self._config, None, notice)
 
     def report_interrupt(self) -> int:
         """Report Ctrl-C, and which parameters were set before it; return the exit code."""
@@ -190,8 +189,8 @@ class _DoctorRun:
                 path = shlex.quote(str(undo.path))
                 self.say(f"Undo with: companion doctor --config FILE --undo {path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
-        _, refusals = _maneuvers(config, evidence.known_drag)
-        code = self._report([*refusals, *run_checks(config, evidence), *_response_findings(config)])
+        _, maneuver_findings = _maneuvers(config, evidence.known_drag)
+        code = self._report([*maneuver_findings, *_other_findings(config, evidence)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code

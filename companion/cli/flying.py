@@ -10,7 +10,7 @@ from pathlib import Path
 from companion import demo
 from companion.api.connection import run
 from companion.cli import interrupts
-from companion.cli.helper_process import environment, helper_process
+from companion.cli.helper_process import flight_environment, helper_process
 from companion.cli.signals import fly_interruptibly
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
@@ -29,7 +29,7 @@ from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.folder import flight_folder
 from companion.recording.measurements.summary import Summary
-from companion.recording.summary_tables import flight_table, words_text
+from companion.recording.summary_tables import flight_table, styled_text
 
 
 def with_options(config: Config, options: argparse.Namespace, planner: str | None = None) -> Config:
@@ -53,10 +53,10 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
         "planner": {"name": planner},
     }
     changes = {
-        section: {key: value for key, value in values.items() if value}  # else it is not given
+        section: {key: value for key, value in values.items() if value}  # only given options
         for section, values in keys.items()
     }
-    if options.arm or options.take_over:  # each replaces the other one of the file
+    if options.arm or options.take_over:  # --arm replaces take_over of the file, and the reverse
         changes["flight"] |= {"arm": options.arm, "take_over": options.take_over}
     flown_config = with_assignments(config, options.set)
     flown_config = changed(flown_config, changes, "the command line")
@@ -95,7 +95,7 @@ def fly(
     observer = TerminalObserver(console)
     observers = observer if helper is None else SeveralObservers(observer, helper)
     session = Session(
-        config, folder, observers, observer.ask_landing, environment=environment(helper)
+        config, folder, observers, observer.ask_landing, environment=flight_environment(helper)
     )
     flight = fly_interruptibly(session)
     if helper is not None:
@@ -113,15 +113,15 @@ def fly(
     finally:
         observer.close()
     # The vehicle is handed back and the record is complete: signals may interrupt again.
-    interrupts.raise_interrupt(interrupts.signals_with_default_handler())
+    interrupts.raise_interrupt_on(interrupts.signals_with_default_handler())
     with suppress(OSError):
         console.print(flight_table(summary))
-        gone = f"Not recorded: {folder} was removed or renamed in flight"
-        recorded = f"Recorded in {folder}" if folder.is_dir() else gone
-        console.print(recorded, soft_wrap=True)
+        not_recorded = f"Not recorded: {folder} was removed or renamed in flight"
+        place = f"Recorded in {folder}" if folder.is_dir() else not_recorded
+        console.print(place, soft_wrap=True)
         words = closing_words(summary.as_dict(), invocation)
-        console.print(words_text(words), soft_wrap=True)
-    if config.recording.report:  # also where nobody reads the console, as after `| head`
+        console.print(styled_text(words), soft_wrap=True)
+    if config.recording.report:  # even if nobody reads the console, as after `| head`
         page = write_flight_page(folder)
         with suppress(OSError):
             console.print(page, soft_wrap=True)
@@ -162,14 +162,14 @@ def fly_bundled(
     """
     path = path or shipped("mock-px4.yaml")
     config = config_as_read = load(path)
-    with demo.wire_like(config.link.endpoint) as wire:
-        options.endpoint, options.arm, options.take_over = wire.endpoint, True, False
+    with demo.local_endpoints(config.link.endpoint) as endpoints:
+        options.endpoint, options.arm, options.take_over = endpoints.program, True, False
         config = with_options(config, options, planner)
         demo.check_mock(path)
         folder = flight_folder(config.recording.directory)
         in_lockstep = config.link.lockstep
         with (
             helper_process(options, config, path, config_as_read, folder, console) as helper,
-            demo.bundled_vehicle(path, wire, folder / "mock.log", lockstep=in_lockstep),
+            demo.bundled_vehicle(path, endpoints, folder / "mock.log", lockstep=in_lockstep),
         ):
             return fly(config, folder, console, invocation, helper)

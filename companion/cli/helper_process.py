@@ -24,14 +24,18 @@ def helper_process(
     folder: Path | None,
     console: Console,
 ) -> Iterator[Helper | None]:
-    """Run the helper process that the options ask for, if any, while the block runs.
+    """Run the helper process that the options demand, if any, while the block runs.
 
-    `--watch` watches the file `path`, which was read as `config_as_read`. `folder` is that of the
-    flight of the configured maneuvers; None: other programs command the flights. `console` shows
-    where the live page and the live stream are.
+    Args:
+        options: the options of the command line.
+        config: the configuration of the flight.
+        path: the configuration file, which `--watch` watches.
+        config_as_read: the configuration as `path` had it.
+        folder: the flight's folder; None: other programs command the flights (`serve`).
+        console: shows the addresses of the live page and the live stream.
 
     Raises:
-        ConfigError: the page or the stream cannot be served at this address.
+        ConfigError: the page or the stream cannot be served at the address of its option.
         MissingExtraError: an extra is not installed.
     """
     if not options.watch and options.live is None and options.foxglove is None:
@@ -61,7 +65,7 @@ def helper_process(
         helper.close(reason)
 
 
-def environment(helper: Helper | None) -> Environment:
+def flight_environment(helper: Helper | None) -> Environment:
     """The `Environment` of a flight: this computer, and the live stream of the helper process."""
     if helper is None or helper.feed is None:
         return THIS_COMPUTER

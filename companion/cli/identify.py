@@ -77,14 +77,14 @@ def _log_of(given_path: Path) -> Path:
     if log.is_file() and log.suffix != ".mcap":
         return log
     if given_path.is_dir():
-        fault, meant = f"holds no {TLOG_FILE}", _suggestion(given_path)
+        fault, suggestion = f"holds no {TLOG_FILE}", _suggestion(given_path)
     elif not given_path.exists():
-        fault, meant = "does not exist", _suggestion(given_path.parent)
+        fault, suggestion = "does not exist", _suggestion(given_path.parent)
     else:
-        fault, meant = "is no MAVLink log", _suggestion(given_path.parent)
+        fault, suggestion = "is no MAVLink log", _suggestion(given_path.parent)
     raise LogError(
         f"{given_path} {fault}: --log takes the folder of a flight, or a MAVLink log such as the "
-        f"flight.tlog in it{meant}"
+        f"flight.tlog in it{suggestion}"
     )
 
 

@@ -28,7 +28,7 @@ _DEFAULT_HANDLERS: dict[signal.Signals, Handler] = {
 def signals_with_default_handler() -> list[signal.Signals]:
     """Those of SIGINT, SIGTERM and SIGHUP that still have their default handler.
 
-    `nohup` has SIGHUP ignored, so SIGHUP is then not among them.
+    Under `nohup` SIGHUP is ignored, so the list does not contain it.
     """
     return [
         number
@@ -37,16 +37,16 @@ def signals_with_default_handler() -> list[signal.Signals]:
     ]
 
 
-def leave_at_once(signals: list[signal.Signals]) -> None:
+def exit_on(signals: list[signal.Signals]) -> None:
     """Have these signals end the process without an exception.
 
     During imports an exception could be swallowed or printed.
     """
     for number in signals:
-        signal.signal(number, _leave)
+        signal.signal(number, _exit)
 
 
-def raise_interrupt(signals: list[signal.Signals]) -> None:
+def raise_interrupt_on(signals: list[signal.Signals]) -> None:
     """Have these signals raise KeyboardInterrupt in the main thread.
 
     Closing the event loop of a flight removes all handlers; call this again afterwards.
@@ -56,13 +56,13 @@ def raise_interrupt(signals: list[signal.Signals]) -> None:
         signal.signal(number, _DEFAULT_HANDLERS[number] if number == signal.SIGINT else _interrupt)
 
 
-def restore(signals: list[signal.Signals]) -> None:
+def restore_default_handlers(signals: list[signal.Signals]) -> None:
     """Give these signals the default handlers of a Python program again."""
     for number in signals:
         signal.signal(number, _DEFAULT_HANDLERS[number])
 
 
-def _leave(_number: int, _frame: FrameType | None) -> NoReturn:
+def _exit(_number: int, _frame: FrameType | None) -> NoReturn:
     os.write(2, b"companion: interrupted before anything was sent\n")
     os._exit(EXIT_FAILURE)
 

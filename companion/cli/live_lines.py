@@ -38,11 +38,11 @@ def _activity(status: FlightStatus) -> str:
             "" if status.maneuver_duration is None else f" of {status.maneuver_duration:.0f}"
         )
         return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{duration_text} s"
-    return f"{status.detail or 'working'} ({allowed_time(status.elapsed, status.timeout)})"
+    return f"{status.detail or 'working'} ({elapsed_text(status.elapsed, status.timeout)})"
 
 
-def allowed_time(elapsed: float, timeout: float) -> str:
-    """Text with two times in s: how long a phase has lasted, and its time limit."""
+def elapsed_text(elapsed: float, timeout: float) -> str:
+    """How long a phase has lasted, and its time limit if it has one; both times in s."""
     return f"{elapsed:.0f} s" if isinf(timeout) else f"{elapsed:.0f} of at most {timeout:.0f} s"
 
 

@@ -1,6 +1,7 @@
-"""The program's entry. Exit codes: 0 success, 1 failed or interrupted, 2 usage or configuration.
+"""The program's entry point. Exit codes: 0 success, 1 failed or interrupted, 2 usage error.
 
-It imports almost nothing before it handles signals: the other imports take most of a second.
+This module imports almost nothing before it handles signals: the other imports take most of a
+second.
 """
 
 from __future__ import annotations
@@ -22,18 +23,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None:
         _use_utf8_names()
     our_signals = interrupts.signals_with_default_handler()
-    interrupts.leave_at_once(our_signals)
+    interrupts.exit_on(our_signals)
     try:
         try:
             run = _load_command(arguments)
         finally:
-            interrupts.raise_interrupt(our_signals)
+            interrupts.raise_interrupt_on(our_signals)
         return run()
     except KeyboardInterrupt:
         sys.stderr.write("companion: interrupted\n")
         return EXIT_FAILURE
     finally:
-        interrupts.restore(our_signals)
+        interrupts.restore_default_handlers(our_signals)
         if arguments is None and signal.SIGINT in our_signals:  # Ctrl-C may end Python's shutdown
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
@@ -42,8 +43,8 @@ def _use_utf8_names() -> None:
     """Start this process again in Python's UTF-8 mode if its locale knows only ASCII file names.
 
     With `LC_ALL=C`, `PYTHONCOERCECLOCALE=0` and `PYTHONUTF8=0`, as some service managers and shells
-    set them, Python cannot name a file `flüge` that a configuration names. The encoding of the
-    output stays. If the process cannot be started again, it goes on.
+    set them, Python cannot open a file with a name such as `flüge`. The encoding of the output does
+    not change. If the restart fails, the process continues in its locale.
     """
     if sys.getfilesystemencoding() not in ("ascii", "us-ascii") or not sys.executable:
         return
@@ -67,7 +68,7 @@ def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:
     try:
         options = parse(arguments)
     finally:
-        output_fault()  # no error if nobody reads the help to its end
+        output_fault()  # so that Python reports no error if the help is cut off, as by `| head`
     from companion.cli.run import command_of, run  # noqa: PLC0415
 
     command = command_of(options)

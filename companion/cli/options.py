@@ -80,7 +80,7 @@ def add_live(command: argparse.ArgumentParser) -> None:
 def number_parser(least: float, most: float) -> Callable[[str], float]:
     """Make a parser for a number within bounds; it refuses NaN."""
 
-    def read(text: str) -> float:
+    def parse(text: str) -> float:
         try:
             value = float(text)
         except ValueError:
@@ -89,15 +89,15 @@ def number_parser(least: float, most: float) -> Callable[[str], float]:
             raise argparse.ArgumentTypeError(f"must be a number from {least:g} to {most:g}")
         return value
 
-    return read
+    return parse
 
 
 def whole_number_parser(least: int, most: int) -> Callable[[str], int]:
     """Make a parser for a whole number within bounds."""
 
-    def read(text: str) -> int:
+    def parse(text: str) -> int:
         if not (text.isascii() and text.isdigit()) or not least <= int(text) <= most:
             raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most}")
         return int(text)
 
-    return read
+    return parse

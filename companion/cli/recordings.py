@@ -40,14 +40,14 @@ def compare(options: argparse.Namespace) -> int:
     return _write_page(lambda on_fault: write_comparison(options.flights, options.out, on_fault))
 
 
-def _write_page(make: Callable[[Callable[[str], None]], Path]) -> int:
-    """Write a page by calling `make`; print its path, and the faults of the records on the page.
+def _write_page(write: Callable[[Callable[[str], None]], Path]) -> int:
+    """Write a page by calling `write`; print its path, and the faults of the records on the page.
 
     The exit code is 1 if a record has a fault, because the page then has gaps.
     """
     faults: list[str] = []
     try:
-        page = make(faults.append)
+        page = write(faults.append)
     except OSError as error:
         raise ConfigError(f"{error.filename}: cannot write there: {error.strerror}") from error
     for fault in faults:

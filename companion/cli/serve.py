@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
-from companion.cli.helper_process import environment, helper_process
+from companion.cli.helper_process import flight_environment, helper_process
 from companion.cli.signals import SECOND_CTRL_C_AFTER, hangup_signal
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
@@ -40,7 +40,7 @@ def serve(options: argparse.Namespace) -> int:
     with helper_process(options, config, options.config, config_as_read, None, console) as helper:
         observers = observer if helper is None else SeveralObservers(observer, helper)
         session = ServeSession(
-            config, note, observers, environment(helper), config.recording.directory
+            config, note, observers, flight_environment(helper), config.recording.directory
         )
         pages = ReportPages()
         if config.recording.report:

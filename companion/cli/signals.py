@@ -28,18 +28,21 @@ class SignalHandler:
 
     When a terminal closes, the shell and the kernel each send SIGHUP, and SIGTERM may follow. So a
     repeated SIGHUP or SIGTERM changes nothing. Only a second Ctrl-C interrupts a hand-back.
+
+    Args:
+        cancel_flight: called at the first signal if the session has no flight to hand back yet.
     """
 
     def __init__(
         self,
         session: Session,
-        give_up: Callable[[], object],
+        cancel_flight: Callable[[], object],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._session = session
-        self._give_up = give_up
+        self._cancel_flight = cancel_flight
         self._clock = clock
-        self._gave_up = False
+        self._cancelled = False
         self._ctrl_c_at: float | None = None
 
     def handle(self, number: signal.Signals) -> None:
@@ -61,9 +64,9 @@ class SignalHandler:
             self._session.leave()
 
     def _hand_back(self, cause: str) -> None:
-        if not self._session.interrupt(f"interrupted by {cause}") and not self._gave_up:
-            self._gave_up = True  # only once: closing the link must not be interrupted
-            self._give_up()
+        if not self._session.interrupt(f"interrupted by {cause}") and not self._cancelled:
+            self._cancelled = True  # only once: closing the link must not be interrupted
+            self._cancel_flight()
 
 
 async def fly_interruptibly(session: Session) -> Summary:

@@ -11,7 +11,7 @@ from typing import Any
 
 from rich.console import Console
 
-from companion.cli.live_lines import LiveLines, allowed_time, can_redraw, status_lines
+from companion.cli.live_lines import LiveLines, can_redraw, elapsed_text, status_lines
 from companion.flight.status import FlightStatus
 
 _STATUS_PERIOD = 5.0
@@ -74,17 +74,17 @@ async def read_line() -> str:
 
 
 class FlightConsole(Console):
-    """A console that shows brackets as they are, and survives a closed pipe.
+    """A console that prints brackets unchanged, and survives a closed pipe.
 
-    Rich by itself would take brackets, for example in the name of a folder, for markup. It would
-    end the program when the pipe closes.
+    `rich.console.Console` would take brackets, for example in the name of a folder, for markup, and
+    would end the program when the pipe closes.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options, markup=False)
 
     def on_broken_pipe(self) -> None:
-        """Raise `BrokenPipeError`. Rich would end the program."""
+        """Raise `BrokenPipeError`, where Rich would end the program."""
         raise BrokenPipeError
 
 
@@ -111,11 +111,11 @@ class TerminalObserver:
         """Print periodically what the phase waits for, unless live lines already show it."""
         if self._live_lines is None and elapsed - self._status_printed_at >= _STATUS_PERIOD:
             self._status_printed_at = elapsed
-            text = f"{name}: {detail or 'working'} ({allowed_time(elapsed, timeout)})"
+            text = f"{name}: {detail or 'working'} ({elapsed_text(elapsed, timeout)})"
             self._printer.queue_line(lambda: self._print(f"           {text}"))
 
     def status(self, status: FlightStatus) -> None:
-        """Redraw the live lines once per `_REDRAW_PERIOD`; a stalled terminal skips states."""
+        """Redraw the live lines, at most once per `_REDRAW_PERIOD`, unless the terminal stalls."""
         self._newest_status = status
         now = time.monotonic()
         if (

@@ -1,7 +1,8 @@
 """Makes standard output and error transliterate the characters that they cannot encode.
 
 A terminal may be ASCII or Latin-1 (`LANG=C`, `PYTHONIOENCODING`), and a file name may be any bytes.
-Neither may end a command that flies. Nor may an output that is closed, full, or no longer read.
+Neither may end a command that flies, and an output that is closed, full or no longer read may not
+end it either.
 """
 
 import codecs

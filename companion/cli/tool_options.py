@@ -65,7 +65,7 @@ def add_tune(commands: Commands) -> None:
     )
     tune.add_argument(
         "--out",
-        "--output",  # its name until all commands had --out
+        "--output",  # the former name of --out
         dest="output",
         type=Path,
         metavar="FILE",

@@ -19,8 +19,8 @@ def bench(options: argparse.Namespace) -> int:
         for name in ("seconds", "rate_hz", "profile")
         if hasattr(options, name)
     }
-    measured = import_module(f"companion.bench.{options.bench}")
-    figures = measured.run(**settings, as_json=options.json)
+    benchmark = import_module(f"companion.bench.{options.bench}")
+    figures = benchmark.run(**settings, as_json=options.json)
     if options.json:
         print(json.dumps(figures))
     return EXIT_OK

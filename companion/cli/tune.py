@@ -54,12 +54,13 @@ def tune(options: argparse.Namespace) -> int:
             mode="json", exclude_none=True, exclude_defaults=True
         )
         vehicle_source = {"vehicle": values}
-    console.print("\n".join(summary_lines(proposal, flights)))  # kept if the disk is full
+    # Printed first, so that a full disk does not lose it.
+    console.print("\n".join(summary_lines(proposal, flights)))
     write_whole(output, proposal_text(proposal, vehicle_source, flights, source.name))
     load(output)
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
-    own = vehicle if included and not _is_vehicle_file(vehicle) else None
-    console.print(_next_step(output, keys, own))
+    user_config = vehicle if included and not _is_vehicle_file(vehicle) else None
+    console.print(_next_step(output, keys, user_config))
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
     return EXIT_OK if worse_flights_warning(flights) is None else EXIT_FAILURE
@@ -70,12 +71,12 @@ def _is_vehicle_file(path: Path) -> bool:
     return load(path).model_fields_set <= set(_VEHICLE_SECTIONS)
 
 
-def _next_step(output: Path, keys: Sequence[str], own: Path | None) -> str:
-    """What to do with `output`; `own` is the user's configuration if `output` includes it."""
-    if own is not None:
+def _next_step(output: Path, keys: Sequence[str], user_config: Path | None) -> str:
+    """What to do with `output`; `user_config`: the user's configuration that `output` includes."""
+    if user_config is not None:
         return (
-            f"Written to {output}, which includes {own}. Fly it with --config {output}; do not "
-            f"include it in {own}."
+            f"Written to {output}, which includes {user_config}. Fly it with --config {output}; do "
+            f"not include it in {user_config}."
         )
     return (
         f"Written to {output}. Let your configuration include it, and remove {', '.join(keys)} "

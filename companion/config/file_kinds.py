@@ -32,13 +32,13 @@ _USED_BY: Mapping[FileKind, str] = {
     FileKind.CONFIG: "`companion fly --config` flies it, and the key `config` of a campaign file "
     "names it",
     FileKind.TRAJECTORY: "`companion fly --trajectory` flies it",
-    FileKind.CAMPAIGN: "`companion campaign run` flies it, and `campaign tune` its search; the key "
-    "`config` in it names the configuration",
+    FileKind.CAMPAIGN: "`companion campaign run` flies it, and its key `config` names the "
+    "configuration",
 }
 
 
 def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> None:
-    """Refuse a file whose top-level keys are rather those of another kind of file.
+    """Refuse a file whose top-level keys fit another kind of file better.
 
     Raises:
         ConfigError: it is another kind of file; the message names the command or key that takes it.

@@ -48,7 +48,7 @@ def load(path: Path | str) -> Config:
     reader = _IncludeReader()
     reader.add((path,), own)
     merged = reader.merged
-    _drop_foreign_identified(merged)
+    _drop_mixed_identification(merged)
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
 
 
@@ -76,10 +76,10 @@ def _read(path: Path) -> Contents:
     return contents
 
 
-def _drop_foreign_identified(merged: Contents) -> None:
-    """Drop `vehicle.identified` if another key of `vehicle` comes from another file.
+def _drop_mixed_identification(merged: Contents) -> None:
+    """Drop `vehicle.identified` and `vehicle.autopilot` if keys of `vehicle` come from other files.
 
-    The values are then not those of the identified vehicle, nor of its `vehicle.autopilot`.
+    The keys together are then not those that `companion identify` measured.
     """
     identified_place = merged.places.get(("vehicle", "identified"))
     files = {
@@ -192,7 +192,7 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
             known.update(values)
         elif section == "include":
             raise ConfigError(f"{name}: `include` belongs in a file; load that file instead")
-        else:  # is refused below, with the key that was probably meant
+        else:  # `validated` refuses it, and names the key that was probably meant
             data[section] = values
     return yaml_file.validated(data, name, Config)
 

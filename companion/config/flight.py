@@ -56,9 +56,9 @@ class FlightConfig(Section):
     takeoff_timeout_s: Seconds = 40.0
     """Time allowed to reach takeoff_height_m."""
     landing_timeout_s: Seconds = 90.0
-    """Time allowed to begin the landing, and as long again until the autopilot reports that it has
-    landed. Without setpoints ArduPilot would drift, so it is held until it lands or a pilot takes
-    over."""
+    """Time allowed until the landing begins, and again until the autopilot reports that it has
+    landed. A vehicle with ArduPilot that does not begin to land is held until it does or a pilot
+    takes over, because it would drift without setpoints."""
 
     @model_validator(mode="after")
     def _check_who_arms(self) -> "FlightConfig":

@@ -28,8 +28,8 @@ class KnownDrag(NamedTuple):
     """Configured or learned drag; None: unknown."""
     source: Path | None = None
     """The file of a learned drag; None: configured or unknown."""
-    trouble: str | None = None
-    """Why the file of a learned drag could not be used; None: no such fault, or no file."""
+    file_fault: str | None = None
+    """Why the file of a learned drag could not be used; None: it could, or there is none."""
 
     @property
     def least(self) -> Drag:
@@ -62,8 +62,6 @@ def before_connecting(config: Config) -> KnownDrag:
 def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
     """The configured drag, or the one that this vehicle learned; unknown without either.
 
-    `trouble` tells why a learned drag could not be read.
-
     Args:
         config: configuration of the flight.
         directory: folder of the flights, which has the learned drag; None: no learned drag.
@@ -73,16 +71,17 @@ def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> Known
         return KnownDrag(config.guidance.drag)
     if uid is None or directory is None:
         return KnownDrag()
-    learned, trouble = LearnedFile(directory, uid).load()
-    return KnownDrag(trouble=trouble) if learned is None else KnownDrag(learned.drag, learned.path)
+    learned, fault = LearnedFile(directory, uid).load()
+    return KnownDrag(file_fault=fault) if learned is None else KnownDrag(learned.drag, learned.path)
 
 
-def prior_of(drag: Drag) -> DragPrior:
-    """The prior of a drag that is configured or was learned in an earlier flight."""
+def prior_of(drag: Drag | None) -> DragPrior:
+    """The prior of a drag that is configured or was learned in an earlier flight; None: unknown."""
+    if drag is None:
+        return ANY_VEHICLE
     return DragPrior(drag, _LINEAR_DEVIATION_PER_S, _QUADRATIC_DEVIATION_PER_M)
 
 
 def drag_prior(config: Config) -> DragPrior:
-    """The prior with which the drag estimate begins."""
-    drag = config.guidance.drag
-    return ANY_VEHICLE if drag is None else prior_of(drag)
+    """The prior of the configured drag."""
+    return prior_of(config.guidance.drag)

@@ -75,7 +75,7 @@ class LimitsConfig(Section):
 
 
 class DeadmanConfig(Section):
-    """Largest age of data. A setpoint leaves only in answer to fresh data."""
+    """Largest age of data. The program sends a setpoint only in answer to fresh data."""
 
     telemetry_stale_ms: Annotated[float, Field(ge=10.0, le=500.0)] = 100.0
     """Largest age of an attitude sample that is answered with a setpoint. Without TIMESYNC the age

@@ -56,8 +56,8 @@ def keys(config: Config) -> Iterator[ConfigKey]:
     """Every key, with its value in a configuration."""
     values, defaults = config.model_dump(mode="json"), Config().model_dump(mode="json")
     for section, descriptions in _descriptions().items():
-        for name, words in descriptions.items():
-            yield ConfigKey(section, name, values[section][name], defaults[section][name], *words)
+        for name, text in descriptions.items():
+            yield ConfigKey(section, name, values[section][name], defaults[section][name], *text)
 
 
 @cache
@@ -89,10 +89,10 @@ def as_yaml(config_keys: Iterable[ConfigKey]) -> str:
         lines += ["", *_comment(models[section].__doc__ or "", ""), f"{section}:"]
         for key in section_keys:
             lines += _comment(key.meaning, "  ")
-            limits = ", ".join(part for part in (key.unit, key.allowed_values) if part)
+            note = ", ".join(part for part in (key.unit, key.allowed_values) if part)
             if key.value != key.default:
-                limits += f"; default: {dump_value(key.default)}"
-            note = f"  # {limits.removeprefix('; ')}" if limits else ""
+                note += f"; default: {dump_value(key.default)}"
+            note = f"  # {note.removeprefix('; ')}" if note else ""
             lines.append(f"  {key.name}: {dump_value(key.value)}{note}")
     return "\n".join(lines).strip() + "\n"
 

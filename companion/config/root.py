@@ -1,6 +1,6 @@
 """The typed configuration: all sections, and the rules between them.
 
-The defaults are right for the mock vehicle.
+The defaults fit the mock vehicle.
 """
 
 from collections.abc import Iterator, Mapping

@@ -1,8 +1,8 @@
 """The safety section of the configuration: limits, and the action on each breach.
 
 Some actions are fixed and have no key: on silence, gaps, low rates and a changed clock; when a
-pilot or a failsafe has the vehicle; when it is disarmed or on the ground. If a breach means that
-our control cannot be trusted, its action cannot be `warn`.
+pilot or a failsafe flies the vehicle; when the vehicle is disarmed or on the ground. If a breach
+means that our control cannot be trusted, its action cannot be `warn`.
 """
 
 from typing import Annotated, Literal

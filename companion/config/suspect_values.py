@@ -69,7 +69,8 @@ def _mistaken_units(config: Config) -> Iterator[SuspectValue]:
         usual = key.default
         if usual is None:
             usual = next(
-                (v for suffix, v in _USUAL_VALUES.items() if key.name.endswith(suffix)), None
+                (value for suffix, value in _USUAL_VALUES.items() if key.name.endswith(suffix)),
+                None,
             )
         if key.value == key.default or not isinstance(usual, int | float) or not usual:
             continue

@@ -41,7 +41,7 @@ _SMALLEST_NOTED_DETOUR = 0.05
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
 _MOST_TURNED = 13.0
-"""Largest change of yaw that no note reports, rad: two turns."""
+"""Largest change of yaw that no note reports, rad: a little more than two turns."""
 _MOST_ROWS_COMPARED = 2000
 """Tables with more rows are not compared with the path, because their rows are dense."""
 
@@ -239,7 +239,7 @@ def read(path: Path) -> LoadedTrajectory:
                 if is_table(path)
                 else load_shape(path).read(path.parent)
             )
-            loaded.trajectory.check_times()  # this may overflow, too
+            loaded.trajectory.check_times()  # in the block, because it may overflow too
             return loaded
     except TrajectoryError as error:
         # The errors of a table name it already.

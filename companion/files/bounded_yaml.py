@@ -187,8 +187,8 @@ def _value(node: yaml.Node, where: KeyPath, lines: dict[KeyPath, int]) -> Any:
 
 def _new_key(key: Any, parent: dict[str, Any], line: int) -> str:
     if not isinstance(key, str):
-        comma = "; a number has a point for decimals, not a comma" if parent else ""
-        raise YamlError(f"a key must be a word, not {key!r:.40}{comma}", line)
+        hint = "; a number has a point for decimals, not a comma" if parent else ""
+        raise YamlError(f"a key must be a word, not {key!r:.40}{hint}", line)
     if len(key) > LONGEST_KEY:
         raise YamlError(f"the key {key[:20]!r}... is longer than {LONGEST_KEY} characters", line)
     if key in parent:

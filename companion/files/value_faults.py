@@ -78,7 +78,7 @@ def value_fault(detail: Any, key: str | int) -> str:
         return remedy
     kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
     got = f" (got {'a section' if isinstance(value, dict) else shortened_text(value)})"
-    if kind == "value_error":  # of a validator of ours, which says what must be
+    if kind == "value_error":  # from one of our validators, whose message says what must be
         got = "" if isinstance(value, dict) else got
         return f": {_own_message(detail)}{got}"
     if kind == "literal_error":
@@ -89,7 +89,7 @@ def value_fault(detail: Any, key: str | int) -> str:
 
 
 def _own_message(detail: Any) -> str:
-    """The message of a validator of ours, with a small first letter."""
+    """The message of one of our validators, with a small first letter."""
     message: str = detail["msg"].removeprefix("Value error, ")
     return f"{message[:1].lower()}{message[1:]}"
 

@@ -25,11 +25,11 @@ _UNION_MEMBER = re.compile(r".*\[.*\]|(constrained-)?(str|int|float|bool)")
 
 
 def types_in(annotation: Any) -> frozenset[Any]:
-    """A type and its type arguments, at any depth, as of unions and annotated types."""
+    """A type, and at any depth its type arguments, such as the members of a union."""
     return _types_in(annotation)
 
 
-@cache  # a function of its own, because mypy does not regard a type as hashable
+@cache  # separate from `types_in`, because mypy does not regard a type as hashable
 def _types_in(annotation: Any) -> frozenset[Any]:
     return frozenset({annotation}).union(*(types_in(part) for part in get_args(annotation)))
 
@@ -37,8 +37,8 @@ def _types_in(annotation: Any) -> frozenset[Any]:
 def essential_details(details: list[Any]) -> list[Any]:
     """The errors that a user needs, without those that follow from others.
 
-    Dropped are "too short" for a list that is short only because an item was refused, further
-    missing items of one list, and the errors of all members of a union but one.
+    This drops "too short" for a list that is short only because an item was refused, further
+    missing items of a list, and the errors of all members of a union but one.
     """
     essential: list[Any] = []
     for detail in details:
@@ -57,7 +57,7 @@ def essential_details(details: list[Any]) -> list[Any]:
 
 
 def _one_member(details: list[Any]) -> list[Any]:
-    """Of the errors in a union, keep those of one member: the one whose type fits the value."""
+    """Keep only the errors of one member of each union: the one whose type fits the value."""
     chosen: dict[Location, Location] = {}
     for fits in (True, False):
         for detail in details:

@@ -36,7 +36,7 @@ def is_path(text: str) -> bool:
 
 
 def expanded_path(path: str) -> str:
-    """A path with `~` replaced by the home folder; no shell does it in a file or after `--set`."""
+    """A path with `~` replaced by the home folder, as a shell does only on the command line."""
     return expanduser(path)  # noqa: PTH111  Path.expanduser raises for an unknown user
 
 
@@ -54,7 +54,7 @@ class Section(BaseModel):
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
 
-    if not TYPE_CHECKING:  # a type checker shall see the keys as arguments
+    if not TYPE_CHECKING:  # so that a type checker sees the keys as arguments
 
         def __init__(self, /, **keys: Any) -> None:
             """Make a section in a program; the keys are checked like those of a file.
@@ -67,7 +67,7 @@ class Section(BaseModel):
             except ValidationError as error:
                 raise _config_error(error, type(self).__name__, type(self), {}) from error
 
-        # Pydantic shall not call it for sections inside of others: their errors are collected.
+        # Pydantic then validates inner sections without this method, and collects their errors.
         __init__.__pydantic_base_init__ = True
 
     @field_validator("*", mode="before")

@@ -19,7 +19,7 @@ def brake_inside_fence(context: FlightContext) -> None:
     guidance = context.guidance_loop
     guidance.give_up()
     centre, pose = context.snapshot_builder.flown_fence_centre(), guidance.flown_source.pose
-    if not context.link.autopilot.forgets_lean or centre is None or pose is None:
+    if not context.link.autopilot.modes_begin_level or centre is None or pose is None:
         return
     stop, wind = minus(pose.position_ned, centre.position_ned), guidance.estimate.disturbance
     if only_upwind_is_inside(fence_of(context.config), centre.place, stop, wind):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from companion.config import Config
 from companion.config.known_drag import KnownDrag, of_vehicle, prior_of
-from companion.guidance.drag_estimate import ANY_VEHICLE, DragEstimate
+from companion.guidance.drag_estimate import DragEstimate
 from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
 from companion.safety.actions import Exit, FlightEnded
@@ -169,10 +169,10 @@ class DragMemory:
         self._file = file
         if self._config.guidance.drag is not None:
             return
-        self._estimate.begin(ANY_VEHICLE if known.drag is None else prior_of(known.drag))
+        self._estimate.begin(prior_of(known.drag))
         self.on_begin(known)
-        if known.trouble is not None:
-            self._note(known.trouble)
+        if known.file_fault is not None:
+            self._note(known.file_fault)
         if known.drag is not None:
             self._note(
                 f"drag from an earlier flight of this vehicle: linear {known.drag.linear:.2f} 1/s, "

@@ -193,7 +193,7 @@ class BrakingUpwind(NamedTuple):
 def drift(wind: NorthEast) -> NorthEast:
     """How far the vehicle drifts downwind after the autopilot takes over, m north and east.
 
-    The autopilot begins level, without the tilt that balances the wind (`Autopilot.forgets_lean`).
+    Its modes begin level, without the tilt that balances the wind (`Autopilot.modes_begin_level`).
 
     Args:
         wind: acceleration by the wind of a vehicle at rest, m/s², north and east.

@@ -15,7 +15,7 @@ from companion.flight.changes import ChangeRefusedError, Changes
 from companion.flight.status import FlightStatus
 from companion.live.addresses import PageSocket, StreamAddress
 from companion.live.channel import Channel, Feed, Message
-from companion.realtime import schedule_as_usual
+from companion.realtime import use_normal_scheduler
 
 T = TypeVar("T")
 
@@ -202,7 +202,7 @@ def _start_process(
             pass_fds=[each for each in descriptors if each >= 0],
             start_new_session=True,
         )
-    schedule_as_usual(process.pid)  # it must not compute with the flight's real-time priority
+    use_normal_scheduler(process.pid)  # it must not compute with the flight's real-time priority
     return process
 
 

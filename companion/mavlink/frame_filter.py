@@ -38,9 +38,9 @@ class FrameFilter:
         self._noticed: set[str] = set()
 
     @property
-    def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only because its time stamp is not proved yet."""
-        return self._signing is not None and self._signing.awaits_answer
+    def needs_timesync_answer(self) -> bool:
+        """Whether only a TIMESYNC answer can prove the stamp of the last frame; see `Signing`."""
+        return self._signing is not None and self._signing.needs_timesync_answer
 
     def is_vehicle(self, frame: Frame) -> bool:
         """Whether a frame carries the vehicle's system and component id."""

@@ -101,9 +101,9 @@ class FrameScanner:
         message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
         checksum_start = start + _V2_HEADER_LENGTH + data[start + 1]
         end = checksum_start + (2 + SIGNATURE_LENGTH if incompatible else 2)
-        fault = self._frame_fault(data, start, checksum_start, end, message_id)
-        if fault is not None and not (fault == end - start and self._keep_unknown):
-            return fault
+        skipped = self._skipped_length(data, start, checksum_start, end, message_id)
+        if skipped is not None:
+            return skipped
         frames.append(
             Frame(
                 message_id,
@@ -123,27 +123,27 @@ class FrameScanner:
         _, size, sequence, system, component, message_id = data[start : start + _V1_HEADER_LENGTH]
         checksum_start = start + _V1_HEADER_LENGTH + size
         end = checksum_start + 2
-        fault = self._frame_fault(data, start, checksum_start, end, message_id)
-        if fault is not None and not (fault == end - start and self._keep_unknown):
-            return fault
+        skipped = self._skipped_length(data, start, checksum_start, end, message_id)
+        if skipped is not None:
+            return skipped
         payload = data[start + _V1_HEADER_LENGTH : checksum_start]
         frames.append(
             Frame(message_id, system, component, sequence, payload, data[start:end], signed=False)
         )
         return end - start
 
-    def _frame_fault(
+    def _skipped_length(
         self, data: bytes, start: int, checksum_start: int, end: int, message_id: int
     ) -> int | None:
-        """Check that the bytes `start`..`end` are an intact frame of a known message.
+        """Check whether the bytes `start`..`end` are a frame to return.
 
         Returns:
             None if they are; else `_NOT_A_FRAME`, `_INCOMPLETE`, or the length of a frame of an
-            unknown message.
+            unknown message, which is skipped.
         """
         extra = CRC_EXTRA.get(message_id)
         if extra is None:
-            return self._unknown_frame(data, start, end)
+            return self._skipped_length_of_unknown(data, start, end)
         if end > len(data):
             return _INCOMPLETE
         received_checksum = data[checksum_start] | data[checksum_start + 1] << 8
@@ -152,12 +152,12 @@ class FrameScanner:
         self._stats.bad_crc += 1
         return _NOT_A_FRAME
 
-    def _unknown_frame(self, data: bytes, start: int, end: int) -> int:
+    def _skipped_length_of_unknown(self, data: bytes, start: int, end: int) -> int | None:
         # Without CRC_EXTRA the checksum cannot be checked. The bytes count as a frame if another
         # frame or the end of the data follows them.
         if end == len(data) or (end < len(data) and data[end] in (V1_MAGIC, V2_MAGIC)):
             self._stats.unknown += 1
-            return end - start
+            return None if self._keep_unknown else end - start
         if self._keep_unknown and end > len(data) and _is_plausible(data, start):
             return _INCOMPLETE
         return _NOT_A_FRAME

@@ -34,7 +34,7 @@ async def resolve_peers(peers: Sequence[PeerAddress], kind: socket.SocketKind) -
 
 
 class NamedPeers:
-    """The senders that may talk to the endpoint; everyone if the endpoint names none.
+    """The senders that may talk to the endpoint; all senders if the endpoint names none.
 
     Args:
         admitted: IP address and port of each sender; a port of `None` is any port.

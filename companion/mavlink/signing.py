@@ -70,6 +70,9 @@ class Signing:
         file: keeps the newest stamps from one run to the next; `None`: they are not kept.
         remarks: sentences about time stamps for the user; the code that shows them removes them.
         changed: set when the time stamps should be written to the file soon.
+        needs_timesync_answer: whether the last frame was refused only because its time stamp is far
+            ahead of this program's date. The vehicle can prove the stamp by answering a TIMESYNC
+            request.
 
     Raises:
         SigningError: the key is not 32 bytes.
@@ -95,7 +98,7 @@ class Signing:
             self.remarks.append(load_error)
         self._newest_stamp = kept_stamps.newest_sent
         self._timesync_requests: deque[bytes] = deque(maxlen=_MAX_REQUESTS)
-        self._unproven_stamp = 0
+        self.needs_timesync_answer = False
 
     def sign(self, frame: bytes) -> bytes:
         """Append the signature to a frame built with `signed=True`."""
@@ -109,7 +112,7 @@ class Signing:
 
     def check(self, frame: Frame) -> SignatureResult:
         """Check the signature of a frame; only a good one updates the stamps of its stream."""
-        self._unproven_stamp = 0
+        self.needs_timesync_answer = False
         if not frame.signed:
             return SignatureResult.UNSIGNED
         signature = frame.raw[-SIGNATURE_LENGTH:]
@@ -121,20 +124,11 @@ class Signing:
         result = self._judge.judge(stream, stamp, answers_timesync=answers_timesync)
         if result is SignatureResult.GOOD:
             self._newest_stamp = max(self._newest_stamp, stamp)
-        elif result is SignatureResult.AHEAD and self._judge.awaits_answer(stamp):
+        elif result is SignatureResult.AHEAD and self._judge.answer_would_prove(stamp):
             # The vehicle would ignore a request with a stamp older than those it has seen.
             self._newest_stamp = max(self._newest_stamp, stamp)
-            self._unproven_stamp = stamp
+            self.needs_timesync_answer = True
         return result
-
-    @property
-    def awaits_answer(self) -> bool:
-        """Whether the last frame was refused only because its time stamp is not proved yet.
-
-        The vehicle proves a time stamp far ahead of this program's date by answering a TIMESYNC
-        request.
-        """
-        return self._unproven_stamp != 0
 
     def stamps(self) -> Stamps:
         """The stamps of this run, to be written to the file; called by another thread."""

@@ -95,9 +95,9 @@ class StampJudge:
         self._start_monotonic = monotonic_clock()
         self._ahead_limit = self._start_date + _DAY
         self._kept_streams = kept_stamps.streams
-        # The bool has the same meaning as in `_newest`.
+        # The newest stamps of all streams. True: of stamps far ahead of the date; False: of others.
+        self._newest = {False: 0, True: 0}
         self._newest_by_stream: dict[tuple[SignatureStream, bool], int] = {}
-        self._newest = {False: 0, True: 0}  # of all streams; True: of stamps far ahead of the date
         self._date_proven = False
 
     def date(self) -> int:
@@ -106,7 +106,7 @@ class StampJudge:
             (self._monotonic_clock() - self._start_monotonic) * TICKS_PER_S
         )
 
-    def awaits_answer(self, stamp: int) -> bool:
+    def answer_would_prove(self, stamp: int) -> bool:
         """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
         date = self.date()
         is_far_ahead = date + _DAY < stamp <= date + _MAX_AHEAD

@@ -28,7 +28,7 @@ _OTHER_LOGS = {
     b"ULog\x01\x12\x35": "a ULog",
     b"\xa3\x95\x80": "a DataFlash log",
 }
-"""How the logs begin that autopilots record themselves."""
+"""First bytes of the logs that autopilots record themselves, and the kind of each log."""
 _MAGIC = re.compile(rb"[\xfd\xfe]")
 
 
@@ -53,7 +53,7 @@ def messages(
         count = len(reader.damaged_at)
         on_damage(
             f"{path}: damaged at {count} {'place' if count == 1 else 'places'}, the first after "
-            f"{reader.damaged_at[0]} bytes; what stood there is missing, all the rest was read"
+            f"{reader.damaged_at[0]} bytes; the damaged records are left out, all others were read"
         )
 
 
@@ -90,24 +90,24 @@ class _RecordReader:
                 start = end + _STAMP_BYTES
             else:
                 following = self._next_intact(start + 1)
-                if following is not None or end <= end_of_data:  # else the end is incomplete
+                if following is not None or end <= end_of_data:  # otherwise the end is incomplete
                     self.damaged_at.append(start)
                 start = end_of_data if following is None else following
 
     def _first_record(self) -> int:
-        """Where the frame of the first record begins, which may stand after damaged ones."""
+        """Where the frame of the first intact record begins."""
         if self._frame_length(_STAMP_BYTES):
             return _STAMP_BYTES
-        if not self._data.strip(b"\0"):  # what a crash leaves of a file just begun
+        if not self._data.strip(b"\0"):  # a crash leaves zeros in a file that was just begun
             raise LogError(f"{self._path} is empty: its flight ended before anything was recorded")
-        other = next((words for begin, words in _OTHER_LOGS.items() if self._begins(begin)), None)
-        if other is not None:
-            raise LogError(
-                f"{self._path}: this is {other}; give the .tlog that a ground station or this "
-                "program recorded"
-            )
+        for beginning, kind in _OTHER_LOGS.items():
+            if self._data.startswith(beginning):
+                raise LogError(
+                    f"{self._path}: this is {kind}; give the .tlog that a ground station or this "
+                    "program recorded"
+                )
         first = None
-        if self._intact_frame(0) is None:  # else the records have no time
+        if self._intact_frame(0) is None:  # otherwise the records have no time
             first = self._next_intact(_STAMP_BYTES, _LONGEST_DAMAGED_BEGINNING)
         if first is None:
             raise LogError(
@@ -117,13 +117,10 @@ class _RecordReader:
         self.damaged_at.append(0)
         return first
 
-    def _begins(self, begin: bytes) -> bool:
-        return self._data.startswith(begin)
-
     def _may_skip(self, start: int, end: int) -> bool:
         """Whether `start`..`end` may be a frame of a message that is unknown or not wanted.
 
-        Its checksum says nothing: other dialects have other messages with the same number.
+        Its checksum cannot tell: another dialect may use the same number for another message.
         """
         if end == start or self._message_id(start) in self._wanted:
             return False

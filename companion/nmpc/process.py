@@ -24,7 +24,7 @@ from companion.extras import require
 from companion.guidance.trajectory.sample import Trajectory
 from companion.nmpc.messages import READY_MESSAGE, Answer, Request, Status
 from companion.nmpc.settings import Settings
-from companion.realtime import schedule_as_usual
+from companion.realtime import use_normal_scheduler
 
 _LARGEST_MESSAGE = 4096  # bytes
 _EXIT_TIME = 0.02
@@ -101,7 +101,7 @@ class Solver:
                 env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
             )
         self.pid = self._process.pid
-        schedule_as_usual(self.pid)  # without real-time priority, because it always computes
+        use_normal_scheduler(self.pid)  # without real-time priority, because it always computes
         self.alive = True
 
     @property

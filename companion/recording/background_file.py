@@ -1,8 +1,9 @@
 """A file written by its own thread, so that the caller never waits for the disk.
 
 The thread checks every 50 ms for new items, because waking it for each item would cost the control
-loop more than the rest of the recording. It writes them in slices, with a pause after each, in
-which the control loop can run. Twice a second it waits until the written data are on the disk.
+loop more than the rest of the recording. The thread writes the items in slices, and pauses after
+each slice, so that the control loop can run. Twice a second it waits until the written data are on
+the disk.
 """
 
 import threading
@@ -60,7 +61,7 @@ class BackgroundFile(ABC, Generic[T]):
         self._waiting: deque[T] = deque()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
-        self._synced_at = -inf  # the first items are on the disk at once
+        self._synced_at = -inf  # so that the first items are synced at once
 
     @abstractmethod
     def _create(self) -> None:

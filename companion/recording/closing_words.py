@@ -44,7 +44,7 @@ class ClosingWords(NamedTuple):
     headline: str
     """Which maneuvers flew, and whether all figures are within their limits; or the early end."""
     lines: tuple[str, ...]
-    """The figures and advice behind the headline, or how and why the flight ended early."""
+    """The figures and advice for the headline, or how and why the flight ended early."""
     next_command: str | None
     """Suggested next command line, or None."""
     good: bool
@@ -127,7 +127,7 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
     advice = what_to_do(end["monitor"], end["phase"], figures["result"])
     remedy = "nothing needs fixing" if interrupted else advice
     if figures["at_the_end"]["armed"]:
-        on_ground = end["since_takeoff_s"] is None  # or the take-off was not heard
+        on_ground = end["since_takeoff_s"] is None  # or no lift-off was reported
         first_step = (
             "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         )
@@ -154,7 +154,7 @@ def _gain_warning(figures: Figures) -> list[str]:
 def _when_ended(end: dict[str, Any]) -> str:
     words = f"at {end['time_s']:.1f} s, in phase `{end['phase']}`"
     if end["since_takeoff_s"] is None:
-        # In later phases it may fly although it was not heard to.
+        # In later phases the vehicle may fly although no lift-off was reported.
         is_on_ground = end["phase"] in _PHASES_BEFORE_TAKEOFF
         words += ", before take-off" if is_on_ground else ", before any report of lift-off"
     if end["maneuver"] is not None:
@@ -181,7 +181,7 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
         if invocation.config is None
         else ["--config", invocation.config, *_shared_options(again)]
     )
-    if figures["result"].startswith(_INTERRUPTED) or _flies_better_again(figures):
+    if figures["result"].startswith(_INTERRUPTED) or _repetition_is_better(figures):
         return command(*again)
     end = figures["early_end"]
     if (
@@ -200,15 +200,15 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
     return command("plot", figures["log"]) if figures["log"] is not None else None
 
 
-def _flies_better_again(figures: Figures) -> bool:
-    """Whether the same flight again is better, because it knows the drag that this one learned."""
+def _repetition_is_better(figures: Figures) -> bool:
+    """Whether a repetition would be better, because it knows the drag that this flight learned."""
     if figures["early_end"] is not None or figures["settings"] or not figures.get("drag_learned"):
         return False
     return any(not check.good and check.fault.endswith(OFF_COURSE) for check in checks(figures))
 
 
 def _computer_was_slow(figures: Figures) -> bool:
-    """Whether this computer was too slow to fly in real time, where lockstep would wait for it."""
+    """Whether this computer was too slow for real time; a flight in lockstep would wait for it."""
     if figures["lockstep"]:
         return False
     end = figures["early_end"]

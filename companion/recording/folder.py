@@ -8,9 +8,9 @@ from companion.files.yaml_file import ConfigError
 from companion.recording.tlog import TLOG_FILE
 
 _BYTES_PER_S = 160_000
-"""What a flight with 250 attitude samples a second records, measured."""
+"""Measured size of the recording of 1 s with 250 attitude samples, bytes."""
 _SHORTEST_RECORDING = 600.0
-"""With room for a longer recording there is no warning, s."""
+"""A warning is given if the disk has room only for a shorter recording, s."""
 
 
 def flight_folder(directory: Path) -> Path:
@@ -34,7 +34,7 @@ def flight_folder(directory: Path) -> Path:
     raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
 
 
-def own_folder(folder: Path) -> Path:
+def named_folder(folder: Path) -> Path:
     """Make the folder that the user names for one flight, unless it exists.
 
     Raises:

@@ -56,8 +56,8 @@ class LearnedFile:
                 return None, None
             reason = error if isinstance(error, FileRefusedError) else "it is damaged"
             return None, (
-                f"{self.path}: what earlier flights learned cannot be used ({reason}); "
-                "the drag is learned anew"
+                f"{self.path}: the drag that earlier flights learned cannot be used "
+                f"({reason}); this flight learns it anew"
             )
 
     def save(self, drag: Drag, top_speed: float) -> None:

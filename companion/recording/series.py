@@ -28,7 +28,7 @@ _MOST_WAITING = 64
 
 
 class SpooledFile:
-    """A temporary file of doubles in `folder`, made at the first write, deleted with its owner."""
+    """A temporary file of doubles in `folder`, made at the first write, deleted with its object."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

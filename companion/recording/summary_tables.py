@@ -28,7 +28,7 @@ def flight_table(summary: Summary) -> RenderableType:
     return Group(*parts)
 
 
-def words_text(words: ClosingWords) -> Text:
+def styled_text(words: ClosingWords) -> Text:
     """The closing words as coloured text."""
     style = "green" if words.good else "yellow" if words.completed else "red"
     text = Text(words.headline, style=f"bold {style}")

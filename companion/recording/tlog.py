@@ -1,7 +1,7 @@
 """Writes the flight's MAVLink frames, sent and received, as a `.tlog`, which ground stations read.
 
 A record is the time in microseconds since 1970 (if the flight runs in vehicle time: since the
-vehicle's boot), 8 bytes big endian, then the frame as it was on the wire.
+vehicle's boot), 8 bytes big endian, then the frame as it was sent.
 """
 
 import os

@@ -67,7 +67,7 @@ def what_to_do(monitor: str | None, phase: str, result: str = "") -> str:
     """
     if result.startswith(MESSAGE_START):
         return _USER_CODE
-    if monitor is not None:  # one of another package is not in the table
-        own = f"fix what your own monitor `{monitor}` reported, or change its limit"
-        return ADVICE_BY_MONITOR.get(monitor, own)
+    if monitor is not None:
+        plugin_advice = f"fix what your own monitor `{monitor}` reported, or change its limit"
+        return ADVICE_BY_MONITOR.get(monitor, plugin_advice)
     return ADVICE_BY_PHASE.get(phase, "read the events before the end")

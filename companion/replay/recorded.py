@@ -1,4 +1,4 @@
-"""Rows of `flight.mcap` as the inputs and outputs of the loops, and the vehicle that they show."""
+"""Converts rows of `flight.mcap` into inputs and outputs of the loops, and into telemetry."""
 
 from math import isnan
 from typing import Any, NamedTuple

@@ -1,9 +1,9 @@
 """Replays a recorded flight: the same control and guidance loops get the recorded inputs, in order.
 
-Guidance flies the maneuvers of the configuration again, with two exceptions: a program commanded
-the flight, or the solver process of predictive control did. The record lacks these inputs, so the
-recorded commands of guidance are used, and only the control loop is replayed. Changes of values in
-flight are repeated.
+Guidance flies the maneuvers of the configuration again, unless a program or the solver process of
+predictive control commanded the flight. The record lacks their inputs, so then the recorded
+commands of guidance are used, and only the control loop is replayed. Changes of values in flight
+are repeated.
 """
 
 from math import isnan
@@ -24,7 +24,6 @@ from companion.control.telemetry import GuidedVehicle
 from companion.drag import Drag
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose, Reference, VehicleMotion
-from companion.guidance.drag_estimate import ANY_VEHICLE
 from companion.guidance.reference import ReferenceAt
 from companion.guidance.source import ManeuverSource, Source
 from companion.mavlink.codec import SetpointEncoder
@@ -173,8 +172,7 @@ class Replay:
             case "stop_turning":
                 self._loop.end_stream()
             case "drag_prior":
-                prior = ANY_VEHICLE if entry.drag is None else prior_of(entry.drag)
-                guidance.estimate.drag.begin(prior)
+                guidance.estimate.drag.begin(prior_of(entry.drag))
             case "follow":
                 guidance.follow(self._source)
             case "stand_by" | "hold_here" | "hold_reference" | "give_up" | "move_upwind" as name:

@@ -64,7 +64,8 @@ def _step_response(flight: FlightData) -> Plot:
     ]
     if np.isfinite(flight.gain):
         ideal = f"ideal: first order, {1.0 / flight.gain:.2g} s"
-        traces.append(line(ideal, time, first_order(run, 1.0 / flight.gain) @ along, IDEAL_COLOUR))
+        response = first_order(run.steps(), 1.0 / flight.gain) @ along
+        traces.append(line(ideal, time, response, IDEAL_COLOUR))
     note = (
         "The first doublet along its direction. The response is linear if it follows the nearest "
         "model. The vehicle's own rate loop makes that model slower than the ideal."

@@ -113,7 +113,7 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
     along, time = run.direction, run.time - run.time[0]
     nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
     axes.plot(time, run.target @ along, color=_TARGET_COLOUR, label="target")
-    exact = first_order(run, ideal) @ along
+    exact = first_order(run.steps(), ideal) @ along
     axes.plot(time, exact, "--", color=_IDEAL_COLOUR, label=f"ideal, 1/p = {ideal:.2g} s")
     axes.plot(time, run.measured @ along, color=_MEASURED_COLOUR, label="measured")
     axes.plot(time, model.path(run) @ along, ":", color=_NEAREST_COLOUR, label=nearest)

@@ -9,7 +9,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from companion.realtime import schedule_as_usual
+from companion.realtime import use_normal_scheduler
 
 _PAGE_TIMEOUT = 120.0
 """Time allowed for one page, s; a small computer needs about ten seconds."""
@@ -91,6 +91,6 @@ class ReportPages:
 
 def _lower_priority(pid: int) -> None:
     """Give a process the normal scheduler and the lowest priority instead of the flight's."""
-    schedule_as_usual(pid)
+    use_normal_scheduler(pid)
     with suppress(ProcessLookupError):  # it has ended already
         os.setpriority(os.PRIO_PROCESS, pid, _NICENESS)

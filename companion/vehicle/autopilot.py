@@ -99,8 +99,8 @@ class Autopilot(Protocol):
             from the present yaw, not from north.
         can_compensate_tilt: whether the autopilot can divide thrust by cos(tilt) itself; a rule in
             `parameters` then compares its setting with the configuration.
-        forgets_lean: whether the autopilot's own modes begin level, so that a vehicle that leaned
-            against the wind drifts downwind until their integral has grown.
+        modes_begin_level: whether the autopilot's own modes begin level. A vehicle that leaned
+            against the wind then drifts downwind until the integral of the mode has grown.
         offboard_loss_failsafe: what the autopilot does when setpoints stop.
         fence_text: part of the text by which its geofence tells that it changes the mode; None:
             HEARTBEAT or CURRENT_MODE report it as a failsafe.
@@ -120,7 +120,7 @@ class Autopilot(Protocol):
     rates_about_target_axes: bool
     body_yaw_is_relative: bool
     can_compensate_tilt: bool
-    forgets_lean: bool
+    modes_begin_level: bool
     offboard_loss_failsafe: OffboardLossFailsafe
     fence_text: str | None
     cannot_arm_in: frozenset[Role]

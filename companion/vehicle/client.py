@@ -161,7 +161,7 @@ class VehicleClient:
 
         Raises:
             NotConnected: no heartbeat has come yet.
-            UnknownMessage: A name is not in the dialect; nothing was sent.
+            UnknownMessage: a name is not in the dialect; nothing was sent.
             CommandTimeout: the autopilot did not answer a request.
             LinkLost: the connection dropped while waiting.
         """
@@ -172,6 +172,6 @@ class VehicleClient:
         """Rates in Hz at which messages arrive, counted over `window_s`.
 
         Raises:
-            UnknownMessage: A name is not in the dialect.
+            UnknownMessage: a name is not in the dialect.
         """
         return await measured_rates(self.stats, names, window_s)

@@ -202,7 +202,7 @@ class VehicleClock:
         if not self._misfits.agrees_with(stamp):
             self._drop_misfits()
         self._misfits.stamps.append(stamp)
-        if not self._misfits.confirmed(quickest):
+        if not self._misfits.show_jump(quickest):
             return Misfit.AHEAD if stamp.time > self._newest_time else Misfit.NOT_NEWER
         jump = self._misfits.largest_offset() - quickest
         self._misfits.stamps.clear()

@@ -70,7 +70,7 @@ class MisfitRun:
             and abs(stamp.apparent_offset - last.apparent_offset) < SAME_CLOCK_SPREAD
         )
 
-    def confirmed(self, quickest: float) -> bool:
+    def show_jump(self, quickest: float) -> bool:
         """Whether the misfits show a jump of the clock away from `quickest`, the old offset, s."""
         first, last = self.stamps[0], self.stamps[-1]
         return (

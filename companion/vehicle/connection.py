@@ -85,7 +85,7 @@ class Connection:
             await asyncio.sleep(pause)
             try:
                 await self.open()
-            except Exception as error:  # whatever failed, the next try may succeed
+            except Exception as error:  # after any failure the next try may succeed
                 _LOG.info("reconnecting failed, the next try follows: %s", error)
                 pause = min(2.0 * pause, _BACKOFF_MAX_S)
         self._stats.reconnects += 1
@@ -119,9 +119,9 @@ def no_beacon_message(settings: LinkSettings, stats: LinkStats) -> str:
 
 
 def _refusal_message(opening: str, stats: LinkStats) -> str | None:
-    """The error message if frames were refused for their sender or signature; otherwise None.
+    """The error message, with this opening, if frames were refused for their sender or signature.
 
-    `opening` is its first clause.
+    None: no frame was refused.
     """
     if stats.unclaimed:
         return (

@@ -1,6 +1,6 @@
 """Checks arriving bytes, and passes their frames to the control loop and to the dispatcher.
 
-Every frame takes the same way, whatever the transport: scan, filter, control loop, count,
+Every frame of every transport passes the same steps: scan, filter, control loop, counter,
 subscribers. `lockstep_inbox.py` says how frames wait in lockstep.
 """
 
@@ -44,7 +44,7 @@ class Inbox:
         tap: called with every accepted frame, for recordings.
         notice: called once with each notice about signatures, their time stamps and the peer.
         clock: the vehicle's clock; takes the time stamp of every sample.
-        outbox: knows when the last setpoint was sent.
+        outbox: gives the time of the last setpoint; in lockstep it also sends the answers.
     """
 
     def __init__(
@@ -63,6 +63,7 @@ class Inbox:
         self._loop = asyncio.get_running_loop()
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
+        # The sender that becomes the peer with the next accepted frame; see `may_prove_date`.
         self._candidate: str | None = None
         self._peer_rule = PeerRule(
             stats,
@@ -104,7 +105,7 @@ class Inbox:
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
         """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
 
-        If none of the frames entitles `sender` to become the peer, none is accepted. Never raises.
+        Without a valid claim in the bytes, no frame in them is accepted. Never raises.
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._is_admitted(frame)]
@@ -125,7 +126,7 @@ class Inbox:
 
         See `Receiver`.
         """
-        if not self._filter.awaits_answer:
+        if not self._filter.needs_timesync_answer:
             return False
         self._candidate = sender
         return True
@@ -134,7 +135,7 @@ class Inbox:
         """Whether another sender may become the peer although the present one still sends."""
         return self._peer_rule.may_replace_peer()
 
-    def note_stranger(self, sender: str) -> None:
+    def report_ignored(self, sender: str) -> None:
         """Tell the user that `sender` was ignored, because the endpoint names only other peers."""
         self._peer_rule.report_ignored(sender)
 

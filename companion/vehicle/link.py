@@ -165,14 +165,14 @@ class Link(VehicleClient, LinkCallbacks):
             Whether it was sent; False if the connection is down or the kernel refuses it.
 
         Raises:
-            InvalidSetpoint: A value is out of range, or not finite; nothing was sent.
+            InvalidSetpoint: a value is out of range, or not finite; nothing was sent.
         """
         if self._lockstep is not None and self._lockstep.open_step_time_ms == time_boot_ms:
             self._outbox.latch(time_boot_ms, rates, thrust)
             return True
         return self._outbox.send_setpoint(time_boot_ms, rates, thrust)
 
-    # --- inside
+    # --- internal
 
     def _on_dropped(self, reason: str) -> None:
         self._registry.fail(reason)

@@ -88,7 +88,7 @@ class ModeState:
             except UnsupportedAutopilot as error:
                 self.unsupported_error = error
         elif message.autopilot != self.autopilot.mav_autopilot or message.type not in MULTIROTORS:
-            return  # an autopilot does not change its kind: this is another component
+            return  # another component: the kind of an autopilot does not change
         armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
         self.armings += armed and not self.armed
         mode = str(message.custom_mode)
@@ -103,7 +103,7 @@ class ModeState:
             return  # the meaning of the mode's number is not known yet
         mode, intended = (
             self.autopilot.mode_name(self._base_mode, number)
-            # An intended mode of 0 is unknown (MAVLink), so as if nothing had changed the mode.
+            # MAVLink: an intended mode of 0 is unknown; then the present mode counts as intended.
             for number in (message.custom_mode, message.intended_custom_mode or message.custom_mode)
         )
         self.current_mode = CurrentMode(self._clock(), mode, intended)

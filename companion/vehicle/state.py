@@ -30,7 +30,7 @@ from companion.vehicle.records import (
 )
 
 GROUND_HEIGHT = 1.5
-"""Largest height above home that counts as on the ground, m: the estimate drifts."""
+"""Largest height above home that counts as on the ground, m, because the estimate drifts."""
 _UNKNOWN_U16 = 65535
 _PREARM_CHECK = 0x10000000
 _LANDED_UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
@@ -183,8 +183,8 @@ class VehicleState(ModeState, _Values):
         self._take_battery(
             None if millivolts == _UNKNOWN_U16 else millivolts / 1000.0, message.battery_remaining
         )
-        good = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
-        self.prearm = Prearm(self._clock(), good)
+        passed = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
+        self.prearm = Prearm(self._clock(), passed)
 
     def _on_odometry(self, payload: bytes) -> None:
         self.reset_counter = decode_reset_counter(payload)
@@ -224,8 +224,8 @@ class VehicleState(ModeState, _Values):
         self.global_position = GlobalPosition(self._clock(), message.lat / 1e7, message.lon / 1e7)
 
     def _on_gps(self, message: Message) -> None:
-        seen = message.satellites_visible
-        satellites = None if seen == 255 else seen
+        count = message.satellites_visible
+        satellites = None if count == 255 else count
         self.gps = Gps(self._clock(), message.fix_type, satellites, message.alt / 1000.0)
         self.gps_was_good = self.gps_was_good or message.fix_type >= GPS_FIX_3D
 

@@ -17,7 +17,7 @@ from companion.mavlink.outbox import Outbox
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
 
-# For a good clock offset within the first second.
+# The first exchanges follow quickly, so that the clock offset is good after a second.
 _QUICK_EXCHANGES, _QUICK_EXCHANGE_PERIOD_S = 10, 0.1
 _EXCHANGE_PERIOD_S = 1.0
 _NS_PER_S, _S_PER_NS = 1e9, 1e-9
@@ -108,14 +108,14 @@ class TimeSync:
     async def run(self) -> None:
         """Begin exchanges until cancelled: quickly at first, then one each second."""
         for _ in range(_QUICK_EXCHANGES):
-            self.ask()
+            self.send_exchange_request()
             await asyncio.sleep(_QUICK_EXCHANGE_PERIOD_S)
         while True:
-            self.ask()
+            self.send_exchange_request()
             await asyncio.sleep(_EXCHANGE_PERIOD_S)
             self._vehicle_clock.update(self._clock())
 
-    def ask(self) -> None:
+    def send_exchange_request(self) -> None:
         """Send the request of one exchange."""
         self._send_request(self._exchanges, self._now_ns())
 

@@ -66,8 +66,8 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
     (folder / "log").mkdir()
     mock_px4, log = shipped("mock-px4.yaml"), folder / "log" / "a"
     with (
-        demo.wire_like("udpin://0.0.0.0:14540") as wire,
-        demo.bundled_vehicle(mock_px4, wire, log, lockstep=True),
+        demo.local_endpoints("udpin://0.0.0.0:14540") as endpoints,
+        demo.bundled_vehicle(mock_px4, endpoints, log, lockstep=True),
     ):
         assert main(["demo", "--lockstep"]) == 1
     assert f"UDP port {port + 40}" in " ".join(capsys.readouterr().err.split())
@@ -77,10 +77,10 @@ def test_a_vehicle_that_cannot_start_is_told_with_its_own_words(folder, monkeypa
 def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, capsys):
     mock_px4, log = shipped("mock-px4.yaml"), folder / "log"
     with (
-        demo.wire_like("udpin://0.0.0.0:14540") as wire,
-        demo.bundled_vehicle(mock_px4, wire, log, lockstep=False),
+        demo.local_endpoints("udpin://0.0.0.0:14540") as endpoints,
+        demo.bundled_vehicle(mock_px4, endpoints, log, lockstep=False),
     ):
-        (folder / "mine.yaml").write_text(f"link: {{endpoint: '{wire.endpoint}'}}")
+        (folder / "mine.yaml").write_text(f"link: {{endpoint: '{endpoints.program}'}}")
         code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
     assert code == 1
     assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())

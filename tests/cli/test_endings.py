@@ -328,7 +328,7 @@ def test_a_flight_is_served_beside_its_helper(monkeypatch, tmp_path, beside, rem
     monkeypatch.setattr(flying, "Session", lambda *_, **__: session)
     monkeypatch.setattr(flying, "fly_interruptibly", lambda each: ("flight", each))
     monkeypatch.setattr(flying, "flight_table", lambda _: "table")
-    monkeypatch.setattr(flying, "words_text", lambda _: "words")
+    monkeypatch.setattr(flying, "styled_text", lambda _: "words")
     monkeypatch.setattr(flying, "closing_words", lambda *_: None)
     summary = SimpleNamespace(as_dict=dict)
     monkeypatch.setattr(flying, "run", lambda work, **_: (ran.append(work), summary)[1])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.demo import wire_like
+from companion.demo import local_endpoints
 from companion.mavlink import lockstep
 from companion.mavlink import loop as link_loop
 from companion.mavlink.errors import LinkTimeout
@@ -37,13 +37,16 @@ def signed(key):
 def test_keys_that_do_not_fit(theirs, ours, said, keys, tmp_path):
     """Nothing is obeyed, and why is said once. By TCP, where both sides speak from the start."""
     with (
-        wire_like("tcp://127.0.0.1:1") as wire,
+        local_endpoints("tcp://127.0.0.1:1") as endpoints,
         mock_vehicle(
-            tmp_path, in_lockstep=False, endpoint=wire.vehicle_arguments[1], **signed(keys[theirs])
+            tmp_path,
+            in_lockstep=False,
+            endpoint=endpoints.vehicle_arguments[1],
+            **signed(keys[theirs]),
         ) as mock,
     ):
         mock.state()  # it is there
-        summary = flown(mock, tmp_path, endpoint=wire.endpoint, signing_key_file=keys[ours])
+        summary = flown(mock, tmp_path, endpoint=endpoints.program, signing_key_file=keys[ours])
         truth = mock.state()
     assert sum(said in text for _, text in summary.events) == 1
     assert (truth["armed"], truth["setpoints"], truth["mode"]) == (False, 0, "LOITER")

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from companion.demo import wire_like
+from companion.demo import local_endpoints
 from companion.mavlink import loop as link_loop
 from tests.flight.fly import LOOP_HZ
 from tests.flight.sockets import fly, mock_vehicle, session_for
@@ -35,8 +35,8 @@ def joined(stack, folder, autopilot, wire, signs, **settings):
     ours = {"signing_key_file": str(key)} if signs else {}
     ours["min_attitude_rate_hz"] = 10.0  # in real time, a busy computer pauses telemetry
     if WIRES[wire] is not None:
-        made = stack.enter_context(wire_like(WIRES[wire]))
-        ours["endpoint"], theirs["endpoint"] = made.endpoint, made.vehicle_arguments[1]
+        made = stack.enter_context(local_endpoints(WIRES[wire]))
+        ours["endpoint"], theirs["endpoint"] = made.program, made.vehicle_arguments[1]
     settings |= theirs | {"autopilot": autopilot}
     mock = stack.enter_context(mock_vehicle(folder, **settings))
     mock.state()  # it is there

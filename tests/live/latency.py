@@ -55,13 +55,13 @@ def _flight(seconds: float, *, page: bool) -> tuple[list[float], list[float]]:
     path = shipped("mock-px4.yaml")
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        wire = stack.enter_context(demo.wire_like("udpin://127.0.0.1:1"))
+        endpoints = stack.enter_context(demo.local_endpoints("udpin://127.0.0.1:1"))
         log = folder / "mock.log"
-        stack.enter_context(demo.bundled_vehicle(path, wire, log, lockstep=False))
+        stack.enter_context(demo.bundled_vehicle(path, endpoints, log, lockstep=False))
         config = changed(
             load(path),
             {
-                "link": {"endpoint": wire.endpoint},
+                "link": {"endpoint": endpoints.program},
                 "flight": {"arm": True, "maneuvers": ["hover"]},
                 "hover": {"duration_s": seconds},
             },

@@ -57,7 +57,7 @@ def test_a_damaged_file_is_told_and_not_used(tmp_path, text):
     file.path.write_text(text)
     kept, trouble = file.load()
     assert kept is None
-    assert "learned-4954.json: what earlier flights learned cannot be used" in trouble
+    assert "learned-4954.json: the drag that earlier flights learned cannot be used" in trouble
     assert newest_learned(tmp_path) is None
 
 

@@ -60,7 +60,7 @@ def test_a_probe_changes_neither_the_clock_nor_the_long_round_trip():
         bench.probe(0.05)
     assert bench.exchanges == []
     assert bench.timesync.round_trip_s is None
-    bench.timesync.ask()
+    bench.timesync.send_exchange_request()
     bench.answer(0.01)
     assert len(bench.exchanges) == 1
     assert bench.timesync.round_trip_s == pytest.approx(0.01)
@@ -94,7 +94,7 @@ def test_unanswered_probes_are_counted_once_the_vehicle_has_answered_any_request
 
 def test_an_answer_leaves_the_probes_sent_after_its_request_unanswered():
     bench = Bench()
-    bench.timesync.ask()
+    bench.timesync.send_exchange_request()
     bench.answer(0.01)
     for _ in range(6):
         bench.now += 0.1
@@ -108,7 +108,7 @@ def test_an_answer_leaves_the_probes_sent_after_its_request_unanswered():
     assert unanswered_after(probes[3]) == 2
     assert unanswered_after(probes[1]) == 2  # overtaken on the way
     assert unanswered_after(probes[3] + 1) == 2  # an answer to another station
-    bench.timesync.ask()
+    bench.timesync.send_exchange_request()
     assert unanswered_after(bench.sent[-1].ts1) == 0
 
 

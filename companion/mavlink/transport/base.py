@@ -32,16 +32,16 @@ class Receiver(Protocol):
     def may_prove_date(self, sender: str) -> bool:
         """Whether to send frames to `sender`, although its claim was refused.
 
-        True if the frame was signed with the right key, but its time stamp is not proved yet
-        (`Signing.awaits_answer`). `sender` can prove it by answering a TIMESYNC request. The next
-        frame that is accepted then makes `sender` the peer.
+        True if the frame was signed with the right key, but only an answer to a TIMESYNC request
+        can prove its time stamp (`Signing.needs_timesync_answer`). The next frame that is accepted
+        then makes `sender` the peer.
         """
 
     def may_replace_peer(self) -> bool:
         """Whether the peer's claim is so old that another sender may become the peer."""
 
-    def note_stranger(self, sender: str) -> None:
-        """Note that bytes of `sender`, whom the endpoint does not name as a peer, were ignored."""
+    def report_ignored(self, sender: str) -> None:
+        """Tell the user that `sender` was ignored, because the endpoint names only other peers."""
 
 
 LostCallback = Callable[[str], None]

@@ -16,7 +16,7 @@ from companion.mavlink.transport.endpoint import SerialPort
 _READ_BYTES = 4096
 
 _NO_PERMISSION = "not permitted; add yourself to its group: sudo adduser $USER dialout"
-_IN_USE = "in use by another program (a ground station?); end that first"
+_IN_USE = "in use by another program (a ground station?); end that program first"
 _NO_HARDWARE = "no hardware answers under this name; is it plugged in and enabled?"
 _OPEN_FAULTS: dict[int | None, str] = {
     errno.ENOENT: (

@@ -106,7 +106,7 @@ class TcpTransport:
             return False
         address = connection.get_extra_info("peername")
         if self._server is not None and not self._named_peers.admits(address):
-            self._receiver.note_stranger(host_and_port(address))
+            self._receiver.report_ignored(host_and_port(address))
             return False
         if self._connection is not None:
             if not self._may_be_replaced():

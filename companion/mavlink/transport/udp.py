@@ -149,7 +149,7 @@ class UdpTransport:
         """
         sender = host_and_port(address)
         if not self._named_peers.admits(address):
-            self._receiver.note_stranger(sender)
+            self._receiver.report_ignored(sender)
             return False
         if address == self._peer and not self._receiver.may_replace_peer():
             accepted = self._receiver.receive(data, received_ns)  # the peer was only silent

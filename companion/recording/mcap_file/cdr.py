@@ -161,9 +161,9 @@ def log_message(time_ns: int, level: int, text: str, name: str) -> bytes:
     message = CdrMessage()
     message.add_time(time_ns)
     message.add_uint8(level)
-    for each in (text, name, ""):  # the last one: no source file
+    for each in (text, name, ""):  # "": no source file
         message.add_text(each)
-    message.add_uint32(0)  # no line of it
+    message.add_uint32(0)  # no source line
     return message.bytes()
 
 

@@ -47,7 +47,7 @@ MOTION = Channel(
 )
 RESOURCES = Channel(
     "/resources",
-    "What the flight takes from the computer, and the counters of the link, once a second.",
+    "The flight's use of the computer, and the counters of the link, once a second.",
     (
         Field("time_s", "Time on our clock, s."),
         Field("processor_share", "Processor load of the program; 1: one core fully used."),

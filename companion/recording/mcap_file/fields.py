@@ -64,7 +64,7 @@ class Channel:
 
     @property
     def type(self) -> MessageType:
-        """The message type, in whose definition the names of codes are constants."""
+        """The message type; its definition has a constant for each name of a code."""
         words = "".join(word.capitalize() for word in self.name.split("_"))
         lines = [f"# {self.meaning}"]
         for field in self.numbers:

@@ -157,7 +157,7 @@ GUIDANCE = Channel(
 )
 TARGET = Channel(
     "/target",
-    "One command that guidance left with the control loop; it holds until the next one.",
+    "One command of guidance to the control loop; it holds until the next one.",
     (
         Field("time_s", "When it was made, on our clock, s."),
         Field("north", "Target coefficient, north."),

@@ -56,8 +56,8 @@ class FlightFacts:
     mode: str | None = None
     """Mode of the vehicle at the end; None: unknown."""
     silence: float | None = None
-    """How long the vehicle was silent at the end, s, so that `armed` and `mode` may have changed
-    since; None: it was heard."""
+    """Time since the vehicle was last heard, s; `armed` and `mode` may have changed since. None: it
+    was heard to the end."""
     battery: tuple[float | None, float | None] = (None, None)
     """Remaining charge, 0..1, at take-off and at the end; None: unknown."""
     min_battery: float = 0.0
@@ -77,8 +77,8 @@ class FlightFacts:
     settings: dict[str, str] = field(default_factory=dict)
     """Keys of hover thrust and drag that the advice names, with values for `--set`."""
     drag_learned: str | None = None
-    """A sentence if the drag was far from the assumed one and the vehicle's next flight begins with
-    it, or None."""
+    """A sentence if the drag was far from the assumed drag, and is stored for the vehicle's next
+    flight; or None."""
     changes: tuple[dict[str, Any], ...] = ()
     """Changes in flight, each with `time_s`, `by` and `keys` (values before and after)."""
 

@@ -37,8 +37,8 @@ _REQUIRED_KEYS = frozenset(
 def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
     """The summary of a flight with the keys of `summary.json`, and whether it is provisional.
 
-    A provisional summary is derived from the record: `result` says that the record ends early, and
-    what is not recorded is null or empty, such as the dead times, the realtime grants, the advice
+    A provisional summary is derived from the record, and `result` says that the record ends early.
+    Values that are not recorded are null or empty: the dead times, the realtime grants, the advice,
     and whether the vehicle is armed.
 
     Raises:
@@ -131,7 +131,7 @@ def _tracking(guidance: Rows) -> NDArray[np.float64]:
 def reference_positions(guidance: Rows) -> NDArray[np.float64]:
     """(N, 3), positions of the reference, m, NED; NaN where there is none, as in open loop.
 
-    While the autopilot does not obey us, the recorded reference is where the vehicle is.
+    While the autopilot does not obey our setpoints, the recorded reference is the vehicle itself.
     """
     positions = matrix(guidance, vector_names("reference", "m"))
     positions[guidance["offboard_active"] == 0] = np.nan

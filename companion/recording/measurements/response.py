@@ -66,7 +66,7 @@ def measure_response(rows: Floats, gain: float) -> StepResponse | None:
         target_tilt=asin(min(1.0, max(largest_norm(run.target) for run in runs))),
         cross_axis_max=max(_largest_deviation(step) for run in runs for step in run.steps()),
         model_deviation_max=max(
-            largest_norm(run.measured - first_order(run, 1.0 / gain)) for run in runs
+            largest_norm(run.measured - first_order(run.steps(), 1.0 / gain)) for run in runs
         ),
         second_order=second_order,
         second_order_deviation_max=max(
@@ -100,13 +100,13 @@ def response_as_dict(response: StepResponse | None) -> dict[str, Any]:
     }
 
 
-def first_order(run: StepRun, time_constant: float) -> Floats:
-    """(n, 2), exact response of τ·ċ = c_d − c to the targets c_d of `run`, from its first row."""
-    return _first_order(run.steps(), time_constant)
+def first_order(steps: list[StepRun], time_constant: float) -> Floats:
+    """(n, 2), exact response of τ·ċ = c_d − c to the targets c_d of a run.
 
-
-def _first_order(steps: list[StepRun], time_constant: float) -> Floats:
-    """`first_order` of a run that is split into its steps."""
+    Args:
+        steps: the steps of the run (`StepRun.steps`); the response starts at their first row.
+        time_constant: τ, s.
+    """
     since, start, target = steps[0].time[0], steps[0].measured[0], steps[0].target[0]
     parts = []
     for step in steps:
@@ -142,7 +142,7 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
 
     def residuals(log_time_constant: Floats) -> tuple[Floats, Floats]:
         tau = float(np.exp(log_time_constant[0]))
-        paths = np.concatenate([_first_order(each, tau) for each in steps])
+        paths = np.concatenate([first_order(each, tau) for each in steps])
         return np.empty(0), (measured - paths).ravel()
 
     lowest, highest = np.log(_TIME_CONSTANT_RANGE)

@@ -73,7 +73,7 @@ class ArduPilot:
     rates_about_target_axes = True
     body_yaw_is_relative = True
     can_compensate_tilt = True
-    forgets_lean = False  # landings from a hover in wind of 3 m/s drifted by 0.01 and 0.03 m
+    modes_begin_level = False  # landings from a hover in wind of 3 m/s drifted by 0.01 and 0.03 m
     offboard_loss_failsafe = OffboardLossFailsafe(
         "GUID_TIMEOUT",
         "it levels and keeps its height, but drifts: it does not hold its position",

@@ -49,8 +49,8 @@ def _transmitter_failsafe(value: float, values: Values, _: CompanionSettings) ->
         return None
     return Problem(
         UNSAFE,
-        "ArduPilot does nothing when the pilot's transmitter is lost, nor when the ground station "
-        "is (FS_GCS_ENABLE)",
+        "ArduPilot does nothing when the pilot's transmitter is lost, and nothing when the ground "
+        "station is lost (FS_GCS_ENABLE)",
         1.0,
     )
 
@@ -70,7 +70,7 @@ def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem 
     if value >= settings.attitude_rate_hz:
         return None
     wanted = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
-    return Problem(INEFFECTIVE, f"the main loop is slower, so {wanted} is denied; lower that key")
+    return Problem(INEFFECTIVE, f"the main loop is slower, so {wanted} is denied; lower this key")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:

@@ -92,7 +92,7 @@ class Px4:
     rates_about_target_axes = False
     body_yaw_is_relative = False
     can_compensate_tilt = False
-    forgets_lean = True
+    modes_begin_level = True
     offboard_loss_failsafe = OffboardLossFailsafe(
         "COM_OF_LOSS_T", "it takes the action that COM_OBL_RC_ACT sets", brakes=True
     )
