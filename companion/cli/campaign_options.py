@@ -13,9 +13,8 @@ def with_campaign_run(arguments: Sequence[str]) -> list[str]:
     """The arguments, with `campaign FILE` expanded to `campaign run FILE`."""
     words = list(arguments)
     position = next((n for n, word in enumerate(words) if not word.startswith("-")), len(words))
-    if words[position : position + 1] == [_CAMPAIGN] and not (
-        words[position + 1 : position + 2] and words[position + 1] in _SUB_COMMANDS
-    ):
+    command, following = words[position : position + 1], words[position + 1 : position + 2]
+    if command == [_CAMPAIGN] and not set(following).intersection(_SUB_COMMANDS):
         words.insert(position + 1, _RUN)
     return words
 

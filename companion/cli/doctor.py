@@ -17,7 +17,7 @@ from companion.cli.exit_codes import EXIT_FAILURE, EXIT_OK
 from companion.cli.terminal import read_line
 from companion.config import Config
 from companion.config.files import changed, load, with_assignments
-from companion.config.known_drag import KnownDrag, of_vehicle
+from companion.config.known_drag import KnownDrag, drag_of_vehicle
 from companion.control.expected_response import expected_response, hold_sentence
 from companion.files.yaml_file import ConfigError
 from companion.files.yaml_file import load as load_yaml
@@ -129,7 +129,7 @@ class _DoctorRun:
                 evidence = await vehicle.gather(wait)
             except (LinkTimeout, LinkLost) as error:
                 return self._report(vehicle.unanswered_findings(error))
-            drag = of_vehicle(config, config.recording.directory, evidence.identity.uid)
+            drag = drag_of_vehicle(config, config.recording.directory, evidence.identity.uid)
             maneuvers, maneuver_findings = _maneuvers(config, drag)
             evidence = replace(evidence, maneuvers=maneuvers, known_drag=drag)
             findings = [*maneuver_findings, *_other_findings(config, evidence)]

@@ -41,14 +41,13 @@ def helper_process(
     if not options.watch and options.live is None and options.foxglove is None:
         yield None
         return
-    stream = None
     if options.live is not None:
         require("nicegui", "live", "--live")
     if options.foxglove is not None:
         require("foxglove", "foxglove", "--foxglove")
     page = None if options.live is None else open_page_socket(options.live)
-    if options.foxglove is not None:  # after the page, so that a port given to both is refused
-        stream = stream_address(options.foxglove)
+    # After the page, so that a port given to both is refused.
+    stream = None if options.foxglove is None else stream_address(options.foxglove)
     for each in (page, stream):
         if each is not None:
             console.print(each.address_text(), highlight=False, soft_wrap=True)

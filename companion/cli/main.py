@@ -60,7 +60,7 @@ def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:
     """Parse the arguments and import their command; return a function that runs it."""
     # Our matrices are small: a second thread takes twice the CPU time and is slower.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from companion.cli.text_streams import output_fault, transliterate_output  # noqa: PLC0415
+    from companion.cli.text_streams import flush_output, transliterate_output  # noqa: PLC0415
 
     transliterate_output()
     from companion.cli.command_line import parse  # noqa: PLC0415
@@ -68,7 +68,7 @@ def _load_command(arguments: Sequence[str] | None) -> Callable[[], int]:
     try:
         options = parse(arguments)
     finally:
-        output_fault()  # so that Python reports no error if the help is cut off, as by `| head`
+        flush_output()  # so that Python reports no error if the help is cut off, as by `| head`
     from companion.cli.run import command_of, run  # noqa: PLC0415
 
     command = command_of(options)

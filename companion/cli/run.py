@@ -9,7 +9,7 @@ from importlib import import_module
 from rich.console import Console
 
 from companion.cli.exit_codes import EXIT_FAILURE, EXIT_USAGE
-from companion.cli.text_streams import output_fault
+from companion.cli.text_streams import flush_output
 from companion.demo import VehicleStoppedError
 from companion.extras import MissingExtraError
 from companion.files.write_whole import reason_of
@@ -68,7 +68,7 @@ def run(command: Command, options: argparse.Namespace) -> int:
         if options.debug:
             traceback.print_exc()
         _print_error(f"internal error: {error!r}; run again with --debug to see where it happened")
-    fault = output_fault()
+    fault = flush_output()
     # An error without a file may be that of standard output, which is reported below.
     if os_error is not None and (fault is None or os_error.filename is not None):
         file = "" if os_error.filename is None else f"{os_error.filename}: "

@@ -69,13 +69,14 @@ class _Output(io.TextIOWrapper):
             raise
 
 
-def output_fault() -> str | None:
-    """Why the text printed so far does not reach standard output.
+def flush_output() -> str | None:
+    """Flush standard output; return why the text printed so far does not reach it.
+
+    After a failure, later text is discarded, so that Python does not report it again at exit.
 
     Returns:
         None: nothing is lost. Empty: the reader has stopped, as after `| head`. Otherwise: the
-        reason. After a failure, later text is discarded, so that Python does not report the
-        failure again at exit.
+        reason.
     """
     failure: OSError | None = getattr(sys.stdout, "failure", None)
     try:

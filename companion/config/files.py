@@ -43,10 +43,10 @@ def load(path: Path | str) -> Config:
         raise ConfigError(
             f"{path} is a table of a trajectory, not a configuration; fly it with --trajectory"
         )
-    own = _read(path)
-    require_kind(path, own.keys, FileKind.CONFIG)
+    contents = _read(path)
+    require_kind(path, contents.keys, FileKind.CONFIG)
     reader = _IncludeReader()
-    reader.add((path,), own)
+    reader.add((path,), contents)
     merged = reader.merged
     _drop_mixed_identification(merged)
     return yaml_file.validated(merged.keys, str(path), Config, merged.places)
@@ -103,19 +103,19 @@ class _IncludeReader:
         self.merged = Contents({}, {})
         self.files: list[Path] = []
 
-    def add(self, chain: tuple[Path, ...], own: Contents) -> None:
+    def add(self, chain: tuple[Path, ...], contents: Contents) -> None:
         """Add the keys of a file, after those of the files that it includes.
 
         Args:
             chain: the including files, the outermost first, and at the end the file itself.
-            own: contents of that last file.
+            contents: contents of the file itself.
 
         Raises:
             ConfigError: see `load`.
         """
-        for path in _included_paths(chain[-1], own.keys):
+        for path in _included_paths(chain[-1], contents.keys):
             self.add((*chain, path), self._read_included(*chain, path))
-        _merge(self.merged, own)
+        _merge(self.merged, contents)
 
     def _read_included(self, *chain: Path) -> Contents:
         *_, including_file, path = chain
@@ -130,15 +130,15 @@ class _IncludeReader:
                 f"{including_file}: includes may be nested at most {_MAX_DEPTH} files deep"
             )
         try:
-            part = _read(path)
+            included = _read(path)
         except UnreadableFileError as error:
             raise ConfigError(f"{error} (included by {including_file})") from error
-        _check_part(path, part.keys)
-        return part
+        _check_included(path, included.keys)
+        return included
 
 
-def _included_paths(path: Path, own: dict[str, Any]) -> list[Path]:
-    names = own.get(_INCLUDE, [])
+def _included_paths(path: Path, keys: dict[str, Any]) -> list[Path]:
+    names = keys.get(_INCLUDE, [])
     names = [names] if isinstance(names, str) else names
     if not isinstance(names, list) or not all(
         isinstance(name, str) and yaml_file.is_path(name) for name in names
@@ -148,11 +148,11 @@ def _included_paths(path: Path, own: dict[str, Any]) -> list[Path]:
     return [path.parent / yaml_file.expanded_path(name) for name in names]
 
 
-def _check_part(included: Path, part: dict[str, Any]) -> None:
-    for section, values in part.items():
+def _check_included(path: Path, keys: dict[str, Any]) -> None:
+    for section, values in keys.items():
         if section == "mock":
             raise ConfigError(
-                f"{included}: `mock` is not allowed in an included file: the mock vehicle reads "
+                f"{path}: `mock` is not allowed in an included file: the mock vehicle reads "
                 "only the main file; move the section there (`companion init mock` writes a file "
                 "that has one)"
             )
@@ -160,13 +160,13 @@ def _check_part(included: Path, part: dict[str, Any]) -> None:
             continue
         if section in Config.model_fields and not isinstance(values, dict):
             shown = shortened_text(values)
-            raise ConfigError(f"{included}: `{section}` must hold keys, not {shown}")
+            raise ConfigError(f"{path}: `{section}` must hold keys, not {shown}")
 
 
-def _merge(merged: Contents, part: Contents) -> None:
+def _merge(merged: Contents, contents: Contents) -> None:
     """Let the keys of a file override earlier ones, and remember the file of each key."""
     data = merged.keys
-    for section, values in part.keys.items():
+    for section, values in contents.keys.items():
         data.setdefault(section, {})
         if isinstance(values, dict) and isinstance(data[section], dict):
             replaced_keys: set[KeyPath] = {(section, key) for key in values}
@@ -176,7 +176,7 @@ def _merge(merged: Contents, part: Contents) -> None:
             data[section] = values
         for where in [where for where in merged.places if where[:2] in replaced_keys]:
             del merged.places[where]
-    merged.places.update(part.places)
+    merged.places.update(contents.places)
 
 
 def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str) -> Config:

@@ -1,8 +1,8 @@
 """The drag known before a flight: from the configuration, or learned in an earlier flight.
 
 The maneuvers are checked twice. Before the vehicle identifies itself, it is assumed to be the one
-that flew last (`before_connecting`). Then they are checked with its own drag (`of_vehicle`), which
-is read once for each vehicle and handed on in the preflight evidence.
+that flew last (`drag_before_connecting`). Then they are checked with the vehicle's own drag
+(`drag_of_vehicle`), which is read once for each vehicle and passed on in the preflight evidence.
 """
 
 from pathlib import Path
@@ -51,7 +51,7 @@ class KnownDrag(NamedTuple):
         return ""
 
 
-def before_connecting(config: Config) -> KnownDrag:
+def drag_before_connecting(config: Config) -> KnownDrag:
     """The configured drag, or the one of the vehicle that flew last; unknown without either."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
@@ -59,7 +59,7 @@ def before_connecting(config: Config) -> KnownDrag:
     return KnownDrag() if learned is None else KnownDrag(learned.drag, learned.path)
 
 
-def of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
+def drag_of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
     """The configured drag, or the one that this vehicle learned; unknown without either.
 
     Args:

@@ -15,6 +15,7 @@ from companion.flight.hand_over import hand_over_to_hold, hand_over_to_landing
 from companion.guidance import ManeuverSequence
 from companion.guidance.fence import height_in_words
 from companion.guidance.source import ManeuverSource, Source
+from companion.mavlink.commands import DISARM
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
@@ -197,8 +198,7 @@ async def disarm(context: FlightContext) -> None:
         )
         if context.armed():
             context.detail = "the autopilot to accept disarming"
-            command = context.link.autopilot.disarm()
-            await command_if_ours(context, command, require_ours, disarmed)
+            await command_if_ours(context, DISARM, require_ours, disarmed)
         await context.until(disarmed)
     await context.fresh_heartbeat()
     await leave_offboard(context)

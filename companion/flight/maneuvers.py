@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from companion.config import Config, trajectory_file
 from companion.config.flight import IdentifyConfig
-from companion.config.known_drag import KnownDrag, before_connecting
+from companion.config.known_drag import KnownDrag, drag_before_connecting
 from companion.files.yaml_file import ConfigError
 from companion.flight.maneuver_checks import (
     envelope_of,
@@ -28,7 +28,7 @@ def configured_maneuvers(config: Config, drag: KnownDrag | None = None) -> Maneu
         ConfigError: a trajectory cannot be read, or a maneuver cannot be flown within the limits
             and the fence.
     """
-    drag = drag or before_connecting(config)
+    drag = drag or drag_before_connecting(config)
     return ManeuverSequence([_maneuver(config, name, drag) for name in config.flight.maneuvers])
 
 

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Protocol
 
 from companion.config import Config
-from companion.config.known_drag import before_connecting
+from companion.config.known_drag import drag_before_connecting
 from companion.flight.context import FlightContext
 from companion.flight.control_phases import fly_commanded
 from companion.flight.maneuvers import configured_maneuvers
@@ -45,7 +45,7 @@ class ConfiguredPlan:
     """
 
     def __init__(self, config: Config) -> None:
-        self.drag = before_connecting(config)
+        self.drag = drag_before_connecting(config)
         self.maneuvers = configured_maneuvers(config, self.drag)
 
     async def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:

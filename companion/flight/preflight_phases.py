@@ -1,6 +1,6 @@
 """The phases on the ground, one coroutine each, and the exit that disarms."""
 
-from companion.config.known_drag import before_connecting
+from companion.config.known_drag import drag_before_connecting
 from companion.control.expected_response import gain_warning
 from companion.files.yaml_file import ConfigError
 from companion.flight.commands import (
@@ -12,6 +12,7 @@ from companion.flight.commands import (
 from companion.flight.context import INITIAL_HEARTBEAT_LIMIT, FlightContext
 from companion.flight.maneuver_checks import require_inside, require_still_flyable
 from companion.guidance.fence import Place
+from companion.mavlink.commands import ARM, DISARM
 from companion.preflight import vehicle_checks
 from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import Finding
@@ -117,9 +118,7 @@ async def undo_arming(context: FlightContext) -> None:
             raise FlightEnded("the vehicle has left the ground, so it is not disarmed", Exit.LAND)
 
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.
-    await command_if_ours(
-        context, context.link.autopilot.disarm(), require_ours, lambda: not context.armed()
-    )
+    await command_if_ours(context, DISARM, require_ours, lambda: not context.armed())
     await context.fresh_heartbeat()
     await context.until(lambda: not context.armed())
 
@@ -129,14 +128,13 @@ async def _arm(context: FlightContext) -> None:
     state = context.link.state
     await context.next_position()
     context.detail = "the autopilot to accept arming"
-    *before, command = context.link.autopilot.arm()
-    for each in before:
-        await command_if_ours(
-            context,
-            each,
-            lambda: _require_untouched(context),
-            lambda: in_role(context.link, Role.READY),
-        )
+    autopilot = context.link.autopilot
+    await command_if_ours(
+        context,
+        autopilot.set_mode(autopilot.ready_mode),
+        lambda: _require_untouched(context),
+        lambda: in_role(context.link, Role.READY),
+    )
     await context.until(lambda: in_role(context.link, Role.READY))
     await context.preflight.require(Stage.GROUND)
     armings = state.armings
@@ -152,7 +150,7 @@ async def _arm(context: FlightContext) -> None:
         context.must_disarm = True  # only now: a vehicle that somebody else armed is not disarmed
 
     context.replacement_detector.note_arming()
-    await command_if_ours(context, command, require_ours, armed)
+    await command_if_ours(context, ARM, require_ours, armed)
     await context.until(armed, "the vehicle to be armed")
 
 
@@ -175,7 +173,7 @@ def _require_flyable_by_vehicle(context: FlightContext) -> None:
     config, maneuvers, drag = context.config, context.maneuvers, context.known_drag
     global_position = context.link.state.global_position
     try:
-        if drag != before_connecting(config):
+        if drag != drag_before_connecting(config):
             require_still_flyable(config, maneuvers, drag)
         if config.safety.fence_polygon_deg and global_position is not None:
             place = Place(global_position.latitude_deg, global_position.longitude_deg)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.config import Config
-from companion.config.known_drag import KnownDrag, of_vehicle, prior_of
+from companion.config.known_drag import KnownDrag, drag_of_vehicle, prior_of
 from companion.guidance.drag_estimate import DragEstimate
 from companion.preflight.evidence import Identity
 from companion.recording.learned_file import LearnedFile
@@ -154,7 +154,7 @@ class DragMemory:
         """
         if self._known_drag is None or identity.uid != self._uid:
             self._uid = identity.uid
-            self._known_drag = of_vehicle(self._config, self._directory, identity.uid)
+            self._known_drag = drag_of_vehicle(self._config, self._directory, identity.uid)
             self._begin_estimate(self._known_drag)
             self.on_known(self._known_drag)
         return self._known_drag

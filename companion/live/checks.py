@@ -8,7 +8,7 @@ from typing import Any
 
 from companion.config import Config
 from companion.config.in_flight import Values, changed_in_flight
-from companion.config.known_drag import KnownDrag, before_connecting
+from companion.config.known_drag import KnownDrag, drag_before_connecting
 from companion.control.retuning import reason_against_changes
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError
@@ -35,7 +35,7 @@ class ChangeChecks:
 
     def __init__(self, start: Config, *, flies_maneuvers: bool) -> None:
         self.start = self.current = start
-        self._drag = before_connecting(start)
+        self._drag = drag_before_connecting(start)
         self._maneuvers: ManeuverSequence | None = None
         self._maneuvers_error: ConfigError | None = None
         try:

@@ -28,9 +28,14 @@ class Command(NamedTuple):
     p7: float = 0.0
 
 
+ARM = Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+"""Arms, with all checks of the autopilot."""
+DISARM = Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+"""Disarms a vehicle on the ground; autopilots refuse it in the air."""
+
 _ACCEPTED, _IN_PROGRESS = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS
 _IN_PROGRESS_TIMEOUT_S = 30.0  # from the ACK "in progress" to the final one
-_STALL_S = 0.1  # a timeout that ends this late means that our process was stalled
+_STALL_S = 0.1  # a timeout that ends this late means that this process was stalled
 _BACKLOG_S = 0.5  # after a stall the backlog of frames is read within this time
 _REASON_DELAY_S = 0.3  # the reason of a refusal may come as a STATUSTEXT this long after the ACK
 

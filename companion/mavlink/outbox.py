@@ -7,7 +7,7 @@ from companion.attitude.types import BodyRates
 from companion.mavlink.codec import SYSTEM_TIME, SetpointEncoder, encode_system_time
 from companion.mavlink.framing import build_frame
 from companion.mavlink.messages import Message, dialect, encode
-from companion.mavlink.settings import LinkSettings
+from companion.mavlink.settings import MAV_TYPE_ONBOARD_CONTROLLER, LinkSettings
 from companion.mavlink.stats import LinkStats
 from companion.mavlink.transport.base import Tap, Transport
 
@@ -75,10 +75,10 @@ class Outbox:
             )
 
     def send_heartbeat(self) -> None:
-        """Send one HEARTBEAT of the configured type, with the state active."""
+        """Send one HEARTBEAT, as an onboard controller in the state active."""
         self.send(
             dialect.MAVLink_heartbeat_message(
-                type=self._settings.heartbeat_type,
+                type=MAV_TYPE_ONBOARD_CONTROLLER,
                 autopilot=dialect.MAV_AUTOPILOT_INVALID,
                 base_mode=0,
                 custom_mode=0,

@@ -22,9 +22,6 @@ class LinkSettings:
     """System id of this program; a companion computer has that of its vehicle."""
     source_component: int = MAV_COMP_ID_ONBOARD_COMPUTER
     """Component id of this program."""
-    heartbeat_type: int = MAV_TYPE_ONBOARD_CONTROLLER
-    """MAV_TYPE in the heartbeats that are sent. PX4 sends its STATUSTEXTs only on links where it
-    receives heartbeats of type GCS (6)."""
     heartbeat_rate_hz: float = 1.0
     """Rate of the heartbeats that are sent, Hz. No setpoint depends on it."""
     signing: Signing | None = None

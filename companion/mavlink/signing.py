@@ -69,7 +69,7 @@ class Signing:
     Attributes:
         file: keeps the newest stamps from one run to the next; `None`: they are not kept.
         remarks: sentences about time stamps for the user; the code that shows them removes them.
-        changed: set when the time stamps should be written to the file soon.
+        write_requested: set when the time stamps should be written to the file soon.
         needs_timesync_answer: whether the last frame was refused only because its time stamp is far
             ahead of this program's date. The vehicle can prove the stamp by answering a TIMESYNC
             request.
@@ -93,7 +93,8 @@ class Signing:
         self.file = file
         kept_stamps, load_error = file.load() if file is not None else (Stamps(), None)
         self._judge = StampJudge(kept_stamps, clock, monotonic_clock)
-        self.remarks, self.changed = self._judge.remarks, self._judge.changed
+        self.remarks = self._judge.remarks
+        self.write_requested = self._judge.write_requested
         if load_error is not None:
             self.remarks.append(load_error)
         self._newest_stamp = kept_stamps.newest_sent
@@ -171,15 +172,15 @@ class StampWriter:
         if self._thread.ident is None:
             return  # not started
         self._ended = True
-        self._signing.changed.set()
+        self._signing.write_requested.set()
         self._thread.join(_LAST_WRITE_TIMEOUT_S)
 
     def _run(self) -> None:
         while not self._ended:
-            self._signing.changed.clear()
+            self._signing.write_requested.clear()
             self._write(_with_reserve(self._signing.stamps()))
             if not self._ended:
-                self._signing.changed.wait(WRITE_PERIOD_S)
+                self._signing.write_requested.wait(WRITE_PERIOD_S)
         self._write(self._signing.stamps())
 
     def _write(self, stamps: Stamps) -> None:

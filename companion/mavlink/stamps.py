@@ -76,7 +76,7 @@ class StampJudge:
 
     Attributes:
         remarks: sentences for the user; the code that shows them removes them.
-        changed: set at the first frame of a stream in this run.
+        write_requested: set at the first frame of a stream in this run.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class StampJudge:
         monotonic_clock: Callable[[], float],
     ) -> None:
         self.remarks: list[str] = []
-        self.changed = Event()
+        self.write_requested = Event()
         self._remarked: set[str] = set()
         self._monotonic_clock = monotonic_clock
         clock_date = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
@@ -149,7 +149,7 @@ class StampJudge:
                 f"which has the right key and answers, so its date is used; {SET_CLOCK}"
             )
         if (stream, ahead) not in self._newest_by_stream:
-            self.changed.set()
+            self.write_requested.set()
         self._newest_by_stream[stream, ahead] = stamp
         self._newest[ahead] = max(self._newest[ahead], stamp)
         return SignatureResult.GOOD

@@ -59,11 +59,6 @@ class FlightRecord:
 
     folder: Path
     content: McapContent
-    complete: bool
-    """Whether the recording was closed. False: power failed, the process was killed, or the disk
-    was full; up to a second may then be missing at the end."""
-    damage: str | None
-    """Why reading ended before the end of the file, or None."""
     began: float
     """Time when the flight began, s on our clock."""
     epoch: float
@@ -102,15 +97,15 @@ class FlightRecord:
 
         A record that ends because its flight was killed (no `summary.json`) has no fault.
         """
-        if self.damage is not None:
+        if self.content.damage is not None:
             return (
                 f"{self.folder}: the recording is damaged, and only the part before was read: "
-                f"{self.damage}"
+                f"{self.content.damage}"
             )
         if not self.content.order:
             path = self.folder / RECORD_FILE
             return f"{path} is missing or empty: no sample and no event was recorded"
-        if not self.complete and (self.folder / "summary.json").is_file():
+        if not self.content.complete and (self.folder / "summary.json").is_file():
             return (
                 f"{self.folder / RECORD_FILE} ends at {self.duration:.1f} s, before its flight "
                 "did: it was cut off, or the disk was full"
@@ -209,9 +204,7 @@ def read_flight(folder: Path | str) -> FlightRecord:
             f"{path}: the messages of {topic} have other columns than this version's; read the "
             f"record with the version that wrote it: companion {flight.get('companion', 'unknown')}"
         )
-    return FlightRecord(
-        folder, content, content.complete, content.damage, began, epoch, content.metadata
-    )
+    return FlightRecord(folder, content, began, epoch, content.metadata)
 
 
 def _why_not_a_flight(path: Path, error: OSError) -> str:

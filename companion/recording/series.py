@@ -111,7 +111,6 @@ class Series:
     """Rows of one kind, appended in flight.
 
     Args:
-        columns: names of the columns.
         spool: writes the rows that are not kept in memory.
         rows_in_memory: number of newest rows that are always in memory.
 

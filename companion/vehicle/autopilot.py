@@ -86,7 +86,8 @@ class Autopilot(Protocol):
         name: name to show to users, such as `PX4`.
         mav_autopilot: MAV_AUTOPILOT number.
         modes: `custom_mode` of each mode that may be commanded, by name.
-        ready_mode: name of the mode that a pilot who has armed enters to hand over control.
+        ready_mode: name of the mode in which this program arms, and which a pilot who has armed
+            enters to hand over control.
         offboard_mode: name of the mode in which the autopilot obeys setpoints.
         control_entry: how the autopilot begins to obey setpoints.
         bytewise_parameters: whether integer parameters are sent as bytes; see
@@ -137,12 +138,6 @@ class Autopilot(Protocol):
 
     def why_not_ready(self, readiness: Readiness) -> str | None:
         """What is missing before the vehicle can be armed and flown, in words; `None`: nothing."""
-
-    def arm(self) -> tuple[Command, ...]:
-        """Commands, in order, that enter a mode that allows arming, and arm with all checks."""
-
-    def disarm(self) -> Command:
-        """Command that disarms on the ground."""
 
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
         """Command by which the armed vehicle takes off from the ground.

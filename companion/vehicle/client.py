@@ -16,7 +16,7 @@ from companion.vehicle.autopilot import Autopilot
 from companion.vehicle.clock import VehicleClock
 from companion.vehicle.registry import read_events
 from companion.vehicle.state import VehicleState
-from companion.vehicle.streams import StreamRate, measured_rates, set_rates
+from companion.vehicle.streams import StreamRate, measure_rates, set_rates
 
 
 class VehicleClient:
@@ -174,4 +174,4 @@ class VehicleClient:
         Raises:
             UnknownMessage: a name is not in the dialect.
         """
-        return await measured_rates(self.stats, names, window_s)
+        return await measure_rates(self.stats, names, window_s)

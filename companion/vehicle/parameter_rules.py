@@ -85,8 +85,8 @@ class ParameterRule:
     """Whether a vehicle that does not send the parameter is not flown: without it, the effect of a
     setpoint, or how long the autopilot holds it, is unknown."""
     universal: bool = False
-    """Whether every supported version has the parameter, with some unsafe values. If it was not
-    received on a link that loses frames, it may have such a value."""
+    """Whether every supported version has the parameter, and some of its values are unsafe. If it
+    was not received, because the link loses frames, it may have an unsafe value."""
     alternative: str = ""
     """Name of the rule for the parameter that other versions have in its place."""
     reboot: bool = False

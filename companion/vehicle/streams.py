@@ -49,7 +49,7 @@ async def set_rates(
         name: await _request(commands, numbers[name], rate, interval_step_us)
         for name, rate in rates.items()
     }
-    achieved = await measured_rates(stats, rates, window_s)
+    achieved = await measure_rates(stats, rates, window_s)
     return {
         name: StreamRate(rate, answers[name][0], achieved[name], answers[name][1])
         for name, rate in rates.items()
@@ -79,7 +79,7 @@ async def _request(
     return 0.0, refusal
 
 
-async def measured_rates(
+async def measure_rates(
     stats: LinkStats, names: Iterable[str], window_s: float
 ) -> dict[str, float]:
     """Rates in Hz at which messages arrive, by name; see `VehicleClient.measure_rates`."""

@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from companion.config import Config
-from companion.config.known_drag import before_connecting
+from companion.config.known_drag import drag_before_connecting
 from companion.drag import Drag
 from companion.files.yaml_file import ConfigError, parse
 from companion.flight.fence_check import TRACKING_MARGIN, FenceCheck
@@ -139,11 +139,11 @@ def test_a_polygon_on_the_map_is_judged_as_soon_as_the_place_is_known():
     with pytest.raises(
         ConfigError, match=r"goes up to .* outside the fence .* safety\.fence_polygon_deg"
     ):
-        require_inside(round_, parts, here, before_connecting(round_))
+        require_inside(round_, parts, here, drag_before_connecting(round_))
     small = config_of(
         ROUND, circle={"radius_m": 3.0, "speed_m_s": 1.0}, safety={"fence_polygon_deg": corners}
     )
-    require_inside(small, configured_maneuvers(small).parts, here, before_connecting(small))
+    require_inside(small, configured_maneuvers(small).parts, here, drag_before_connecting(small))
 
 
 @pytest.mark.parametrize(

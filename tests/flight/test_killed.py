@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from companion.config.known_drag import before_connecting
+from companion.config.known_drag import drag_before_connecting
 from companion.flight.maneuvers import configured_maneuvers
 from companion.preflight.offboard_loss import worst_reach
 from tests.flight.fly import mock_vehicle, quick_flight, run, session_for
@@ -104,7 +104,7 @@ def worst(autopilot, speed, held, *, all_of_them):
 def bound(autopilot, speed, held):
     """What the doctor's model says of the same flight."""
     config = quick_flight(autopilot, flight(autopilot, speed))
-    drag = before_connecting(config).least
+    drag = drag_before_connecting(config).least
     flown = configured_maneuvers(config)
     return worst_reach(config, flown, held, drag, brakes=autopilot == "px4")
 

@@ -37,7 +37,7 @@ def test_numpy_rates_are_recorded_and_a_bad_entry_costs_itself_alone(tmp_path):
     assert "no reason" in told
     assert recorder.dropped == 3
     record = read_flight(tmp_path)
-    assert record.complete
+    assert record.content.complete
     assert record.events[-1].text == "after the bad ones"
     (setpoint,) = record.rows("setpoint")
     assert setpoint["commanded_yaw_rad_s"] == 0.5

@@ -77,8 +77,8 @@ def write(folder):
 def test_what_is_written_is_read_again_by_both_readers(tmp_path):
     path = write(tmp_path)
     record = read_flight(tmp_path)
-    assert record.complete
-    assert record.damage is None
+    assert record.content.complete
+    assert record.content.damage is None
     for channel in CHANNELS:
         rows = record.rows(channel.name)
         assert len(rows) == ROWS
@@ -123,7 +123,7 @@ def test_a_file_cut_off_anywhere_gives_all_chunks_before(tmp_path):
         except RecordError:
             found.append(-1)
         else:
-            assert not record.complete
+            assert not record.content.complete
             found.append(len(record.rows("sample")))
     assert found == sorted(found)
     assert set(found) == {-1, 0, ROWS // 2 + 1, ROWS}

@@ -77,7 +77,7 @@ def killed(folder, autopilot, moment):
 def test_a_killed_flight_lacks_at_most_its_last_second(tmp_path, autopilot, moment):
     reached = killed(tmp_path, autopilot, moment)
     record = read_flight(tmp_path)
-    assert not record.complete
+    assert not record.content.complete
     assert record.duration >= reached
     summary, provisional = summary_of(record)
     assert provisional
@@ -107,7 +107,7 @@ def test_a_record_cut_off_anywhere_gives_what_stands_before(tmp_path, monkeypatc
         for name, content in data.items():
             (cut / name).write_bytes(content[: int(share * len(content))])
         record = read_flight(cut)
-        assert not record.complete
+        assert not record.content.complete
         derived, provisional = summary_of(record)
         assert provisional
         found.append(derived["setpoints"])
@@ -117,4 +117,4 @@ def test_a_record_cut_off_anywhere_gives_what_stands_before(tmp_path, monkeypatc
     assert len(set(found)) > 2  # several chunks
     (cut / "flight.mcap").write_bytes(data["flight.mcap"])
     assert len(read_flight(cut).rows("sample")) == everything
-    assert read_flight(cut).complete
+    assert read_flight(cut).content.complete

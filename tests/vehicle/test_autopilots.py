@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from companion.mavlink.commands import ARM, DISARM
 from companion.mavlink.dispatcher import MessageDispatcher
 from companion.mavlink.errors import UnsupportedAutopilot
 from companion.mavlink.stats import LinkStats
@@ -48,8 +49,8 @@ def test_px4_speaks_px4():
     assert PX4.set_mode("AUTO.LOITER")[:4] == PX4.hold()[:4] == (176, 1.0, 4.0, 3.0)
     assert PX4.control_entry is ControlEntry.BY_COMMAND
     assert PX4.set_mode(PX4.offboard_mode)[:4] == (176, 1.0, 6.0, 0.0)
-    assert [command[:3] for command in PX4.arm()] == [(176, 1.0, 4.0), (400, 1.0, 0.0)]
-    assert PX4.disarm()[:2] == (400, 0.0)
+    assert PX4.set_mode(PX4.ready_mode)[:3] == (176, 1.0, 4.0)
+    assert (ARM[:3], DISARM[:2]) == ((400, 1.0, 0.0), (400, 0.0))
     assert PX4.land()[0] == 21
     take_off = PX4.take_off(10.0, 489.4)
     assert (take_off.command, take_off.p7) == (22, 499.4)
@@ -58,12 +59,11 @@ def test_px4_speaks_px4():
 
 def test_ardupilot_speaks_as_recorded():
     """The commands of the recorded flight, whose ACKs were all 0; BRAKE it did not need."""
-    assert [command[:3] for command in ARDUPILOT.arm()] == [(176, 1.0, 4.0), (400, 1.0, 0.0)]
+    assert ARDUPILOT.set_mode(ARDUPILOT.ready_mode)[:3] == (176, 1.0, 4.0)
     assert ARDUPILOT.take_off(10.0, 584.09) == (22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 10.0)
     assert ARDUPILOT.control_entry is ControlEntry.BY_FIRST_SETPOINT
     assert ARDUPILOT.land()[:3] == (176, 1.0, 9.0)
     assert ARDUPILOT.hold()[:3] == (176, 1.0, 17.0)
-    assert ARDUPILOT.disarm()[:2] == (400, 0.0)
 
 
 @EVERY_AUTOPILOT

@@ -7,7 +7,7 @@ import pytest
 
 from companion.mavlink.errors import CommandRefused
 from companion.mavlink.stats import LinkStats
-from companion.vehicle.streams import StreamRate, measured_rates, set_rates
+from companion.vehicle.streams import StreamRate, measure_rates, set_rates
 
 WHOLE_MILLISECONDS = 1000
 DENIED, UNSUPPORTED = 2, 3
@@ -72,7 +72,7 @@ def test_only_messages_of_the_window_count_towards_a_measured_rate():
         clock = asyncio.get_running_loop().time
         began = clock()
         counting = asyncio.ensure_future(
-            measured_rates(stats, ("ATTITUDE_QUATERNION", "HEARTBEAT", "ODOMETRY"), 0.05)
+            measure_rates(stats, ("ATTITUDE_QUATERNION", "HEARTBEAT", "ODOMETRY"), 0.05)
         )
         await asyncio.sleep(0.01)
         stats.by_message.update({31: 105, 0: 2})

@@ -42,7 +42,8 @@ class McapContent:
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     """Metadata records by name; the last one if a name occurs several times."""
     complete: bool = False
-    """Whether the file was closed, with its index at the end."""
+    """Whether the file was closed, with its index at the end. False: power failed, the process was
+    killed, or the disk was full; up to a second may then be missing at the end."""
     damage: str | None = None
     """Why reading ended before the end of the file, or None."""
 

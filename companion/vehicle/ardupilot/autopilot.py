@@ -115,14 +115,6 @@ class ArduPilot:
             return "the autopilot's pre-arm checks"
         return None
 
-    def arm(self) -> tuple[Command, ...]:
-        """Commands that enter GUIDED, then arm with all of GUIDED's checks."""
-        return self.set_mode("GUIDED"), Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-
-    def disarm(self) -> Command:
-        """Command that disarms on the ground; ArduPilot refuses it in the air."""
-        return Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
-
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
         """Command that takes off here, to a height above home (m)."""
         return Command(dialect.MAV_CMD_NAV_TAKEOFF, p7=height_m)

@@ -128,14 +128,6 @@ class Px4:
             return "the autopilot's pre-arm checks"
         return None
 
-    def arm(self) -> tuple[Command, ...]:
-        """Commands that enter AUTO.LOITER, then arm with all checks."""
-        return (self.hold(), Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0))
-
-    def disarm(self) -> Command:
-        """Command that disarms on the ground; PX4 refuses it in the air."""
-        return Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
-
     def take_off(self, height_m: float, home_altitude_m: float) -> Command:
         """Command that takes off here, to a height above home (m), and keeps the heading (NaN)."""
         altitude = home_altitude_m + height_m

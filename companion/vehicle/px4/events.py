@@ -1,8 +1,9 @@
 """PX4's events (EVENT, 410) as texts, for a link on which PX4 sends no STATUSTEXT.
 
-PX4 numbers an event by a hash of its name. The texts are in metadata that is not sent over the
-link, so this module has the texts that matter to a flight (source: PX4 main, 2026; checked against
-recorded events). Any other event that is meant for users is reported by its number, once.
+PX4 sends STATUSTEXT only on links on which it receives heartbeats of type GCS. It numbers an event
+by a hash of its name. The texts are in metadata that is not sent over the link, so this module has
+the texts that matter to a flight (source: PX4 main, 2026; checked against recorded events). Any
+other event that is meant for users is reported by its number, once.
 """
 
 import struct
