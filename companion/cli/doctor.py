@@ -92,17 +92,15 @@ def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None
         return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
 
 
-def _other_findings(config: Config, evidence: Evidence) -> list[Finding]:
-    """The findings of the checks, and whether the gain is too large for the expected response."""
-    findings = run_checks(config, evidence)
+def _response_findings(config: Config) -> list[Finding]:
+    """The finding on the expected response: whether the gain is too large for the vehicle."""
     if config.planner_name not in PLANNER_NAMES:
-        return findings
+        return []
     response = expected_response(config)
     result = CheckResult.INEFFECTIVE if response.gain_is_too_high else CheckResult.SAFE
     source = "planner, rate loop and limits"
     because = f"{response.sentence()}; {hold_sentence(config)}"
-    gain_finding = Finding(Key.RESPONSE, result, response.gain_sentence(), because, source=source)
-    return [*findings, gain_finding]
+    return [Finding(Key.RESPONSE, result, response.gain_sentence(), because, source=source)]
 
 
 class _DoctorRun:
@@ -130,9 +128,9 @@ class _DoctorRun:
             except (LinkTimeout, LinkLost) as error:
                 return self._report(vehicle.unanswered_findings(error))
             drag = drag_of_vehicle(config, config.recording.directory, evidence.identity.uid)
-            maneuvers, maneuver_findings = _maneuvers(config, drag)
+            maneuvers, refused = _maneuvers(config, drag)
             evidence = replace(evidence, maneuvers=maneuvers, known_drag=drag)
-            findings = [*maneuver_findings, *_other_findings(config, evidence)]
+            findings = [*refused, *run_checks(config, evidence), *_response_findings(config)]
             code = self._report(findings)
             if fix:
                 code = await self._fix(vehicle, evidence, findings, without_asking=without_asking)
@@ -189,8 +187,8 @@ class _DoctorRun:
                 path = shlex.quote(str(undo.path))
                 self.say(f"Undo with: companion doctor --config FILE --undo {path}")
         evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
-        _, maneuver_findings = _maneuvers(config, evidence.known_drag)
-        code = self._report([*maneuver_findings, *_other_findings(config, evidence)])
+        _, refused = _maneuvers(config, evidence.known_drag)
+        code = self._report([*refused, *run_checks(config, evidence), *_response_findings(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
         return code

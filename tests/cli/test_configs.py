@@ -123,7 +123,7 @@ def test_one_key_of_a_file_is_printed(tmp_path, capsys):
     assert main(["config", str(own), "--get", "limits.max_tilt_deg"]) == 0
     assert "max_tilt_deg: 21.0" in capsys.readouterr().out
     assert main(["config", str(own), "--schema"]) == 2
-    assert "--schema and --markdown have none" in capsys.readouterr().err
+    assert "--schema and --markdown take none" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,7 @@ def test_a_file_that_changes_nothing_says_so(tmp_path, capsys):
 def test_a_file_that_changes_nothing_is_told_when_it_is_checked(tmp_path, capsys):
     """An editor that had not saved left an empty file, which was called ok."""
     path = tmp_path / "c.yaml"
-    told = f"warning: {path} changes no default; is it the file that you meant?"
+    told = f"warning: {path} changes no default; is this the file that you meant?"
     for text, warned in (("", True), ("# nothing yet\n", True), ("link: {lockstep: true}", False)):
         path.write_text(text)
         assert main(["check-config", str(path)]) == 0
