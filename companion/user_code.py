@@ -52,7 +52,7 @@ def naming_user_code(
             raise
         text = " ".join(f"{type(error).__name__}: {error}".removesuffix(": ").split())
         raise UserCodeError(
-            f"{MESSAGE_START}the {role} {source.__qualname__} of the module "
+            f"an error outside this program: the {role} {source.__qualname__} of the module "
             f"{source.__module__} raised {text[:_LONGEST_TEXT]}{_error_place(package, error)}"
         ) from error
 

@@ -14,7 +14,7 @@ from urllib.request import Request, urlopen
 import pytest
 from rich.console import Console
 
-from companion.cli.helper_process import environment, helper_process
+from companion.cli.helper_process import flight_environment, helper_process
 from companion.config import Config
 from companion.config.files import load
 from companion.config.known_drag import KnownDrag
@@ -40,7 +40,7 @@ def started(console=None, folder=None, path=None, **options):
 def test_without_the_options_nothing_is_started():
     with started() as helper:
         assert helper is None
-    assert environment(helper) is THIS_COMPUTER
+    assert flight_environment(helper) is THIS_COMPUTER
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_missing_extra_is_told_before_a_port_is_opened(monkeypatch, option, pa
 def test_the_page_is_served_until_the_next_flight_needs_its_port(tmp_path):
     shown = Console(file=io.StringIO())
     with started(shown, tmp_path, live="127.0.0.1:0") as helper:
-        assert environment(helper) is THIS_COMPUTER  # there is no stream
+        assert flight_environment(helper) is THIS_COMPUTER  # there is no stream
         told = shown.file.getvalue()
         url = re.match(r"Live page: (http://127\.0\.0\.1:(\d+)/)  token", told)
         helper.status(status(1.0))
@@ -84,7 +84,7 @@ def test_a_stream_that_lost_its_port_is_noted_and_the_flight_goes_on(monkeypatch
             )
         )  # fmt: skip
         with started(foxglove="127.0.0.1:0") as helper:
-            assert environment(helper).send_batch == helper.feed.send
+            assert flight_environment(helper).send_batch == helper.feed.send
             note = noted(helper)
     assert note.startswith("there is no live stream: ")
     assert note.endswith("; the flight goes on without it")
