@@ -24,8 +24,8 @@ _MAX_TEXT_LENGTH = 200
 _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _MAX_ANSWERS = 10
-"""Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`. Texts that contain the numbers of
-a setpoint may all differ, so that none is a repetition."""
+"""Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`. Without this limit, a stream of
+refused setpoints could cause as many texts, because a text may contain the setpoint's numbers."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
 
 WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
@@ -87,8 +87,8 @@ class Component:
             client: sender of the frame.
             frame: COMMAND_LONG, COMMAND_INT, SET_MODE, MISSION_ITEM or any other frame.
             result: MAV_RESULT of the command; a mission item is always denied.
-            sender: component in whose name the answer is sent: the one to which the client sent
-                its command, because clients accept no other answer.
+            sender: source address of the answer. Clients accept an answer only from the component
+                to which they sent the command.
         """
         message = _acknowledgement(frame, result)
         if message is not None:

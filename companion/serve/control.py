@@ -16,12 +16,12 @@ from companion.serve.mode_requests import (
 )
 from companion.serve.network.addresses import Address, source_of, target_of
 from companion.serve.network.client import Client
-from companion.serve.ownership import Program, Programs
+from companion.serve.ownership import NewestRequests, Program
 from companion.serve.served_flight import ACCEPTED, IN_PROGRESS, REJECTED, ControlRequest
 from companion.serve.setpoints.approach import UnplannableError
+from companion.serve.setpoints.decoding import SETPOINT_IDS, decode_setpoint
 from companion.serve.setpoints.request import RefusedSetpoint, Request
-from companion.serve.setpoints.understand import SETPOINT_IDS, decode_setpoint
-from companion.serve.situation import SituationKeeper
+from companion.serve.vehicle_pose import PoseTracker
 from companion.vehicle.autopilot import ControlEntry, Role
 from companion.vehicle.link import Link
 
@@ -38,12 +38,13 @@ class ServedControl:
         config: Config,
         link: Link,
         component: Component,
-        keeper: SituationKeeper,
+        pose_tracker: PoseTracker,
         flights: ServedFlights,
     ) -> None:
         self._config, self._link, self._component = config, link, component
-        self._keeper, self._flights, self._ownership = keeper, flights, flights.ownership
-        self._clock, self._programs = asyncio.get_running_loop().time, Programs()
+        self._pose_tracker = pose_tracker
+        self._flights, self._ownership = flights, flights.ownership
+        self._clock, self._newest_requests = asyncio.get_running_loop().time, NewestRequests()
         ids = link.settings
         self._autopilot = Address(ids.target_system, ids.target_component)
         self._targets = self._autopilot, Address(ids.source_system, ids.source_component)
@@ -75,18 +76,18 @@ class ServedControl:
         return True
 
     def _take_setpoint(self, client: Client, frame: Frame) -> None:
-        autopilot, situation = self._link.state.autopilot, self._keeper.situation()
+        autopilot, pose = self._link.state.autopilot, self._pose_tracker.pose()
         if autopilot is None:
             self._component.answer(client, "setpoint refused: no autopilot was heard yet")
             return
-        if situation is None:
+        if pose is None:
             self._component.answer(client, "setpoint refused: position or attitude is unknown")
             return
         now, owner = self._clock(), Program(client, source_of(frame))
         owner_before = self._ownership.owner
         try:
             request = decode_setpoint(
-                frame, situation, self._targets, body_yaw_is_relative=autopilot.body_yaw_is_relative
+                frame, pose, self._targets, body_yaw_is_relative=autopilot.body_yaw_is_relative
             )
             refusal = self._ownership.note_setpoint(owner, now)
             if refusal is None:
@@ -100,15 +101,15 @@ class ServedControl:
             self._component.answer(client, f"setpoint refused: {refusal}")
 
     def _fly_request(self, owner: Program, request: Request, now: float) -> str | None:
-        """Pass a request to the flight, or begin a flight; return why it is refused, or None.
+        """Pass a request to the flight, or begin a flight; return the reason of a refusal, or None.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous one stays in force.
+            UnplannableError: no motion leads to the request; the previous request stays in force.
         """
         flight = self._flights.current_flight
         if flight is not None and not flight.is_ending and self._ownership.owner == owner:
             flight.give(request)
-        self._programs.keep(owner, request)
+        self._newest_requests.keep(owner, request)
         if flight is not None and flight.is_ending:
             return _FLIGHT_ENDING
         if flight is None and self._give_control(owner, now):
@@ -134,16 +135,16 @@ class ServedControl:
             return False
         if not self._ownership.has_stream(program, now):
             return False
-        refusal = self._flights.fence_refusal() or self._ownership.request_control(program, now)
+        refusal = self._flights.fence.refusal() or self._ownership.request_control(program, now)
         if refusal is not None:
             self._component.answer(program.client, f"control refused: {refusal}")
         return refusal is None
 
     def _take_control_request(self, client: Client, frame: Frame) -> None:
-        """Answer a command that requests control: by a takeover or a refusal."""
-        now, owner = self._clock(), self._programs.sender_of(client, frame)
+        """Answer a command that requests control: take over, or refuse."""
+        now, owner = self._clock(), self._newest_requests.sender_of(client, frame)
         flight, on_ground = self._flights.current_flight, not self._link.state.flying
-        request = self._programs.newest_request(owner)
+        request = self._newest_requests.get(owner)
         refusal = self._ownership.request_control(owner, now)
         if refusal is None and flight is not None:
             refusal = _FLIGHT_ENDING if flight.is_ending else None
@@ -152,9 +153,9 @@ class ServedControl:
                 "too many programs send setpoints, and yours were forgotten; let the others stop"
             )
         elif refusal is None and request is not None:
-            refusal = self._flights.fence_refusal()
+            refusal = self._flights.fence.refusal()
             if refusal is None and on_ground:
-                refusal = self._keeper.takeoff_refusal(request)
+                refusal = self._pose_tracker.takeoff_refusal(request)
         result = ACCEPTED if self._flights.in_control else IN_PROGRESS
         if refusal is not None:
             if flight is None:

@@ -1,7 +1,6 @@
-"""Stops a client's motion in front of the fence, before a safety monitor has to.
+"""Stops a client's motion in front of the fence, so that the client stays in control.
 
-The monitor `braking` ends the control of a client, and the vehicle lands where it is. A client that
-commands a place just inside the fence, or a velocity towards it, needs no such end.
+Otherwise the monitor `braking` would end the client's control, and land the vehicle where it is.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,20 +17,20 @@ from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _MARGIN = 0.5
 """How far inside the fence the vehicle stops, m. It covers the tracking error at rest."""
-_EARLIER = 0.6
-"""How much earlier than for the monitor the vehicle brakes, s. Meanwhile the deceleration builds
-up: its jerk is limited, and the vehicle follows late."""
-_REST = 0.2
-"""Speed below which a stop is complete, m/s. A stop that leads outward is completed first: taking
-turns with the command, it would come too late for a vehicle that follows late."""
+_BRAKING_LEAD = 0.6
+"""Time by which the vehicle brakes earlier than the monitor `braking` requires, s. The deceleration
+needs this time to build up, because the jerk is limited and the vehicle follows late."""
+_REST_SPEED = 0.2
+"""Speed below which a stop is complete, m/s. While a request leads outward, a begun stop goes on
+until it is complete: if stop and request alternated, the vehicle would brake too late."""
 _BRAKING_SHARE = 0.8
 """Share of the largest acceleration of a client's motions that counts as their deceleration."""
 _LOOKAHEAD = 10.0
-"""Time for which a commanded velocity shows where it leads, s."""
+"""Time over which a commanded velocity is extrapolated to a destination, s."""
 _STEP = 0.1
-"""Length of the step that shows whether a command leads out or back, m."""
-_PAUSE = 3.0
-"""Time without a stop after which the next stop is told, s."""
+"""Length of the step towards the destination that shows whether a request leads outward, m."""
+_REPORT_PAUSE = 3.0
+"""Time without a stop after which the next stop is reported, s."""
 
 _HORIZONTAL_STOP = AxisDemand(None, (0.0, 0.0), None)
 _VERTICAL_STOP = AxisDemand(None, (0.0,), None)
@@ -40,8 +39,8 @@ _VERTICAL_STOP = AxisDemand(None, (0.0,), None)
 class FenceGuard:
     """Replaces the part of a request that would lead beyond the fence by a stop.
 
-    Each step of guidance asks again. So the vehicle comes to rest in front of the fence, and goes
-    on as soon as a request leads back. Horizontal and vertical motions are stopped independently.
+    Each step of guidance calls `inside`. The vehicle comes to rest in front of the fence, and moves
+    again as soon as a request leads back. Horizontal and vertical motion stop independently.
 
     Args:
         config: limits of the fence, and of clients' motions.
@@ -69,7 +68,7 @@ class FenceGuard:
     def inside(
         self, request: MotionRequest, reference: Reference, actual: VehicleMotion, now: float
     ) -> MotionRequest:
-        """The request, with a stop in place of what would lead beyond the fence.
+        """The request; each part of it that would lead beyond the fence is replaced by a stop.
 
         Args:
             request: command of the client.
@@ -96,7 +95,7 @@ class FenceGuard:
         breach = wall or level
         if breach is None:
             return request
-        if now - self._stopped_at > _PAUSE:
+        if now - self._stopped_at > _REPORT_PAUSE:
             self._tell(f"stopped in front of the fence: the setpoints lead to {breach}")
         self._stopped_at = now
         return request._replace(
@@ -115,11 +114,11 @@ class _FenceFrame(NamedTuple):
     """Acceleration by the wind of a vehicle at rest, m/s², north and east."""
 
     def breach(self, fence: Fence, position: Vector, margin: float) -> Breach | None:
-        """The breach of a place, NED in the frame of `centre`."""
+        """The breach at a position, NED in the frame of `centre`; None: no breach."""
         return fence.breach(*self._arguments(position), self.centre.place, margin)
 
     def breach_of_stop(self, fence: Fence, state: "_State", margin: float) -> Breach | None:
-        """The breach where the vehicle would stop from a state."""
+        """The breach at the place where the vehicle would stop from a state; None: no breach."""
         offset, height = self._arguments(state.position)
         return fence.breach_at_stopping_point(
             offset, state.velocity, height, self.centre.place, margin, state.acceleration, self.wind
@@ -152,7 +151,7 @@ class _Destination(NamedTuple):
 
     position: Vector
     is_commanded: bool
-    """Whether the request names the position; else it lies in the commanded direction."""
+    """Whether the request commands the position; otherwise the position is extrapolated."""
 
 
 class _Side:
@@ -167,14 +166,14 @@ class _Side:
         self._fence = replace(
             fence,
             deceleration=min(fence.deceleration, _BRAKING_SHARE * acceleration),
-            reaction=fence.reaction + _EARLIER,
+            reaction=fence.reaction + _BRAKING_LEAD,
         )
         self._stopped_for: Breach | None = None
 
     def breach(
         self, states: Sequence[_State], destination: _Destination, frame: _FenceFrame
     ) -> Breach | None:
-        """The breach to which a request leads, if the vehicle must stop now.
+        """The breach to which a request leads, if the vehicle must stop now; None: it may go on.
 
         Args:
             states: the state that is flown, and that of the vehicle.
@@ -184,24 +183,24 @@ class _Side:
         fence = self._fence
         leads_inside = frame.breach(fence, destination.position, 0.0) is None
         margin = 0.0 if destination.is_commanded and leads_inside else _MARGIN
-        is_moving = hypot(*states[0].velocity) > _REST
+        is_moving = hypot(*states[0].velocity) > _REST_SPEED
         if self._stopped_for is not None and is_moving and not leads_inside:
             return self._stopped_for
         breach = None
         for state in states:
             if frame.breach(fence, state.position, margin) is None:
                 found = frame.breach_of_stop(fence, state, margin)
-            else:  # such as low after a take-off
-                found = _farther_out(frame, fence, state.position, destination.position)
+            else:  # outside already, such as below the floor after a take-off
+                found = _worsened_breach(frame, fence, state.position, destination.position)
             breach = breach or found
         self._stopped_for = breach
         return breach
 
 
-def _farther_out(
+def _worsened_breach(
     frame: _FenceFrame, fence: Fence, position: Vector, destination: Vector
 ) -> Breach | None:
-    """The breach that a step towards the destination makes worse; None: none."""
+    """The breach after a step towards the destination, if the step makes a breach worse."""
     way = minus(destination, position)
     share = _STEP / max(hypot(*way), _STEP)
     north, east, down = (a + share * b for a, b in zip(position, way, strict=True))

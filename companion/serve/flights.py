@@ -13,10 +13,11 @@ _RETRY_PAUSE = 2.0
 
 
 class ServedFlights:
-    """Begins the flights, and ends the owner's control with each of them.
+    """Begins the flights; the owner's control ends with its flight.
 
     Attributes:
         ownership: decides which client's requests are flown.
+        fence: the fence of all flights until the vehicle is disarmed.
         current_flight: the flight that runs, or None.
     """
 
@@ -24,7 +25,7 @@ class ServedFlights:
         config = vehicle.config
         self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
         self.current_flight: ServedFlight | None = None
-        self._vehicle, self._fence = vehicle, KeptFence(config, vehicle.link)
+        self._vehicle, self.fence = vehicle, KeptFence(config, vehicle.link)
         self._clock, self._retry_time = asyncio.get_running_loop().time, 0.0
         self._task: asyncio.Task[None] | None = None
         self._unfinished: set[asyncio.Task[None]] = set()
@@ -39,10 +40,6 @@ class ServedFlights:
         """Whether setpoints alone may begin a takeover: none has failed within `_RETRY_PAUSE`."""
         return self._clock() >= self._retry_time
 
-    def fence_refusal(self) -> str | None:
-        """Why the next flight must not begin, as found by `KeptFence.refusal`; None: it may."""
-        return self._fence.refusal()
-
     def begin(
         self, owner: Program, request: Request, command: ControlRequest | None, *, from_ground: bool
     ) -> None:
@@ -55,7 +52,7 @@ class ServedFlights:
             UnplannableError: no motion leads to the request.
         """
         self.current_flight = flight = ServedFlight(
-            str(owner), self._vehicle, self.ownership, self._fence.centre, from_ground=from_ground
+            str(owner), self._vehicle, self.ownership, self.fence.centre, from_ground=from_ground
         )
         flight.give(request)
         self._task = task = asyncio.create_task(self._fly(flight, command))
@@ -63,7 +60,7 @@ class ServedFlights:
         task.add_done_callback(self._unfinished.discard)
 
     async def close(self, reason: str) -> None:
-        """Hand the vehicle back if a client has it; wait until that is done and recorded."""
+        """End the flight, if there is one: hand the vehicle back, and complete all records."""
         if self.current_flight is not None:
             self.current_flight.interrupt(reason)
         if self._unfinished:
@@ -81,7 +78,7 @@ class ServedFlights:
             has_begun = await flight.run(command)
         finally:
             self.ownership.release()
-            self._fence.keep(flight.fence_centre)
+            self.fence.keep(flight.fence_centre)
             self.current_flight = self._task = None
             if not has_begun:
                 self._retry_time = self._clock() + _RETRY_PAUSE

@@ -66,8 +66,8 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame makes the autopilot fly elsewhere without leaving the mode of our setpoints.
 
     In GUIDED, ArduPilot flies to the position of a DO_REPOSITION or of a single mission item, and
-    after DO_PAUSE_CONTINUE it ignores setpoints until the pause ends. Such a frame would work
-    against the client in control. PX4 leaves OFFBOARD for these commands.
+    after DO_PAUSE_CONTINUE it ignores setpoints until the pause ends. These commands would
+    work against the client in control. PX4 leaves OFFBOARD for these commands.
     """
     if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
         return False

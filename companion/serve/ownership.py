@@ -10,10 +10,10 @@ from companion.serve.network.addresses import Address, source_of
 from companion.serve.network.client import Client
 from companion.serve.setpoints.request import Request
 
-_MAX_CLIENTS = 64
-"""Largest number of remembered clients; if more send setpoints, silent clients are forgotten."""
-_MAX_PROGRAMS = 32
-"""Number of programs whose newest request is kept."""
+_MAX_STREAMS = 64
+"""Largest number of remembered streams; if there are more, silent ones are forgotten."""
+_MAX_REQUESTS = 32
+"""Largest number of programs whose newest request is kept."""
 
 
 class Program(NamedTuple):
@@ -27,7 +27,7 @@ class Program(NamedTuple):
 
 
 class ControlState(Enum):
-    """State of the control by the owner, the client in control."""
+    """State of the control by the owner, the program in control."""
 
     FREE = "no client is in control"
     LIVE = "the owner's setpoints are flown"
@@ -37,7 +37,7 @@ class ControlState(Enum):
 
 @dataclass
 class _Stream:
-    """Arrival times of the last two setpoints of one client."""
+    """Arrival times of the last two setpoints of one program."""
 
     newest_arrival: float = -inf
     """Event-loop time at which the newest setpoint arrived, s; −inf: none yet."""
@@ -47,56 +47,56 @@ class _Stream:
 
 @dataclass(eq=False)
 class Ownership:
-    """Keeps one owner, the client in control, and refuses all others with a reason."""
+    """Keeps one owner, the program in control, and refuses all others with a reason."""
 
     _timeout: float
-    """Time without a setpoint after which a client counts as silent, s."""
+    """Time without a setpoint after which a program counts as silent, s."""
     _hold_time: float
     """Time for which the vehicle is held for a silent owner, s."""
     owner: Program | None = field(default=None, init=False)
-    """The client in control, or None."""
+    """The program in control, or None."""
     _streams: dict[Program, _Stream] = field(default_factory=dict, init=False)
 
-    def note_setpoint(self, client: Program, now: float) -> str | None:
+    def note_setpoint(self, program: Program, now: float) -> str | None:
         """Note a setpoint; return why it is not flown, or None.
 
-        A setpoint of another client takes over from a silent owner.
+        A setpoint of another program takes over from a silent owner.
         """
         owner = self.owner
-        if owner is not None and client != owner:
+        if owner is not None and program != owner:
             if self._is_live(owner, now):
                 return f"{owner} is in control"
-            self.owner = client
-        stream = self._streams.setdefault(client, _Stream())
+            self.owner = program
+        stream = self._streams.setdefault(program, _Stream())
         stream.previous_arrival, stream.newest_arrival = stream.newest_arrival, now
-        if len(self._streams) > _MAX_CLIENTS:
+        if len(self._streams) > _MAX_STREAMS:
             self._forget_silent(now)
         return None
 
-    def withdraw(self, client: Program, owner_before: Program | None) -> None:
+    def withdraw(self, program: Program, owner_before: Program | None) -> None:
         """Withdraw the setpoint that was noted last, because it cannot be flown.
 
         `owner_before` was in control before the setpoint.
         """
         self.owner = owner_before
-        stream = self._streams[client]
+        stream = self._streams[program]
         stream.newest_arrival = stream.previous_arrival
 
-    def request_control(self, client: Program, now: float) -> str | None:
-        """Give control to a client that requests it; return the reason of a refusal, or None."""
+    def request_control(self, program: Program, now: float) -> str | None:
+        """Give control to a program that requests it; return the reason of a refusal, or None."""
         owner = self.owner
-        if owner is not None and owner != client and self._is_live(owner, now):
+        if owner is not None and owner != program and self._is_live(owner, now):
             return f"{owner} is in control"
-        if not self._is_live(client, now):
+        if not self._is_live(program, now):
             return f"send setpoints first, every {1e3 * self._timeout:.0f} ms or more often"
-        self.owner = client
+        self.owner = program
         return None
 
-    def has_stream(self, client: Program, now: float) -> bool:
-        """Whether a client sends a stream: its last two setpoints came within the timeout."""
-        stream = self._streams.get(client, _Stream())
+    def has_stream(self, program: Program, now: float) -> bool:
+        """Whether a program sends a stream: its last two setpoints came within the timeout."""
+        stream = self._streams.get(program, _Stream())
         return (
-            self._is_live(client, now)
+            self._is_live(program, now)
             and stream.newest_arrival - stream.previous_arrival <= self._timeout
         )
 
@@ -119,31 +119,31 @@ class Ownership:
             return ControlState.LIVE
         return ControlState.HOLDING if overdue <= self._hold_time else ControlState.EXPIRED
 
-    def _is_live(self, client: Program, now: float) -> bool:
-        return now - self._streams.get(client, _Stream()).newest_arrival <= self._timeout
+    def _is_live(self, program: Program, now: float) -> bool:
+        return now - self._streams.get(program, _Stream()).newest_arrival <= self._timeout
 
     def _forget_silent(self, now: float) -> None:
         self._streams = {
-            client: stream
-            for client, stream in self._streams.items()
-            if client == self.owner or self._is_live(client, now)
+            program: stream
+            for program, stream in self._streams.items()
+            if program == self.owner or self._is_live(program, now)
         }
 
 
-class Programs:
+class NewestRequests:
     """Keeps the newest request of each program, unless it was refused."""
 
     def __init__(self) -> None:
         self._newest: dict[Program, Request] = {}  # in the order of their newest requests
 
     def keep(self, program: Program, request: Request) -> None:
-        """Keep a program's newest request; drop the oldest of more than `_MAX_PROGRAMS`."""
+        """Keep a program's newest request; drop the oldest of more than `_MAX_REQUESTS`."""
         self._newest.pop(program, None)
         self._newest[program] = request
-        while len(self._newest) > _MAX_PROGRAMS:
+        while len(self._newest) > _MAX_REQUESTS:
             del self._newest[next(iter(self._newest))]
 
-    def newest_request(self, program: Program) -> Request | None:
+    def get(self, program: Program) -> Request | None:
         """The newest request of a program; None if it has sent none, or its request was dropped."""
         return self._newest.get(program)
 

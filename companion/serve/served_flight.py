@@ -48,7 +48,7 @@ class ControlRequest(NamedTuple):
 
 
 class ServedVehicle(NamedTuple):
-    """The vehicle of a session, and what all flights under clients' control share."""
+    """The vehicle of a session, and the objects that its flights under clients' control share."""
 
     config: Config
     link: Link
@@ -63,7 +63,7 @@ class ServedFlight:
     """Takes over, flies the requests of the owner, and hands back.
 
     Args:
-        ownership: decides which client's requests are flown, and how long.
+        ownership: decides which client's requests are flown, and for how long.
         fence_centre: centre of the fence of an earlier flight; None: the fence is centred where
             control begins.
         from_ground: whether the vehicle stands armed, and takes off first.
@@ -98,8 +98,8 @@ class ServedFlight:
             environment,
             changes,
         )
-        self._source.resets = self._assembled.context.loop.resets
         context = self._assembled.context
+        self._source.resets = context.loop.resets
         self._source.fence_guard = FenceGuard(
             changes.wanted_config,
             context.snapshot_builder.flown_fence_centre,
@@ -107,8 +107,7 @@ class ServedFlight:
             lambda: context.guidance_loop.estimate.disturbance,
             self._tell_alarm,
         )
-        self._assembled.context.fence_centre = fence_centre
-        self._assembled.context.released_by = self._released_by
+        context.fence_centre, context.released_by = fence_centre, self._released_by
         ladder = self._assembled.ladder
         self._note_alarm, ladder.note = ladder.note, self._tell_alarm
 
@@ -140,7 +139,7 @@ class ServedFlight:
         """Fly a request, at once if control has begun.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous one stays in force.
+            UnplannableError: no motion leads to the request; the previous request stays in force.
         """
         self._source.give(request, self._clock())
         self._assembled.context.guidance_loop.step_at_once()
@@ -150,7 +149,7 @@ class ServedFlight:
         self._release_commanded_at = self._clock()
 
     def interrupt(self, reason: str) -> None:
-        """Hand the vehicle back for a reason, in words."""
+        """Hand the vehicle back; `reason` is text for the user."""
         self._assembled.flight.interrupt(reason)
 
     async def run(self, command: ControlRequest | None) -> bool:
@@ -159,8 +158,8 @@ class ServedFlight:
             result = "stopped at once"
             self._record.begin_counting(self._assembled.context.link.stats)
             try:
-                beside = self._answer_and_tell(command), self._send_values()
-                async with connected(self._assembled, *beside):
+                background = self._answer_and_tell(command), self._send_values()
+                async with connected(self._assembled, *background):
                     result = await self._assembled.flight.run()
             finally:
                 self._tell_end(command, result)
@@ -203,7 +202,7 @@ class ServedFlight:
         while True:
             state = self._ownership.state(self._clock())
             self._owner_name = str(self._ownership.owner or self._owner_name)
-            if self._owner_name != told_owner:  # also when another client goes on for a silent one
+            if self._owner_name != told_owner:  # also if another client replaced a silent owner
                 told_owner, told_state = self._owner_name, ControlState.LIVE
                 self._component.tell(f"{told_owner} is in control")
             elif state is not told_state and state in (ControlState.LIVE, ControlState.HOLDING):

@@ -24,8 +24,8 @@ from companion.serve.network.client import Client
 from companion.serve.network.network import Network
 from companion.serve.network.permission import Permission
 from companion.serve.network.routing import Routing
-from companion.serve.setpoints.understand import SETPOINT_IDS
-from companion.serve.situation import SituationKeeper
+from companion.serve.setpoints.decoding import SETPOINT_IDS
+from companion.serve.vehicle_pose import PoseTracker
 from companion.vehicle.link import Link
 
 if TYPE_CHECKING:
@@ -89,20 +89,17 @@ class ServeSession:
             RealtimeError: the system refused a required `realtime` setting.
             SigningError: the key cannot be used.
         """
-        settings = realtime_settings(self._config, self._environment)
+        config, opener = self._config, self._environment.open_transport
+        settings = realtime_settings(config, self._environment)
         with realtime.request_settings(settings) as grants:
             self.records.grants = grants
             for grant in grants:
                 self._note(str(grant))
-            return await self._run_with_link()
-
-    async def _run_with_link(self) -> dict[str, Any]:
-        config, opener = self._config, self._environment.open_transport
-        async with make_link(config, self.records, self._note, opener) as link:
-            self._log_state(link)
-            link.clock.on_event = self._note
-            async with Network(link, config.serve.clients, self._note) as network:
-                return await self._serve(link, network)
+            async with make_link(config, self.records, self._note, opener) as link:
+                self._log_state(link)
+                link.clock.on_event = self._note
+                async with Network(link, config.serve.clients, self._note) as network:
+                    return await self._serve(link, network)
 
     def _log_state(self, link: Link) -> None:
         """Note changes of the vehicle's state, except in a flight, which notes them itself."""
@@ -121,10 +118,10 @@ class ServeSession:
         background: list[Coroutine[Any, Any, None]] = [component.run(), self._tell_silence(link)]
         control = None
         if self._config.serve.control:
-            keeper = SituationKeeper(link, network)
-            control = self._make_control(link, component, keeper)
+            pose_tracker = PoseTracker(link, network)
+            control = self._make_control(link, component, pose_tracker)
             network.setpoint_ids = SETPOINT_IDS
-            background.append(keeper.keep_telemetry(self._config))
+            background.append(pose_tracker.keep_telemetry(self._config))
         interceptor = _FrameInterceptor(
             permission, component, control, network.routing, link.settings.target_system
         )
@@ -144,9 +141,9 @@ class ServeSession:
         return _counters(link, network)
 
     def _make_control(
-        self, link: Link, component: Component, keeper: SituationKeeper
+        self, link: Link, component: Component, pose_tracker: PoseTracker
     ) -> "ServedControl":
-        """Make the objects through which clients command the vehicle."""
+        """Make the handlers of setpoints and commands; set `flights`."""
         from companion.serve.control import ServedControl  # noqa: PLC0415  needs the extra
         from companion.serve.flights import ServedFlights  # noqa: PLC0415  the same
         from companion.serve.served_flight import ServedVehicle  # noqa: PLC0415  the same
@@ -161,7 +158,7 @@ class ServeSession:
             self.changes,
         )
         self.flights = ServedFlights(vehicle)
-        return ServedControl(self._config, link, component, keeper, self.flights)
+        return ServedControl(self._config, link, component, pose_tracker, self.flights)
 
     async def _tell_silence(self, link: Link) -> None:
         """Say once that no vehicle is heard; clients are served all the same."""

@@ -37,7 +37,7 @@ class ServedSource:
         name: shown to the user.
         start_pose: pose of the vehicle when control began; None before.
         resets: jumps of the autopilot's estimate, which are removed from requests.
-        fence_guard: stops motions in front of the fence; None: nothing does.
+        fence_guard: stops motions in front of the fence; None: motions are not stopped.
         failure: always None; a silent client does not count as a failure.
     """
 
@@ -58,8 +58,8 @@ class ServedSource:
         self._vehicle_motion = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         self._open_loop_reference: Reference | None = None  # a commanded attitude or body rates
         self._waiting_request: Request | None = None
-        self._motion_request: MotionRequest | None = None  # flown, as far as the fence allows
-        self._commanded: MotionRequest | None = None
+        self._motion_request: MotionRequest | None = None
+        self._allowed_request: MotionRequest | None = None  # `_motion_request` inside the fence
         self._is_stopped = False
 
     def begin(self, now: float, pose: Pose) -> None:
@@ -77,7 +77,7 @@ class ServedSource:
         """Fly a request from now on; before `begin`, keep it.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous one stays in force.
+            UnplannableError: no motion leads to the request; the previous request stays in force.
         """
         if self.start_pose is None:
             self._waiting_request = request
@@ -113,17 +113,17 @@ class ServedSource:
         return self._ownership.state(now) not in _FLOWN_STATES
 
     def _command(self, allowed: MotionRequest, now: float) -> None:
-        """Command what the fence allows."""
+        """Command the motion to a request that the fence allows."""
         self._motion.command(allowed, now, self._vehicle_motion)
-        self._commanded = allowed
+        self._allowed_request = allowed
 
     def _keep_inside_fence(self, now: float) -> None:
         """Stop in front of the fence, or go on if the request leads back."""
         if self._motion_request is None:
             return
         allowed = self._inside_fence(self._motion_request, now)
-        if allowed != self._commanded:
-            with suppress(UnplannableError):  # the motion before stays in force
+        if allowed != self._allowed_request:
+            with suppress(UnplannableError):  # the previous motion stays in force
                 self._command(allowed, now)
 
     def _inside_fence(self, wanted: MotionRequest, now: float) -> MotionRequest:

@@ -27,7 +27,7 @@ from companion.serve.mode_requests import (
 )
 from companion.serve.network.addresses import Address
 from companion.serve.network.network import Network
-from companion.serve.ownership import Program, Programs
+from companion.serve.ownership import NewestRequests, Program
 from companion.vehicle.ardupilot.autopilot import ArduPilot
 from companion.vehicle.px4.autopilot import Px4
 
@@ -86,16 +86,16 @@ def test_what_ardupilot_would_fly_to_in_guided(frame, steers):
 
 def test_a_command_under_another_component_id_is_of_the_program_that_was_heard_last():
     client, other = object(), object()
-    programs, asked = Programs(), command(176, 1.0, 6.0, 0.0)
-    assert programs.sender_of(client, asked) == Program(client, Address(255, 190))
+    requests, asked = NewestRequests(), command(176, 1.0, 6.0, 0.0)
+    assert requests.sender_of(client, asked) == Program(client, Address(255, 190))
     for component, request in ((5, "old"), (6, "newest")):
-        programs.keep(Program(client, Address(255, component)), request)
-    programs.keep(Program(other, Address(255, 190)), "of another")
-    found = programs.sender_of(client, asked)
-    assert programs.newest_request(found) == "newest"
+        requests.keep(Program(client, Address(255, component)), request)
+    requests.keep(Program(other, Address(255, 190)), "of another")
+    found = requests.sender_of(client, asked)
+    assert requests.get(found) == "newest"
     for number in range(40):
-        programs.keep(Program(other, Address(1, number)), "many")
-    assert programs.newest_request(found) is None
+        requests.keep(Program(other, Address(1, number)), "many")
+    assert requests.get(found) is None
 
 
 def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():
@@ -190,7 +190,7 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_
 
     flights = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
-        _fence=SimpleNamespace(keep=lambda centre: None),
+        fence=SimpleNamespace(keep=lambda centre: None),
         _vehicle=SimpleNamespace(
             config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test")
         ),

@@ -14,30 +14,30 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from companion.guidance.fence import EARTH_RADIUS
 from companion.mavlink.framing import FrameScanner
 from companion.serve.network.addresses import Address
+from companion.serve.setpoints.decoding import decode_setpoint
 from companion.serve.setpoints.request import (
     AttitudeRequest,
     MotionRequest,
     Origin,
     RatesRequest,
     RefusedSetpoint,
-    Situation,
+    VehiclePose,
 )
-from companion.serve.setpoints.understand import decode_setpoint
-from companion.serve.situation import OriginEstimate
+from companion.serve.vehicle_pose import OriginEstimate
 
 LOCAL, OFFSET, BODY, BODY_OFFSET, BODY_FRD = 1, 7, 8, 9, 12
 POSITION, VELOCITY, ACCELERATION = (3.0, -4.0, -5.5), (1.25, 2.5, -0.5), (0.5, -0.25, 0.125)
 YAW, YAW_RATE = 0.75, -0.375
 HERE, HEADING = (10.0, 20.0, -30.0), 0.6
 ORIGIN = Origin(47.4, 8.5, 450.0, 440.0)
-SITUATION = Situation(HERE, HEADING, ORIGIN)
+POSE = VehiclePose(HERE, HEADING, ORIGIN)
 TARGETS = Address(1, 1), Address(1, 191)
 
 
-def understand(message, situation=SITUATION, *, ardupilot=False):
+def understand(message, pose=POSE, *, ardupilot=False):
     raw = message.pack(dialect.MAVLink(None, 245, 190))
     (frame,) = FrameScanner().feed(raw)
-    return decode_setpoint(frame, situation, TARGETS, body_yaw_is_relative=ardupilot)
+    return decode_setpoint(frame, pose, TARGETS, body_yaw_is_relative=ardupilot)
 
 
 def local(mask, frame=LOCAL, position=POSITION, target=(1, 1), **changed):
@@ -224,8 +224,8 @@ def test_every_mask_in_a_global_frame(frame):
 
 
 def test_across_the_date_line_the_short_way_counts():
-    here = Situation(HERE, HEADING, Origin(0.0, 179.9999, 0.0, 0.0))
-    request = understand(place(0x0DF8, 5, 0.0, -179.9999, 5.0), situation=here)
+    here = VehiclePose(HERE, HEADING, Origin(0.0, 179.9999, 0.0, 0.0))
+    request = understand(place(0x0DF8, 5, 0.0, -179.9999, 5.0), pose=here)
     assert request.horizontal.position == pytest.approx((0.0, 22.24), abs=0.02)
 
 
@@ -236,10 +236,10 @@ def test_terrain_is_not_known(frame):
 
 
 def test_a_place_before_the_origin_is_known_is_refused_but_a_velocity_is_not():
-    nowhere = Situation(HERE, HEADING)
+    nowhere = VehiclePose(HERE, HEADING)
     with pytest.raises(RefusedSetpoint, match="global position is not known"):
-        understand(place(0x0DF8, 5, 47.4, 8.5, 460.0), situation=nowhere)
-    assert understand(place(0x0DC7, 5, 0.0, 0.0, 0.0), situation=nowhere).vertical.velocity
+        understand(place(0x0DF8, 5, 47.4, 8.5, 460.0), pose=nowhere)
+    assert understand(place(0x0DC7, 5, 0.0, 0.0, 0.0), pose=nowhere).vertical.velocity
 
 
 def test_a_place_on_another_continent_is_refused():

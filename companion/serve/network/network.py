@@ -192,8 +192,8 @@ class Network:
     def _note_taken_ids(self, client: Client) -> None:
         ids = f"{self._link.settings.source_system}/{self._link.settings.source_component}"
         self._note_fault_once(
-            f"{client.name} sends under our own ids {ids}, so nothing of it is passed on: give "
-            "that program another component id, or change link.source_component"
+            f"{client.name} sends under our own ids {ids}, so its frames are not forwarded: "
+            "give that program another component id, or change link.source_component"
         )
 
     def _note_fault_once(self, text: str) -> None:

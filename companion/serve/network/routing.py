@@ -16,8 +16,6 @@ _REPETITION_TIME = 0.2
 """Time within which a frame identical to a forwarded one is a repetition, s."""
 _MAX_REMEMBERED_FRAMES = 4096
 """Largest number of remembered frames; in a flood, only the newest are remembered."""
-
-
 _MAX_ADDRESSES = 1024
 """Largest number of addresses that are learned on one channel; all are searched for each frame."""
 
@@ -125,8 +123,9 @@ class Routing:
             or self._repeats.is_repeat(frame.raw)
         ):
             self.stats.looped += 1
-            if source == self._our_address:
-                self._tell_taken_ids(client, frame)
+            # A client that only sends our own frame back does not use our ids itself.
+            if source == self._our_address and not self._repeats.is_repeat(frame.raw):
+                self.on_taken_ids(client)
             return
         if source.system != 0:
             self._learn(client, source)
@@ -146,13 +145,8 @@ class Routing:
 
     def send_to_client(self, client: Client, frame: bytes) -> None:
         """Send a frame of our own component to one client."""
-        self._repeats.is_repeat(frame)  # remembered, so that its echo is known
+        self._repeats.is_repeat(frame)  # remembers the frame, so that its echo is dropped
         client.put(frame)
-
-    def _tell_taken_ids(self, client: Client, frame: Frame) -> None:
-        """Tell that another program uses our ids, unless a client only sends our frame back."""
-        if not self._repeats.is_repeat(frame.raw):
-            self.on_taken_ids(client)
 
     def _learn(self, channel: Client | UplinkQueue, source: Address) -> None:
         if len(self._heard[channel]) < _MAX_ADDRESSES:

@@ -68,9 +68,8 @@ def _attitude(message: Message) -> tuple[float, float, float, float]:
     try:
         q = normalised(tuple(message.q))
     except AttitudeError as error:
-        raise RefusedSetpoint("q is no unit quaternion (w, x, y, z)") from error
-    # An attitude beyond 90 degrees of tilt has the same horizontal acceleration per specific thrust
-    # as one below, and could not be told from it.
+        raise RefusedSetpoint("q is not a unit quaternion (w, x, y, z)") from error
+    # Beyond 90 degrees, an attitude has the same acceleration coefficients as one below.
     if cos_tilt(q[1], q[2]) <= 0.0:
         raise RefusedSetpoint("an attitude beyond 90 degrees of tilt is not supported")
     return q

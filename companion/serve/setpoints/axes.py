@@ -23,8 +23,8 @@ from companion.serve.setpoints.approach import (
 )
 from companion.serve.setpoints.request import AxisDemand
 
-_MAX_STREAM_PERIOD = 0.25
-"""Setpoints at most this time apart, s, form a stream, whose derivatives are estimated."""
+MAX_STREAM_PERIOD = 0.25
+"""Setpoints at most this time apart, s, form a stream; its derivatives are estimated."""
 _DERIVATIVE_WEIGHT = 0.5
 """Weight of a new derivative in the exponential average."""
 _LARGEST_ACCELERATION = 15.0
@@ -110,7 +110,7 @@ class CommandFollower:
         Without a commanded position, the state stays close to `actual`, the motion of the vehicle.
 
         Raises:
-            UnplannableError: no motion leads to the command; the previous one stays in force.
+            UnplannableError: no motion leads to the command; the previous command stays in force.
         """
         if demand == self._newest_demand:
             self._repeat(demand, now, actual)
@@ -192,7 +192,7 @@ class CommandFollower:
         is_stream = (
             before is not None
             and before.position is not None
-            and 0.0 < interval <= _MAX_STREAM_PERIOD
+            and 0.0 < interval <= MAX_STREAM_PERIOD
         )
         if not is_stream or before is None or demand.velocity is None or before.velocity is None:
             return commanded or self._zero, self._zero

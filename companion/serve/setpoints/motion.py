@@ -13,7 +13,7 @@ from companion.serve.setpoints.approach import (
     AxisState,
     UnplannableError,
 )
-from companion.serve.setpoints.axes import CommandFollower, JumpLimits
+from companion.serve.setpoints.axes import MAX_STREAM_PERIOD, CommandFollower, JumpLimits
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _HORIZONTAL_JUMP_LIMITS = JumpLimits(0.3, 0.6)
@@ -26,8 +26,6 @@ _YAW_ACCELERATION, _YAW_JERK = 2.0, 10.0
 """Largest yaw acceleration, rad/s², and jerk, rad/s³, after a jump of the commanded yaw. Vehicles
 respond slowly in yaw.
 """
-_MAX_STREAM_PERIOD = 0.25
-"""Yaw setpoints at most this time apart, s, form a stream, whose yaw rate is estimated."""
 
 
 class MotionLimits(NamedTuple):
@@ -86,7 +84,7 @@ class CommandedMotion:
         """Follow a request; `actual` is the motion of the vehicle.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous one stays in force.
+            UnplannableError: no motion leads to the request; the previous request stays in force.
         """
         state_before = (
             copy(self._horizontal),
@@ -122,7 +120,7 @@ class CommandedMotion:
     def _slowed(self, horizontal: AxisDemand) -> AxisDemand:
         """Shorten a commanded velocity to its limit; its direction stays.
 
-        With a position, a shorter velocity would contradict it.
+        A velocity with a position is not shortened: it would no longer match the position.
         """
         if horizontal.position is not None or horizontal.velocity is None:
             return horizontal
@@ -171,7 +169,7 @@ class CommandedMotion:
             mean_rate = wrap_angle(request.yaw - yaw) / max(now - commanded_at, 1e-3)
             if (
                 rate is None
-                and now - commanded_at <= _MAX_STREAM_PERIOD
+                and now - commanded_at <= MAX_STREAM_PERIOD
                 and abs(mean_rate) <= self._largest_yaw_rate
             ):
                 rate = mean_rate

@@ -17,7 +17,7 @@ from companion.serve.setpoints.request import (
     MotionRequest,
     Origin,
     RefusedSetpoint,
-    Situation,
+    VehiclePose,
 )
 
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS = (1, 2, 4), (8, 16, 32), (64, 128, 256)
@@ -57,7 +57,7 @@ _TERRAIN_FRAMES = dialect.MAV_FRAME_GLOBAL_TERRAIN_ALT, dialect.MAV_FRAME_GLOBAL
 
 
 def decode_local_target(
-    message: Message, situation: Situation, *, body_yaw_is_relative: bool
+    message: Message, pose: VehiclePose, *, body_yaw_is_relative: bool
 ) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_LOCAL_NED.
 
@@ -75,17 +75,17 @@ def decode_local_target(
     position, velocity, acceleration = groups
     if not frame.has_same_position and any(value is not None for value in position):
         raise RefusedSetpoint("position in BODY_NED is ambiguous: use LOCAL_NED or BODY_OFFSET_NED")
-    frame_yaw = situation.yaw if frame.is_body else 0.0
-    frame_origin = situation.position_ned if frame.is_offset else (0.0, 0.0, 0.0)
+    frame_yaw = pose.yaw if frame.is_body else 0.0
+    frame_origin = pose.position_ned if frame.is_offset else (0.0, 0.0, 0.0)
     position = _shift(_rotate(position, frame_yaw), frame_origin)
     velocity, acceleration = _rotate(velocity, frame_yaw), _rotate(acceleration, frame_yaw)
     yaw, yaw_rate = _heading(message)
     if frame.is_body and body_yaw_is_relative and yaw is not None:
-        yaw += situation.yaw
+        yaw += pose.yaw
     return _make_request((position, velocity, acceleration), yaw, yaw_rate)
 
 
-def decode_global_target(message: Message, situation: Situation) -> MotionRequest:
+def decode_global_target(message: Message, pose: VehiclePose) -> MotionRequest:
     """The command of a SET_POSITION_TARGET_GLOBAL_INT.
 
     Raises:
@@ -99,9 +99,9 @@ def decode_global_target(message: Message, situation: Situation) -> MotionReques
         raise RefusedSetpoint(f"coordinate_frame {frame} is not supported")
     position, velocity, acceleration = _groups(message, (0.0, 0.0, message.alt))
     if any(value is not None for value in position):
-        if situation.origin is None:
+        if pose.origin is None:
             raise RefusedSetpoint("the vehicle's global position is not known yet")
-        local = _to_local(message, situation.origin, above_home=frame in _ABOVE_HOME_FRAMES)
+        local = _to_local(message, pose.origin, above_home=frame in _ABOVE_HOME_FRAMES)
         position = tuple(
             None if used is None else value for used, value in zip(position, local, strict=True)
         )

@@ -61,8 +61,8 @@ class RatesRequest(NamedTuple):
 Request = MotionRequest | AttitudeRequest | RatesRequest
 
 
-class Situation(NamedTuple):
-    """State of the vehicle when a setpoint comes, for setpoints relative to it."""
+class VehiclePose(NamedTuple):
+    """Pose of the vehicle when a setpoint arrives, for setpoints relative to the vehicle."""
 
     position_ned: Vector
     """Position in the autopilot's local frame, m."""
@@ -76,7 +76,7 @@ _MIN_TAKEOFF_HEIGHT, _MIN_TAKEOFF_SPEED = 1.0, 0.1
 """Least commanded height above the vehicle (m) or upward speed (m/s) that requests a take-off."""
 
 
-def requests_takeoff(request: Request, situation: Situation) -> bool:
+def requests_takeoff(request: Request, pose: VehiclePose) -> bool:
     """Whether a request makes a vehicle on the ground take off.
 
     Requests of an attitude or of body rates never do.
@@ -85,7 +85,7 @@ def requests_takeoff(request: Request, situation: Situation) -> bool:
         return False
     position, velocity, _ = request.vertical
     if position is not None:
-        return position[0] < situation.position_ned[2] - _MIN_TAKEOFF_HEIGHT
+        return position[0] < pose.position_ned[2] - _MIN_TAKEOFF_HEIGHT
     return velocity is not None and velocity[0] < -_MIN_TAKEOFF_SPEED
 
 

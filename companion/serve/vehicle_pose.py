@@ -17,7 +17,7 @@ from companion.mavlink.errors import LinkError
 from companion.mavlink.messages import Message
 from companion.preflight.session import wanted_rates
 from companion.serve.network.network import Network
-from companion.serve.setpoints.request import Origin, Request, Situation, requests_takeoff
+from companion.serve.setpoints.request import Origin, Request, VehiclePose, requests_takeoff
 from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
@@ -35,7 +35,7 @@ _NEW_ORIGIN_DISTANCE = 2.0
 """Distance from the estimate at which a measured origin counts as newly set, m."""
 
 
-class SituationKeeper:
+class PoseTracker:
     """Keeps the vehicle's newest position and yaw, and the origin of its local frame."""
 
     def __init__(self, link: Link, network: Network) -> None:
@@ -43,31 +43,26 @@ class SituationKeeper:
         self._origin = OriginEstimate()
         link.subscribe("GLOBAL_POSITION_INT", self._on_global_position)
 
-    def situation(self) -> Situation | None:
-        """The present situation; None while position or attitude is unknown or outdated."""
+    def pose(self) -> VehiclePose | None:
+        """The present pose; None while position or attitude is unknown or outdated."""
         position, now = self._link.state.position, self._network.now()
-        decoded = (
-            decode_attitude(self._network.attitude_payload)
-            if self._network.attitude_payload
-            else None
-        )
-        if position is None or decoded is None:
+        if position is None:
             return None
         age = self._link.clock.age(position.vehicle_time, now) or 0.0
         if max(age, now - position.received, now - self._network.attitude_at) > _MAX_TELEMETRY_AGE:
             return None
-        _, q, _ = decoded
-        if not is_unit(q):
+        decoded = decode_attitude(self._network.attitude_payload)
+        if decoded is None or not is_unit(decoded[1]):
             return None
-        _, _, yaw = euler_angles(q)
-        return Situation(position.position_ned, yaw, self._origin.origin)
+        _, _, yaw = euler_angles(decoded[1])
+        return VehiclePose(position.position_ned, yaw, self._origin.origin)
 
     def takeoff_refusal(self, request: Request) -> str | None:
         """Why a request for control on the ground does not begin a take-off; None if it does."""
-        situation = self.situation()
-        if not self._link.state.landed or situation is None:
+        pose = self.pose()
+        if not self._link.state.landed or pose is None:
             return "take off first: it is not known whether the vehicle stands on the ground"
-        if requests_takeoff(request, situation):
+        if requests_takeoff(request, pose):
             return None
         return "command a height of 1 m or more above the ground, or take off first"
 

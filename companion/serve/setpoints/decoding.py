@@ -1,11 +1,11 @@
-"""Converts the frame of a client's setpoint to a request, or to the reason why it is not flown."""
+"""Decodes the frame of a client's setpoint to a request, or refuses it with a reason."""
 
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import decode, dialect
 from companion.serve.network.addresses import Address, target_of
 from companion.serve.setpoints.attitude_target import decode_attitude_target
 from companion.serve.setpoints.position_target import decode_global_target, decode_local_target
-from companion.serve.setpoints.request import RefusedSetpoint, Request, Situation
+from companion.serve.setpoints.request import RefusedSetpoint, Request, VehiclePose
 
 _ATTITUDE_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
 _LOCAL_TARGET_ID = dialect.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
@@ -16,7 +16,7 @@ SETPOINT_IDS = frozenset({_ATTITUDE_TARGET_ID, _LOCAL_TARGET_ID, _GLOBAL_TARGET_
 
 def decode_setpoint(
     frame: Frame,
-    situation: Situation,
+    pose: VehiclePose,
     targets: tuple[Address, Address],
     *,
     body_yaw_is_relative: bool,
@@ -35,8 +35,8 @@ def decode_setpoint(
     if frame.message_id == _ATTITUDE_TARGET_ID:
         return decode_attitude_target(message)
     if frame.message_id == _GLOBAL_TARGET_ID:
-        return decode_global_target(message, situation)
-    return decode_local_target(message, situation, body_yaw_is_relative=body_yaw_is_relative)
+        return decode_global_target(message, pose)
+    return decode_local_target(message, pose, body_yaw_is_relative=body_yaw_is_relative)
 
 
 def _check_target(target: Address, autopilot: Address, our_address: Address) -> None:
