@@ -1,4 +1,4 @@
-"""After the flight, the page and the live stream stay for users who have them open."""
+"""Keeps the live page and the live stream after the flight for users who have them open."""
 
 import asyncio
 import os
@@ -16,7 +16,7 @@ _LONGEST_STAY = 3600.0
 
 
 async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
-    """Wait until nobody has the page or stream open any more, or the next flight needs its port.
+    """Wait until nobody has the page or stream open, or the next flight needs its port.
 
     Wait at most an hour.
     """

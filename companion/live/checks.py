@@ -19,8 +19,8 @@ from companion.guidance import ManeuverSequence
 from companion.tuning import stability
 
 _LEAST_GAIN_MARGIN_DB, _LEAST_PHASE_MARGIN_DEG = 4.0, 20.0
-"""Smallest gain margin, dB, and phase margin, degrees, that a change may leave. A margin that was
-smaller when the flight began must not become smaller still."""
+"""Smallest gain margin, dB, and phase margin, degrees, that a change may leave. If a margin was
+smaller when the flight began, the limit is that margin."""
 _ROUNDING = 1e-3
 """Relative error of computed margins that is ignored."""
 
@@ -42,16 +42,6 @@ class ChangeChecks:
             self._maneuvers = configured_maneuvers(start, self._drag) if flies_maneuvers else None
         except ConfigError as error:  # a file has changed since the flight read it
             self._maneuvers_error = error
-
-    @staticmethod
-    def from_message(message: dict[str, Any]) -> "ChangeChecks":
-        """Make the checks from the first message of the flight."""
-        start = Config.model_validate(message["config"])
-        return ChangeChecks(start, flies_maneuvers=bool(message["follows"]))
-
-    def note_config(self, message: dict[str, Any]) -> None:
-        """Note the changed configuration, from a message of the flight."""
-        self.current = Config.model_validate(message["config"])
 
     def note_drag(self, message: dict[str, Any]) -> None:
         """Note the drag of this vehicle, from a message of the flight.

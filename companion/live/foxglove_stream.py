@@ -98,7 +98,7 @@ class LiveStream:
 
 
 async def serve_stream(connection: FlightConnection, feed: socket.socket) -> None:
-    """Serve the stream of a flight until the flight has ended and `until_unused` has returned.
+    """Serve the stream of a flight until the flight has ended and nobody needs the stream.
 
     The records of the flight arrive on the socket `feed`.
     """

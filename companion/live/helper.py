@@ -86,7 +86,7 @@ class Helper:
             loop.remove_reader(self._channel.fileno())
 
     def close(self, reason: str) -> None:
-        """Tell the process why the flight has ended; it ends when `until_unused` returns."""
+        """Tell the process why the flight has ended. The process goes on while it has users."""
         self._send("end", text=reason)
         self._has_ended = True
         self._channel.close()
@@ -189,7 +189,7 @@ def _helper_name(tasks: HelperTasks) -> str:
 def _start_process(
     sockets: tuple[socket.socket | None, ...], folder: Path | None
 ) -> "subprocess.Popen[bytes]":
-    """Start the helper process, which survives Ctrl-C; it outlives the flight (`until_unused`)."""
+    """Start the helper process, which survives Ctrl-C and outlives the flight."""
     descriptors = [-1 if each is None else each.fileno() for each in sockets]
     command = [sys.executable, "-m", "companion.live.helper_process", *map(str, descriptors)]
     log = Path("/dev/null") if folder is None else folder / "live.log"
@@ -210,9 +210,9 @@ def _first_message(tasks: HelperTasks, config: Config) -> Message:
     page, stream = tasks.page, tasks.stream
     return {
         "config": _as_json(config),
-        "read": _as_json(tasks.config_as_read),
-        "follows": tasks.flies_maneuvers,
-        "watch": None if tasks.watched_file is None else str(tasks.watched_file.absolute()),
+        "config_as_read": _as_json(tasks.config_as_read),
+        "flies_maneuvers": tasks.flies_maneuvers,
+        "watched_file": None if tasks.watched_file is None else str(tasks.watched_file.absolute()),
         "folder": None if tasks.folder is None else str(tasks.folder.absolute()),
         "token": None if page is None else page.token,
         "host": None if page is None else page.host,

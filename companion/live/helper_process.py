@@ -4,10 +4,9 @@ import asyncio
 import os
 import socket
 import sys
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 from companion.config import Config
 from companion.config.in_flight import Values
@@ -35,16 +34,18 @@ class FlightConnection:
     """
 
     def __init__(self, channel: Channel, first_message: Message) -> None:
-        self.first_message, self.checks = first_message, ChangeChecks.from_message(first_message)
+        self.first_message = first_message
+        config = Config.model_validate(first_message["config"])
+        self.checks = ChangeChecks(config, flies_maneuvers=first_message["flies_maneuvers"])
         self.flight_ended = asyncio.Event()
         self._channel = channel
         self._ids = count()
         self._pending_answers: dict[int, asyncio.Future[Message]] = {}
-        self._listeners: list[Any] = []
+        self._listeners: list[Callable[[Message], None]] = []
         self._request_lock = asyncio.Lock()
         asyncio.get_running_loop().add_reader(channel.fileno(), self._on_readable)
 
-    def listen(self, take: Any) -> None:
+    def listen(self, take: Callable[[Message], None]) -> None:
         """Call `take` with each further message of the flight."""
         self._listeners.append(take)
 
@@ -118,7 +119,7 @@ class FlightConnection:
 
     def _take(self, message: Message) -> None:
         if message["kind"] == "config":
-            self.checks.note_config(message)
+            self.checks.current = Config.model_validate(message["config"])
         elif message["kind"] == "drag":
             self.checks.note_drag(message)
         answer = self._pending_answers.get(message.get("id", -1))
@@ -130,7 +131,7 @@ class FlightConnection:
 
 async def watch(connection: FlightConnection, path: Path) -> None:
     """Apply the edits of a file until the flight ends."""
-    config_as_read = Config.model_validate(connection.first_message["read"])
+    config_as_read = Config.model_validate(connection.first_message["config_as_read"])
     watched = WatchedFile(path, config_as_read, connection.checks.check)
     connection.note(f"edits of {path.name} are applied from now on")
     while not connection.flight_ended.is_set():
@@ -149,36 +150,36 @@ async def watch(connection: FlightConnection, path: Path) -> None:
         await asyncio.sleep(_CHECK_PERIOD_S)
 
 
-async def _serve(descriptor: int, listening: int, feed: int) -> None:
+async def _serve(channel_fd: int, page_fd: int, feed_fd: int) -> None:
     """Do the tasks that the flight's first message names.
 
     Args:
-        descriptor: file descriptor of the channel to the flight.
-        listening: file descriptor of the live page's listening socket; −1: no live page.
-        feed: file descriptor of the socket on which the flight sends its records for the live
+        channel_fd: file descriptor of the channel to the flight.
+        page_fd: file descriptor of the live page's listening socket; −1: no live page.
+        feed_fd: file descriptor of the socket on which the flight sends its records for the live
             stream; −1: no live stream.
     """
-    channel = Channel(socket.socket(fileno=descriptor))
+    channel = Channel(socket.socket(fileno=channel_fd))
     first = next(channel.received_messages(1))
     if first is None:
         return
-    os.set_blocking(descriptor, False)
+    os.set_blocking(channel_fd, False)
     connection = FlightConnection(channel, first)
     serving: list[Awaitable[None]] = [_watch_until_ended(connection)]
-    if feed >= 0:
+    if feed_fd >= 0:
         from companion.live.foxglove_stream import serve_stream  # noqa: PLC0415  needs the extra
 
-        serving.append(serve_stream(connection, socket.socket(fileno=feed)))
-    if listening >= 0:
+        serving.append(serve_stream(connection, socket.socket(fileno=feed_fd)))
+    if page_fd >= 0:
         from companion.live.page.server import serve_page  # noqa: PLC0415  needs the extra
 
-        serving.append(serve_page(connection, socket.socket(fileno=listening)))
+        serving.append(serve_page(connection, socket.socket(fileno=page_fd)))
     await asyncio.gather(*serving)
 
 
 async def _watch_until_ended(connection: FlightConnection) -> None:
-    """Wait for the end of the flight; until then watch the file, if there is one to watch."""
-    path = connection.first_message["watch"]
+    """Wait for the end of the flight; meanwhile watch the file, if one is to be watched."""
+    path = connection.first_message["watched_file"]
     watching = None if path is None else asyncio.create_task(watch(connection, Path(path)))
     await connection.flight_ended.wait()
     if watching is not None:

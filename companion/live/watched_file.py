@@ -19,7 +19,7 @@ FileStamps = tuple[tuple[int, int, int] | None, ...]
 
 
 class Edit(NamedTuple):
-    """What an edit of the file changes, or why it is refused.
+    """The changes by an edit of the file, or why the edit is refused.
 
     Attributes:
         values: the changed values, by section and key.

@@ -17,7 +17,7 @@ from companion.live.checks import ChangeChecks
 from companion.live.watched_file import Edit
 
 SLOWER = {"planner": {"gain_per_s": 4.0}}
-FIRST = {"config": Config().model_dump(mode="json"), "follows": False, "watch": None}
+FIRST = {"config": Config().model_dump(mode="json"), "flies_maneuvers": False, "watched_file": None}
 
 
 class Flight:
@@ -139,7 +139,7 @@ def test_what_becomes_of_an_edit_is_noted(monkeypatch, tmp_path, answer, said, a
         assert [note.startswith(said) for note in rest] == ([True] if said else [])
         assert seen == (["accepted"] if accepted else [])
 
-    used(use, {"read": FIRST["config"]})
+    used(use, {"config_as_read": FIRST["config"]})
 
 
 def test_a_process_whose_flight_never_began_ends():

@@ -73,7 +73,7 @@ def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
 
     async def ask():
         ours, theirs = Channel.pair()
-        first = {"config": Config().model_dump(mode="json"), "follows": False}
+        first = {"config": Config().model_dump(mode="json"), "flies_maneuvers": False}
         connection = helper_process.FlightConnection(Channel(theirs), first)
         try:
             with pytest.raises(NoAnswerError, match="the change may have been applied"):

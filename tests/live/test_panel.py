@@ -12,7 +12,7 @@ from companion.files.yaml_file import ConfigError
 from companion.flight.changes import ChangeRefusedError
 from companion.live.channel import NoAnswerError
 from companion.live.page.guard import Guard
-from companion.live.page.store import Store
+from companion.live.page.page_data import PageData
 
 pytestmark = pytest.mark.skipif(
     find_spec("nicegui") is None, reason="the extra `live` is not installed"
@@ -30,14 +30,14 @@ class FlightConnection:
         refusal: error that answers the next requests, or None.
     """
 
-    def __init__(self, store, folder):
+    def __init__(self, page_data, folder):
         self.first_message = {"folder": None if folder is None else str(folder)}
         self.asked, self.refusal = [], None
-        self._store, self._start = store, store.config
+        self._page_data, self._start = page_data, page_data.config
 
     async def change(self, values, by):
         self._ask(values, by)
-        return self._answer(changed(self._store.config, values, by), can_undo=True)
+        return self._answer(changed(self._page_data.config, values, by), can_undo=True)
 
     async def undo(self, by):
         self._ask("undo", by)
@@ -51,15 +51,15 @@ class FlightConnection:
 
     def _answer(self, config, *, can_undo):
         told = config.model_dump(mode="json")
-        self._store.take({"kind": "config", "config": told, "can_undo": can_undo})
+        self._page_data.take({"kind": "config", "config": told, "can_undo": can_undo})
         return f"done {len(self.asked)}"
 
 
 class Page:
     """The page as the simulated user sees it."""
 
-    def __init__(self, user, connection, store):
-        self.user, self.connection, self.store = user, connection, store
+    def __init__(self, user, connection, page_data):
+        self.user, self.connection, self.page_data = user, connection, page_data
 
     def element(self, kind, name):
         (found,) = (
@@ -112,11 +112,11 @@ def used(use, folder=None, path="/"):
 
     async def serve():
         async with user_simulation() as user:
-            store = Store(Config())
-            connection = FlightConnection(store, folder)
-            add_page(connection, store, Guard(None, TOKEN))
+            page_data = PageData(Config())
+            connection = FlightConnection(page_data, folder)
+            add_page(connection, page_data, Guard(None, TOKEN))
             await user.open(path)
-            await use(Page(user, connection, store))
+            await use(Page(user, connection, page_data))
 
     ours = {name: each for name, each in sys.modules.items() if name.split(".")[0] == "companion"}
     try:
@@ -194,7 +194,7 @@ def test_another_tabs_change_is_shown_but_not_over_an_edited_field():
         )
         await page.until(lambda: page.value(CLIMB) == "1.5")
         assert page.value("limits.max_tilt_deg") == "31"
-        page.store.take({"kind": "end", "text": "the flight is over"})
+        page.page_data.take({"kind": "end", "text": "the flight is over"})
         await page.until(lambda: not page.can_undo())
 
     used(use, path=f"/?token={TOKEN}")
@@ -219,10 +219,10 @@ def test_new_states_and_events_are_pushed_once(monkeypatch):
         client = page.user.client
         client.run_javascript = pushed.append
         monkeypatch.setattr(type(client), "has_socket_connection", property(lambda _: True))
-        page.store.take({"kind": "status", "time_s": 1.0, "phase": "hover"})
-        page.store.take({"kind": "event", "time_s": 1.0, "text": "maneuver: hover"})
+        page.page_data.take({"kind": "status", "time_s": 1.0, "phase": "hover"})
+        page.page_data.take({"kind": "event", "time_s": 1.0, "text": "maneuver: hover"})
         await page.until(lambda: len(pushed) > 2)
-        page.store.take({"kind": "end", "text": "the flight is over"})
+        page.page_data.take({"kind": "end", "text": "the flight is over"})
         await page.until(lambda: '"over": "the flight is over"' in pushed[-1])
         monkeypatch.undo()
 

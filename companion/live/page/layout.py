@@ -7,8 +7,8 @@ from nicegui import Client, app, ui
 
 from companion.live.helper_process import FlightConnection
 from companion.live.page.guard import Guard
+from companion.live.page.page_data import PageData
 from companion.live.page.panel import Panel
-from companion.live.page.store import Store
 
 _PAGE_FOLDER = Path(__file__).parent
 _PUSH_PERIOD = 0.2
@@ -37,7 +37,7 @@ _PLOTS = (
 )
 
 
-def add_page(connection: FlightConnection, store: Store, guard: Guard) -> None:
+def add_page(connection: FlightConnection, page_data: PageData, guard: Guard) -> None:
     """Add the page, and send new states to all browsers that show it."""
     shared = f"<style>{_file_text('live.css')}</style><script>{_file_text('live.js')}</script>"
     ui.add_head_html(shared, shared=True)
@@ -46,13 +46,13 @@ def add_page(connection: FlightConnection, store: Store, guard: Guard) -> None:
     @ui.page("/")
     def page(client: Client, token: str = "") -> None:
         _add_drawings()
-        Panel(connection, store, guard, unlocked=guard.is_token(token))
+        Panel(connection, page_data, guard, unlocked=guard.is_token(token))
         state = {
-            "fence": store.fence(),
-            "frames": store.states_since(0),
-            "events": store.events_since(0),
+            "fence": page_data.fence(),
+            "frames": page_data.states_since(0),
+            "events": page_data.events_since(0),
         }
-        sent_counts[client.id] = store.state_count, store.event_count
+        sent_counts[client.id] = page_data.state_count, page_data.event_count
         client.run_javascript(f"live.begin({json.dumps(state)})")
 
     async def push() -> None:
@@ -61,12 +61,12 @@ def add_page(connection: FlightConnection, store: Store, guard: Guard) -> None:
             if counts is None or not client.has_socket_connection:
                 continue
             new = {
-                "frames": store.states_since(counts[0]),
-                "events": store.events_since(counts[1]),
-                "fence": store.fence(),
-                "over": store.end_text,
+                "frames": page_data.states_since(counts[0]),
+                "events": page_data.events_since(counts[1]),
+                "fence": page_data.fence(),
+                "over": page_data.end_text,
             }
-            sent_counts[client.id] = store.state_count, store.event_count
+            sent_counts[client.id] = page_data.state_count, page_data.event_count
             client.run_javascript(f"live.push({json.dumps(new)})")
         for gone in sent_counts.keys() - Client.instances.keys():
             del sent_counts[gone]

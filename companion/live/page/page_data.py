@@ -14,7 +14,7 @@ SHOWN_S = 30.0
 _MOST_STATES, _MOST_EVENTS = 400, 200
 
 
-class Store:
+class PageData:
     """Keeps what the page shows, from the messages of the flight.
 
     Attributes:

@@ -13,7 +13,7 @@ from companion.flight.changes import ChangeRefusedError
 from companion.live.channel import NoAnswerError
 from companion.live.helper_process import FlightConnection
 from companion.live.page.guard import Guard
-from companion.live.page.store import Store
+from companion.live.page.page_data import PageData
 
 _SOURCE = "the live page"
 _DOWNLOAD_NAME = "changed.yaml"
@@ -28,16 +28,16 @@ class Panel:
     """
 
     def __init__(
-        self, connection: FlightConnection, store: Store, guard: Guard, *, unlocked: bool
+        self, connection: FlightConnection, page_data: PageData, guard: Guard, *, unlocked: bool
     ) -> None:
-        self._connection, self._store, self._guard = connection, store, guard
+        self._connection, self._page_data, self._guard = connection, page_data, guard
         self._unlocked = unlocked
         self._inputs: dict[tuple[str, str], ui.input] = {}
         self._shown: dict[tuple[str, str], str] = {}
         with ui.expansion("Change values in flight").classes("live-wide").props("id=live-panel"):
             self._add_unlock_row()
             with ui.element("div").classes("live-values"):
-                for key in store.values():
+                for key in page_data.values():
                     name = key.section, key.name
                     self._shown[name] = value_text(key.value)
                     self._inputs[name] = ui.input(
@@ -95,7 +95,7 @@ class Panel:
 
     async def _save(self) -> None:
         """Send the changed values to the browser; if unlocked, also write them to the folder."""
-        text = self._store.changed_yaml()
+        text = self._page_data.changed_yaml()
         ui.download.content(text, _DOWNLOAD_NAME)
         folder = self._connection.first_message["folder"]
         if folder is None or not self._unlocked:
@@ -111,14 +111,14 @@ class Panel:
 
     def _refresh(self) -> None:
         """Show values changed elsewhere, except in edited fields; enable or disable Undo."""
-        for key in self._store.values():
+        for key in self._page_data.values():
             name, value = (key.section, key.name), value_text(key.value)
             field = self._inputs[name]
             if value != self._shown[name]:
                 if str(field.value or "").strip() == self._shown[name] or field.value is None:
                     field.value = value
                 self._shown[name] = value
-        self._undo.set_enabled(self._store.can_undo and self._store.end_text is None)
+        self._undo.set_enabled(self._page_data.can_undo and self._page_data.end_text is None)
 
     def _show_message(self, text: str) -> None:
         self._message.set_text(text)
