@@ -31,7 +31,7 @@ measured in steps, circles, figure-eights and doublets agree within 3 ms."""
 _FILTER_REACH = 3.5
 """Half width of the filter's impulse response, in standard deviations of its Gaussian."""
 _LEAST_EXPLAINED = 0.985
-"""Smallest R² of a correlation that is used; below it, gusts or another axis distort the delay."""
+"""Smallest usable R² of a correlation; with less, gusts or another axis distort the delay."""
 _LEAST_EXCITATION = 0.005
 """Smallest RMS of the filtered commands with which a delay is measured, rad/s."""
 

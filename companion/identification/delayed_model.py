@@ -124,7 +124,7 @@ _SAME_COMMAND_SHARE = 0.005
 
 
 class DelayedModel:
-    """A record with every n-th sample, and the response of a model to its commands.
+    """The response of a model to the commands of a record, compared with every n-th sample.
 
     y(t) = gain·x(t − dead time) + offset + free response of each stretch, where x is the model's
     exact response. Linear regression gives the offset, the initial states, and the gain if it is
@@ -212,8 +212,8 @@ class DelayedModel:
     def _offset_columns(self, unknown: Floats) -> Floats:
         """(m, 1 + number of initial states): ones, and free responses of each stretch.
 
-        A free response begins at the first sample of its stretch. If it began at the first command,
-        it would be nearly 0 at the samples, and its weight would be unbounded.
+        A free response begins at the first sample of its stretch. A free response from the first
+        command on would be nearly 0 at the samples, and its weight would be unbounded.
         """
         log_params = unknown[: self._dead_time_index]
         decays = [self.model.free_responses(log_params, times - times[0]) for times in self.times]

@@ -148,66 +148,68 @@ def _second_order_fit(
             for share in _TRIED_DEAD_TIME_SHARES
         ]
     )
-    data = DelayedModel(record, model, None, first_order_model.thinning)
-    solution = data.search(start)
+    delayed_model = DelayedModel(record, model, None, first_order_model.thinning)
+    solution = delayed_model.search(start)
     if solution.rss > _CLEARLY_BETTER_SHARE * first_order.rss:
         return None
     frequency, damping = frequency_damping(solution.unknown)
     return SecondOrderFit(
         frequency=frequency,
         damping=damping,
-        dead_time=data.dead_time(solution.unknown),
+        dead_time=delayed_model.dead_time(solution.unknown),
         gain=float(solution.weights[0]),
-        slew=data.slew(solution.unknown),
-        fit=_quality(data, solution),
+        slew=delayed_model.slew(solution.unknown),
+        fit=_quality(delayed_model, solution),
     )
 
 
-def _quality(data: DelayedModel, solution: Solution) -> FitQuality:
+def _quality(delayed_model: DelayedModel, solution: Solution) -> FitQuality:
     """The quality of a fit of either order."""
     unknown, lag = solution.unknown, exp(solution.unknown[0])
-    commands = data.delayed_commands(unknown)
+    commands = delayed_model.delayed_commands(unknown)
     span = float(np.ptp(commands))
-    excited_samples = int((np.abs(data.response(unknown) - commands) > _EXCITED_SHARE * span).sum())
-    response_duration = _RESPONSE_DURATION_FACTOR * (lag + data.dead_time(unknown))
-    sample_period = float(np.median(np.diff(np.concatenate(data.times))))
+    excited_samples = int(
+        (np.abs(delayed_model.response(unknown) - commands) > _EXCITED_SHARE * span).sum()
+    )
+    response_duration = _RESPONSE_DURATION_FACTOR * (lag + delayed_model.dead_time(unknown))
+    sample_period = float(np.median(np.diff(np.concatenate(delayed_model.times))))
     misfit, standard_errors = analyse_residual(
         solution.residual,
         solution.jacobian,
-        lambda delay: data.delayed_commands(unknown, delay),
+        lambda delay: delayed_model.delayed_commands(unknown, delay),
         response_duration,
         excited_samples,
         correlated_samples=1 + int(response_duration / max(sample_period, 1e-4)),
     )
-    deviation = float(np.std(data.measured))
+    deviation = float(np.std(delayed_model.measured))
     return FitQuality(
-        explained=data.r_squared(solution),
+        explained=delayed_model.r_squared(solution),
         misfit=misfit / deviation if deviation > 0.0 else 0.0,
-        dead_time_error=data.dead_time(standard_errors),
+        dead_time_error=delayed_model.dead_time(standard_errors),
         lag_error=lag * float(standard_errors[0]),
         span=span,
         excited_samples=excited_samples,
     )
 
 
-def _best_without_slew(data: DelayedModel, start: Floats) -> Solution:
+def _best_without_slew(delayed_model: DelayedModel, start: Floats) -> Solution:
     """The best fit without a slew limit.
 
     If samples come at regular times after commands, there are shallow minima one sample apart, with
     the same sum of lag and dead time. Neighbouring minima are therefore tried too.
     """
-    solution = data.search(start)
+    solution = delayed_model.search(start)
     lag, dead_time = exp(solution.unknown[0]), float(solution.unknown[1])
     neighbours = [
-        data.search(np.array([log(lag - shift), dead_time + shift]))
+        delayed_model.search(np.array([log(lag - shift), dead_time + shift]))
         for shift in (-_NEIGHBOUR_DISTANCE, _NEIGHBOUR_DISTANCE)
         if lag > shift
     ]
     return min(solution, *neighbours, key=lambda each: each.rss)
 
 
-def _grid_start(data: DelayedModel) -> Floats:
+def _grid_start(delayed_model: DelayedModel) -> Floats:
     """(2,), start of the search (log lag, dead time): the best point of a coarse grid."""
-    return data.best_of(
+    return delayed_model.best_of(
         [np.array([log(lag), dead_time]) for lag in _TRIED_LAGS for dead_time in _TRIED_DEAD_TIMES]
     )

@@ -14,7 +14,8 @@ ConfiguredValues = Mapping[str, Sequence[float | None]]
 _KEY_PREFIX = {"roll": "", "pitch": "pitch_", "yaw": "yaw_"}
 _AXIS_KEYS = "lag_ms", "dead_time_ms", "acceleration_limit_deg_s2", "damping"
 _NO_SLEW_LIMIT = 100_000.0
-"""Slew limit, °/s², written for an axis without one if roll has one: null means that of roll."""
+"""Slew limit, °/s², written for an axis without a slew limit if roll has a slew limit, because null
+would mean the slew limit of roll."""
 _NEGLIGIBLE_TIME_DIFFERENCE_MS = 3.0
 """Largest difference of lag and of dead time at which roll and pitch count as the same, ms."""
 _NEGLIGIBLE_SLEW_DIFFERENCE_SHARE = 0.1

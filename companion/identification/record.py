@@ -32,7 +32,7 @@ class Stretch(NamedTuple):
     """(n,), the commands."""
     measured_time: Floats
     """(m,), times of the samples, s, from `LONGEST_DEAD_TIME` after the first command to the last
-    command. So the command one dead time before a sample is known for every dead time."""
+    command. For every dead time, the command one dead time before a sample is therefore known."""
     measured: Floats
     """(m,), the samples, in the unit of the commands."""
 

@@ -40,7 +40,7 @@ class FitQuality:
 
 def analyse_residual(
     residual: Floats,
-    slopes: Floats,
+    jacobian: Floats,
     commands: Callable[[float], Floats],
     response_duration: float,
     excited_samples: int,
@@ -50,8 +50,8 @@ def analyse_residual(
 
     Args:
         residual: (m,), measured − modelled.
-        slopes: (m, k), derivatives of the residual with respect to the unknowns; the effect of the
-            linear unknowns is projected out.
+        jacobian: (m, k), derivatives of the residual with respect to the unknowns; the effect of
+            the linear unknowns is projected out.
         commands: function from an additional delay (s) to the commands of the model, (m,).
         response_duration: longest time for which the vehicle responds to a command, s.
         excited_samples: number of excited samples; see `FitQuality`.
@@ -70,19 +70,19 @@ def analyse_residual(
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     # The regression takes one degree of freedom for each delay.
     correction = excited_samples / max(excited_samples - delays, 1)
-    standard_errors = _standard_errors(slopes, noise, correlated_samples) * np.sqrt(correction)
+    standard_errors = _standard_errors(jacobian, noise, correlated_samples) * np.sqrt(correction)
     return float(np.sqrt(np.mean(np.square(residual - noise)))), standard_errors
 
 
-def _standard_errors(slopes: Floats, noise: Floats, correlated_samples: int) -> Floats:
+def _standard_errors(jacobian: Floats, noise: Floats, correlated_samples: int) -> Floats:
     """(k,), standard errors of the unknowns that allow for correlated noise (Newey & West)."""
-    scores = slopes * noise[:, np.newaxis]
+    scores = jacobian * noise[:, np.newaxis]
     spread = scores.T @ scores
     for offset in range(1, min(correlated_samples, noise.size)):
         lagged_product = scores[offset:].T @ scores[:-offset]
         spread += (1.0 - offset / correlated_samples) * (lagged_product + lagged_product.T)
-    # Slopes near the smallest float have no inverse: such unknowns are not determined.
+    # Derivatives near the smallest float have no inverse: such unknowns are not determined.
     with np.errstate(over="ignore", invalid="ignore"):
-        inverse = np.linalg.pinv(slopes.T @ slopes)
+        inverse = np.linalg.pinv(jacobian.T @ jacobian)
         errors: Floats = np.sqrt(np.maximum(np.diagonal(inverse @ spread @ inverse), 0.0))
     return np.where(np.isnan(errors), np.inf, errors)

@@ -170,7 +170,7 @@ def expectation(config: Config, disturbances: Disturbances) -> Expectation:
     """
     s = frequencies()
     loop = control_loop(config, s)
-    peak, settling = _after_gust(config)
+    peak, settling = _gust_response(config)
     return Expectation(
         margins(s, loop.gain_at_rate),
         margins(s, loop.gain_at_acceleration),
@@ -191,9 +191,9 @@ def _variance(omega: Floats, response: Complex, density: Floats | float) -> floa
     return float(np.trapezoid(np.abs(response) ** 2 * density, omega) / (2.0 * pi))
 
 
-def _after_gust(config: Config) -> tuple[float, float]:
+def _gust_response(config: Config) -> tuple[float, float]:
     """`Expectation.peak_error` and `Expectation.settling_time` of a configuration."""
-    real_part = 0.1  # 1/s; real part of the frequencies, so that the integrators lie to their left
+    real_part = 0.1  # 1/s; the integrators lie to the left of the frequencies
     omega = np.arange(0.0, 60.0, 0.05)
     s = np.asarray(real_part + 1j * omega, dtype=np.complex128)
     position, _ = control_loop(config, s).responses_to_acceleration()

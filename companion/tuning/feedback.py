@@ -54,7 +54,7 @@ def guidance_feedback(
     by_acceleration, by_position, by_velocity = _observer_responses(s, observer, position_period)
     age = 0.5 * position_period
     delay = np.exp(-s * age)[:, None]
-    prediction = guidance.tilt.dead_time + 0.5 * guidance.period
+    horizon = age + (guidance.tilt.dead_time + 0.5 * guidance.period)
     # The known acceleration is g·c − drag·v; between two positions its newest value is used.
     inputs = (
         (GRAVITY * by_acceleration, GRAVITY),
@@ -65,9 +65,10 @@ def guidance_feedback(
     for observer_response, known in inputs:
         position, velocity, disturbance = (delay * observer_response).T
         present_velocity = velocity + age * (disturbance + known)
-        predicted_velocity = velocity + (age + prediction) * (disturbance + known)
-        span = age + prediction
-        predicted_position = position + span * velocity + 0.5 * span * span * (disturbance + known)
+        predicted_velocity = velocity + horizon * (disturbance + known)
+        predicted_position = (
+            position + horizon * velocity + 0.5 * horizon * horizon * (disturbance + known)
+        )
         by_tilt = max(known, 0.0)  # drag acts on the observed velocity, not on the measured one
         acceleration = by_tilt - drag * present_velocity + disturbance
         gains = guidance.gains

@@ -23,7 +23,7 @@ _LARGEST_RESERVE = 0.8
 _MAX_THRUST = 0.95
 _FENCE_SIZE = 50.0  # m
 _LEAST_SPEED = 0.05
-"""Speed of the reference from which it moves, m/s."""
+"""Speed above which the reference counts as moving, m/s."""
 _DATAGRAM_DELAY_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
 _QUICK_TAKEOFF_AND_LANDING = {
@@ -56,12 +56,14 @@ TRIAL_FLIGHTS = (CIRCLE, EIGHT, CIRCLE_IN_GUSTS, EIGHT_IN_GUSTS)
 class TrialResult:
     """How well a trial flight was tracked; the figures are NaN if the flight failed.
 
+    `companion tune --json` prints the attributes.
+
     Attributes:
         result: "ok", or why the flight ended early.
         reported: RMS horizontal distance of the estimated position from the reference, m.
         true: RMS horizontal distance of the true position from the reference, m.
-        estimate: RMS horizontal distance of the estimated from the true position, m; no setting
-            reduces it.
+        estimate: RMS horizontal distance of the estimated from the true position, m; no
+            setting reduces this error.
         rate: RMS commanded roll-pitch rate, rad/s.
         rate_limited: share of the setpoints at the rate limit.
         speed: largest speed of the reference, m/s; lower if the trajectory was slowed down.
@@ -84,10 +86,7 @@ class TrialResult:
 
 
 def matching_autopilot(config: Config) -> str:
-    """Autopilot of the mock vehicle that suits the vehicle best: "ardupilot" or "px4".
-
-    It is "ardupilot" if the roll rate has a slew limit.
-    """
+    """Autopilot of the mock vehicle: "ardupilot" if the roll rate has a slew limit, else "px4"."""
     roll = config.vehicle.axes["roll"]
     return "px4" if roll.acceleration_limit is None else "ardupilot"
 
@@ -98,8 +97,7 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
     The configured limits of tilt and tilt rate apply. The trajectory is slowed down if it would
     exceed them, with a reserve for feedback and wind. Wind and gusts are both scaled down if the
     vehicle could not hold its position in them within the tilt limit. Thrust, drag, take-off height
-    and fence are not the configured ones, but suit the mock vehicle and the trial. No message is
-    signed.
+    and fence are those of the mock vehicle and the trial. No message is signed.
 
     Args:
         config: the configuration.
@@ -150,9 +148,9 @@ def _tracking_figures(
     moving_rows = slice(moving_indices[0], moving_indices[-1] + 1)
     true_position = true_positions(truth, time)[:, :2]
     tilt_rates = [
-        hypot(*column.rates[:2])
-        for column in vehicle.setpoints
-        if time[moving_indices[0]] <= column.time <= time[moving_indices[-1]]
+        hypot(*setpoint.rates[:2])
+        for setpoint in vehicle.setpoints
+        if time[moving_indices[0]] <= setpoint.time <= time[moving_indices[-1]]
     ]
     rates, max_tilt_rate = np.array(tilt_rates), flown_config.limits.max_tilt_rate
     return TrialResult(

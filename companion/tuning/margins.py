@@ -8,7 +8,7 @@ import numpy as np
 from companion.tuning.feedback import Complex
 
 _REAL_PART = 1e-2
-"""Real part of the frequencies s, 1/s; keeps them to the right of the integrators at s = 0."""
+"""Real part of the frequencies s, 1/s; the integrators at s = 0 lie to the left of them."""
 _HIGHEST_FREQUENCY = 150.0
 """Highest frequency of the analysis, rad/s; the Nyquist frequency of guidance at 50 Hz is 157."""
 _FREQUENCY_COUNT = 120

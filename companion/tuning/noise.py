@@ -121,7 +121,7 @@ def _densities(time: Floats, residual: Floats) -> tuple[float, float]:
             hertz = np.fft.rfftfreq(length, period)
             band_levels.append(density[(hertz >= _HOLD_BAND[0]) & (hertz <= _HOLD_BAND[1])].mean())
             is_high = hertz >= _WHITE_NOISE_SHARE * hertz[-1]
-            # Noise of single messages, differenced over a period, is amplified by this.
+            # Differencing over a period amplifies the noise of single messages by this gain.
             noise_gain = (2.0 * np.sin(np.pi * hertz[is_high] * period) / period) ** 2
             noise_levels.append((density[is_high].mean(axis=1) / noise_gain).mean())
     if not band_levels:

@@ -33,7 +33,7 @@ class Proposal:
     """Disturbances of the vehicle."""
     aims: Aims
     """Requirements of the search. The margins without model error are at least 95 % of the required
-    ones; the other requirements may be missed a little."""
+    margins; the other requirements may be missed by a little."""
 
     @property
     def changes(self) -> dict[str, dict[str, float]]:

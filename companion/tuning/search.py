@@ -20,7 +20,7 @@ _COST_OF_MISSED_AIM = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Aims:
-    """Requirements for a proposal; the search adds a penalty for each missed requirement."""
+    """Requirements of a proposal; the search adds a penalty for each missed requirement."""
 
     gain_db: float = 7.0
     """Smallest gain margin, dB."""

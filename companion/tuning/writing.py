@@ -16,10 +16,9 @@ from companion.tuning.search import largest_gain
 
 Flights = Mapping[str, tuple[TrialResult, TrialResult]]
 """Results of the flights without and with the proposal, by name of the trial flight."""
-
-
 _WORSE_FACTOR, _WORSE_DISTANCE = 1.25, 0.01
-"""A flight is worse if its true error grows by more than both this factor and this distance, m."""
+"""A flight is worse if its true error grows by more than this factor and by more than this
+distance, m."""
 
 
 def proposal_text(
