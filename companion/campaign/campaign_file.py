@@ -11,7 +11,7 @@ from companion.files.yaml_file import PathKey, Section
 
 
 def _require_folder_name(name: str) -> str:
-    """Return `name`; raise ValueError if a folder's name cannot begin with `name`."""
+    """Return `name`; raise ValueError if it cannot begin the name of a folder."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
         raise ValueError(
             "must begin with a letter or a digit, and have only these, `-` and `_` after it"
@@ -169,7 +169,7 @@ class CampaignFile(Section):
     @field_validator("config", mode="before")
     @classmethod
     def _require_file_or_keys(cls, value: Any) -> Any:
-        """Refuse what is neither a path nor keys, in one message; pydantic would write several."""
+        """Refuse any other value in one message; pydantic would write several."""
         if not isinstance(value, str | Path | dict):
             raise ValueError("must name a file, or hold the keys of a configuration")
         return value

@@ -51,7 +51,7 @@ def few_samples_warning(file: CampaignFile) -> str | None:
     values = "only one value" if samples == 1 else f"at most {samples} values"
     return (
         f"samples: {samples} gives {values} of {', '.join(names)}; raise samples, or replace "
-        "the distribution by a list, of which all values are flown"
+        "the distribution by a list: every value of a list is flown"
     )
 
 

@@ -2,7 +2,7 @@
 
 There is no position, no estimator and no link. The planner's control law and the attitude functions
 are those of a flight, compiled. The section `vehicle` gives the dead time, slew limit, lag and
-damping of the simulated rate loop; in a flight they are only what the program assumes. The vehicle
+damping of the simulated rate loop; in a flight, the program only assumes these values. The vehicle
 begins level and without rotation, at the heading `mock.home.heading_deg`.
 """
 

@@ -145,7 +145,7 @@ class _CampaignReader:
             for fault in scenario_section.inject:
                 if fault.keys() & {"at_s", "after_offboard_s"}:
                     raise ConfigError(
-                        f"{name}: faults.{scenario}: phase and after_s say when it begins; "
+                        f"{name}: faults.{scenario}: phase and after_s say when the fault begins; "
                         "take out at_s and after_offboard_s"
                     )
             try:

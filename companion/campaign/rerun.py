@@ -57,9 +57,9 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
         return Rerun(recording, True, (*lines, "The campaign has not flown this case yet."))
     changed_columns = [name for name, value in stored_row.items() if row.get(name) != value]
     lines.append(
-        f"It differs from the campaign's flight in {', '.join(changed_columns)}."
+        f"This flight differs from the campaign's flight in {', '.join(changed_columns)}."
         if changed_columns
-        else f"It is bit-identical to the campaign's flight: digest {row['digest']}."
+        else f"This flight is bit-identical to the campaign's flight: digest {row['digest']}."
     )
     return Rerun(recording, not changed_columns, tuple(lines))
 

@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     if path.is_dir():
         if out is not None:
             raise ConfigError(
-                "--out needs a campaign's file; a folder is continued in place, so leave out --out"
+                "--out needs a campaign file; a folder is continued in place: leave out --out"
             )
         path, out = path / folder.CAMPAIGN_FILE_NAME, path
     campaign = load(path)

@@ -130,7 +130,7 @@ def read(folder: Path) -> "pa.Table":
     numbers = sorted(finished_units(folder))
     if not numbers:
         raise ConfigError(f"{folder}: there are no results of a campaign")
-    message = f"{folder / RESULTS_FOLDER}: its files are not of one campaign"
+    message = f"{folder / RESULTS_FOLDER}: its files are of different campaigns"
     units = [read_unit(folder, number) for number in numbers]
     if any(not (unit.schema.metadata or {}).get(METADATA_KEY) for unit in units):
         raise ConfigError(message)

@@ -24,7 +24,7 @@ class SweptValues(Section):
 
     Exactly one of `values`, `range`, `uniform`, `loguniform`, `normal` and `choice` is given.
     `values` and `range` form a grid: each value is flown with every value of the other grids. The
-    other four are distributions, of which samples are flown.
+    other four are distributions: samples of them are flown.
     """
 
     values: Annotated[tuple[Any, ...], Field(min_length=1, max_length=_MOST_VALUES)] | None = None
@@ -42,7 +42,7 @@ class SweptValues(Section):
     within: TwoNumbers | None = None
     """Bounds of `normal`, which is truncated there."""
     choice: Annotated[tuple[Any, ...], Field(min_length=2, max_length=_MOST_VALUES)] | None = None
-    """List of values, of which one is chosen at random, all equally likely."""
+    """List of values; each sample is one of these values, all equally likely."""
     times_base: bool = False
     """Whether the values multiply the value of the base configuration, instead of replacing it."""
     keys: Annotated[tuple[KeyName, ...], Field(min_length=1, max_length=20)] | None = None

@@ -20,7 +20,7 @@ _UNITS_PER_WORKER = 4
 """Number of units for each worker in a campaign with few cases, before rounding.
 
 With several units each, all workers end at about the same time. With many cases `LONGEST_UNIT_S`
-limits the units instead, and there are more of them."""
+limits the size of the units instead."""
 
 
 class UnitResult(NamedTuple):

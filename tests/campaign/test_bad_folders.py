@@ -150,15 +150,15 @@ def test_results_that_cannot_be_read_are_named(begun, capsys):
     with pytest.raises(ConfigError, match=r"unit-00001.*cannot be read"):
         again._stored_row(out, campaign, SimpleNamespace(unit=1), 1)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)
-    with pytest.raises(ConfigError, match="are not of one campaign"):
+    with pytest.raises(ConfigError, match="are of different campaigns"):
         store.read(out)
     other = store.schema(campaign.file).metadata
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}).replace_schema_metadata(other), path)
-    with pytest.raises(ConfigError, match="are not of one campaign"):
+    with pytest.raises(ConfigError, match="are of different campaigns"):
         store.read(out)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)
     store.unit_file(out, 0).unlink()
-    with pytest.raises(ConfigError, match="are not of one campaign"):
+    with pytest.raises(ConfigError, match="are of different campaigns"):
         Results.read(out)
     path.unlink()
     with pytest.raises(ConfigError, match="there are no results"):
@@ -217,7 +217,7 @@ def test_a_case_flown_again_is_compared_with_its_row(begun, monkeypatch):
     judged, version, differs = found.lines
     assert judged.endswith("not good: touchdown")
     assert version.startswith("The campaign was flown by another version: this one has numpy")
-    assert differs == "It differs from the campaign's flight in ok, failed_checks, digest."
+    assert differs == "This flight differs from the campaign's flight in ok, failed_checks, digest."
 
 
 def test_a_batch_has_no_flight_to_repeat(tmp_path):

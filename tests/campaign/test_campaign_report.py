@@ -70,7 +70,7 @@ def flown(tmp_path_factory):
     return out, rows[:150]
 
 
-def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, capsys):
+def test_the_page_says_what_was_flown_how_it_went_and_summary_sentences(flown, capsys):
     place, rows = flown
     assert run(argparse.Namespace(folder=place, out=None)) == 0
     said = " ".join(capsys.readouterr().out.split())
@@ -94,7 +94,7 @@ def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, cap
     assert "<td>mock.wind.gust_m_s</td><td>0.3</td><td>0.0</td><td>m/s</td>" in flown_with
     assert "planner.name" not in flown_with
     assert "mass_kg" not in flown_with
-    assert "its own report shows what is estimated_rms_m here" in body
+    assert "its own report shows the error estimated_rms_m" in body
     influence = re.search(r"Share of the variance.*?</table>", body, re.S)[0]
     shares = dict(re.findall(r"<td>(\S+)</td><td>(-?\d+)%", influence))
     assert int(shares["planner.name"]) > int(shares["mock.wind.speed_m_s"]) > 5
@@ -106,8 +106,16 @@ def test_the_page_says_what_was_flown_how_it_went_and_what_to_look_at(flown, cap
 @pytest.mark.parametrize(
     ("documented", "words", "first"),
     [
-        ([True, True], "c: 2 of 2 flights with a fault ended as documented: 100 %", "1 of them"),
-        ([False, True], "c: 1 of 2 flights with a fault ended as documented: 50", "1 of them"),
+        (
+            [True, True],
+            "c: 2 of 2 flights with a fault ended as documented: 100 %",
+            "1 of 2 flights were good in spite of the fault",
+        ),
+        (
+            [False, True],
+            "c: 1 of 2 flights with a fault ended as documented: 50",
+            "1 of 2 flights were good in spite of the fault",
+        ),
         ([None, True], "c: 1 of 2 flights good: 50", "1 of 1 flights with a fault ended"),
     ],
 )
@@ -115,7 +123,7 @@ def test_with_a_fault_in_each_flight_the_ending_counts(documented, words, first)
     columns = {"ok": [True, False], "as_documented": documented, "result": ["ok", "GPS lost"]}
     results = Results(Path(), "c", "flights", 2, {}, pyarrow.table(columns))
     assert page.headline(results).startswith(words)
-    assert first in " ".join(page.what_to_look_at(results, {}))
+    assert first in " ".join(page.summary_sentences(results, {}))
 
 
 def test_all_results_stand_in_one_table(flown):

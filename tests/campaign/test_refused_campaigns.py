@@ -47,7 +47,7 @@ def test_a_swept_key_that_is_none(tmp_path, told, words):
                 "sweep": {"fault": ["none", "lost"]},
                 "faults": {"lost": {**SILENCE, "inject": [{"kind": "gps_loss", "at_s": 3.0}]}},
             },
-            "faults.lost: phase and after_s say when it begins; take out at_s",
+            "faults.lost: phase and after_s say when the fault begins; take out at_s",
         ),
         (
             {

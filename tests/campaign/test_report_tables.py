@@ -91,7 +91,7 @@ def test_of_many_cases_some_are_listed_evenly():
 
 def test_without_factors_or_crashes_the_page_says_what_was_flown():
     told = {"ok": [False, True], "result": ["fence left", "ok"], "crashed": [False, False]}
-    lines = list(page.what_to_look_at(results(told), {}))
+    lines = list(page.summary_sentences(results(told), {}))
     assert lines == [
         "Swept: nothing but noise and gusts.",
         "Most frequent reason why a case was not good, 1 times: fence left.",
@@ -110,14 +110,14 @@ def test_the_reason_is_the_result_then_the_checks_then_the_crash():
 
 def test_some_flights_with_a_fault_are_counted_beside_the_others():
     told = {"ok": [True, True, False], "as_documented": [True, False, None], "a": [1.0, 2.0, 3.0]}
-    lines = list(page.what_to_look_at(results(told, ["a"]), {}))
+    lines = list(page.summary_sentences(results(told, ["a"]), {}))
     assert "1 of 2 flights with a fault ended as documented." in lines
     assert any(line.startswith("Sensitivity needs at least") for line in lines)
     assert lines[-1].startswith("Success is lowest with a = 3")
 
 
 def test_equal_success_everywhere_points_to_no_factor():
-    lines = list(page.what_to_look_at(results({"ok": [True, True], "a": ["x", "y"]}, ["a"]), {}))
+    lines = list(page.summary_sentences(results({"ok": [True, True], "a": ["x", "y"]}, ["a"]), {}))
     assert not any("Success is lowest" in line for line in lines)
 
 
@@ -126,7 +126,7 @@ def test_few_samples_of_a_distribution_are_told():
     found = results(told, ["a"])
     found.factors["a"]["sampled"] = True
     influence = {"position_rms_m": [Influence("a", 0.5, 0.1)]}
-    lines = list(page.what_to_look_at(found, influence))
+    lines = list(page.summary_sentences(found, influence))
     assert "a explains 50% ± 10% of the variance of the true position error by itself." in lines
     assert any(line.startswith("Only 20 different samples") for line in lines)
 

@@ -302,7 +302,7 @@ def test_flights_that_ended_early_are_told_and_with_too_few_nothing_is_compared(
     *_, early, nothing = summary_lines(told)
     assert early.startswith("Of 4 flights that the search has not seen, 3 ended early with the ")
     assert "and 0 with the result" in early
-    assert nothing.startswith("Fewer than two samples were flown to their end by both")
+    assert nothing.startswith("Fewer than two samples were flown to their end with both")
 
 
 class Flights:

@@ -34,7 +34,7 @@ _DONE = 0  # exit code
 _MOST_GRID_VALUES = 12
 """Largest number of different values with which a sampled factor counts as a grid."""
 _ENOUGH_SAMPLES = 60
-"""Number of different values from which the influences of sampled factors can be told apart."""
+"""Number of different values with which the influences of sampled factors can be distinguished."""
 
 
 def run(options: argparse.Namespace) -> int:
@@ -107,7 +107,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         shown_plots,
         headline=headline(results),
         good=not results.crashed_count and bool(_successes(results).all()),
-        lines=[*missing_cases_note(results), *what_to_look_at(results, by_outcome)],
+        lines=[*missing_cases_note(results), *summary_sentences(results, by_outcome)],
         tables=[table for table in first_tables if table is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
     )
@@ -139,7 +139,7 @@ def missing_cases_note(results: Results) -> list[str]:
     ]
 
 
-def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
+def summary_sentences(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
     """The sentences at the head of the page: what was swept, and the most important results.
 
     `by_outcome` holds the influences of the factors on each outcome, the largest first.
@@ -150,7 +150,7 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
             f"{crashed_count} {results.noun} crashed; they stand first in the table of worst cases."
         )
     if results.all_faulty:
-        yield f"{results.good.sum()} of them were good in spite of the fault."
+        yield f"{results.good.sum()} of {results.count} flights were good in spite of the fault."
     elif results.as_documented.size:
         documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
         yield f"{documented_count} of {faulty_count} flights with a fault ended as documented."
@@ -162,7 +162,7 @@ def what_to_look_at(results: Results, by_outcome: dict[str, list[Influence]]) ->
     if results.error_outcome == TRUE_ERROR:
         yield (
             "Errors are distances of the true vehicle from the reference. A flight knows only the "
-            "autopilot's estimate, so its own report shows what is estimated_rms_m here."
+            "autopilot's estimate, so its own report shows the error estimated_rms_m."
         )
 
 

@@ -148,8 +148,8 @@ def pareto(results: Results) -> Iterator[Plot]:
     criteria = "error, rate use and thrust use" if thrust else "error and rate use"
     note = (
         "Each point is one choice of the program's own keys: the medians over all other factors, "
-        "and the success rate. It is a single case if no choice was flown twice or there are very "
-        f"many. A point is on the front if no other one is better in {criteria} at once."
+        "and the success rate. If no choice was flown twice, or there are very many, each point is "
+        f"one case. A point is on the front if no other point is better in {criteria} at once."
     )
     layout = axes(x=label(RATE_OUTCOME), y=label(results.error_outcome))
     yield Plot("Pareto front", note, traces, layout, 420)

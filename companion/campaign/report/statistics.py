@@ -147,9 +147,9 @@ def pareto_front(goals: Floats) -> NDArray[np.bool_]:
 def choice_groups(results: Results) -> list[Group]:
     """The cases grouped by equal values of the swept keys that a user chooses.
 
-    Those are the keys outside `_UNCHOSEN_PREFIXES`. If no two cases have equal values, or there are
-    more than `_MOST_GROUPS` groups, each group is a single case. If there are many cases, only
-    every k-th is returned, so that there are fewer than 2·`_MOST_GROUPS`.
+    The user chooses the keys outside `_UNCHOSEN_PREFIXES`. If no two cases have equal values, or
+    there are more than `_MOST_GROUPS` groups, each group is a single case. If there are many cases,
+    only every k-th is returned, so that there are fewer than 2·`_MOST_GROUPS`.
     """
     chosen_keys = [name for name in results.factors if not name.startswith(_UNCHOSEN_PREFIXES)]
     rows = range(results.count)

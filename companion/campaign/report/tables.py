@@ -36,7 +36,7 @@ def worst_cases(results: Results) -> Table:
             str(columns["case"][row]),
             _rerun_command(results, int(columns["case"][row])),
             *(_cell(columns[name][row]) for name in (results.error_outcome, *shown)),
-            _factor_values(results, row),
+            ", ".join(f"{name} = {_cell(columns[name][row])}" for name in results.factors),
         )
         for row in worst_rows(results, _WORST_SHOWN)
     ]
@@ -48,11 +48,6 @@ def _rerun_command(results: Results, case: int) -> str:
     if results.kind == "batch":
         return EMPTY
     return f"companion campaign rerun {shlex.quote(str(results.folder))} {case}"
-
-
-def _factor_values(results: Results, row: int) -> str:
-    cells = (f"{name} = {_cell(results.columns[name][row])}" for name in results.factors)
-    return ", ".join(cells)
 
 
 def configuration(campaign: Campaign) -> Table:
@@ -73,7 +68,7 @@ def configuration(campaign: Campaign) -> Table:
         for key, value in flattened(mock).items()
         if value != defaults.get(key)
     ]
-    title = "Configuration of every case: the limits, and what is not the default"
+    title = "Configuration of every case: the limits, and the keys that differ from the default"
     header = ("key", "value", "default", "unit")
     return Table(title, header, [row for row in rows if row[0] not in swept_keys])
 

@@ -117,7 +117,7 @@ def start_candidates(
     try:
         changes = propose(replace_unchecked(start_config, planner={"name": "auto"})).changes
     except ConfigError:
-        return  # its rate loop is not known, or the linear analysis does not cover it
+        return  # the rate loop is not known, or the linear analysis does not support the planner
     proposed_values = {
         f"{section}.{key}": value
         for section, keys in changes.items()

@@ -66,7 +66,7 @@ def _with_rate_response(config: Config, case: Case, *, second_order: bool) -> Co
 def _with_drag(config: Config, case: Case) -> Config:
     """The configuration with the drag measured in a flight of the case, if drag was measured."""
     with tempfile.TemporaryDirectory(prefix="companion-drag-") as parent_folder:
-        # A recorded flight keeps what it learned beside its folder.
+        # A recorded flight writes its learned file beside its folder.
         CaseFlight(replace(case, fault=None), Path(parent_folder)).fly(
             Path(parent_folder) / "flight"
         )

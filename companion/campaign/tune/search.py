@@ -13,7 +13,6 @@ from companion.campaign.case import Case
 from companion.campaign.tune.candidates import (
     candidates_near,
     cases,
-    clamped_to_search,
     start_candidates,
     suggested_values,
 )
@@ -189,7 +188,7 @@ class Search:
         return list(self._study.get_trials(deepcopy=False, states=ended_states))
 
     def _try_candidate(self, trial: "Trial") -> None:
-        values = clamped_to_search(suggested_values(trial, self._tune.search), self._tune.search)
+        values = suggested_values(trial, self._tune.search)
         trial.set_user_attr(_VALUES_KEY, values)
         try:
             all_cases = cases(self._campaign, values)

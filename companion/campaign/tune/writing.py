@@ -32,7 +32,7 @@ class CheckedResult(NamedTuple):
 
 
 def summary_lines(result: CheckedResult) -> list[str]:
-    """What was searched, what was found, and how certain it is."""
+    """Text for the user: the search, its result, and how certain the result is."""
     results, best, tune = result.results, result.best, result.campaign.file.tune
     assert tune is not None
     cases = len(best.score.true_errors)
@@ -62,7 +62,10 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
         )
     comparison = result.comparison
     if comparison is None:
-        yield "Fewer than two samples were flown to their end by both, so no errors are compared."
+        yield (
+            "Fewer than two samples were flown to their end with both configurations, so no errors "
+            "are compared."
+        )
         return
     yield (
         f"On {comparison.samples} samples that the search has not seen, RMS of the true horizontal "
@@ -79,7 +82,7 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
     )
     yield (
         f"On the same flights the estimated position was {before:.3f} -> {after:.3f} m from the "
-        f"reference, and {estimate_before:.3f} -> {estimate_after:.3f} m from the true one."
+        f"reference, and {estimate_before:.3f} -> {estimate_after:.3f} m from the true position."
     )
     yield (
         "The distance from the true position is the estimate's own error. Gains and weights hardly "
