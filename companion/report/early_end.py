@@ -27,7 +27,7 @@ class CrossedLimit:
     """Configuration key of the limit."""
     levels: tuple[float, ...] = ()
     """Values of the limit, in the curve's unit. The flight ended because the curve was at or beyond
-    one of them for too long, or "latency" too often."""
+    one of these values for too long or, for "latency", too often."""
     outline: tuple[tuple[float, float], ...] = ()
     """Fence around the track, (N, 2) north and east, m; empty for other curves."""
 

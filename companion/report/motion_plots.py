@@ -26,7 +26,7 @@ _NORTH, _EAST, _HEIGHT = range(3)
 _CAMERA_POSITION = {"x": 1.3, "y": -1.7, "z": 1.0}
 """Position of the camera: from the south-east and above, far enough to show the axis titles."""
 _LONGEST_EDGE = 1.2
-"""Longest edge of the box around the track, in Plotly's units: the camera sees all of it."""
+"""Longest edge of the box around the track, in Plotly's units: the camera sees the whole box."""
 
 
 def motion_plots(flights: Sequence[FlightData]) -> Iterator[Plot]:
@@ -159,7 +159,7 @@ def _error_plot(flights: Sequence[FlightData]) -> Plot:
         layout["yaxis"]["range"] = [0.0, 1.2 * largest]
         note += (
             " Outside of the tracked maneuvers, such as on the way back from steps, the error is "
-            "larger: double-click to see all of it."
+            "larger: double-click to see all errors."
         )
     return Plot("Tracking error", note, traces, layout)
 

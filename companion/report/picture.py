@@ -36,8 +36,8 @@ _ROOM_FOR_LEGEND = 0.2
 def draw_flight(folder: Path, out: Path) -> str | None:
     """Draw the flight recorded in `folder` into the file `out`.
 
-    The suffix of `out` selects the format; without one it is PNG. Returns why not all of the flight
-    is drawn, as a sentence; None: all of it is.
+    The suffix of `out` selects the format; without a suffix the format is PNG. Returns why a part
+    of the flight is not drawn, as a sentence; None: everything is drawn.
 
     Raises:
         MissingExtraError: matplotlib is missing.
@@ -80,7 +80,7 @@ def draw_flight(folder: Path, out: Path) -> str | None:
 
 
 def _check_numbers(flight: FlightData, folder: Path) -> None:
-    """Refuse a record with a number that is too large to be valid; NaN means that there is none."""
+    """Refuse a record with a number that is too large to be valid; NaN stands for no number."""
     for name, curve in flight.curves.items():
         for values in curve:
             if np.abs(values[~np.isnan(values)]).max(initial=0.0) > _LARGEST_VALID:
@@ -143,7 +143,7 @@ def _draw_ground(axes: "Axes", flight: FlightData) -> None:
     """The ground track, and its reference, which has gaps in open-loop steps."""
     position, reference = flight.curves["position"].values, flight.curves["reference"].values
     if not np.isnan(reference[:, 0]).all():
-        # On top, and thin: a good flight would hide it.
+        # Drawn on top, because a good flight would cover the reference.
         axes.plot(
             *(reference[:, 1], reference[:, 0], "--"),
             color=_IDEAL_COLOUR,

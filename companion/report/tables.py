@@ -12,7 +12,7 @@ from companion.report.flight_data import FlightData
 
 _EMPTY = "–"
 _END_WINDOW = 5.0
-"""Events at most this long before or after an early end are listed at the top of the page, s."""
+"""Longest time between an early end and an event listed at the top of the page, s."""
 _MAX_EVENTS = 20
 _PORT_AT_END = re.compile(r":\d+$")
 
