@@ -25,13 +25,13 @@ from companion.vehicle.link import Link
 _GUIDANCE_PERIOD_S = 0.02
 
 
-async def fly(port: str, how: str = "") -> None:
+async def fly(port: str, forwarding: str = "") -> None:
     """Answer each attitude sample with a setpoint until killed; arguments: see the module."""
     settings = LinkSettings(endpoint=f"udpin://127.0.0.1:{port}")
     async with AsyncExitStack() as stack:
-        link = await stack.enter_async_context(_link(settings, by_mavsdk=how == "mavsdk"))
-        if how.isdigit():
-            network = Network(link, [f"udpin://127.0.0.1:{how}"])
+        link = await stack.enter_async_context(_link(settings, by_mavsdk=forwarding == "mavsdk"))
+        if forwarding.isdigit():
+            network = Network(link, [f"udpin://127.0.0.1:{forwarding}"])
             network = await stack.enter_async_context(network)
             network.routing.intercept = lambda *_: False
         await _answer(link)

@@ -19,7 +19,7 @@ def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> di
     """Measure each program for `seconds`, in interleaved rounds; return all figures by key.
 
     Raises:
-        BenchmarkError: A program ended, or answered no sample in time.
+        BenchmarkError: a program ended, or answered no sample in time.
     """
     rounds = ceil(seconds / ROUND_S)
     with no_garbage_collection():  # the senders must not pause

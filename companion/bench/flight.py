@@ -21,7 +21,8 @@ from companion.testing import MockVehicle, fly
 CONFIG_FILES = {"px4": "mock-px4.yaml", "ardupilot": "mock-ardupilot.yaml"}
 """File name of the shipped configuration for each autopilot of the mock vehicle."""
 CLOCKS = {"lockstep": True, "free": False}
-"""Whether the vehicle runs in lockstep, by clock; with `free` it does not wait for setpoints."""
+"""Whether the vehicle runs in lockstep, by name of the clock; a vehicle with the clock `free` does
+not wait for setpoints."""
 
 _FLIGHTS = 3  # of which the quickest counts
 _WARM_UP_S = 0.2  # hover of the flight that is not measured

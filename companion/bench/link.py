@@ -65,7 +65,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
     Raises:
         MissingExtraError: MAVSDK is not installed.
-        BenchmarkError: A program failed.
+        BenchmarkError: a program failed.
         LinkError: there are no free ports.
     """
     require("mavsdk", "mavsdk", "this benchmark")

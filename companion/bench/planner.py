@@ -91,7 +91,7 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 def _flight_cases() -> list[_Case]:
     """Cases of a step with an unchanged target, which is usual in flight, and with a new target."""
     q, targets = _fleet(2)
-    same, other = (Target(*column) for column in targets.T.tolist())
+    same, other = (Target(*row) for row in targets.T.tolist())
     values: dict[str, Any] = {"q": tuple(q[:, 0].tolist()), "same": same, "other": other}
     functions: dict[str, Callable[..., Any]] = {"baseline": _first_argument}
     functions |= {name: _planner(name).rates for name in LAW_NAMES}

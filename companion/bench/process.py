@@ -13,7 +13,7 @@ from companion.mavlink.transport.free_port import free_port
 
 
 class BenchmarkError(LinkError):
-    """A program that is measured, or a client of it, failed."""
+    """A measured program, or one of its clients, failed."""
 
 
 class BenchmarkedProgram:
@@ -21,7 +21,7 @@ class BenchmarkedProgram:
 
     Args:
         name: name to show to users.
-        module: A module that listens on the UDP port given to it.
+        module: a module that listens on the UDP port given to it.
         arguments: further arguments of the module.
     """
 

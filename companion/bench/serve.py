@@ -52,7 +52,7 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
         that each of the three reading clients received and lost.
 
     Raises:
-        BenchmarkError: A program failed.
+        BenchmarkError: a program failed.
         LinkError: there are no free ports.
     """
     with ExitStack() as stack:
@@ -89,7 +89,7 @@ def _start_clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
-        start_new_session=True,  # Ctrl-C ends the benchmark, and that ends the clients
+        start_new_session=True,  # Ctrl-C ends the benchmark, which ends the clients
         preexec_fn=partial(end_with_parent, os.getpid()),  # noqa: PLW1509  the benchmark has one thread
     )
     stack.callback(process.communicate)
