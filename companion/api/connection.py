@@ -24,7 +24,7 @@ from companion.flight.observer import Observer, SilentObserver, decline_landing
 from companion.flight.phases import HAND_BACK
 from companion.flight.session import Session
 from companion.mavlink import lockstep, loop
-from companion.recording.folder import flight_folder, named_folder
+from companion.recording.folder import flight_folder, make_named_folder
 from companion.safety.actions import FlightEnded
 
 T = TypeVar("T")
@@ -73,7 +73,7 @@ async def connect(
     flown_folder = (
         flight_folder(flown_config.recording.directory)
         if folder is None
-        else named_folder(Path(folder))
+        else make_named_folder(Path(folder))
     )
     async with connect_configured(flown_config, flown_folder, observer) as vehicle:
         yield vehicle

@@ -131,7 +131,10 @@ def _rotation(
 def _tilt_change(
     a: float, x: float, y: float, north: float, east: float
 ) -> tuple[float, float, float, float]:
-    """The quaternion tilt⁻¹ ⊗ tilt'; tilt' has the coefficients of tilt plus (north, east)."""
+    """The rotation tilt⁻¹ ⊗ tilt' that adds (north, east) to the coefficients of the tilt.
+
+    tilt is the quaternion (a, x, y, 0), and tilt' the tilt with the new coefficients.
+    """
     north -= 2.0 * a * y
     east += 2.0 * a * x
     next_a = sqrt(0.5 * (1.0 + sqrt(1.0 - north * north - east * east)))

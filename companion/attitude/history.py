@@ -199,7 +199,7 @@ class SampleHold:
         ) = 0.0
 
     def note_sample(self, dt: float) -> None:
-        """Account for a new sample, `dt` seconds after the last one."""
+        """Update the attributes for a new sample, `dt` seconds after the last one."""
         expected = self.period or dt
         self.lateness = lateness = dt - expected
         # Bounded, so that the plan always advances.

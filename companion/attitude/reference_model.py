@@ -25,7 +25,7 @@ _DIFFERENCE_STEP = 1e-4
 def rates_along(
     north: float, east: float, speed_north: float, speed_east: float
 ) -> tuple[float, float, float]:
-    """Body rates (rad/s) that move the coefficients at this speed (1/s), with the heading at 0.
+    """Body rates (rad/s) that move the coefficients at this speed (1/s), and hold the heading 0.
 
     `kinematics.rotate_to_heading` rotates roll and pitch to another heading; yaw is independent of
     the heading.

@@ -143,7 +143,7 @@ class TargetFrame:
             del times[:_ROWS_PER_DROP], self._turns[:_ROWS_PER_DROP]
 
     def lead(self, start_heading: float, plans: PlanHistory) -> float:
-        """Angle by which the target leads the body in yaw when the rates sent now take effect, rad.
+        """Predicted yaw lead of the target over the body when rates sent now begin to act, rad.
 
         The lead is computed from the newest attitude target, or from `RateLoopResponse.lead_time`
         if that target is missing, older than `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD`
@@ -162,7 +162,7 @@ class TargetFrame:
         return 0.0 if self._lead_time == 0.0 else plans.predicted_yaw_change(self._lead_time)
 
     def heading(self) -> float | None:
-        """The target's heading when the rates sent now take effect, rad; None: not known."""
+        """Predicted heading of the target when rates sent now begin to act, rad; None: unknown."""
         if self._time - self._reported_at > OLDEST_ATTITUDE_TARGET:
             return None
         return self._heading_offset + self._turns[-1]

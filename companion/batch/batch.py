@@ -202,7 +202,7 @@ def _require_plain_function(law: Law) -> None:
 
 
 def _turned_too_far(loops: Loops, q: Array) -> bool:
-    """Whether a turn in one sample was too large for the polynomials of `loops`: then q is NaN."""
+    """Whether q is NaN: a turn in one sample was too large for the polynomials of `loops`."""
     return not loops.any_angle and not bool(np.isfinite(q).all())
 
 

@@ -1,4 +1,4 @@
-"""Checks and limits arrays of attitudes and targets by the rules of a planner for one sample."""
+"""Checks and limits arrays of attitudes and targets, each as a planner does a single one."""
 
 from functools import cache
 from math import pi

@@ -100,7 +100,9 @@ def _start_clients(stack: ExitStack, port: int, count: int) -> subprocess.Popen[
 def _read_counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
     out, _ = process.communicate()
     if process.returncode != 0:
-        raise BenchmarkError(f"the clients of the benchmark ended with {process.returncode}")
+        raise BenchmarkError(
+            f"the clients of the benchmark ended with exit code {process.returncode}"
+        )
     counts: list[dict[str, int]] = json.loads(out)
     return counts
 

@@ -14,7 +14,7 @@ def _require_folder_name(name: str) -> str:
     """Return `name`; raise ValueError if it cannot begin the name of a folder."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
         raise ValueError(
-            "must begin with a letter or a digit, and have only these, `-` and `_` after it"
+            "must begin with a letter or a digit, and contain only letters, digits, `-` and `_`"
         )
     return name
 
@@ -169,7 +169,7 @@ class CampaignFile(Section):
     @field_validator("config", mode="before")
     @classmethod
     def _require_file_or_keys(cls, value: Any) -> Any:
-        """Refuse any other value in one message; pydantic would write several."""
+        """Raise ValueError for any other type; pydantic would report one error for each type."""
         if not isinstance(value, str | Path | dict):
             raise ValueError("must name a file, or hold the keys of a configuration")
         return value
@@ -196,7 +196,7 @@ class CampaignFile(Section):
                         "one of them"
                     )
         if self.kind == "batch" and (self.faults or FAULT in self.sweep):
-            raise ValueError("faults need kind: flights")
+            raise ValueError("`faults` need `kind: flights`")
         return self
 
     @property

@@ -102,7 +102,7 @@ def read_description(folder: Path) -> Description:
         description = Description(**{**values, "versions": as_versions(values["versions"])})
         # `range` refuses everything but whole numbers.
         if not (range(description.cases) and range(description.unit)):
-            raise ValueError("cases and unit must be positive")
+            raise ValueError("`cases` and `unit` must be above 0")
     except FileRefusedError as error:
         raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:

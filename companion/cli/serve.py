@@ -9,7 +9,7 @@ from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.helper_process import flight_environment, helper_process
-from companion.cli.signals import SECOND_CTRL_C_AFTER, hangup_signal
+from companion.cli.signals import SECOND_CTRL_C_AFTER, hangup_signals
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import changed, load, with_assignments
@@ -95,7 +95,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
             pages.leave()
 
     loop.add_signal_handler(signal.SIGINT, interrupt)
-    for number in (signal.SIGTERM, *hangup_signal()):
+    for number in (signal.SIGTERM, *hangup_signals()):
         loop.add_signal_handler(number, stop)
     return await session.run()
 

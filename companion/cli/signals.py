@@ -81,12 +81,12 @@ async def fly_interruptibly(session: Session) -> Summary:
     flight = asyncio.ensure_future(session.fly())
     handler = SignalHandler(session, flight.cancel)
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM, *hangup_signal()):
+    for number in (signal.SIGINT, signal.SIGTERM, *hangup_signals()):
         loop.add_signal_handler(number, handler.handle, number)
     return await flight
 
 
-def hangup_signal() -> list[signal.Signals]:
+def hangup_signals() -> list[signal.Signals]:
     """SIGHUP in a list; empty if this process was started with SIGHUP ignored, as by `nohup`."""
     ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     return [] if ignored else [signal.SIGHUP]

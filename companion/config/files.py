@@ -216,8 +216,9 @@ def with_assignments(config: Config, texts: Sequence[str]) -> Config:
             raise ConfigError(f"--set {text}: there is no section `{section}`")
         if section == "mock":
             raise ConfigError(
-                f"--set {text}: the mock vehicle reads its section from the file; write it there, "
-                "or into a file of your own: `companion init mock` writes one for --config"
+                f"--set {text}: --set cannot change the section `mock`, because the mock vehicle "
+                "reads it from the configuration file; change it there (`companion init mock` "
+                "writes a file for --config)"
             )
         try:
             changes.setdefault(section, {})[name] = bounded_yaml.parse(value)

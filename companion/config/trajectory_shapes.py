@@ -148,7 +148,10 @@ class WaypointsShape(Section):
         if self.headings_deg is not None and "heading" in self.model_fields_set:
             raise ValueError("give either heading or headings_deg")
         if self.stops and self.heading == "along":
-            raise ValueError("heading: along would turn on the spot at each stop; use headings_deg")
+            raise ValueError(
+                "with `heading: along` the vehicle would turn on the spot at each stop; use "
+                "`headings_deg`"
+            )
         return self
 
     def trajectory(self) -> Trajectory:

@@ -230,6 +230,6 @@ class ControlLoop:
         self._recorder.action("restart_planner")
 
     def resume(self) -> None:
-        """Answer again after a gap, because the autopilot has confirmed offboard."""
+        """Send setpoints again after a gap, because the autopilot has confirmed offboard."""
         self.awaiting_mode = False
         self.record.gap_from = inf

@@ -72,7 +72,8 @@ class FlownSource:
     def reference(self, now: float, motion: VehicleMotion, heading: float) -> ReferenceAt:
         """Return the reference as a function of event-loop time (s).
 
-        Without source and pose the reference is the present position of the vehicle.
+        It is that of the source, or else of the braking, or else the held pose. Without these it is
+        the present position and heading.
 
         Args:
             now: event-loop time, s.

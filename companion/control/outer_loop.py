@@ -80,8 +80,8 @@ def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float])
     inputs = GuidanceInput(rest, rest, (0.0, 0.0), (0.0, 0.0), NO_DRAG, thrust)
     try:
         command = guidance.command(lambda _: Reference(rest.position_ned), 0.0, inputs)
-        target, later, down = command
-        numbers = (guidance.acts_after, *target, *later, down)
+        target, later_target, acceleration_down = command
+        numbers = (guidance.acts_after, *target, *later_target, acceleration_down)
         finite = all(map(isfinite, numbers))
     except (Exception, SystemExit) as error:
         raise ConfigError(

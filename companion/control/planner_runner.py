@@ -45,7 +45,7 @@ class PlannerRunner:
         self.planner_input: tuple[Quaternion, Target] | None = None
         self._planner = planner
         self._model_follower = planner if isinstance(planner, ModelFollowingPlanner) else None
-        self._resets, self._limits = resets, limits
+        self._estimator_resets, self._limits = resets, limits
         self._step_frame = StepFrame()
         self._planned_at = -inf
         self._period = 0.0
@@ -75,7 +75,7 @@ class PlannerRunner:
 
     def attitude(self, q: Quaternion) -> Quaternion:
         """An attitude of the autopilot in the frame that the planner sees."""
-        return self._step_frame.frame.attitude(self._resets.frame.attitude(q))
+        return self._step_frame.frame.attitude(self._estimator_resets.frame.attitude(q))
 
     def rates(
         self, sample: AttitudeSample, command: GuidanceCommand, arrival_period: float
@@ -105,7 +105,7 @@ class PlannerRunner:
         # Over a gap the body rates are not known, so the frame does not follow the estimator.
         stepping = is_step and period <= _LONGEST_PERIOD
         self._step_frame.advance(
-            self._resets.heading_corrections, min(abs(period), 10.0), stepping=stepping
+            self._estimator_resets.heading_corrections, min(abs(period), 10.0), stepping=stepping
         )
         q = self.attitude(sample.q)
         if not is_step:
@@ -127,8 +127,11 @@ class PlannerRunner:
 
         An ATTITUDE_TARGET from before a heading reset is ignored: its frame is not known.
         """
-        if self._resets.frame != self._resets_frame:
-            self._resets_frame, self._reset_at_ms = self._resets.frame, sample.time_boot_ms
+        if self._estimator_resets.frame != self._resets_frame:
+            self._resets_frame, self._reset_at_ms = (
+                self._estimator_resets.frame,
+                sample.time_boot_ms,
+            )
         target = self.attitude_target()
         if target is None or target is self._passed_target:
             return

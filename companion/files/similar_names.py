@@ -11,7 +11,7 @@ MIN_SIMILARITY_ELSEWHERE = 0.75
 
 
 def name_hint(written: Any, known: Iterable[str]) -> str:
-    """The end of a message that refuses a name: which one was probably meant; else empty."""
+    """End of the message that refuses a name: "; did you mean …?"; empty if none is similar."""
     near = (
         most_similar_name(written, known, MIN_SIMILARITY_ELSEWHERE)
         if isinstance(written, str)

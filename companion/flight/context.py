@@ -127,7 +127,7 @@ class FlightContext:
             await asyncio.sleep(_POLL_PERIOD)
 
     def timed_out(self, seconds: float, waited_for: str, exit_: Exit | None = None) -> FlightEnded:
-        """The failure of a wait that took longer than the `seconds` allowed."""
+        """The exception to raise for a wait that took longer than `seconds`."""
         return FlightEnded(f"waited {seconds:g} s for {waited_for}: {self.detail}", exit_)
 
     async def fresh_heartbeat(self) -> None:

@@ -210,7 +210,9 @@ def _require_not_falling(context: FlightContext) -> None:
     position = context.fresh_position()
     falls = position is not None and position.velocity_ned[2] > _FALLING_SPEED
     if falls and not context.armed():
-        raise FlightEnded("the vehicle disarmed in the landing, not by us, and fell", Exit.RELEASE)
+        raise FlightEnded(
+            "the vehicle disarmed in the landing, not by this program, and fell", Exit.RELEASE
+        )
 
 
 def _require_upright(context: FlightContext) -> None:

@@ -94,7 +94,7 @@ class FenceCheck:
         )
 
     def _begin_time(self, motion: Motion, worst_time: float) -> float:
-        """Time of the first breach among the checked moments, s; at most `worst_time`."""
+        """Time of the first checked moment with a breach, s; `worst_time` if none is earlier."""
         stride = max(1, motion.times.size // _MAX_MOMENTS)
         for k in range(0, motion.times.size, stride):
             if motion.times[k] >= worst_time or self._breach(motion, k) is not None:

@@ -35,7 +35,7 @@ def only_upwind_is_inside(
         fence: the fence; its ceiling and floor are not used.
         origin: place of the fence's centre; None: it is not known.
         stop: where the vehicle stops, from the fence's centre, m NED.
-        wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
+        wind: acceleration that the wind gives a vehicle at rest, m/s², north and east.
     """
     walls = fence.walls
     (north, east, down), (drift_north, drift_east) = stop, drift(wind)

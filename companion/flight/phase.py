@@ -23,8 +23,9 @@ class Phase:
     timeout: float
     """Time after which the phase has failed, s; may be infinite."""
     on_failure: Exit = Exit.LEAVE
+    """What the flight does with the vehicle if the phase fails."""
     on_failure_on_ground: Exit | None = None
-    """The exit if the phase fails while the vehicle is on the ground; None: `on_failure`."""
+    """Like `on_failure`, while the vehicle stands on the ground; None: `on_failure`."""
     allowed_roles: frozenset[Role] = frozenset()
     """Roles of the allowed modes; any other or unknown mode counts as a takeover by the pilot.
     Empty: any mode is allowed."""
@@ -33,7 +34,7 @@ class Phase:
     breach that caused the exit would end them, too."""
 
     def exit_on_failure(self, *, standing: bool) -> Exit:
-        """The exit if the phase fails; `standing`: the vehicle still stands on the ground."""
+        """What the flight does if the phase fails; `standing`: the vehicle stands on the ground."""
         if self.on_failure_on_ground is not None and standing:
             return self.on_failure_on_ground
         return self.on_failure

@@ -107,13 +107,13 @@ def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, .
 
 
 def takeover_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """The phases that take over a vehicle which its autopilot holds in the air."""
+    """Checks and takeover of a vehicle that its autopilot holds in the air."""
     checks = _checks(config, "to be taken over", takeover.check_airborne, _TAKEOFF_ROLES)
     return checks, _takeover(Exit.HOLD)
 
 
 def handover_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """The phases that wait until the pilot hands over in the air, and take the vehicle over."""
+    """The wait until the pilot hands over a flying vehicle, then its checks and takeover."""
     hand_over = Phase(
         "hand over",
         "the pilot to hand over in the air",
@@ -124,7 +124,7 @@ def handover_phases(config: FlightConfig) -> tuple[Phase, ...]:
 
 
 def takeoff_for_client_phases(config: FlightConfig) -> tuple[Phase, ...]:
-    """The phases that take off a vehicle which somebody else armed, and take it over."""
+    """Checks, take-off and takeover of a vehicle that somebody else armed on the ground."""
     checks = _checks(config, "to take off", takeover.check_armed_on_ground, _ARMED_ON_GROUND_ROLES)
     return checks, _takeoff(config), _takeover(Exit.HOLD)
 

@@ -115,7 +115,9 @@ class _Climb:
         """Whether the height is reached; raise `FlightEnded` if somebody stopped the climb."""
         context, state = self._context, self._context.link.state
         if not context.armed():
-            raise FlightEnded("the vehicle disarmed in the take-off, not by us", Exit.RELEASE)
+            raise FlightEnded(
+                "the vehicle disarmed in the take-off, not by this program", Exit.RELEASE
+            )
         height, position = state.height, context.fresh_position()
         if height is None or position is None:
             return False
@@ -129,7 +131,7 @@ class _Climb:
         is_near_height = height > self._height - MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
             raise self._jump(height) or FlightEnded(
-                f"the climb was stopped at {height:.1f} m, not by us", Exit.RELEASE
+                f"the climb was stopped at {height:.1f} m, not by this program", Exit.RELEASE
             )
         if is_near_height and state.landed:
             self._require_leaving_ground(height)

@@ -48,7 +48,7 @@ def acceleration_beside_wind(largest: float, velocity: NorthEast, wind: NorthEas
     Args:
         largest: largest horizontal acceleration by tilt, m/s².
         velocity: velocity north and east, m/s.
-        wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
+        wind: acceleration that the wind gives a vehicle at rest, m/s², north and east.
     """
     speed = hypot(*velocity)
     if speed == 0.0:
@@ -196,7 +196,7 @@ def drift(wind: NorthEast) -> NorthEast:
     Its modes begin level, without the tilt that balances the wind (`Autopilot.modes_begin_level`).
 
     Args:
-        wind: acceleration by the wind of a vehicle at rest, m/s², north and east.
+        wind: acceleration that the wind gives a vehicle at rest, m/s², north and east.
     """
     return _DRIFT_TIME_SQUARED * wind[0], _DRIFT_TIME_SQUARED * wind[1]
 

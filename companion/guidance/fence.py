@@ -157,8 +157,8 @@ class Fence:
                 arrays of them.
             velocity: velocity, m/s NED; numbers, or arrays of them.
             acceleration: acceleration north and east, m/s²; numbers, or arrays of them.
-            wind: acceleration by the wind of a vehicle at rest, m/s², north and east; only for
-                motions in numbers. None: no wind.
+            wind: acceleration that the wind gives a vehicle at rest, m/s², north and east. None: no
+                wind. It must be None if the other arguments are arrays.
         """
         north, east, down = velocity
         reaction = self.reaction + self.estimate_delay

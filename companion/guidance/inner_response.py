@@ -105,7 +105,10 @@ class InnerResponse:
         return compared + self.lag * acceleration / self.gain, rate
 
     def _lead(self, before: float, then: float, after: float) -> float:
-        """(ċ + lag·c̈)/gain from three values of a coefficient, `_PATH_STEP` apart."""
+        """How far the target leads a coefficient c on its path: (ċ + lag·c̈)/gain.
+
+        The arguments are three values of c, `_PATH_STEP` apart.
+        """
         speed, acceleration = _derivatives(before, then, after)
         return (speed + self.lag * acceleration) / self.gain
 

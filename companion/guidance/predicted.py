@@ -23,7 +23,8 @@ class PredictedMotion(NamedTuple):
         time: time since the maneuver began, s.
         offset: position from where the maneuver began, m.
         velocity: velocity, m/s.
-        acceleration: acceleration, m/s²; in open loop that by tilt, without drag.
+        acceleration: acceleration, m/s². In open loop the horizontal part is that of the tilt
+            alone, without drag.
     """
 
     time: float

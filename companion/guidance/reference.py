@@ -1,4 +1,4 @@
-"""Types of guidance: world NED, SI units, radians; headings are tilt-yaw headings."""
+"""Data types of guidance: world NED, SI units, radians; headings are tilt-yaw headings."""
 
 from collections.abc import Callable, Sequence
 from enum import Enum, auto

@@ -135,7 +135,7 @@ class BatterySag:
         self._time = 0.0
 
     def reset(self) -> None:
-        """Take the next voltage as V₀; called on the ground."""
+        """Forget V₀; the next voltage becomes V₀. Called on the ground, again and again."""
         self._first_voltage = None
         self._ratio = self.factor = 1.0
 

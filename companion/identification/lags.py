@@ -95,7 +95,7 @@ def complex_lag_response(commands: Knots, lag: complex, at: Floats) -> Numbers:
     steady = commands.value - commands.slope * lag
     ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
     jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
-    transients = _decayed_sums(commands.time / lag, jumps)
+    transients = _transients_at_knots(commands.time / lag, jumps)
     pieces = np.searchsorted(commands.time, at, side="right") - 1
     elapsed = at - commands.time[pieces]
     steady_response = steady[pieces] + commands.slope[pieces] * elapsed
@@ -103,7 +103,7 @@ def complex_lag_response(commands: Knots, lag: complex, at: Floats) -> Numbers:
     return response
 
 
-def _decayed_sums(scaled_times: Numbers, jumps: Numbers) -> Numbers:
+def _transients_at_knots(scaled_times: Numbers, jumps: Numbers) -> Numbers:
     """(n,), at each knot the sum of the jumps so far, each decayed by exp(−elapsed time / lag).
 
     `scaled_times` are the times of the knots divided by the lag. The sums are computed in parts so

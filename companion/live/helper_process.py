@@ -106,7 +106,7 @@ class FlightConnection:
         return str(reply.get("text"))
 
     def note(self, text: str) -> None:
-        """Have the flight record a sentence and show it to the user."""
+        """Send a sentence to the flight, which records it and shows it to the user."""
         self._channel.send({"kind": "note", "text": text})
 
     def _on_readable(self) -> None:

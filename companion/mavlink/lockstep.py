@@ -47,7 +47,7 @@ class LockstepClock(Protocol):
         """Event-loop time, s."""
 
     def advance(self, vehicle_time: float) -> bool:
-        """Set the vehicle time, s; return False for a repeated beacon."""
+        """Set the time to that of a beacon, s; return False if the beacon is not newer."""
 
 
 class _BeaconClock:
@@ -69,7 +69,7 @@ class _BeaconClock:
         return self._vehicle_time + self._offset
 
     def advance(self, vehicle_time: float) -> bool:
-        """Set the vehicle time, s; return False for a repeated beacon."""
+        """Set the time to that of a beacon, s; return False if the beacon is not newer."""
         if self._vehicle_time is not None and vehicle_time <= self._vehicle_time:
             if self._vehicle_time - vehicle_time < 1.0:
                 return False
@@ -200,7 +200,7 @@ class LockstepEventLoop(LinkEventLoop):
         return super().call_at(when - advance + order, callback, *args, context=context)
 
     def advance(self, vehicle_time: float) -> bool:
-        """Move the clock to a beacon's time, s; return False for a repeated beacon."""
+        """Set the time to that of a beacon, s; return False if the beacon is not newer."""
         return self._clock.advance(vehicle_time)
 
     def settle(self, callback: Callable[[], None]) -> None:

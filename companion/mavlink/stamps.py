@@ -98,7 +98,7 @@ class StampJudge:
         # The newest stamps of all streams. True: of stamps far ahead of the date; False: of others.
         self._newest = {False: 0, True: 0}
         self._newest_by_stream: dict[tuple[SignatureStream, bool], int] = {}
-        self._date_proven = False
+        self._vehicle_date_proven = False
 
     def date(self) -> int:
         """The date of this program now, ticks."""
@@ -111,7 +111,7 @@ class StampJudge:
         date = self.date()
         is_far_ahead = date + _DAY < stamp <= date + _MAX_AHEAD
         # Once a stamp near the date was accepted, no other stamp changes the date.
-        return is_far_ahead and not self._date_proven and not self._newest[False]
+        return is_far_ahead and not self._vehicle_date_proven and not self._newest[False]
 
     def judge(
         self, stream: SignatureStream, stamp: int, *, answers_timesync: bool
@@ -136,14 +136,14 @@ class StampJudge:
                     f"yet (GPS), or this computer's clock is ahead: {SET_CLOCK}"
                 )
             return SignatureResult.REPLAYED
-        if ahead and not self._date_proven:
+        if ahead and not self._vehicle_date_proven:
             if not answers_timesync:
                 self._remark_ahead(
                     stamp - date,
                     f"and refused until the vehicle answers a TIMESYNC request; {SET_CLOCK}",
                 )
                 return SignatureResult.AHEAD
-            self._date_proven = True
+            self._vehicle_date_proven = True
             self._remark(
                 f"this computer's clock is wrong: it is {_days(stamp - date)} behind the vehicle, "
                 f"which has the right key and answers, so its date is used; {SET_CLOCK}"

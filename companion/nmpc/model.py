@@ -90,7 +90,7 @@ class Model:
 
 
 def constants_symbols(own_count: int = 0) -> ca.SX:
-    """Symbols of `Conditions` and of `own_count` further constants, (6 + own_count,)."""
+    """Symbols (6 + own_count,): the 6 constants of `Conditions`, then those of the model itself."""
     return ca.SX.sym("constants", len(Conditions._fields) + own_count)
 
 

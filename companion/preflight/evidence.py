@@ -20,7 +20,7 @@ _POSITION_MESSAGES = frozenset(
 
 
 class Stage(Enum):
-    """The next step of the vehicle; the value completes "ready …", as in "ready to take off"."""
+    """State in which a vehicle is checked; the value says for what, as in "ready to take off"."""
 
     GROUND = "to be armed"
     """The vehicle stands on the ground, disarmed."""

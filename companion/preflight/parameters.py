@@ -94,7 +94,7 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether neither the rule's parameter nor its alternative was read, but one may exist."""
+    """Whether the autopilot may have a parameter of the rule, although the survey read none."""
     names = {rule.name, rule.alternative}
     return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread_names)
 

@@ -146,7 +146,7 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
 
 
 def _gain_warning(figures: Figures) -> list[str]:
-    """A warning that does not make a flight bad: the gain is above the largest sensible one."""
+    """The warning of a gain above the largest sensible one; empty: no warning."""
     warning = figures.get("gain_warning")
     return [] if warning is None else [warning]
 
@@ -208,7 +208,7 @@ def _repetition_is_better(figures: Figures) -> bool:
 
 
 def _computer_was_slow(figures: Figures) -> bool:
-    """Whether this computer was too slow for real time; a flight in lockstep would wait for it."""
+    """Whether the computer was too slow for a flight in real time; never in lockstep."""
     if figures["lockstep"]:
         return False
     end = figures["early_end"]

@@ -34,7 +34,7 @@ def flight_folder(directory: Path) -> Path:
     raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
 
 
-def named_folder(folder: Path) -> Path:
+def make_named_folder(folder: Path) -> Path:
     """Make the folder that the user names for one flight, unless it exists.
 
     Raises:

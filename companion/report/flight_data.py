@@ -98,7 +98,7 @@ def explain_other_version(*paths: Path) -> Iterator[None]:
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise RecordError(
             f"{' or '.join(map(str, paths))}: recorded by another version, or damaged ({error!r}); "
-            "rename its summary.json, and the figures are computed from flight.mcap"
+            "rename its summary.json, so that the figures are computed from flight.mcap instead"
         ) from error
 
 

@@ -84,7 +84,7 @@ def _name_maneuvers(axes: "Axes", flight: FlightData) -> None:
 
 
 def _is_open_loop(flight: FlightData, span: Span) -> bool:
-    """Whether a maneuver has a part without a reference, where the panel of the error has a gap."""
+    """Whether a maneuver has a part without a reference, and so without a tracking error."""
     if "reference" not in flight.curves:
         return False
     time, values = flight.curves["reference"]

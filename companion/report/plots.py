@@ -186,7 +186,7 @@ def _maneuver_shade(span: Span, number: int) -> dict[str, Any]:
 
 
 def _name_above(span: Span) -> dict[str, Any]:
-    """The name of a maneuver; by its duration in `name`, s, the page hides a name that is wider."""
+    """Label of a maneuver; its field `name` is the duration, s: the page hides wider labels."""
     return {
         "x": 0.5 * (span.begin + span.end),
         "y": 1.0,

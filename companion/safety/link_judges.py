@@ -174,13 +174,13 @@ def deadlines(max_share: float) -> Judge:
 
 
 def starvation(max_share: float) -> Judge:
-    """CPU starvation: our timer lost more than the share `max_share` of the last second."""
+    """CPU starvation: this program's timer was late for more than `max_share` of a second."""
     return above(
         max_share,
         lambda snapshot: snapshot.health.starved_share,
         lambda share: (
-            f"CPU starvation: the program's timer lost {100 * share:.0f} % of the last second, "
-            f"more than safety.max_starved = {max_share:g} ({100 * max_share:g} %)"
+            f"CPU starvation: the program's timer was late for {100 * share:.0f} % of the last "
+            f"second, more than safety.max_starved = {max_share:g} ({100 * max_share:g} %)"
         ),
     )
 

@@ -1,9 +1,10 @@
 """Monitors of other packages: they run beside ours, and cannot stop or soften them.
 
-Each one has three rows in the table: the monitor itself, one for exceptions of its judge, and one
-for the time that the judge takes. A judge that raises is not called again, and the vehicle
-is handed back, because the flight must not go on without a monitor that the user wanted. A slow
-judge delays the answers to samples, and a warning names it.
+The judge of a monitor is its function that looks for a breach in each snapshot. Each monitor has
+three rows in the table: the monitor itself, one for exceptions of its judge, and one for the time
+that the judge takes. A judge that raises is not called again, and the vehicle is handed back,
+because the flight must not go on without a monitor that the user wanted. A slow judge delays
+the answers to samples, and a warning names it.
 """
 
 from dataclasses import replace
@@ -51,8 +52,8 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
         )
     if monitor.action not in _ACTIONS or monitor.then not in _AFTER_HOLD:
         raise ConfigError(
-            f"{setting}: its action must be WARN, HOLD, HAND_BACK or LAND, and "
-            "`then`, its action after a hold, HAND_BACK or LAND"
+            f"{setting}: `action` must be WARN, HOLD, HAND_BACK or LAND, and `then` (the action "
+            "after a hold) must be HAND_BACK or LAND"
         )
     guarded_judge = GuardedJudge(monitor)
     guarded_judge.judge(Snapshot(0.0), False)

@@ -48,7 +48,7 @@ class Motion(NamedTuple):
     acceleration: NorthEast = (0.0, 0.0)
     """Estimated horizontal acceleration, m/s², NED."""
     wind: NorthEast = (0.0, 0.0)
-    """Estimated acceleration by the wind of a vehicle at rest, m/s², NED."""
+    """Estimated acceleration that the wind gives a vehicle at rest, m/s², NED."""
     moves_to_hold: bool = False
     """Whether guidance still brakes, or moves, to the place that it then holds."""
 

@@ -47,7 +47,7 @@ class FenceGuard:
         centre: returns the centre of the fence in the frame without estimator resets; None: unknown
             yet.
         height: returns the height above home, m; None: unknown.
-        wind: returns the acceleration by the wind of a vehicle at rest, m/s², north and east.
+        wind: returns the acceleration that the wind gives a vehicle at rest, m/s², north and east.
         tell: called with a sentence when the vehicle is stopped.
     """
 
@@ -60,8 +60,8 @@ class FenceGuard:
         tell: Callable[[str], None],
     ) -> None:
         fence, acceleration = fence_of(config), config.serve.max_acceleration_m_s2
-        self._wall = _Side(fence.walls, acceleration)
-        self._levels = _Side(fence.levels, min(acceleration, VERTICAL_ACCELERATION))
+        self._wall = _FencePart(fence.walls, acceleration)
+        self._levels = _FencePart(fence.levels, min(acceleration, VERTICAL_ACCELERATION))
         self._centre, self._height, self._wind, self._tell = centre, height, wind, tell
         self._stopped_at = -inf
 
@@ -111,7 +111,7 @@ class _FenceFrame(NamedTuple):
     home_down: float | None
     """Coordinate down of home, m; None: unknown."""
     wind: NorthEast
-    """Acceleration by the wind of a vehicle at rest, m/s², north and east."""
+    """Acceleration that the wind gives a vehicle at rest, m/s², north and east."""
 
     def breach(self, fence: Fence, position: Vector, margin: float) -> Breach | None:
         """The breach at a position, NED in the frame of `centre`; None: no breach."""
@@ -154,12 +154,12 @@ class _Destination(NamedTuple):
     """Whether the request commands the position; otherwise the position is extrapolated."""
 
 
-class _Side:
-    """One side of the fence: its wall, or its floor and ceiling.
+class _FencePart:
+    """The horizontal limits of the fence (walls), or the vertical ones (floor and ceiling).
 
     Args:
-        fence: the fence with the limits of this side alone.
-        acceleration: largest acceleration of clients' motions across this side, m/s².
+        fence: the fence with only these limits.
+        acceleration: largest horizontal or vertical acceleration of clients' motions, m/s².
     """
 
     def __init__(self, fence: Fence, acceleration: float) -> None:

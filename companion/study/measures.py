@@ -17,20 +17,24 @@ _UPPER_BOUNDS = np.array([log(1000.0), log(100.0), 0.5])
 
 
 def deviation(response: Response, reference: Floats) -> Floats:
-    """(samples + 1, headings) distance of the coefficients from a (samples + 1, 2) reference."""
+    """Distance of the acceleration coefficients from a reference.
+
+    `reference`: (samples + 1, 2). Returns (samples + 1, headings).
+    """
     difference = response.coefficients - reference[:, :, None]
     return np.asarray(np.hypot(difference[:, 0], difference[:, 1]))
 
 
 def largest_deviation(response: Response, reference: Floats) -> Floats:
-    """(headings,) largest distance of the coefficients from a (samples + 1, 2) reference."""
+    """(headings,) largest `deviation` from a (samples + 1, 2) reference."""
     return np.asarray(deviation(response, reference).max(axis=0))
 
 
 def signed_distance_from_line(response: Response) -> Floats:
-    """(samples + 1, headings) distance of the coefficients from the straight line start → target.
+    """Distance of the acceleration coefficients from the straight line start → target.
 
-    The distance is positive to the right of the direction to the target, seen with north up.
+    Shape (samples + 1, headings). The distance is positive to the right of the direction to
+    the target, seen with north up.
     """
     start, target = np.array(response.step.start), np.array(response.step.target)
     north, east = (target - start) / np.hypot(*(target - start))
@@ -39,7 +43,7 @@ def signed_distance_from_line(response: Response) -> Floats:
 
 
 def cross_track(response: Response) -> Floats:
-    """(headings,) largest distance from the straight line between start and target."""
+    """(headings,) largest distance of the coefficients from the straight line start → target."""
     return np.asarray(np.abs(signed_distance_from_line(response)).max(axis=0))
 
 

@@ -43,7 +43,11 @@ _ENTRIES = (
     Study("fig4", "step response with the tilt rate limited", "companion.study.paper.fig4"),
     Study("fig5", "step response with the complete inner loop", "companion.study.paper.fig5"),
     Study("rates", "error of the paper's method by sample rate", "companion.study.paper.rates"),
-    Study("kmax", "body rate needed per rate of the coefficients", "companion.study.paper.kmax"),
+    Study(
+        "kmax",
+        "body rate needed per rate of the acceleration coefficients",
+        "companion.study.paper.kmax",
+    ),
     Study(
         "lag",
         "every planner behind dead time and lag of the rate loop",

@@ -31,7 +31,7 @@ _SETTLING_TIME = 3.0
 """Time allowed to reach a new target, s: 15 times the time constant 1/`_GAIN`."""
 _MAX_REMAINING_ERROR = 0.02
 """Largest distance of the coefficients from their target after `_SETTLING_TIME`."""
-_MAX_DISTANCE = 1.5
+_MAX_TRACKING_ERROR = 1.5
 """Largest distance of the vehicle from its reference in a hover and a circle, m."""
 
 
@@ -94,7 +94,9 @@ def check_guidance(name: str) -> None:
         summary = fly({**changes, "thrust": {"hover_thrust": hover}}, vehicle)
         assert summary.result == "ok", f"{autopilot}: {summary.result}"
         distance = summary.tracking()["position_max_m"]
-        assert distance < _MAX_DISTANCE, f"{autopilot}: {distance:.2f} m away from its reference"
+        assert distance < _MAX_TRACKING_ERROR, (
+            f"{autopilot}: {distance:.2f} m away from its reference"
+        )
 
 
 _BOOT_S = 0.5

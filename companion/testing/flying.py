@@ -152,7 +152,7 @@ async def connect(
     """
     if not isinstance(asyncio.get_running_loop(), VirtualEventLoop):
         raise RuntimeError(
-            "connect flies on the vehicle's clock: call it inside run(vehicle, main())"
+            "call `connect` inside `run(vehicle, main())`: it needs the event loop of `run`"
         )
     flown_config = config_in_memory(config, vehicle)
     async with connect_configured(
@@ -171,14 +171,18 @@ def _made_folder(folder: Path | str | None) -> Path | None:
 
 
 def config_in_memory(configuration: Configuration, vehicle: MockVehicle) -> Config:
-    """The configuration for a vehicle in memory; lockstep is set to match the vehicle.
+    """The configuration for a mock vehicle in this process; lockstep is set to match the vehicle.
 
     Raises:
-        ConfigError: the configuration is wrong, or its link cannot reach a vehicle in memory.
+        ConfigError: the configuration is wrong, or its link cannot reach a mock vehicle in this
+            process.
     """
     config = as_config(configuration)
     if config.link.backend != "direct":
-        raise ConfigError(f"link.backend {config.link.backend} cannot reach a vehicle in memory")
+        raise ConfigError(
+            f"link.backend {config.link.backend} cannot reach a mock vehicle in this process; "
+            "set it to direct"
+        )
     if config.link.lockstep != vehicle.in_lockstep:
         return changed(config, {"link": {"lockstep": vehicle.in_lockstep}}, "the vehicle")
     return config

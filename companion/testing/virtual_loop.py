@@ -27,7 +27,7 @@ class VirtualClock:
         return self.now
 
     def advance(self, vehicle_time: float) -> bool:
-        """Set the time by a lockstep beacon, s; return false for a repeated one."""
+        """Set the time to that of a beacon, s; return False if the beacon is not newer."""
         if self._last_beacon is not None and vehicle_time <= self._last_beacon:
             return False
         self._last_beacon = self.now = vehicle_time

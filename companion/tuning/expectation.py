@@ -31,11 +31,11 @@ class Disturbances:
     gust_correlation_time: float = 2.0
     """Correlation time of the gusts, s."""
     velocity_error: float = 0.03
-    """Standard deviation of the slow error of the estimated velocity on a path, m/s."""
+    """Standard deviation of the slow error of the estimated velocity on a flown path, m/s."""
     acceleration_error: float = 0.1
-    """Standard deviation of the slow error of the predicted acceleration on a path, m/s²."""
+    """Standard deviation of the slow error of the predicted acceleration on a flown path, m/s²."""
     path_correlation_time: float = 1.0
-    """Correlation time of `velocity_error` and `acceleration_error`, s."""
+    """Correlation time of the errors on a path, `velocity_error` and `acceleration_error`, s."""
     velocity_density: float = 0.01
     """One-sided amplitude spectral density of the estimated velocity's error in hover, m/s/√Hz."""
     acceleration_density: float = 0.02
@@ -123,11 +123,11 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
     by_acceleration = loop.responses_to_acceleration()
     by_velocity = loop.responses_to_error(loop.velocity_feedback)
     by_position = loop.responses_to_error(loop.position_feedback)
-    gust_time, path_time = disturbances.gust_correlation_time, disturbances.path_correlation_time
+    gust_time, error_time = disturbances.gust_correlation_time, disturbances.path_correlation_time
     gusts = ((by_acceleration, _slow_density(omega, disturbances.gust * loop.drag, gust_time)),)
     path = (
-        (by_velocity, _slow_density(omega, disturbances.velocity_error, path_time)),
-        (by_acceleration, _slow_density(omega, disturbances.acceleration_error, path_time)),
+        (by_velocity, _slow_density(omega, disturbances.velocity_error, error_time)),
+        (by_acceleration, _slow_density(omega, disturbances.acceleration_error, error_time)),
     )
     velocity_density = disturbances.velocity_density**2
     velocity_density += 2.0 * period * disturbances.velocity_noise**2

@@ -94,14 +94,20 @@ def _telemetry(log: Path) -> tuple[Floats, Floats]:
 
 
 def _integral(time: Floats, slopes: Floats) -> Floats:
-    """(n, 2), integral over time of the slopes (m, 3), up to each time (n,), s."""
+    """(n, 2), integral of the slopes from their first time to each of the times, s.
+
+    `time`: (n,), s. `slopes`: (m, 3), time (s) and slopes, as from `_telemetry`.
+    """
     steps = np.diff(slopes[:, 0], prepend=slopes[0, 0])[:, None]
     sums = np.cumsum(steps * slopes[:, 1:], axis=0)
     return np.column_stack([np.interp(time, slopes[:, 0], each) for each in sums.T])
 
 
 def _densities(time: Floats, residual: Floats) -> tuple[float, float]:
-    """Spectral density of a residual in `_HOLD_BAND`, per √Hz, and noise of a single measurement.
+    """Spectral density of a residual without measurement noise, and noise of one measurement.
+
+    The density is an amplitude spectral density, averaged over `_HOLD_BAND`, in units of the
+    residual per √Hz. The noise is a standard deviation. Both are NaN if the record is too short.
 
     Args:
         time: (n,), s.

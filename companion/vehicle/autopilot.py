@@ -15,7 +15,7 @@ from companion.vehicle.parameter_rules import ParameterRule
 class Role(Enum):
     """Meaning of a mode for a flight, independent of the autopilot's name for it.
 
-    Modes without a role belong to the pilot or to a failsafe.
+    Only the pilot or a failsafe uses the modes without a role.
     """
 
     TAKEOFF = "take-off"
@@ -131,7 +131,7 @@ class Autopilot(Protocol):
         """Name of the mode in a heartbeat; an unknown mode is named by its number."""
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of a mode, by its name (see `mode_name`); empty if it has none."""
+        """What the mode of this name (see `mode_name`) is used for in a flight; may be empty."""
 
     def set_mode(self, name: str) -> Command:
         """Command that enters a mode of `modes`. Raises `KeyError` for any other mode."""

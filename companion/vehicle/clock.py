@@ -66,7 +66,7 @@ class VehicleClock:
 
     @property
     def age_known(self) -> bool:
-        """Whether ages are absolute; otherwise they are relative to the quickest sample's age."""
+        """Whether ages include the quickest sample's delay; otherwise that delay counts as 0."""
         return self._lockstep or self.delay.known
 
     @property

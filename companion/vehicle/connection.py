@@ -36,7 +36,7 @@ class Connection:
     """Called with the reason when the connection drops."""
     _opener: OpenTransport
     _reopening: asyncio.Task[None] | None = field(default=None, init=False)
-    _lost_early: str | None = field(default=None, init=False)
+    _early_loss_reason: str | None = field(default=None, init=False)
 
     async def open(self) -> None:
         """Open the transport.
@@ -46,11 +46,11 @@ class Connection:
         """
         # First, because bytes may arrive before this coroutine resumes.
         self._inbox.start_connection(streaming=not isinstance(self._endpoint, UdpIn | UdpOut))
-        self._lost_early = None
+        self._early_loss_reason = None
         transport = await self._opener(self._endpoint, self._inbox, self._on_lost)
-        if self._lost_early is not None:
+        if self._early_loss_reason is not None:
             transport.close()
-            raise EndpointError(f"the connection was dropped at once: {self._lost_early}")
+            raise EndpointError(f"the connection was dropped at once: {self._early_loss_reason}")
         self._outbox.transport = transport
 
     async def close(self) -> None:
@@ -69,7 +69,7 @@ class Connection:
         _LOG.warning("link lost: %s", reason)
         transport = self._outbox.transport
         if transport is None:
-            self._lost_early = reason
+            self._early_loss_reason = reason
             return
         if transport.reconnects:
             self._drop_transport()

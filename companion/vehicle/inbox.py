@@ -105,7 +105,8 @@ class Inbox:
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
         """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
 
-        Without a valid claim in the bytes, no frame in them is accepted. Never raises.
+        If the bytes contain no valid claim (`PeerRule`), none of their frames is accepted. Never
+        raises.
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._is_admitted(frame)]

@@ -61,7 +61,7 @@ def _unless(is_good: Callable[[float], bool], problem: Problem) -> Check:
 
 
 def required(result: CheckResult, good: float, because: str) -> Check:
-    """A check that requires the value `good`; any other has the consequence `because`."""
+    """A check that requires the value `good`; `because`: consequence of any other value."""
     return _unless(lambda value: value == good, Problem(result, because, good))
 
 

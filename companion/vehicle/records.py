@@ -47,7 +47,7 @@ class AttitudeSample(NamedTuple):
     misfit: Misfit | None = None
     """Why the sample does not fit the vehicle's clock and must not be used, or None."""
     age_known: bool = False
-    """Whether `age` is absolute; see `VehicleClock.age_known`."""
+    """See `VehicleClock.age_known`."""
 
 
 class Heartbeat(NamedTuple):

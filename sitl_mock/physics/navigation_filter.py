@@ -166,17 +166,19 @@ class NavigationFilter:
         follows the fixes, which show the direction of the acceleration. In a turn this direction
         lags, because the fixes are late.
         """
-        config, compass_rate = self._config, 1.0 / _COMPASS_TIME_S
+        config, compass_correction_rate = self._config, 1.0 / _COMPASS_TIME_S
         cross_product = (velocity.conjugate() * acceleration).imag
         turn_rate = cross_product / max(abs(velocity) ** 2, _MIN_COURSE_SPEED**2)
-        fix_rate = self._uncertainty * abs(acceleration) ** 2
-        total_rate = compass_rate + fix_rate
-        numerator = compass_rate * radians(config.compass_error_deg)
-        numerator -= fix_rate * turn_rate * config.turn_yaw_ms * 1e-3
-        steady_error = numerator / total_rate
-        uncertainty = self._uncertainty / (1.0 + fix_rate * elapsed)
+        fix_correction_rate = self._uncertainty * abs(acceleration) ** 2
+        total_correction_rate = compass_correction_rate + fix_correction_rate
+        numerator = compass_correction_rate * radians(config.compass_error_deg)
+        numerator -= fix_correction_rate * turn_rate * config.turn_yaw_ms * 1e-3
+        steady_error = numerator / total_correction_rate
+        uncertainty = self._uncertainty / (1.0 + fix_correction_rate * elapsed)
         self._uncertainty = min(uncertainty + _UNCERTAINTY_GROWTH * elapsed, _LARGEST_UNCERTAINTY)
-        return steady_error + (self.state.noiseless_yaw - steady_error) * exp(-total_rate * elapsed)
+        return steady_error + (self.state.noiseless_yaw - steady_error) * exp(
+            -total_correction_rate * elapsed
+        )
 
     def _next_slow_errors(
         self, acceleration: float, height_noise: float, elapsed: float

@@ -90,7 +90,8 @@ def shaping_constants(
 ) -> ShapingConstants:
     """Return the constants of the shaping of roll, pitch and yaw for steps of `dt` seconds.
 
-    For None they are unused; the compiler needs a value of this type.
+    If `axes` is None, no rate is shaped and the constants are unused: they are zeros, because the
+    compiler needs a value of this type.
     """
     if axes is None:
         return ShapingConstants(

@@ -22,8 +22,8 @@ SILENCE = {"inject": [{"kind": "stop_telemetry"}], "ends": ["held"]}
         ({"loguniform": [0, 8]}, "loguniform: both values must be above 0"),
         ({"normal": [4, 0]}, "normal: the standard deviation must be above 0"),
         ({"range": [0, 8]}, "range and count go together"),
-        ({"uniform": [0, 8], "within": [1, 2]}, "within needs normal"),
-        ({"values": ["a", "b"], "times_base": True}, "times_base needs numbers"),
+        ({"uniform": [0, 8], "within": [1, 2]}, "`within` needs `normal`"),
+        ({"values": ["a", "b"], "times_base": True}, "`times_base` needs numbers"),
     ],
 )
 def test_a_swept_key_that_is_none(tmp_path, told, words):
@@ -74,7 +74,7 @@ def test_a_fault_cannot_be_called_none_nor_be_in_a_batch(tmp_path):
     assert "faults: none means a flight without a fault; choose another name" in said
     steps = {"flight.maneuvers": ["corners"]}
     for told in ({"faults": {"lost": SILENCE}}, {"sweep": {"fault": ["none", "x"]}}):
-        assert "faults need kind: flights" in refusal(tmp_path, kind="batch", set=steps, **told)
+        assert "`faults` need `kind: flights`" in refusal(tmp_path, kind="batch", set=steps, **told)
 
 
 @pytest.mark.parametrize(

@@ -103,7 +103,7 @@ def test_what_ends_a_search_early_is_told(tmp_path, quick, monkeypatch, capsys, 
 
 def test_a_campaign_that_cannot_be_searched_is_refused(tmp_path, monkeypatch):
     batch = {"kind": "batch", "set": {"flight.maneuvers": ["corners"]}}
-    with pytest.raises(ConfigError, match="tune needs kind: flights"):
+    with pytest.raises(ConfigError, match="`tune` needs `kind: flights`"):
         tune_section(campaign(tmp_path, **batch))
     several = {"a": {"uniform": [1, 2], "keys": ["planner.gain_per_s"]}}
     with pytest.raises(ConfigError, match="times_base and keys work only in `sweep`"):

@@ -134,8 +134,8 @@ def test_a_command_that_is_ended_by_a_signal_says_so(tmp_path, number):
 
 def test_nohup_keeps_a_flight_when_its_terminal_goes():
     code = (
-        "import signal; from companion.cli.signals import hangup_signal; from companion.cli import "
-        "interrupts; print(hangup_signal() == [], signal.SIGHUP in "
+        "import signal; from companion.cli.signals import hangup_signals; from companion.cli "
+        "import interrupts; print(hangup_signals() == [], signal.SIGHUP in "
         "interrupts.signals_with_default_handler())"
     )
     done = subprocess.run(

@@ -62,7 +62,7 @@ def test_a_landing_in_which_the_vehicle_crashed_is_not_called_good():
     ("phase", "result"),
     [
         ("maneuvers", "the vehicle disarmed in flight"),
-        ("land", "the vehicle disarmed in the landing, not by us, and fell"),
+        ("land", "the vehicle disarmed in the landing, not by this program, and fell"),
     ],
 )
 def test_motors_that_somebody_stops_in_the_air_end_no_good_flight(autopilot, phase, result):

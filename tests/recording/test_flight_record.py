@@ -12,7 +12,7 @@ from companion.cli.main import main
 from companion.control.loop_record import Unanswered
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import RECORD_FILE, RecordError, read_flight
-from companion.recording.folder import flight_folder, named_folder
+from companion.recording.folder import flight_folder, make_named_folder
 from companion.recording.mcap_file import cdr, reader, writer
 from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
 from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, TOPICS
@@ -319,12 +319,12 @@ def test_a_folder_of_a_flight_is_a_new_one_or_an_error(tmp_path, monkeypatch):
 
 def test_a_folder_that_the_user_names_is_made_and_never_written_over(tmp_path):
     folder = tmp_path / "flights" / "mine"
-    assert named_folder(folder) == named_folder(folder)
+    assert make_named_folder(folder) == make_named_folder(folder)
     (folder / TLOG_FILE).write_bytes(b"a flight")
     with pytest.raises(ConfigError, match=r"folder: .*mine holds a flight already; name another"):
-        named_folder(folder)
+        make_named_folder(folder)
     with pytest.raises(ConfigError, match=r"folder: cannot make .*Not a directory"):
-        named_folder(folder / TLOG_FILE / "below")
+        make_named_folder(folder / TLOG_FILE / "below")
 
 
 def test_a_full_batch_is_sent_at_once_and_an_empty_one_never():

@@ -181,7 +181,7 @@ SAID = [
     (
         lambda: link_judges.starvation(0.2),
         at(health=Health(starved_share=0.6)),
-        "CPU starvation: the program's timer lost 60 % of the last second, "
+        "CPU starvation: the program's timer was late for 60 % of the last second, "
         "more than safety.max_starved = 0.2 (20 %)",
     ),
     (

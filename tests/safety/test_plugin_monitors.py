@@ -228,7 +228,7 @@ def test_it_can_only_choose_among_the_actions():
         ("raising", "accept a snapshot whose values are None: .* raised TypeError: unsupported"),
         ("counting", "it returned 5, which is neither a text nor None"),
         ("wordless", "it returned '', which is neither a text nor None"),
-        ("releasing", "its action must be WARN, HOLD, HAND_BACK or LAND"),
+        ("releasing", "`action` must be WARN, HOLD, HAND_BACK or LAND"),
         ("unmade", "the monitor unmade of the module my_monitors raised OSError: no file"),
         ("nothing", "must make a companion.safety.monitor.Monitor, not None"),
         ("sinkin", "unknown monitor 'sinkin'; known: .*; did you mean sinking?"),

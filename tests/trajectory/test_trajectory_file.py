@@ -193,7 +193,8 @@ def test_a_csv_file_lies_beside_its_yaml_or_stands_alone(tmp_path):
         ),
         (
             "waypoints: {points_m: [[1, 0, 0]], speed_m_s: 1, stops: true, heading: along}",
-            "`waypoints`: heading: along would turn on the spot at each stop; use headings_deg",
+            "`waypoints`: with `heading: along` the vehicle would turn on the spot at each "
+            "stop; use `headings_deg`",
         ),
         ("csv: {file: none.csv}", "none.csv: cannot read it: No such file"),
         (

@@ -53,7 +53,7 @@ def tune_section(campaign: Campaign) -> Tune:
             f"{campaign.file_path}: there is no section `tune` that says what to search"
         )
     if campaign.file.kind != "flights":
-        raise ConfigError(f"{campaign.file_path}: tune needs kind: flights")
+        raise ConfigError(f"{campaign.file_path}: `tune` needs `kind: flights`")
     for key in tune.search.keys() & campaign.file.swept_keys:
         raise ConfigError(
             f"{campaign.file_path}: `{key}` is in sweep and in tune.search; remove it from one of "
@@ -62,9 +62,9 @@ def tune_section(campaign: Campaign) -> Tune:
     maneuvers_of_cases = (case.config.flight.maneuvers for case in campaign.cases())
     if all(set(OPEN_LOOP).issuperset(maneuvers) for maneuvers in maneuvers_of_cases):
         raise ConfigError(
-            f"{campaign.file_path}: tune compares the distances from the reference, and the "
-            f"maneuvers {', '.join(sorted(OPEN_LOOP))} have none; set flight.maneuvers to "
-            "[circle] or another that follows a reference"
+            f"{campaign.file_path}: `tune` compares distances from the reference, but the "
+            f"maneuvers {', '.join(sorted(OPEN_LOOP))} have no reference; set flight.maneuvers to "
+            "[circle] or another maneuver with a reference"
         )
     return tune
 

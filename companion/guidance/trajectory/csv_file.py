@@ -95,8 +95,8 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
     """Parse lines of text; the first one that is neither empty nor a comment is the header.
 
     Args:
-        lines: the text. Empty lines are skipped, and so are lines that begin with #, except that a
-            frame before the header is read from them, and one after it is refused.
+        lines: the text. Empty lines and comments, which begin with #, are skipped. But a comment
+            before the header may name the frame; a frame after the header is refused.
         name: the file's name, for error messages.
 
     Raises:

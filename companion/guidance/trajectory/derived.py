@@ -109,9 +109,9 @@ class TurnedFirst:
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the turn began."""
-        after = time - self.turn.duration
-        if after >= 0.0:
-            return self.trajectory.at(after)
+        trajectory_time = time - self.turn.duration
+        if trajectory_time >= 0.0:
+            return self.trajectory.at(trajectory_time)
         angle, rate, _, _ = self.turn.at(time)
         heading = self.begin + self.sign * angle
         return Sample(_REST, _REST, _REST, _REST, heading, self.sign * rate)

@@ -125,7 +125,7 @@ class Panel:
 
 
 def _range_text(allowed: str) -> str:
-    """The range of a key, for a hint: `allowed` without the words "changeable in flight"."""
+    """`allowed` without "changeable in flight", which holds for every key of the panel."""
     return (
         allowed.replace("changeable in flight within its range", "")
         .strip(", ")

@@ -26,7 +26,7 @@ class Receiver(Protocol):
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
         """Take bytes from `sender`, who is not the peer; return whether `sender` becomes the peer.
 
-        Without a valid claim in the bytes, no frame in them is accepted.
+        If the bytes contain no valid claim, none of their frames is accepted.
         """
 
     def may_prove_date(self, sender: str) -> bool:

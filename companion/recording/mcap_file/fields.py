@@ -109,7 +109,10 @@ class Channel:
         rows = np.frombuffer(b"".join(message[4:] for message in messages), self.dtype)
         for code in self.codes:
             if len(rows) and rows[code.name].max() >= len(code.names):
-                raise ValueError(f"{self.topic}: {code.name} is {rows[code.name].max()}")
+                raise ValueError(
+                    f"{self.topic}: {code.name} is {rows[code.name].max()}, a value that this "
+                    "version does not know"
+                )
         return rows
 
 

@@ -186,7 +186,11 @@ class CommandFollower:
         return Approach(start, limits, now, by_velocity=by_velocity)
 
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[AxisValues, AxisValues]:
-        """Acceleration and jerk of a stream; estimated if they are not commanded."""
+        """Acceleration and jerk of a demand.
+
+        If the demands are a stream of positions and velocities, what is not commanded is estimated
+        from the last two; otherwise it is 0.
+        """
         before, interval = self._newest_demand, now - self._commanded_at
         commanded = demand.acceleration
         is_stream = (

@@ -158,7 +158,7 @@ class Example(NamedTuple):
 
 
 class CompleteLoopFlights(NamedTuple):
-    """The results of the flights with the complete inner loop."""
+    """The results of the flights with the complete inner loop (`companion.study.inner_loop`)."""
 
     by_rate: dict[float, Comparison]
     """Comparison at each sample rate (Hz)."""

@@ -38,7 +38,7 @@ from companion.study.outcome import Finding, Outcome, Row, Table, Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _EQUALITY_TOLERANCE = 1e-9
-"""Difference below which the coefficients at two headings count as the same."""
+"""Difference below which the acceleration coefficients at two headings count as the same."""
 PARTS = len(LAW_METHODS) + 1
 
 

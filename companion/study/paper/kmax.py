@@ -1,4 +1,4 @@
-"""Appendix A: body rate needed for a rate of the coefficients, by tilt and direction."""
+"""Appendix A: body rate per rate of the acceleration coefficients, by tilt and direction."""
 
 from math import cos, degrees, pi, radians, sin
 from typing import NamedTuple

@@ -69,14 +69,15 @@ TRAJECTORIES = (*CIRCLES, *EIGHTS)
 
 
 def planners(guidance: str) -> tuple[str, ...]:
-    """The planners that fly with this guidance in still air; predictive control has only one."""
+    """The planners that fly with this guidance in still air; with predictive guidance only one."""
     return PLANNER_NAMES if guidance == LINEAR else (MODEL_FOLLOWING,)
 
 
 def tasks() -> tuple[Task, ...]:
-    """All flights: every planner in still air, two planners in wind, and one planner without lead.
+    """All flights of the study.
 
-    With predictive guidance only one planner is flown.
+    Linear guidance flies every planner in still air, two planners in wind, and one planner without
+    lead in both. Predictive guidance flies one planner in still air.
     """
     calm = [
         Task(trajectory, planner, guidance)

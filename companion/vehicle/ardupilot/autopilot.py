@@ -90,7 +90,7 @@ class ArduPilot:
         return _BY_RATES if by_rates else name
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of a mode in a flight; empty if it belongs to the pilot or to a failsafe."""
+        """What a mode is used for in a flight; empty if only the pilot or a failsafe uses it."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:

@@ -105,7 +105,7 @@ class Px4:
         return _NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
 
     def roles(self, mode: str) -> frozenset[Role]:
-        """Roles of a mode in a flight; empty if it belongs to the pilot or to a failsafe."""
+        """What a mode is used for in a flight; empty if only the pilot or a failsafe uses it."""
         return _ROLES.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:
