@@ -135,7 +135,7 @@ class BatterySag:
         self._time = 0.0
 
     def reset(self) -> None:
-        """Forget V₀; the next voltage becomes V₀. Called on the ground, again and again."""
+        """Forget V₀; the next voltage becomes V₀. Called at each step on the ground."""
         self._first_voltage = None
         self._ratio = self.factor = 1.0
 

@@ -170,15 +170,13 @@ class NavigationFilter:
         cross_product = (velocity.conjugate() * acceleration).imag
         turn_rate = cross_product / max(abs(velocity) ** 2, _MIN_COURSE_SPEED**2)
         fix_correction_rate = self._uncertainty * abs(acceleration) ** 2
-        total_correction_rate = compass_correction_rate + fix_correction_rate
+        total_rate = compass_correction_rate + fix_correction_rate
         numerator = compass_correction_rate * radians(config.compass_error_deg)
         numerator -= fix_correction_rate * turn_rate * config.turn_yaw_ms * 1e-3
-        steady_error = numerator / total_correction_rate
+        steady_error = numerator / total_rate
         uncertainty = self._uncertainty / (1.0 + fix_correction_rate * elapsed)
         self._uncertainty = min(uncertainty + _UNCERTAINTY_GROWTH * elapsed, _LARGEST_UNCERTAINTY)
-        return steady_error + (self.state.noiseless_yaw - steady_error) * exp(
-            -total_correction_rate * elapsed
-        )
+        return steady_error + (self.state.noiseless_yaw - steady_error) * exp(-total_rate * elapsed)
 
     def _next_slow_errors(
         self, acceleration: float, height_noise: float, elapsed: float

@@ -239,7 +239,7 @@ def test_a_refused_path_names_the_key_that_every_command_takes(tmp_path, capsys)
         ("steepness=20", "write SECTION.KEY=VALUE"),
         ("limits.max_tilt_deg", "write SECTION.KEY=VALUE"),
         ("limit.max_tilt_deg=20", "there is no section `limit`"),
-        ("mock.wind.speed_m_s=5", "of your own: `companion init mock` writes one for --config"),
+        ("mock.wind.speed_m_s=5", "section `mock`, because the mock vehicle reads it from the"),
         ("limits.max_tild_deg=20", "did you mean `max_tilt_deg`?"),
         ("limits.max_tilt_deg=[", "not valid YAML"),
         ("limits.max_tilt_deg=99", "at most 60"),
