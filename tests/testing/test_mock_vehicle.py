@@ -328,7 +328,7 @@ def test_what_is_no_program_no_configuration_or_no_fault_is_refused_in_a_sentenc
         run(mock, main({"flight": 5}))
     with pytest.raises(ConfigError, match="`include` belongs in a file"):
         run(mock, main({"include": "px4.yaml"}))
-    with pytest.raises(RuntimeError, match=r"call it inside run\(vehicle, main\(\)\)"):
+    with pytest.raises(RuntimeError, match=r"call `connect` inside `run\(vehicle, main\(\)\)`"):
         asyncio.run(main({}))
     with pytest.raises(MockConfigError, match="a fault is written as"):
         mock.inject("gps_loss")
