@@ -170,7 +170,7 @@ def test_a_run_that_ends_before_it_began_says_so(tmp_path, monkeypatch, capsys, 
 
 def test_a_folder_takes_no_out(tmp_path, capsys):
     assert main(["campaign", str(tmp_path), "--out", str(tmp_path / "other")]) == 2
-    assert "so leave out --out" in capsys.readouterr().err
+    assert "leave out --out" in capsys.readouterr().err
 
 
 def test_sigterm_ends_a_campaign_like_ctrl_c_and_a_second_one_is_ignored():

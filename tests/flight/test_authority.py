@@ -496,7 +496,6 @@ def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(monkeypatc
 def test_a_hold_that_is_refused_becomes_a_landing(monkeypatch):
     """Interrupted, and the autopilot does not hold: it must not be left to its last rates."""
     monkeypatch.setattr(Px4, "hold", lambda _: Command(dialect.MAV_CMD_DO_SET_MODE, 1.0, 99.0))
-    monkeypatch.setattr(Px4, "arm", lambda _: (Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0),))
     with mock_vehicle() as mock:
         observer = When("maneuvers", lambda: session.interrupt("Ctrl-C"), after=1.0)
         session = session_for(mock, None, observer)

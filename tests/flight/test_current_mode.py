@@ -75,7 +75,7 @@ def test_one_that_comes_early_asks_for_a_heartbeat():
         await answer.wait()
 
     context = SimpleNamespace(
-        snapshot_builder=SimpleNamespace(listen=lambda _: None),
+        snapshot_builder=SimpleNamespace(read_counters=lambda _: None),
         ground=SimpleNamespace(update=lambda: None),
         replacement_detector=SimpleNamespace(update=lambda: None, require=lambda: None),
         fresh_heartbeat=fresh_heartbeat,
@@ -128,7 +128,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
     state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False, mode_not_intended=False)
     autopilot = SimpleNamespace(roles=lambda mode: frozenset({mode}))
     context = SimpleNamespace(
-        snapshot_builder=SimpleNamespace(listen=lambda _: None),
+        snapshot_builder=SimpleNamespace(read_counters=lambda _: None),
         ground=SimpleNamespace(update=lambda: None),
         replacement_detector=SimpleNamespace(update=lambda: None, require=lambda: None),
         config=Config(),
