@@ -7,7 +7,9 @@ from companion.vehicle.timesync import TimeSync
 from tests.flight.fly import fly, mock_vehicle
 
 
-@pytest.mark.parametrize(("sender", "name"), [(Outbox, "send_heartbeat"), (TimeSync, "send_exchange_request")])
+@pytest.mark.parametrize(
+    ("sender", "name"), [(Outbox, "send_heartbeat"), (TimeSync, "send_exchange_request")]
+)
 def test_a_task_of_the_link_that_fails_in_flight_ends_the_flight(sender, name, monkeypatch):
     with mock_vehicle() as mock:
 
