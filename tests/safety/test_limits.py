@@ -264,6 +264,14 @@ def test_it_brakes_in_time_before_a_fence_on_the_map():
     assert "braking now would end" in judge(at(motion=fast), False)
 
 
+@pytest.mark.parametrize("more", [{"acceleration": (4.0, 0.0)}, {"wind": (2.0, 0.0)}])
+def test_it_brakes_earlier_while_the_vehicle_still_gains_speed_and_in_tail_wind(more):
+    judge = braking(Fence(10.0, inf, -inf, (), (), 2.0, 0.5, tilt_acceleration=3.0))
+    moving = Motion(offset=(6.5, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0)
+    assert judge(at(motion=moving), False) is None  # stops 2 m on
+    assert "braking now would end" in judge(at(motion=moving._replace(**more)), False)
+
+
 def odd(name, then=Action.LAND, action=Action.HOLD):
     """A monitor that is wrong while its bit of the flags is set: 1 for a, 2 for b."""
     bit = 1 << "ab".index(name)

@@ -9,7 +9,7 @@ import pytest
 from companion.attitude import BodyRates
 from companion.control.heading_frame import HeadingFrame
 from companion.control.loop_record import LoopRecord, Unanswered
-from companion.guidance.fence import Place
+from companion.guidance.fence import FenceCentre, Place
 from companion.safety.snapshot import AutopilotStatus, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
 from companion.vehicle.records import LocalPosition
@@ -126,6 +126,13 @@ def test_motion_is_seen_from_where_control_began(flight):
         wind=(0.5, -0.6),
         moves_to_hold=True,
     )
+
+
+def test_the_fence_may_have_another_centre_than_where_control_began(flight):
+    flight.builder.begin(10.0, FenceCentre((4.0, 5.0, -6.0), Place(46.0, 7.0)))
+    assert flight.builder.flown_fence_centre().place == Place(46.0, 7.0)
+    flight.listen(10.0)
+    assert flight.snapshot().motion.origin == Place(46.0, 7.0)
 
 
 @pytest.mark.parametrize("command", [None, SimpleNamespace(idle=True)])
