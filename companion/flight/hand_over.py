@@ -77,7 +77,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     def require_ours() -> None:
         require_role(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
 
-    def require_offboard() -> None:
+    def require_offboard_or_landing() -> None:
         require_role(context.link, {Role.OFFBOARD, Role.LAND})
 
     def landing() -> bool:
@@ -93,7 +93,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         await asyncio.sleep(_REPETITION_PAUSE)
         if was_offboard and not landing():
             await _hold_meanwhile(context, landing)
-        return require_offboard if in_role(context.link, Role.OFFBOARD) else require_ours
+        return require_offboard_or_landing if in_role(context.link, Role.OFFBOARD) else require_ours
 
     await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
 

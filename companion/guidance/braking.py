@@ -6,8 +6,8 @@ from typing import NamedTuple
 from companion.guidance.reference import NorthEast, Reference, Vector, VehicleMotion
 
 _DECELERATION_SHARE = 0.47
-"""Mean deceleration of a smooth stop, as a share of the largest horizontal acceleration. The peak
-is a share of 0.7; the other 0.3 are for wind and feedback."""
+"""Mean deceleration of a smooth stop, as a share of what the tilt leaves beside the wind. The peak
+is a share of 0.7; the other 0.3 are for gusts and feedback."""
 _LARGEST_JERK = 8.0
 """Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
 _REST_SPEED = 0.1

@@ -14,9 +14,9 @@ import subprocess
 import sys
 import tomllib
 from fnmatch import fnmatch
-from importlib.util import find_spec
 from pathlib import Path
 
+from companion.extras import MissingExtraError, require
 from tests.mutants.report import WANTED, Mutant, print_room
 from tests.mutants.seconds import measured_seconds
 
@@ -63,8 +63,10 @@ def main() -> int:
     parser.add_argument("--limit", type=float, default=1.0, help="CPU s of a quick test")
     parser.add_argument("--children", type=int, default=os.cpu_count(), help="processes")
     options = parser.parse_args()
-    if find_spec("mutmut") is None:
-        parser.error("mutmut is not installed; `make mutants` installs it, or the extra `mutants`")
+    try:
+        require("mutmut", "mutants", "`tests.mutants`")
+    except MissingExtraError as error:
+        parser.error(str(error))
     unknown = set(options.rooms) - set(ROOMS)
     if unknown:
         parser.error(f"no such room: {', '.join(sorted(unknown))}")
