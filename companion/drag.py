@@ -124,7 +124,7 @@ def axis_drag_deceleration(
 ) -> tuple[Number, Number]:
     """Deceleration by an `AxisDrag`, north and east, m/s².
 
-    `cosine` and `sine` are those of its heading; `north` and `east` are the airspeed, m/s.
+    `cosine` and `sine` are of `AxisDrag.heading`; `north` and `east` are the airspeed, m/s.
     """
     forward, right = _body_components(cosine, sine, north, east)
     mean = _MEAN_CUBE_SUM * _smooth_speed((forward, right, 0.0 * right))

@@ -1,6 +1,6 @@
 """Least squares with linear and a few nonlinear unknowns; the linear ones are eliminated.
 
-This is the variable projection of Golub & Pereyra, with Levenberg–Marquardt steps over the
+The method is the variable projection of Golub & Pereyra, with Levenberg–Marquardt steps over the
 nonlinear unknowns.
 """
 

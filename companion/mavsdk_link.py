@@ -1,8 +1,8 @@
 """The link through MAVSDK (`link.backend: mavsdk`), which holds the connection to the vehicle.
 
 Needs the extra `mavsdk`. MAVSDK forwards frames unchanged between its two connections: one to the
-vehicle, and one of its type `raw` to this process. Each side gets each frame as the other side
-sent it, with its time stamp.
+vehicle, and one of its type `raw` to this process. Vehicle and process receive each frame exactly
+as it was sent, with its time stamp.
 
 MAVSDK sends from a thread of its own, so a frame reaches the kernel 0.1 ms later than if this
 program sends it. MAVSDK does not report whether a frame was sent, and queues frames that a serial

@@ -1,4 +1,4 @@
-"""How a user starts this program again, for the commands that messages suggest."""
+"""The shell command that starts this program, for messages that suggest a command."""
 
 import shlex
 import shutil
@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def program_command() -> str:
-    """The command by which a shell starts this program again."""
+    """The shell command that starts this program again."""
     program = Path(sys.argv[0])
     if program.name != "companion":  # `python -m companion`
         return f"{shlex.quote(sys.executable)} -m companion"

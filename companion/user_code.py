@@ -30,7 +30,7 @@ def naming_user_code(
     unchanged, unless the object contains a trajectory of the user.
 
     Args:
-        role: what the code is to the flight, such as "trajectory".
+        role: role of the code in the flight, such as "trajectory".
         code: the object or function that is called in the block.
         passed_errors: errors that the code may raise; they are raised unchanged.
 

@@ -37,8 +37,8 @@ class Truth(TypedDict):
     mode: str
     """Flight mode, by PX4's or ArduCopter's name."""
     intended_mode: str
-    """The mode that the user chose last. A failsafe of PX4 does not change it; on ArduPilot it is
-    always ``mode``."""
+    """The mode that the user chose last, which a failsafe of PX4 does not change; on ArduPilot
+    always equal to ``mode``."""
     failsafe: bool
     landed: bool
     """Whether the autopilot's land detector reports landed."""

@@ -132,7 +132,7 @@ class Server:
     def _collect_until_answer(self, timeout_s: float) -> None:
         """Collect datagrams until the answer comes or the timeout ends.
 
-        The server polls for a moment before it sleeps. This saves two wake-ups a step, which are
+        The server polls for a moment before it sleeps. Polling saves two wake-ups a step, which are
         most of the cost of a round trip.
         """
         began_s = time.monotonic()
@@ -216,8 +216,8 @@ class Server:
     def _clock_ns(self) -> int:
         """Return vehicle time for TIMESYNC, ns.
 
-        In real time it advances between slots with the wall clock, up to the next slot. While a
-        fault freezes the clock, it does not advance.
+        In real time vehicle time advances between slots with the wall clock, up to the next slot.
+        While a fault freezes the clock, the result stays constant.
         """
         simulation = self._simulation
         if self._in_lockstep or simulation.effects.clock_frozen:

@@ -111,13 +111,13 @@ class Simulation:
     def handle(self, message: Message, link: Link) -> None:
         """Handle one message received on a link; answers are queued on that link.
 
-        An autopilot whose process has ended (`State.aborted`) ignores it.
+        An autopilot whose process has ended (`State.aborted`) ignores the message.
         """
         if not self.state.aborted:
             self._receiver.handle(message, link)
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the clock that answers TIMESYNC: vehicle time, ns, also between slots."""
+        """Set the clock for answers to TIMESYNC: vehicle time, ns, advancing between slots too."""
         self._receiver.clock_ns = clock_ns
 
     def tick(self) -> None:

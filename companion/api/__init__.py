@@ -12,8 +12,8 @@
 
     companion.run(main())
 
-The same checks, limits, fence and safety monitors hold as in `companion fly`. The names stand in
-`help(companion)`.
+The same checks, limits, fence and safety monitors hold as in `companion fly`. `help(companion)`
+lists the names.
 """
 
 # Without `__all__`: see `companion.attitude`.

@@ -204,7 +204,7 @@ async def _interrupt(session: Session, reason: str) -> bool:
 
 
 async def _end_failed(session: Session, program: ProgramPlan, reason: str) -> None:
-    """End the flight after the program failed, which becomes the result of the flight."""
+    """End the flight after the program failed; `reason` becomes the result of the flight."""
     if program.is_over or program.end_error is not None:
         session.note(reason)
     else:

@@ -4,7 +4,7 @@ With a thread for the flight, a program that computes, blocks or never yields de
 commands. The flight continues to answer attitude samples with setpoints, notices the missing
 commands, and hands the vehicle back.
 
-The program calls the methods of `OwnThreadLoop` or `SharedLoop`, which are the same, from its loop.
+`OwnThreadLoop` and `SharedLoop` have the same methods, which the program calls from its own loop.
 """
 
 import asyncio
@@ -33,12 +33,12 @@ _CHECK_PERIOD = 0.1
 
 
 class SharedLoop:
-    """Runs the flight in the program's own loop, if the vehicle's time waits for the program.
+    """Runs the flight in the program's own loop, for a vehicle whose time waits for the program.
 
     The vehicle's time waits in lockstep, and on the virtual clock of `companion.testing`.
 
     Attributes:
-        time: the clock of the flight: a function that returns s.
+        time: returns the time of the flight's loop, s.
     """
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class OwnThreadLoop:
     interpreter waits for that before it ends.
 
     Attributes:
-        time: the clock of the flight: a function that returns s.
+        time: returns the time of the flight's loop, s.
     """
 
     def __init__(self) -> None:
@@ -191,6 +191,6 @@ async def call_in_thread(function: Callable[[*Arguments], T], *arguments: *Argum
 def _vehicle_waits() -> bool:
     """Whether the vehicle's time waits for the running loop.
 
-    A thread would then only make the order of events random.
+    If it waits, a thread would only make the order of events random.
     """
     return isinstance(asyncio.get_running_loop(), LockstepEventLoop)

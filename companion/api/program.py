@@ -122,14 +122,14 @@ class ProgramPlan:
 
     @property
     def end_error(self) -> Exception | None:
-        """The exception that every later call raises; None: the flight does not end."""
+        """The exception that every later call raises; None: the flight continues."""
         if self._end_error is not None:
             return self._end_error
         reason = self.end_reason() or (_CANCELLED if self._cancelled else None)
         return None if reason is None else FlightEnded(reason)
 
     def require_flight(self) -> None:
-        """Raise `end_error` if the flight ends or has ended."""
+        """Raise `end_error` if the flight is ending or has ended."""
         error = self.end_error
         if error is not None:
             raise error
@@ -173,13 +173,13 @@ def flight_ended(result: str) -> FlightEnded:
 
 
 def mark_error_retrieved(ended: asyncio.Future[Any]) -> None:
-    """Done-callback: no warning of asyncio, because the program gets the error by another call."""
+    """Done-callback that stops asyncio's warning; another call raises the error in the program."""
     if not ended.cancelled():
         ended.exception()
 
 
 def failure_words(name: str, error: BaseException) -> str:
-    """How the program `name` failed: cancelled, dropped, or by an error, as a clause."""
+    """A clause that says how the program `name` failed: cancelled, dropped, or by an error."""
     if isinstance(error, asyncio.CancelledError):
         return f"{name} was cancelled"
     if isinstance(error, GeneratorExit):  # as when the cell of a notebook runs once more

@@ -56,7 +56,7 @@ class NewestState:
         return self._newest_state
 
     def subscribe(self, callback: Callable[[], object]) -> Callable[[], None]:
-        """Call `callback` in the program's loop after each new state; call the result to stop.
+        """Call `callback` in the program's loop after each new state; return a function to stop it.
 
         States do not queue up while the program is busy.
         """

@@ -25,10 +25,10 @@ def straight_path(
     """A straight line, from rest to rest; for a distance of nearly 0, a hover.
 
     Args:
-        config: its limits bound the usual speed.
+        config: configuration whose limits bound `_usual_speed`.
         to: end of the line relative to its start, m NED.
         heading: rad; None: the vehicle keeps its heading.
-        speed: largest speed, m/s; None: the usual one.
+        speed: largest speed, m/s; None: `_usual_speed`.
         acceleration: largest acceleration, m/s².
         jerk: largest jerk, m/s³.
 

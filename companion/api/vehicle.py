@@ -85,7 +85,7 @@ class Vehicle:
     async def take_over(self) -> None:
         """Wait until the pilot hands over in the air; check the vehicle, and take over.
 
-        The pilot, or a program that ended before, left it in hold (GUIDED on ArduPilot), at
+        The pilot, or an earlier program, has left the vehicle in hold (GUIDED on ArduPilot) at
         `flight.takeoff_height_m` or higher. The wait is limited by `flight.arming_timeout_s`.
 
         Raises:
@@ -150,7 +150,7 @@ class Vehicle:
 
         Args:
             trajectory: a trajectory, or the path of its file (the format of `flight.trajectory`).
-            slow_down: slow it down where it breaks a limit, as `--slow-down` does; its path stays.
+            slow_down: fly slower where the trajectory breaks a limit, on the same path.
 
         Raises:
             ConfigError: the trajectory is unreadable, inconsistent, or breaks a limit or the fence.

@@ -5,7 +5,8 @@
     >>> planner.rates((1.0, 0.0, 0.0, 0.0), Target(north=0.2, east=0.0, heading=0.0), dt=0.004)
     BodyRates(roll=0.0, pitch=-1.0, yaw=0.0)
 
-Nose down, towards north. One step on plain floats: no I/O, no clock, no configuration, no arrays.
+The vehicle pitches nose down, towards north. A call computes one step on plain floats, without I/O,
+clock, configuration or arrays.
 World NED, body FRD; SI units and radians. Quaternions are (w, x, y, z), Hamilton product, body to
 world.
 Each name below has its own page: `help(companion.attitude.make_planner)`.

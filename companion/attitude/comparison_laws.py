@@ -1,6 +1,6 @@
 """The laws with which the paper compares its own, section 4.2: `quaternion`, `so3` and `euler`.
 
-The paper claims that `quaternion` and `so3` respond in the same way at every heading. This holds
+The paper claims that `quaternion` and `so3` respond in the same way at every heading. This is true
 for the attitude error in the body frame, q⁻¹ ⊗ q_d, used here, and not for the paper's q_d ⊗ q⁻¹.
 As in the paper, one gain serves all three axes.
 """

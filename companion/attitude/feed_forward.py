@@ -46,9 +46,9 @@ class AxisLead:
         self._heading_change = plans.predicted_heading_change(planned_for, self._plan)
 
     def command(self, dt: float, start_heading: float) -> float:
-        """Return the rate to send from this plan to the next one, rad/s; advance to the next plan.
+        """Advance to the next plan; return the rate to send between the two plans, rad/s.
 
-        Both plans are rotated into the body axes predicted for the times of the plans.
+        Each plan is rotated into the body axes predicted for the time of that plan.
 
         Args:
             dt: time from the last plan to the next one, s.

@@ -181,7 +181,8 @@ class SampleHold:
     The rates of each step of the plan are meant for the expected sample period, but the vehicle
     keeps them until the next sample. If that sample is late or early (PX4: after 4 or 8 ms,
     ArduPilot: some in pairs), the vehicle has turned too far or not far enough, and a step would
-    not be straight. The next rates correct this, for a delay of one period at most.
+    not be straight. The next rates correct this error; a sample that is more than one period late
+    is corrected as if it were one period late.
 
     Attributes:
         lateness: how much later than expected the newest sample came, s; negative if it was early.

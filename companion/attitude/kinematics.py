@@ -21,7 +21,7 @@ def half_tilt_products(w: float, x: float, y: float, z: float) -> tuple[float, f
 def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, float, float]:
     """Split a unit quaternion into tilt (a, x, y, 0) ⊗ yaw (b, 0, 0, z); return (a, b, x, y, z).
 
-    This is equation 9. The x and y of the tilt and the z of the yaw are not those of the argument.
+    This is equation 9. The returned x, y and z differ from those of the argument.
     The heading of an exactly inverted attitude (w = z = 0) is undefined; it is taken as zero.
     """
     a = sqrt(w * w + z * z)

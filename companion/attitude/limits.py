@@ -85,7 +85,7 @@ class Constants(NamedTuple):
         max_speed: largest speed of the coefficients, 1/s: `Limits.coefficient_speed`.
         tilt_rate_weight: 1/max_tilt_rate², s²/rad², 0 without a limit: a tilt rate exceeds the
             limit if weight·rate² > 1.
-        speed_weight: the same for `max_speed`, s².
+        speed_weight: 1/max_speed², s², 0 without a limit: used like `tilt_rate_weight`.
         longest_target: largest length of target coefficients: sin of the largest tilt.
         cos_recovery: cosine of the recovery angle.
         recovery_slope: 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND_ANGLE)).

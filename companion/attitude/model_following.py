@@ -180,7 +180,7 @@ class ModelFollowingPlanner:
     ) -> tuple[float, float, float]:
         """Feedback towards the plan: speeds of the coefficients (1/s) and of the heading (rad/s).
 
-        Both are 0 in the first dead time after the start, when no plan has taken effect yet.
+        Both speeds are 0 in the first dead time after the start, when no plan has taken effect yet.
         """
         speed_north = speed_east = turn_rate = 0.0
         forward = self._feed_forward

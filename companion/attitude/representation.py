@@ -69,7 +69,7 @@ def decompose(q: Quaternion) -> TiltYaw:
 def coefficients(q: Quaternion) -> Coefficients:
     """Acceleration coefficients (−2ay, +2ax) of an attitude, with a, x, y of `decompose`.
 
-    Their norm is sin(tilt) (paper, equation 10).
+    The norm of the coefficients is sin(tilt) (paper, equation 10).
 
     Raises:
         InvalidQuaternionError: `q` is not a unit quaternion; see `normalised`.

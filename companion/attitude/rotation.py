@@ -39,14 +39,15 @@ def body_error(q: Quaternion, goal: Quaternion) -> Quaternion:
 
 
 def first_nonzero_is_negative(x: float, y: float, z: float) -> bool:
-    """Whether the first nonzero component is negative: true for one of v and −v, unless v is 0."""
+    """Whether the first nonzero component is negative: for v ≠ 0, true for either v or −v."""
     return x < 0.0 or (x == 0.0 and (y < 0.0 or (y == 0.0 and z < 0.0)))
 
 
 def angle_per_sine(w: float, sine: float) -> float:
     """The factor θ/sin(θ/2) of a rotation with scalar part w ≥ 0 and `sine` = |vector part|.
 
-    It scales the vector part v of a unit quaternion to the rotation vector: Log(q) = θ/sin(θ/2)·v.
+    The factor scales the vector part v of a unit quaternion q to its rotation vector:
+    Log(q) = θ/sin(θ/2)·v.
     """
     if sine < _SMALL_ANGLE:
         return 2.0

@@ -96,8 +96,8 @@ class TargetFrame:
     """Heading of ArduPilot's attitude target, along whose axes ArduPilot applies body rates.
 
     A yaw rate turns the attitude target at once, within its slew limit; the body follows 0.2 s
-    later. ATTITUDE_TARGET reports the target's heading; `advance` adds the turn by the rates sent
-    since then.
+    later. ATTITUDE_TARGET reports the target's heading; `advance` adds the turn by the yaw
+    rates that act on the target after this report.
     """
 
     def __init__(self, response: RateLoopResponse) -> None:
@@ -143,11 +143,11 @@ class TargetFrame:
             del times[:_ROWS_PER_DROP], self._turns[:_ROWS_PER_DROP]
 
     def lead(self, start_heading: float, plans: PlanHistory) -> float:
-        """Predicted yaw lead of the target over the body when rates sent now begin to act, rad.
+        """Predicted yaw lead of the attitude target over the body when rates sent now act, rad.
 
         The lead is computed from the newest attitude target, or from `RateLoopResponse.lead_time`
-        if that target is missing, older than `OLDEST_ATTITUDE_TARGET`, or more than `LARGEST_LEAD`
-        from the body.
+        if this attitude target is missing, older than `OLDEST_ATTITUDE_TARGET`, or more than
+        `LARGEST_LEAD` from the body.
 
         Args:
             start_heading: see `FeedForward.advance`.
@@ -162,13 +162,13 @@ class TargetFrame:
         return 0.0 if self._lead_time == 0.0 else plans.predicted_yaw_change(self._lead_time)
 
     def heading(self) -> float | None:
-        """Predicted heading of the target when rates sent now begin to act, rad; None: unknown."""
+        """Predicted heading of the attitude target when rates sent now act, rad; None: unknown."""
         if self._time - self._reported_at > OLDEST_ATTITUDE_TARGET:
             return None
         return self._heading_offset + self._turns[-1]
 
     def _turn_until(self, time: float) -> float:
-        """Turn of the target by the rates sent until `time`, rad; interpolated linearly."""
+        """Turn of the attitude target by the rates sent until `time`, rad; linear interpolation."""
         times, turns = self._times, self._turns
         if time < times[0]:
             return turns[0]

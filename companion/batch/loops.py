@@ -52,7 +52,7 @@ def _compiler(any_angle: bool) -> Compiler:
 
 @cache
 def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
-    """Compile the loops of `law`; those for turns of up to 1 rad (not `any_angle`) are faster."""
+    """Compile the loops of `law`; faster without `any_angle`, but only for turns up to 1 rad."""
     compiler = _compiler(any_angle)
     one_law = compiler.compile_function(law)
 

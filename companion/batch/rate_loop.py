@@ -1,9 +1,9 @@
 """Flies one vehicle with a model of its rate loop, compiled.
 
 The model has a dead time, a slew limit and a lag for each axis. `companion.batch.loops` steps all
-vehicles together, with an ideal rate loop and the same gains and limits. Here a call flies a single
-vehicle from beginning to end. Each vehicle may therefore have its own limits, gains and rate loop,
-and the memory does not grow with the number of vehicles.
+vehicles together, with an ideal rate loop and the same gains and limits. In this module, a call
+flies a single vehicle from beginning to end. Each vehicle may therefore have its own limits, gains
+and rate loop, and the memory does not grow with the number of vehicles.
 """
 
 from collections.abc import Callable, Sequence

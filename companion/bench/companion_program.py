@@ -1,4 +1,4 @@
-"""A program that answers samples with link, control loop, planner and thrust of `companion fly`.
+"""A program that sends setpoints with the link, control loop and planner of `companion fly`.
 
 `python -m companion.bench.companion_program PORT [mavsdk | CLIENT_PORT]` listens on UDP port PORT.
 With `mavsdk`, MAVSDK forwards all frames (`link.backend: mavsdk`). With CLIENT_PORT, all messages
@@ -46,7 +46,7 @@ def _link(settings: LinkSettings, *, by_mavsdk: bool) -> Link:
 
 
 async def _answer(link: Link) -> NoReturn:
-    """Answer samples by a `ControlLoop`, which gets a new guidance command 50 times a second."""
+    """Run a `ControlLoop` on the samples, with a new guidance command 50 times a second."""
     config = Config()
     now = asyncio.get_running_loop().time
     loop = ControlLoop(

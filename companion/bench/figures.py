@@ -32,7 +32,7 @@ def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> di
 
 
 def print_table(title: str, names: Mapping[str, str], figures: Mapping[str, Any]) -> None:
-    """Print a row for each program; `names` holds its title and `figures` its figures, by key."""
+    """Print a row for each program: its title from `names` and its figures from `figures`."""
     table = Table(title=title)
     for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
         table.add_column(heading, justify="right" if heading else "left")

@@ -1,7 +1,7 @@
 """`companion bench flight`: how much faster than real time one core flies whole flights.
 
 The program and the mock vehicle run in one process (`companion.testing`). The processor time of
-both together is measured, so that other programs on the computer count little. A first, short
+both together is measured, so other programs on the computer have little effect. A first, short
 flight, which imports modules, is not measured. The physics are compiled if numba is installed.
 """
 

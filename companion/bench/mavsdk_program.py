@@ -1,4 +1,4 @@
-"""A program that answers samples with MAVSDK's asyncio interface, as a user of MAVSDK writes it.
+"""A program that answers samples through MAVSDK's asyncio interface, as MAVSDK's users write it.
 
 MAVSDK stamps setpoints with its own clock. This program therefore returns the time stamp of the
 sample in the yaw rate, as 1 °/s for each ms, modulo `STAMP_MODULUS`.

@@ -1,7 +1,7 @@
 """`companion bench planner`: the time of one step of a planner, in a flight and in a batch.
 
 Times are the shortest of many short repeats without garbage collection, so that other load on the
-computer hardly counts. Between these repeats two baselines are measured in the same way: a bare
+computer has little effect. Between these repeats two baselines are measured in the same way: a bare
 Python call, and a copy of the same arrays.
 """
 
@@ -55,10 +55,10 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
         - `compiled`: whether numba compiled the batches.
         - `flight_ns`: time of a step of `planner.rates` on plain floats, by planner; its `baseline`
           is a Python function that returns its argument.
-        - `new_target_ns`: the same, but each step has a new target, which the planner checks.
+        - `new_target_ns`: like `flight_ns`, with a new target in each step, which is checked.
         - `batch_ns`: time of a step in `batch.rates` with its checks, by planner and number of
           vehicles; its `baseline` is a copy of the same attitudes and targets.
-        - `flight_ratio`, `new_target_ratio`, `batch_ratio`: the same divided by the baseline.
+        - `flight_ratio`, `new_target_ratio`, `batch_ratio`: the times divided by their baselines.
         - `simulated`: `step_ns`, time of a step of one vehicle with `first-order`, by
           `batch.advance`; `seconds_per_second`, simulated time per computing time, for
           `vehicles` vehicles at `rate_hz` samples per second.

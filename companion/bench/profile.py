@@ -47,10 +47,10 @@ _ROOTS = tuple(
 
 @contextmanager
 def sampling() -> Iterator[Counter[str]]:
-    """In the context, count samples of the main thread's stack by part.
+    """While the block runs, sample the main thread's stack, and count the samples of each part.
 
-    A function in a file that no part names, such as one of another package, counts for the part
-    that called it.
+    A function in a file that belongs to no part, for example of another package, counts for the
+    part that called the function.
     """
     counts: Counter[str] = Counter()
     parts: dict[str, str | None] = {}

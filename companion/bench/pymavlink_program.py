@@ -1,6 +1,6 @@
 """A simple program on pymavlink: a loop with a blocking socket and the same control law.
 
-It decodes, computes and encodes. It has no offboard-loss checks, thrust control or recording.
+The program has no offboard-loss checks, no thrust control and no recording.
 """
 
 import socket

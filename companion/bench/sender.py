@@ -40,7 +40,7 @@ class Sender:
     """Simulates one vehicle for one program.
 
     Args:
-        program: the program that answers; `close` stops it.
+        program: the measured program, which answers the samples; `Sender.close` stops it.
         read_stamp: reads from a setpoint the time stamp of its sample.
         modulus: value at which the time stamps in setpoints wrap, ms.
         extra_messages: messages that follow each sample, each in a datagram of its own.

@@ -29,10 +29,10 @@ class Campaign:
     """A campaign: what to fly, and the files that the flights read."""
 
     file: CampaignFile
-    """Content of the campaign file. A trajectory in its `sweep` is a path, a key of `files`."""
+    """Content of the campaign file. A trajectory in `file.sweep` is a path: a key of `files`."""
     base: Config
-    """Configuration that the swept keys change; the keys of `set` are already applied. Its
-    `flight.trajectory`, if any, is a key of `files`."""
+    """Configuration that the swept keys change; the keys of `set` are already applied. If
+    `base.flight.trajectory` is set, it is a key of `files`."""
     files: Mapping[str, str]
     """The text of each file that a flight reads, by its path in the campaign's folder."""
     file_path: str
@@ -129,7 +129,7 @@ class Campaign:
 
 
 def _stored_value(name: str, value: Any) -> Value:
-    """The value of a factor as stored in the results; of a trajectory, the name of its folder.
+    """The value of a factor as stored in the results; a trajectory is stored as its folder's name.
 
     Each trajectory is copied into a folder named after its file: `circle`, then `circle-2`.
     """

@@ -169,7 +169,7 @@ class CampaignFile(Section):
     @field_validator("config", mode="before")
     @classmethod
     def _require_file_or_keys(cls, value: Any) -> Any:
-        """Raise ValueError for any other type; pydantic would report one error for each type."""
+        """Raise one ValueError unless `config` is a path or keys; pydantic would report several."""
         if not isinstance(value, str | Path | dict):
             raise ValueError("must name a file, or hold the keys of a configuration")
         return value

@@ -112,9 +112,9 @@ def _silence_dask() -> None:
 
 @contextmanager
 def _termination_deferred() -> Iterator[None]:
-    """Handle SIGTERM when the context ends: Dask cannot close a cluster that is still starting.
+    """Handle SIGTERM at the end of the block: Dask cannot close a cluster that is still starting.
 
-    SIGTERM is not blocked, because Dask ends the worker processes by it.
+    SIGTERM is not blocked, because Dask ends the worker processes by this signal.
     """
     if threading.current_thread() is not threading.main_thread():  # signals are not handled here
         yield

@@ -17,7 +17,7 @@ _MOST_MEASURED_FLIGHTS = 3
 _MOST_MEASURED_VEHICLES = 64
 """Largest number of vehicles in the measured batch.
 
-They share one planner, because compiling a planner takes 2 s."""
+All measured vehicles have one planner, because compiling a planner takes 2 s."""
 
 
 def case_time(kind: str, cases: Sequence[Case]) -> float:
@@ -47,7 +47,7 @@ def check_size(campaign: Campaign, seconds_per_case: float, workers: int) -> Non
     `seconds_per_case` is the wall time that a case takes, s.
 
     Raises:
-        ConfigError: says the number of cases, the time they would take, and which key allows more.
+        ConfigError: the campaign is too large; the message names the key that permits more.
     """
     cases, limits = campaign.number_of_cases, campaign.file.limits
     most_allowed = most_cases(campaign)

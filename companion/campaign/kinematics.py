@@ -37,8 +37,8 @@ def check_case(case: Case) -> None:
     """Check that a case can be flown in a batch.
 
     Raises:
-        ConfigError: its planner keeps state, it has no open-loop steps, 1000 Hz is no multiple of
-            its sample rate, or it has a fault.
+        ConfigError: the planner keeps state, no maneuver has open-loop steps, 1000 Hz is no
+            multiple of the sample rate, or the case has a fault.
     """
     if reason := _why_unflyable(case):
         raise ConfigError(f"{case.description()}: {reason}")
@@ -94,7 +94,7 @@ def run_case(case: Case) -> dict[str, Value]:
 
 
 def _outcomes(flight: StepFlight, figures: StepFigures, longest_target: float) -> dict[str, Value]:
-    """The outcomes of a case; `longest_target`: largest √(north² + east²) of its coefficients."""
+    """The outcomes of a case; `longest_target`: largest √(north² + east²) of a target."""
     time_constants = [constant for constant in figures[-2:] if isfinite(constant)]  # north and east
     values = {
         "cross_axis_max": figures.cross_axis_max,
@@ -167,7 +167,7 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
 def _parts(maneuver: Corners | Steps, rate_hz: float) -> tuple[tuple[int, int, Coefficients], ...]:
     """The open-loop steps of a maneuver and the level parts between them.
 
-    The maneuver has amplitude 1, so that cases of all amplitudes share them.
+    The maneuver has amplitude 1, so that the cached parts serve cases of all amplitudes.
 
     Returns:
         for each part: its first sample, the sample after its last, its acceleration coefficients.

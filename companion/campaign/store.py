@@ -92,7 +92,7 @@ def write_unit(
     rows: Sequence[Mapping[str, Value]],
     timing: Mapping[str, Any],
 ) -> None:
-    """Write the rows of a unit of work, in order. They are on the disk when the function returns.
+    """Write the rows of a unit of work; when the function returns, the rows are on the disk.
 
     `timing` (wall times and worker) gets a file of its own, because it differs between runs.
 

@@ -15,7 +15,7 @@ Row = dict[str, Value]
 LONGEST_UNIT_S = 2.5
 """Longest planned wall time of a unit with several cases, s.
 
-It is long compared with the time to send a unit, and so short that a lost unit costs little."""
+A unit takes long compared with the time to send it, and a lost unit costs little."""
 _UNITS_PER_WORKER = 4
 """Number of units for each worker in a campaign with few cases, before rounding.
 

@@ -129,7 +129,7 @@ def fly(
 
 
 def write_flight_page(folder: Path) -> str:
-    """Write the page about a flight; return a sentence: where it is, or why there is none."""
+    """Write the page about a flight; return its path, or why there is no page, as a sentence."""
     from companion.report.page import write_report  # noqa: PLC0415  after the flight only
 
     try:

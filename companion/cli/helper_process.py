@@ -30,7 +30,7 @@ def helper_process(
         options: the options of the command line.
         config: the configuration of the flight.
         path: the configuration file, which `--watch` watches.
-        config_as_read: the configuration as `path` had it.
+        config_as_read: the configuration read from `path`, without the options.
         folder: the flight's folder; None: other programs command the flights (`serve`).
         console: shows the addresses of the live page and the live stream.
 

@@ -196,7 +196,7 @@ def _how_to_include(out: Path, config: Path | None) -> str:
 
 
 def _figures(vehicle: IdentifiedVehicle) -> dict[str, Any]:
-    """The figures of each axis for `--json`; null where there is none."""
+    """The figures of each axis for `--json`; null for a figure that the fit does not have."""
     return {
         name: {
             "lag_ms": _in_ms(response.lag),

@@ -31,7 +31,7 @@ _USAGE_ERRORS = (
 )
 """Errors of the command line, the configuration, or what they name: exit code 2."""
 _FLIGHT_ERRORS = LinkError, VehicleStoppedError
-"""Errors of the flight or of what it needs: exit code 1."""
+"""The link, the mock vehicle or a benchmark failed: exit code 1."""
 
 Command = Callable[[argparse.Namespace], int]
 

@@ -12,9 +12,9 @@ from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
 SECOND_CTRL_C_AFTER = 1.0
-"""Shortest time between two presses of Ctrl-C of which the second stops the setpoints at once, s.
+"""Time after a Ctrl-C from which another Ctrl-C stops the setpoints at once, s.
 
-A key may bounce, so an earlier second Ctrl-C is ignored.
+A Ctrl-C that comes sooner is ignored, because a key may bounce.
 """
 
 HOW_TO_LEAVE = (

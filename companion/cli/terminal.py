@@ -1,4 +1,4 @@
-"""Shows a flight on the terminal: phases, events, its state, and the question at the end."""
+"""Shows a flight on the terminal: phases, events and state; asks at the end whether to land."""
 
 import asyncio
 import queue

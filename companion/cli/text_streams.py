@@ -1,8 +1,8 @@
 """Makes standard output and error transliterate the characters that they cannot encode.
 
 A terminal may be ASCII or Latin-1 (`LANG=C`, `PYTHONIOENCODING`), and a file name may be any bytes.
-Neither may end a command that flies, and an output that is closed, full or no longer read may not
-end it either.
+A command that flies must continue in spite of text that the output cannot show, and in spite of an
+output that is closed, full or no longer read.
 """
 
 import codecs
@@ -70,7 +70,7 @@ class _Output(io.TextIOWrapper):
 
 
 def flush_output() -> str | None:
-    """Flush standard output; return why the text printed so far does not reach it.
+    """Flush standard output; return why some of the printed text is lost.
 
     After a failure, later text is discarded, so that Python does not report it again at exit.
 

@@ -74,7 +74,7 @@ class RealtimeConfig(Section):
     lock_memory: bool = False
     """Lock the program's memory in RAM, so that a step never waits for the disk."""
     freeze_gc: bool = False
-    """Switch the garbage collector off in flight. It runs after the flight."""
+    """Switch the garbage collector off until the flight has ended."""
     required: bool = False
     """Refuse to fly unless every requested setting is granted."""
 

@@ -20,9 +20,9 @@ CAMPAIGN_KEYS = (
     "name", "kind", "config", "seed", "samples", "sampling", "same_seeds", "set", "sweep", "faults",
     "limits", "tune",
 )  # fmt: skip
-"""The keys of a campaign file. Its model, in `companion.campaign`, may not be imported here."""
+"""The keys of a campaign file, copied: `companion.campaign` may not be imported here."""
 TRAJECTORY_KEYS = ("hover", "line", "circle", "helix", "figure_eight", "waypoints", "csv")
-"""The keys of a trajectory file. Its model imports this module, so it is not imported here."""
+"""The keys of a trajectory file, copied: `trajectory_file` imports this module."""
 _KEYS: Mapping[FileKind, Iterable[str]] = {
     FileKind.CONFIG: Config.model_fields,
     FileKind.TRAJECTORY: TRAJECTORY_KEYS,
@@ -41,7 +41,7 @@ def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> Non
     """Refuse a file whose top-level keys fit another kind of file better.
 
     Raises:
-        ConfigError: it is another kind of file; the message names the command or key that takes it.
+        ConfigError: the file is of another kind; the message names what takes such a file.
     """
     given = set(keys)
     found = {kind: len(given.intersection(known)) for kind, known in _KEYS.items()}

@@ -79,7 +79,7 @@ def _read(path: Path) -> Contents:
 def _drop_mixed_identification(merged: Contents) -> None:
     """Drop `vehicle.identified` and `vehicle.autopilot` if keys of `vehicle` come from other files.
 
-    The keys together are then not those that `companion identify` measured.
+    In that case `companion identify` did not measure all keys of `vehicle`.
     """
     identified_place = merged.places.get(("vehicle", "identified"))
     files = {
@@ -180,7 +180,9 @@ def _merge(merged: Contents, contents: Contents) -> None:
 
 
 def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str) -> Config:
-    """The configuration with new values by section and key, checked again; errors call them `name`.
+    """The configuration with new values by section and key, checked again.
+
+    Error messages begin with `name`, the source of the new values.
 
     Raises:
         ConfigError: the result is not valid.

@@ -42,8 +42,8 @@ class FlightConfig(Section):
     pilot arms it."""
     take_over: bool = False
     """true, or the option --take-over: the pilot flies the vehicle up to takeoff_height_m or higher
-    and hands over by switching to hold (GUIDED on ArduPilot); at the end it holds for the pilot.
-    false: the autopilot takes off and lands."""
+    and hands over by switching to hold (GUIDED on ArduPilot); at the end the vehicle holds for the
+    pilot. false: the autopilot takes off and lands."""
     accept: Annotated[tuple[Annotated[str, Field(max_length=100)], ...], Field(max_length=100)] = ()
     """Names of unsafe findings of `companion doctor` that do not prevent a flight, such as
     COM_OF_LOSS_T. The flight's events list them."""
@@ -111,7 +111,7 @@ class CircleConfig(Section):
     radius_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 3.0
     """Radius. The circle begins at the vehicle, and its centre lies north of it."""
     speed_m_s: Annotated[float, Field(ge=0.01, le=50.0)] = 2.0
-    """Speed along the circle. It rises smoothly at the beginning and falls smoothly at the end."""
+    """Speed along the circle, with smooth acceleration at the beginning and braking at the end."""
     laps: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Number of laps, acceleration and braking included."""
 

@@ -87,8 +87,8 @@ class GuidanceConfig(Section):
         default=None, json_schema_extra=TUNABLE
     )
     """Bandwidth of the wind observer, which compares the vehicle's motion with its tilt.
-    null: 1.5/T, T as in position_weight_per_s4. With a quick rate loop it rises up to 2.4/T while
-    the vehicle moves and its measured positions have little noise."""
+    null: 1.5/T, T as in position_weight_per_s4. With a quick rate loop the bandwidth rises up to
+    2.4/T while the vehicle moves and its measured positions have little noise."""
     position_lateness_ms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """Delay of the autopilot's position beyond what its estimator assumes, for example because of a
     wrong GPS delay parameter. Measure it against an independent position.
@@ -96,7 +96,7 @@ class GuidanceConfig(Section):
     max_disturbance_m_s2: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 6.0
     """Largest acceleration by wind that the observer may estimate."""
     lead: bool = True
-    """Compute each target for a time ahead, the delay of the attitude response, so that the vehicle
+    """Compute each target ahead of time, by the delay of the attitude response, so that the vehicle
     does not lag behind the reference."""
     height_gain_per_s: Annotated[float, Field(ge=0.0, le=20.0, json_schema_extra=TUNABLE)] = 1.5
     """Vertical speed commanded per metre of height error."""

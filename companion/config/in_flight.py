@@ -63,7 +63,9 @@ def differences(before: Config, after: Config) -> Iterator[Difference]:
 
 
 def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> Config:
-    """`now` with new values, which errors call `name`; `start` is the flight's first configuration.
+    """The configuration `now` with new values, checked against `start`, that of the flight's start.
+
+    Error messages begin with `name`, the source of the new values.
 
     Raises:
         ConfigError: a key must not change in flight, or the result is not valid.

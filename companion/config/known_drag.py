@@ -1,7 +1,7 @@
 """The drag known before a flight: from the configuration, or learned in an earlier flight.
 
-The maneuvers are checked twice. Before the vehicle identifies itself, it is assumed to be the one
-that flew last (`drag_before_connecting`). Then they are checked with the vehicle's own drag
+The maneuvers are checked twice: first, before the connection, with the drag of the vehicle that
+flew last (`drag_before_connecting`), and then with the drag of the connected vehicle
 (`drag_of_vehicle`), which is read once for each vehicle and passed on in the preflight evidence.
 """
 
@@ -29,7 +29,7 @@ class KnownDrag(NamedTuple):
     source: Path | None = None
     """The file of a learned drag; None: configured or unknown."""
     file_fault: str | None = None
-    """Why the file of a learned drag could not be used; None: it could, or there is none."""
+    """Why the file of a learned drag could not be used; None: no fault, or no file."""
 
     @property
     def least(self) -> Drag:

@@ -43,13 +43,13 @@ class LimitsConfig(Section):
     max_descent_m_s: Annotated[float, Field(ge=0.1, le=10.0, json_schema_extra=TUNABLE)] = 1.0
     """Largest descent rate that height hold commands."""
     fence_radius_m: Annotated[float, Field(ge=0.1, le=2000.0)] = 50.0
-    """Fence: largest horizontal distance from the place where control began. Beyond it,
-    safety.fence_action follows.
+    """Fence: largest horizontal distance from the place where control began. Beyond this
+    distance, safety.fence_action follows.
     """
     fence_ceiling_m: Annotated[float, Field(ge=0.1, le=1000.0)] = 30.0
     """Fence: largest height above the place where control began."""
     fence_floor_m: Annotated[float, Field(gt=0.0, le=100.0)] = 1.0
-    """Fence: smallest height above home. Below it, safety.fence_action follows."""
+    """Fence: smallest height above home. Below this height, safety.fence_action follows."""
     min_battery_percent: Annotated[float, Field(ge=0.0, le=100.0)] = 20.0
     """Smallest battery charge. Below this charge the program does not arm; in flight,
     safety.battery_action follows."""
@@ -88,12 +88,12 @@ class DeadmanConfig(Section):
     position, guidance and setpoints stop.
     """
     silence_limit_ms: Annotated[float, Field(ge=50.0, le=1000.0)] = 500.0
-    """After this time without a setpoint the program hands back. Keep it below the autopilot's own
-    limit (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s).
+    """After this time without a setpoint the program hands back. Set this limit below that of the
+    autopilot (PX4: COM_OF_LOSS_T, 1 s; ArduPilot: GUID_TIMEOUT, 3 s).
     """
     deadline_ms: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
-    """Longest time from the arrival of a sample to its setpoint. Over TCP and serial it counts from
-    reading the sample. A later setpoint counts as a missed deadline.
+    """Longest time from the arrival of a sample to its setpoint. Over TCP and serial this time
+    begins with reading the sample. A later setpoint counts as a missed deadline.
     """
 
     telemetry_stale = Si("telemetry_stale_ms")

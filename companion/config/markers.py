@@ -1,6 +1,7 @@
 """Markers of keys: whether and how a key may change in flight.
 
-The JSON Schema holds them as `in_flight`; the live page and the reference read them there.
+The JSON Schema holds each marker as `in_flight`. The live page and the reference of the keys read
+the markers from the schema.
 """
 
 from typing import Any

@@ -74,8 +74,8 @@ class Config(Section):
     include: FileName | Annotated[tuple[FileName, ...], Field(max_length=MOST_INCLUDED)] = Field(
         default=(), exclude=True
     )
-    """Files to include, relative to this one. Keys of this file override theirs. They may include
-    others, up to four deep."""
+    """Files to include, relative to this file. Keys of this file override keys of included files.
+    Included files may include others, up to four deep."""
 
     @property
     def planner_name(self) -> str:

@@ -34,8 +34,8 @@ class SafetyConfig(Section):
 
     hold_s: Annotated[float, Field(gt=0.0, le=60.0)] = 3.0
     """Longest hold after a breach. The vehicle lands when the breach has ended and the vehicle is
-    at rest, at the latest after this time. If it is still within braking distance of the fence
-    then, fence_action follows instead."""
+    at rest, at the latest after this time. If the vehicle is then still within braking distance
+    of the fence, fence_action follows instead."""
     fence_polygon_m: Annotated[
         tuple[tuple[Metres, Metres], ...], Field(max_length=MOST_CORNERS)
     ] = ()
@@ -48,7 +48,7 @@ class SafetyConfig(Section):
     both; neither: no polygon."""
     braking_m_s2: Annotated[float, Field(ge=0.1, le=20.0)] = 2.5
     """Assumed braking deceleration: the vehicle brakes in time to stay inside the fence. If
-    limits.max_tilt_deg and the estimated wind leave less, the program counts on less."""
+    limits.max_tilt_deg and the estimated wind allow less, the program assumes less."""
     reaction_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.3
     """Assumed delay before the vehicle brakes at the fence; it may still accelerate meanwhile."""
     fence_action: Ending = "land"

@@ -32,14 +32,14 @@ class ServeConfig(Section):
     """Longest time between setpoints of a client. After a longer time the program makes the
     vehicle hold."""
     hold_s: Annotated[float, Field(ge=0.0, le=600.0)] = 5.0
-    """Duration of the hold after a client's setpoints stop. After it the vehicle is handed back."""
+    """Duration of the hold after a client's setpoints stop. Then the vehicle is handed back."""
     max_speed_m_s: Annotated[float, Field(ge=0.1, le=30.0)] = 5.0
     """Largest horizontal speed towards a commanded position. A commanded velocity, its vertical
     part included, may reach 0.9 of safety.max_speed_m_s."""
     max_acceleration_m_s2: Annotated[float, Field(ge=0.1, le=15.0)] = 3.0
     """Largest horizontal acceleration after a jump of the commanded position or velocity."""
     max_jerk_m_s3: Annotated[float, Field(ge=1.0, le=100.0)] = 8.0
-    """Largest horizontal jerk after a jump of the commanded position or velocity. Divided by
-    gravity it is the tilt rate in rad/s."""
+    """Largest horizontal jerk after a jump of the commanded position or velocity. The jerk
+    divided by gravity is the tilt rate in rad/s."""
 
     setpoint_timeout = Si("setpoint_timeout_ms")

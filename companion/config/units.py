@@ -67,8 +67,8 @@ def converted(value: float | None, convert: Conversion) -> float | None:
 class Si(property):
     """A key's value in SI units, as a property beside the key that the user writes.
 
-    `max_tilt = Si("max_tilt_deg")` is read as `limits.max_tilt`, in rad. It is a property, so that
-    pydantic does not take it for a key.
+    `max_tilt = Si("max_tilt_deg")` is read as `limits.max_tilt`, in rad. Pydantic does not take
+    a property for a key.
     """
 
     def __init__(self, key: str) -> None:

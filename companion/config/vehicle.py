@@ -42,7 +42,7 @@ class AxisKeys(NamedTuple):
         return converted(self.acceleration_limit_deg_s2, radians)
 
     def overridden_by(self, *keys: float | None) -> "AxisKeys":
-        """A copy with new values, given in the order of the fields, where they are not None.
+        """A copy with `keys`, in the order of the fields; None keeps the present value.
 
         A new lag without a damping makes the response first order.
         """

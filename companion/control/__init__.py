@@ -1,1 +1,1 @@
-"""The control loop answers each attitude sample; the guidance loop sets its targets."""
+"""The control loop sends a setpoint for each attitude sample; the guidance loop makes targets."""

@@ -95,7 +95,7 @@ class ControlLoop:
         self._recorder.retune(limits)
 
     def on_sample(self, sample: AttitudeSample) -> None:
-        """Answer an arrived sample, or count why not (in lockstep: called when its step ends)."""
+        """Send a setpoint for a sample, or count why not (in lockstep: called as its step ends)."""
         if not self._recorder.on:
             self._handle_sample(sample)
             return

@@ -1,16 +1,16 @@
 """Resets of the autopilot's estimator: the estimate jumps while the vehicle does not move.
 
 A jump is a change between two samples that neither body rates nor velocity explain. PX4 resets its
-position or heading after it has rejected measurements of them for a while. It counts resets in
-ODOMETRY's `reset_counter`, which comes later and does not tell their size. Guidance and control
-work in a frame without these jumps:
+position or heading after it has rejected measurements of them for a while. PX4 counts its
+resets in ODOMETRY's `reset_counter`, which comes later and does not contain the size of a jump.
+Guidance and control work in a frame without jumps:
 
 - All position jumps are subtracted from a position.
 - Poses, references and targets have headings without jumps. `EstimatorResets.frame` converts
   between these and the estimator's headings and attitudes.
 
 Horizontal accelerations stay in the estimator's frame, in which position is measured. So a heading
-correction of the estimator also corrects them at once.
+correction of the estimator at once corrects the commanded accelerations, too.
 """
 
 from collections import deque
@@ -100,7 +100,7 @@ class EstimatorResets:
         return position._replace(position_ned=minus(position.position_ned, self.position_shift))
 
     def forget(self) -> None:
-        """Forget all jumps: the frame without jumps is now the estimator's. Used on the ground."""
+        """Forget all jumps, on the ground: the frame without jumps is then the estimator's."""
         self.frame, self.position_shift = HeadingFrame(), (0.0, 0.0, 0.0)
         self._newest_position = None
 

@@ -33,7 +33,7 @@ class ExpectedResponse:
     """Time until 63 % of the step is covered, s."""
     time_constants_without: dict[str, float]
     """For each cause of delay, by name, the time constant (s) without this cause: without the rate
-    limit, the lag or the dead time. For the gain it is the time constant with twice the gain."""
+    limit, the lag or the dead time. The entry for the gain is the value with twice the gain."""
     gain: float
     """Gain p of the planner, 1/s."""
     largest_gain: float | None
@@ -54,7 +54,7 @@ class ExpectedResponse:
     def clauses(self) -> list[str]:
         """The parts of `sentence`.
 
-        They give the time constant, its causes in the order of their effect, and the shortest
+        The parts give the time constant, its causes in the order of their effect, and the shortest
         possible time constant.
         """
         changes = ", ".join(
@@ -141,7 +141,7 @@ def _without_rate_loop_delays(
 def _largest_coefficient_rate(config: Config) -> float:
     """Rate of change of a coefficient while the vehicle tilts at the tilt rate limit, 1/s.
 
-    It is computed where the coefficient is half of `steps.coefficient`.
+    The rate is computed where the coefficient is half of `steps.coefficient`.
     """
     roll, pitch, _ = rates_along(0.5 * config.steps.coefficient, 0.0, 1.0, 0.0)
     return config.limits.max_tilt_rate / hypot(roll, pitch)

@@ -36,8 +36,8 @@ class FlownSource:
         pose: the held pose, or the pose from which the source began; None: neither.
         source: the source of references, or None.
         begun_at: when the source began, s of event-loop time, or None.
-        braking: the braking that ends in the held pose, also after its end; None: the pose was
-            given, or none is held.
+        braking: the braking by which the vehicle came, or comes, to rest at the held pose; None:
+            the vehicle did not brake for this pose, or no pose is held.
     """
 
     def __init__(self) -> None:
@@ -72,8 +72,8 @@ class FlownSource:
     def reference(self, now: float, motion: VehicleMotion, heading: float) -> ReferenceAt:
         """Return the reference as a function of event-loop time (s).
 
-        It is that of the source, or else of the braking, or else the held pose. Without these it is
-        the present position and heading.
+        The reference comes from the source; without a source, from the braking; without braking,
+        from the held pose; without a pose, from the present position and heading.
 
         Args:
             now: event-loop time, s.
@@ -125,7 +125,7 @@ class FlownSource:
         """Distance from the reference, m; `now` is event-loop time, s.
 
         None without a pose, and in open loop (the reference does not hold the position). After open
-        loop it stays None until the vehicle has returned to its reference, for at most
+        loop the result stays None until the vehicle has returned to its reference, for at most
         `_RETURN_TIME`. Open loop that begins before the return does not restart this time.
         """
         distance = dist(reference.position_ned, motion.position_ned)

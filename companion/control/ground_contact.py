@@ -25,7 +25,7 @@ class GroundContact:
 
     Attributes:
         takeoff_commanded: whether a take-off was commanded in this flight, or the vehicle already
-            flew. No setpoint may be idle after that.
+            flew. If so, no setpoint may have zero thrust.
     """
 
     def __init__(self, state: VehicleState, clock: Callable[[], float]) -> None:

@@ -8,7 +8,7 @@ from companion.control.heading_frame import HeadingFrame
 
 
 class GuidanceCommand(NamedTuple):
-    """One command from guidance; it holds until the next one."""
+    """One command from guidance, valid until the next command."""
 
     target: Target
     """Target of the planner: its north and east part is in the estimator's frame, its heading in

@@ -9,7 +9,7 @@ from companion.attitude.rotation import clamp, down_in_body, turned_about_vertic
 from companion.guidance.reference import rotate
 
 _LARGEST_OFFSET = radians(3.0)
-"""Largest offset of the frame, rad. It limits the effect of a wrong gyro."""
+"""Largest offset of the frame, rad; limits the effect of a wrong gyro."""
 _DECAY_S = 2.0
 """Time constant with which the offset decays after the steps, s."""
 _FOLLOWING_S = 1.0 / 4.5
@@ -65,7 +65,7 @@ class StepFrame:
     turns, too. For this autopilot, the rotation of the frame is added to the body rates.
 
     Attributes:
-        frame: this frame at present; it converts from the estimator's frame. Targets of open-loop
+        frame: converts attitudes from the estimator's frame to this frame. Targets of open-loop
             steps are in this frame already.
         offset_rate: rate of the frame's `offset`, low-passed, rad/s.
     """

@@ -57,7 +57,7 @@ _LARGEST_CORRECTION = 0.2
 
 
 def hold_weights(config: Config) -> Weights:
-    """The weights of the position hold; those not configured follow from the delay T.
+    """The weights of the position hold; weights not configured are computed from the delay T.
 
     T is the delay of the attitude behind its target (`attitude_delay`), but at least 0.275 s. The
     weights 1/T⁴ (position) and 1/T² (velocity) place the three poles of the hold about 1/T from the
@@ -90,7 +90,7 @@ def _hold_stiffness(config: Config) -> float:
 def slewing_delay(config: Config) -> float:
     """Half the time in which the rate loop slews to the largest roll-pitch rate, s.
 
-    It is 0 if no limit of the angular acceleration is known.
+    The result is 0 s if no limit of the angular acceleration is known.
     """
     axes = config.vehicle.axes["roll"], config.vehicle.axes["pitch"]
     limits = [axis.acceleration_limit for axis in axes if axis.acceleration_limit is not None]

@@ -19,7 +19,7 @@ _BEYOND_LEARNING_SHARE = 0.1
 which `thrust.correction_limit` bounds."""
 
 _LARGEST_IDLE_SHARE = 0.9
-"""Largest share of the weight that the smallest thrust may carry: the rest is for descending."""
+"""Largest share of the weight that the smallest thrust may carry, so the vehicle can descend."""
 
 _MISMATCH_SHARE = 0.15
 """Largest relative error of the configured hover thrust that is not reported."""
@@ -81,7 +81,7 @@ class HoverLearning:
             self.hover_thrust.pause()
 
     def takeover_refusal(self) -> str | None:
-        """Why a vehicle with this hover thrust would climb or fall away in our control; else None.
+        """Why takeover is refused: at this hover thrust the vehicle would climb or sink; or None.
 
         A refusal is possible only if the autopilot reports its own thrust.
         """

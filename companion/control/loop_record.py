@@ -112,7 +112,7 @@ class LoopRecord:
     last_answered_arrival: float = -inf
     """When the newest answered sample arrived, s of event-loop time."""
     gap_from: float = inf
-    """Time from which the present gap between setpoints counts: `last_answered_arrival`. It is inf
+    """Time from which the present gap between setpoints counts: `last_answered_arrival`; inf
     (no gap) before the first answer and after `ControlLoop.resume`."""
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
     """Ends of the latest gaps, s of event-loop time: arrival of the first sample that could be

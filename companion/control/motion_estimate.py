@@ -86,7 +86,7 @@ class MotionEstimate:
     def note_heading_resets(self, total: float) -> None:
         """Take the sum of the heading resets, rad.
 
-        If it changed, the disturbance is rotated, and the earlier attitudes and the filtered
+        If the sum changed, the disturbance is rotated, and the earlier attitudes and the filtered
         position correction are discarded.
         """
         if total != self._heading_resets:
@@ -185,7 +185,7 @@ class MotionEstimate:
         )
 
     def learned_note(self) -> str | None:
-        """For a drag kept for the next flight: how it differs from the assumed one; else None."""
+        """A message that the learned drag differs from the assumed one; None: they are similar."""
         if (mismatch := self._drag_mismatch()) is None:
             return None
         speed, learned, assumed = mismatch
@@ -196,7 +196,7 @@ class MotionEstimate:
         )
 
     def _drag_mismatch(self) -> tuple[float, float, float] | None:
-        """Largest speed, m/s, and learned and assumed drag there, 1/s; None: they differ little."""
+        """Top speed, m/s; learned and assumed drag at it, 1/s; None: nearly equal, or uncertain."""
         speed = self.drag.top_speed
         learned = self.drag.drag.per_velocity(speed)
         assumed = self.drag.prior_drag.per_velocity(speed)

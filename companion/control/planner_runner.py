@@ -123,7 +123,7 @@ class PlannerRunner:
         return rates if self._passed_target is None else self._step_frame.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
-        """Pass a new ATTITUDE_TARGET to the planner when a sample of its time or later has come.
+        """Pass a new ATTITUDE_TARGET to the planner, unless `sample` is older than the message.
 
         An ATTITUDE_TARGET from before a heading reset is ignored: its frame is not known.
         """

@@ -147,9 +147,10 @@ class PredictiveControl:
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:
-    """The answer's target, and the downward acceleration (m/s²) by its thrust at the target's tilt.
+    """The solver's target, and the acceleration by thrust and gravity, positive down, m/s².
 
-    `HoverThrust` converts this acceleration to the thrust at the present tilt.
+    The acceleration is that at the target's tilt; `HoverThrust` converts it to the thrust at the
+    present tilt.
     """
     cosine = sqrt(max(0.0, 1.0 - answer.north**2 - answer.east**2))
     target = Target(answer.north, answer.east, answer.heading)

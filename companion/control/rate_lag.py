@@ -23,7 +23,7 @@ class RateLag:
     from roll and pitch only, because the estimator also changes the heading of a body at rest.
 
     All rotations have the same weight. So a lag that changes in flight, for example when a filter
-    of the autopilot is switched, is followed slowly. That matters little: on the mock vehicles,
+    of the autopilot is switched, is followed slowly. The error is small: on the mock vehicles,
     where the lag grew by 11 ms after `corners`, the heading error in later steps grew by 0.1°;
     without this class it grew by 0.3°. Forgetting old rotations would reduce the growth by only
     0.05°.

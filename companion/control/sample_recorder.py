@@ -1,6 +1,7 @@
 """Records the samples that reach the control loop, and the setpoints that answer them.
 
-`FlightTrace` gets the rows for the figures; `flight.mcap`, if the flight is recorded, gets all.
+`FlightTrace` gets the rows that measurements need. If the flight is recorded, `flight.mcap` gets
+all values.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Converts the control loop's record of a sample to messages of `flight.mcap`.
 
-The loop hands over its objects. The functions here run in the recorder's thread. They write the
-numbers of these objects in the order of the columns in
+The control loop passes its objects to the recorder. In the recorder's thread, the functions here
+write the numbers of these objects in the order of the columns in
 `companion.recording.mcap_file.loop_channels`.
 """
 

@@ -28,11 +28,11 @@ _HALF_ROOT = sqrt(0.5)
 _MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
 _POINT_EVERY, _PATHS_EVERY, _BODY_EVERY = 2, 5, 10
-"""Number of drawings per point that is added to the paths, per message with the paths, and per
-message with the body. With guidance at 50 Hz there are ten drawings a second; each sends the thrust
-arrows. Paths and body are repeated, because a viewer may join late or jump in the recording."""
+"""Each 2nd drawing adds a point to the paths, each 5th sends the paths, each 10th sends the body.
+With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows. Paths and body
+are repeated, because a viewer may join late or jump in the recording."""
 _GAP_NS = 1_000_000_000
-"""A pause longer than this between two drawings starts new paths, ns."""
+"""Shortest pause between two drawings after which new paths begin, ns."""
 _METRES_PER_M_S2 = 0.1
 """Length of a thrust arrow, m per m/s²."""
 _LEAST_COS = 0.2
@@ -150,7 +150,7 @@ def _thrust_arrow_pose(rotation: Quaternion) -> Pose:
 def _arrow(q: Quaternion, thrust_attitude: Quaternion, lift: float, color: Color) -> Arrow:
     """An arrow along the thrust of `thrust_attitude`, in the frame of a vehicle of attitude `q`.
 
-    Its length shows the specific thrust whose vertical part is `lift`, m/s².
+    The length of the arrow shows the specific thrust whose vertical part is `lift`, m/s².
     """
     cosine = max(cos_tilt(thrust_attitude[1], thrust_attitude[2]), _LEAST_COS)
     length = max(_METRES_PER_M_S2 * lift / cosine, 0.01)

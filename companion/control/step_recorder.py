@@ -1,6 +1,7 @@
 """Records the steps of guidance, and how the vehicle tracks the reference.
 
-`FlightTrace` gets the rows for the figures; `flight.mcap`, if the flight is recorded, gets all.
+`FlightTrace` gets the rows that measurements need. If the flight is recorded, `flight.mcap` gets
+all values.
 """
 
 from collections.abc import Callable
@@ -63,7 +64,7 @@ class StepRecorder:
         self._recorder.add(now, self._rows.step, StepEntry(inputs, output, command))
 
     def action(self, now: float, name: str) -> None:
-        """Record a call at `now` by which a phase of the flight controls guidance; see `step`."""
+        """Record at `now` (event-loop time, s) a call by which a flight phase controls guidance."""
         if self._recorder is not None:
             self._recorder.action(now, name, self._vehicle.clock.offset)
 

@@ -182,8 +182,8 @@ def _east_north_up(ned: Vector) -> Vector:
 def _enu_from_flu(q: Quaternion) -> Quaternion:
     """(x, y, z, w) of body FLU → world ENU, from (w, x, y, z) of body FRD → world NED.
 
-    It is −(0, √½, √½, 0) ⊗ q ⊗ (0, 1, 0, 0): the first factor swaps the axes of the world, the last
-    one those of the body.
+    The result is −(0, √½, √½, 0) ⊗ q ⊗ (0, 1, 0, 0): the first factor converts the axes of the
+    world, the last factor converts the axes of the body.
     """
     w, x, y, z = q
     return (

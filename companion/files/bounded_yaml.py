@@ -75,8 +75,8 @@ def read(text: str) -> Document:
     """Read the single document in a YAML text: dicts with texts as keys, lists and scalars.
 
     Raises:
-        YamlError: it is not valid YAML, holds a key twice, an alias or a tag, or exceeds a limit of
-            this module.
+        YamlError: the text is not valid YAML, holds a key twice, an alias or a tag, or exceeds a
+            limit of this module.
     """
     lines: dict[KeyPath, int] = {}
     try:

@@ -37,8 +37,8 @@ def _types_in(annotation: Any) -> frozenset[Any]:
 def essential_details(details: list[Any]) -> list[Any]:
     """The errors that a user needs, without those that follow from others.
 
-    This drops "too short" for a list that is short only because an item was refused, further
-    missing items of a list, and the errors of all members of a union but one.
+    The function drops "too short" for a list that is short only because an item was refused,
+    further missing items of a list, and the errors of all members of a union but one.
     """
     essential: list[Any] = []
     for detail in details:
@@ -109,7 +109,7 @@ def error_sentence(detail: Any, model: type[BaseModel], former: Mapping[str, str
 
 
 def _length_fault(detail: Any, types: list[Any]) -> str:
-    """How many values a list has, and how many it needs; it may have one of these types."""
+    """How many values a list has, and how many it needs; `types`: types that the list may have."""
     value, bounds = detail["input"], detail.get("ctx", {})
     count = f"has {len(value)} {'value' if len(value) == 1 else 'values'}"
     lengths = [

@@ -36,7 +36,7 @@ def is_path(text: str) -> bool:
 
 
 def expanded_path(path: str) -> str:
-    """A path with `~` replaced by the home folder, as a shell does only on the command line."""
+    """A path with a leading `~` replaced by the home folder; in a file no shell expands it."""
     return expanduser(path)  # noqa: PTH111  Path.expanduser raises for an unknown user
 
 
@@ -44,8 +44,8 @@ class Section(BaseModel):
     """A section of the configuration: immutable; unknown keys are refused; every key is described.
 
     Attributes:
-        former_keys: renamed or removed key (`section.key`) -> what replaces it, as the end of a
-            sentence that begins with the key. Only the table of the top-level model is used.
+        former_keys: renamed or removed key (`section.key`) -> predicate of the error message, such
+            as "is now called `flight.maneuvers`". Only the top-level model may define this table.
     """
 
     former_keys: ClassVar[Mapping[str, str]] = {}
@@ -130,11 +130,11 @@ def load(path: Path, model: type[Model]) -> Model:
 
 
 def read(path: Path, model: type[Section]) -> Contents:
-    """Read a YAML file; `model` only says which keys are sections.
+    """Read a YAML file without checking the values; `model` says which keys are sections.
 
     Raises:
         UnreadableFileError: the file is missing, not regular, too large, or not UTF-8.
-        ConfigError: the file is not YAML, or holds something other than keys.
+        ConfigError: the file is not YAML, or its top level is not a mapping.
     """
     try:
         text = read_text(path, MOST_BYTES)
@@ -144,7 +144,7 @@ def read(path: Path, model: type[Section]) -> Contents:
 
 
 def parse(text: str, name: str, model: type[Model]) -> Model:
-    """Parse and check YAML text; errors call it `name`.
+    """Parse and check YAML text; error messages call the text `name`.
 
     Raises:
         ConfigError: see `load`.
@@ -168,7 +168,7 @@ def _contents(text: str, name: str, model: type[Section]) -> Contents:
 
 
 def _value_or_section(key: Any, value: Any, model: type[Section]) -> Any:
-    """The value, or an empty section if only a section's name is given."""
+    """The value; an empty section if the key is a section without contents."""
     field = model.model_fields.get(key)
     if value is not None or field is None:
         return value
@@ -184,7 +184,7 @@ def validated(
     model: type[Model],
     places: Mapping[KeyPath, Place] | None = None,
 ) -> Model:
-    """Check data that was already read; errors call it `name`, or the place of the key.
+    """Check data that was already read; errors begin with file and line of the key, or `name`.
 
     Raises:
         ConfigError: an unknown key or a bad value.
@@ -215,9 +215,9 @@ def _config_error(
 
 
 def nearest_place(where: KeyPath, places: Mapping[KeyPath, Place], name: str) -> Place:
-    """The place of a key, else of the innermost section or list around it that has a place.
+    """File and line of a key, or of the innermost section or list around the key with known line.
 
-    If none has one: the file `name` without a line.
+    If no line is known, the file `name` without a line.
     """
     ends = range(len(where), 0, -1)
     return next((places[where[:end]] for end in ends if where[:end] in places), Place(name))

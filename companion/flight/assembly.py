@@ -48,7 +48,7 @@ class AssembledFlight:
     changes: Changes
 
     def close(self) -> None:
-        """End the process of predictive control, if there is one."""
+        """End the solver's process, if the flight uses predictive control."""
         predictive = self.context.guidance_loop.maker.predictive_control
         if predictive is not None:
             predictive.close()
@@ -66,8 +66,8 @@ def assemble(
 ) -> AssembledFlight:
     """Assemble a flight with the phases of `plan` over an open link.
 
-    Its records are written to `folder`; None: nothing is written, and nothing is kept for later
-    flights.
+    The records of the flight are written to `folder`; None: nothing is written, and nothing is kept
+    for later flights.
     """
     clock: Callable[[], float] = asyncio.get_running_loop().time
     record, real_time = recorder.file, environment.realtime and not config.link.lockstep
@@ -137,7 +137,7 @@ def _context(
 def _drag_memory(
     context: FlightContext, folder: Path | None, note: Callable[[str], None], changes: Changes
 ) -> DragMemory:
-    """Make the `DragMemory`, by which checks and guidance know the drag of earlier flights."""
+    """Make the `DragMemory`, which gives checks and guidance the drag from earlier flights."""
     remembered = None if folder is None else folder.parent
     memory = DragMemory(context.config, remembered, context.guidance_loop.estimate.drag, note)
     memory.on_known = changes.on_drag
@@ -148,7 +148,7 @@ def _drag_memory(
 def _prepare_trajectories(
     context: FlightContext, note: Callable[[str], None], *, real_time: bool
 ) -> None:
-    """Report how trajectory files were read; with `guidance.kind: nmpc`, start its solver."""
+    """Note the messages about trajectory files; with `guidance.kind: nmpc`, start the solver."""
     for part in context.maneuvers.parts:
         if isinstance(part, Follow):
             for text in part.notes:
@@ -168,7 +168,7 @@ def _reporter(
     *,
     real_time: bool,
 ) -> StatusReporter:
-    """Make the reporter of the flight's state, which shows nothing if the observer ignores it."""
+    """Make the reporter of the flight's state; it shows the state only if the observer wants it."""
 
     def phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began

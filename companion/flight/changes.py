@@ -54,8 +54,8 @@ class Change(NamedTuple):
 class Changes:
     """Changes the values of a configuration in flight: checks, slews, undoes and records them.
 
-    A change must pass the checks that the configuration passed at the start. It takes effect in
-    small steps on the event loop, between samples. Monitors, fence and deadman keep their limits.
+    A change must pass the checks that the configuration passed at the start. A change takes effect
+    in small steps, between attitude samples. Monitors, fence and deadman keep their limits.
 
     Attributes:
         start_config: the configuration before the first change; changes may precede the flight.
@@ -66,7 +66,7 @@ class Changes:
         note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted_config` after each change.
         on_drag: called with the known drag of the vehicle, once its hardware id was read; some
-            checks of a change need it.
+            checks of a change need the drag.
     """
 
     def __init__(self, start_config: Config) -> None:
@@ -138,7 +138,7 @@ class Changes:
 
     @contextmanager
     def judged_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
-        """Let `refuses` judge each change and each undo while the `with` block runs.
+        """Let `refuses` decide on each change and each undo while the `with` block runs.
 
         Args:
             refuses: called with the present configuration and the wanted one; returns why the

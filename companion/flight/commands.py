@@ -16,23 +16,23 @@ from companion.vehicle.link import Link
 
 _MAX_TRIES = 4
 _EFFECT_TIMEOUT = 3.0
-"""After a refused repetition, longest wait for the effect of the first try, s. A take-off shows its
-effect later than a mode change."""
+"""If a repeated command is refused, longest wait for the effect of the first try, s. A take-off
+shows its effect later than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
 _TEXT_TIME = 0.3
-"""Largest time between a change of mode and the autopilot's text that says why, s."""
+"""Largest time between a mode change and the STATUSTEXT that gives the reason, s."""
 _BY_FAILSAFE = "the autopilot's failsafe took over"
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 IsDone = Callable[[], bool]
-"""Returns whether the vehicle does what was commanded; may raise `FlightEnded` instead."""
+"""Returns whether the vehicle has obeyed the command; may raise `FlightEnded` instead."""
 RequireOurs = Callable[[], None]
 """Raises `FlightEnded` if we must not command the vehicle; most call `require_role`."""
 
 
 def roles_of(link: Link) -> frozenset[Role]:
-    """The roles of the vehicle's mode; empty if the mode is unknown or has no role in a flight.
+    """The roles of the vehicle's mode, such as HOLD; empty if the mode is unknown or has no role.
 
     A hold that a failsafe chose is not ready for a take-off or takeover: PX4 holds for
     COM_FAIL_ACT_T before it returns or lands, and a command of ours would end the failsafe.
@@ -70,10 +70,10 @@ class ModeTaken(FlightEnded):
 
 
 async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
-    """Return the end of a flight with its cause: a geofence may have changed the mode.
+    """Return `ended`, with the autopilot's geofence as reason if it has changed the mode.
 
-    An autopilot may report this failsafe only in a text. Control is released before the wait for
-    that text.
+    ArduPilot reports a geofence breach only in a STATUSTEXT. Control is released before this
+    function waits for the text.
     """
     if not isinstance(ended, ModeTaken | ControlReleased):
         return ended
@@ -91,7 +91,7 @@ async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
 async def command_if_ours(
     context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
 ) -> None:
-    """Send a command until it is answered; before each try, check who controls the vehicle.
+    """Send a command until the autopilot answers; before each try, check who has control.
 
     A command is never repeated blindly. The vehicle may have obeyed a command whose answer was
     lost, and a pilot may have taken over since.
@@ -139,7 +139,7 @@ async def change_mode(
     """Send a mode command like `command_if_ours`, and wait until the mode is reported.
 
     Raises:
-        FlightEnded: somebody else has the vehicle, or left the accepted mode at once.
+        FlightEnded: somebody else has the vehicle, or the accepted mode ended at once.
         CommandUnfinished: the autopilot accepted the mode, but still obeys our setpoints.
         CommandRefused, CommandTimeout, LinkLost: see `command_if_ours`.
     """
@@ -179,7 +179,7 @@ async def ask_to_hold(context: FlightContext, require_ours: RequireOurs) -> None
 async def leave_offboard(
     context: FlightContext, cannot_arm_in: frozenset[Role] = _OFFBOARD_ONLY
 ) -> None:
-    """Ask a vehicle that stands disarmed in offboard to hold, because it could not be armed again.
+    """Change a disarmed vehicle from offboard to hold mode, because offboard forbids arming.
 
     When PX4 disarms, it returns to the last mode that its user chose: OFFBOARD, if the landing
     began there. PX4's pre-arm checks fail in AUTO.LAND, and in OFFBOARD without setpoints
@@ -188,7 +188,7 @@ async def leave_offboard(
     `cannot_arm_in`: roles of the modes to leave.
 
     Raises:
-        FlightEnded: somebody else armed it or changed its mode, or it refuses to hold.
+        FlightEnded: somebody else armed the vehicle or changed its mode, or hold was refused.
     """
     if context.armed() or not roles_of(context.link) & cannot_arm_in:
         return

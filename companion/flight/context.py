@@ -26,19 +26,20 @@ from companion.vehicle.link import Link
 from companion.vehicle.records import LocalPosition
 
 INITIAL_HEARTBEAT_LIMIT = 3.0
-"""`FlightContext.heartbeat_limit` until the checks have counted the heartbeats, s."""
+"""`FlightContext.heartbeat_limit` until the checks have measured the heartbeat rate, s."""
 
 _POLL_PERIOD = 0.02
-"""Period with which a condition is checked, s; telemetry is slower."""
+"""Period with which a condition is checked, s; shorter than the period of telemetry."""
 
 _LAST_SETPOINT_TIMEOUT = 0.1
-"""Longest wait for a last attitude sample, s; the last setpoint of a flight answers it."""
+"""Time allowed to send the last setpoint, s: it is sent when the next attitude sample arrives."""
 
 _BACKLOG_DRAIN_TIME = 0.5
 """Time after a stall of this program within which the queued telemetry is read, s."""
 
 _SHORTEST_STALL = 0.2
-"""A heartbeat is not fresh if the stalls of this program while waiting for it add up to this, s."""
+"""If stalls of this program during a wait for a heartbeat add up to this time, the heartbeat does
+not count as fresh, s."""
 
 _MAX_STALLED_WAITS = 3
 """After this number of waits with a stall, a heartbeat counts as fresh: a computer that always
@@ -80,11 +81,11 @@ class FlightContext:
     """Whether the flight must disarm the vehicle on the ground, because we commanded arming or
     take-off."""
     took_off_from: NorthEast | None = None
-    """Where the vehicle stood when we commanded the take-off, m; None: we commanded none, or the
-    vehicle was taken over or began to land since. A vehicle whose link is lost before that would
-    hover without end, so it must land when it is heard again."""
+    """Position (north, east) where we commanded the take-off, m; None before the take-off, and
+    after the takeover or the start of the landing. If the link is lost during the take-off, the
+    vehicle would hover without end, so it must land when it is heard again."""
     landing_requested: bool = False
-    """Whether a landing was requested; a vehicle whose link is lost after that must still land."""
+    """Whether a landing was requested; if the link is lost afterwards, the vehicle must land."""
     fence_centre: FenceCentre | None = None
     """Centre of the fence in an earlier flight, if the vehicle has not been disarmed since; None:
     the fence is centred where control begins."""
@@ -94,15 +95,15 @@ class FlightContext:
     """Records and shows an event."""
 
     def release(self) -> None:
-        """Stop answering samples; no setpoint is sent after this."""
+        """Stop the setpoints at once."""
         self.loop.release()
         self.guidance_loop.stand_by()
 
     def end_stream(self) -> None:
         """Stop the setpoints; if the autopilot obeys us, the last setpoint has zero body rates.
 
-        Call this if we end the control. If the pilot has taken over, or data are doubtful, call
-        `release`.
+        Call this method if this program ends the control. If the pilot has taken over, or data are
+        doubtful, call `release`.
         """
         self.loop.end_stream()
         self.guidance_loop.stand_by()
@@ -147,7 +148,7 @@ class FlightContext:
                 return
 
     async def _wait_for_heartbeat(self) -> None:
-        """Wait as `fresh_heartbeat` says, but only once."""
+        """Wait for a heartbeat like `fresh_heartbeat`, but do not wait again after a stall."""
         loop = asyncio.get_running_loop()
         fresh_from = loop.time() + _BACKLOG_DRAIN_TIME
         fresh = loop.create_future()
@@ -192,7 +193,7 @@ class FlightContext:
         return tilt_angle(sample.q[1], sample.q[2])
 
     def armed(self) -> bool:
-        """Whether the autopilot says that it is armed."""
+        """Whether the autopilot reports that the vehicle is armed."""
         return self.link.state.armed is True
 
 

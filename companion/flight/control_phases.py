@@ -23,7 +23,7 @@ _SELF_DISARM_TIMEOUT = 8.0
 """Time allowed for the autopilot to disarm itself after landing, s."""
 
 _FALLING_SPEED = 2.5
-"""Downward speed above which a disarmed vehicle is falling, m/s; a landed one stands still."""
+"""Downward speed above which a disarmed vehicle is falling, m/s; a landed vehicle has no speed."""
 
 _UPRIGHT_TILT = radians(45.0)
 """Largest tilt of a vehicle that stands after a landing, rad; no slope to land on is steeper."""
@@ -206,7 +206,7 @@ async def disarm(context: FlightContext) -> None:
 
 
 def _require_not_falling(context: FlightContext) -> None:
-    """Raise `FlightEnded` if the vehicle falls without its motors: this is no landing."""
+    """Raise `FlightEnded` if the vehicle was disarmed in the air and falls."""
     position = context.fresh_position()
     falls = position is not None and position.velocity_ned[2] > _FALLING_SPEED
     if falls and not context.armed():

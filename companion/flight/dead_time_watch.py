@@ -20,9 +20,9 @@ _WINDOW_PERIODS = 4
 """Length of the window of a measurement, in periods of `_MEASURING_PERIOD`; the first window is one
 period shorter."""
 _MIN_ROW_AGE = 1.5
-"""Smallest age of the rows used, s: in newer ones the autopilot may already have left offboard."""
+"""Smallest age of the records used, s: in newer records offboard mode may already have ended."""
 _MAX_ROWS = 75_000
-"""Largest number of rows for the measurement after the flight: 5 min at 250 Hz."""
+"""Largest number of records for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
 _TIME, _AGE = RATES.index("vehicle_time_s"), RATES.index("age_s")
 
@@ -30,9 +30,9 @@ _TIME, _AGE = RATES.index("vehicle_time_s"), RATES.index("age_s")
 class DeadTimeWatch:
     """Correlates commanded and measured rates; warns once if a configured dead time is wrong.
 
-    It measures right after a setpoint was sent, when the time until the next sample is longest. A
-    measurement takes 1 ms (2 to 3 ms on an axis with an acceleration limit). In its own thread
-    it could delay the answer to a sample by 5 ms.
+    A measurement runs right after a setpoint was sent, when the time until the next sample is
+    longest, and takes 1 ms (2 to 3 ms on an axis with an acceleration limit). In a thread of its
+    own, a measurement could delay a setpoint by 5 ms.
 
     Args:
         trace: records of the flight, with the commanded and the measured body rates.
@@ -59,7 +59,7 @@ class DeadTimeWatch:
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
     def after_answer(self, now: float) -> None:
-        """Measure the dead time of the next axis if that is due at `now`, s on our clock."""
+        """Measure the dead time of the next axis, if due at `now`, s on our clock."""
         if now < self._due_at:
             return
         self._due_at = now + _MEASURING_PERIOD
@@ -78,7 +78,7 @@ class DeadTimeWatch:
             self._judge_axis(name, self._dead_time(name, self._trace.rates.rows(first_row)))
 
     def measure_whole_flight(self) -> DeadTimes:
-        """Measure the dead times over the last `_MAX_ROWS` rows of the flight.
+        """Measure the dead times over the last `_MAX_ROWS` records of the flight.
 
         Warn if a configured dead time is wrong, unless a warning was given already.
         """

@@ -24,7 +24,7 @@ class Environment:
     """Whether the flight runs in real time, and requests the settings of section `realtime` from
     the operating system. False: a virtual clock."""
     send_batch: SendBatch | None = None
-    """Sends batches of the messages that the flight records, in the recording thread; or None."""
+    """Sends recorded messages to the live stream, in the recording thread; None: no stream."""
 
 
 THIS_COMPUTER = Environment()

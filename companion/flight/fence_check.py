@@ -1,6 +1,6 @@
 """Checks before the flight that a maneuver stays far enough from the fence to trigger no monitor.
 
-`Fence.breach_at_stopping_point` judges each moment of the reference with the monitor's formula.
+`Fence.breach_at_stopping_point` checks each time of the reference with the monitor's formula.
 `TRACKING_MARGIN` allows for the tracking error. A vehicle that follows an accepted reference within
 this margin triggers no monitor, unless wind leaves less tilt for braking than the monitor assumes.
 """
@@ -16,7 +16,7 @@ from companion.guidance.trajectory.feasibility import Violation
 from companion.guidance.trajectory.septic_spline import Floats
 
 TRACKING_MARGIN = 0.5
-"""Margin between reference and fence, m. It covers the tracking error and `_POINT_DISTANCE`."""
+"""Margin between reference and fence, m, for the tracking error and for `_POINT_DISTANCE`."""
 
 _POINT_DISTANCE = 0.25
 """Distance between two checked points of a polygon fence, m."""
@@ -69,7 +69,7 @@ class FenceCheck:
         return float(time), breach
 
     def _candidate_indices(self, stops: Floats) -> list[int]:
-        """Indices of the stop points to judge: the farthest, highest and lowest of `stops`.
+        """Indices of the stop points to check: the farthest, highest and lowest of `stops`.
 
         A stop point is where the vehicle would stop if it braked. For a polygon, stop points at
         every `_POINT_DISTANCE` along their path are added.

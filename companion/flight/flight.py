@@ -1,4 +1,4 @@
-"""One flight from the first heartbeat to the last: runs the phases and the exit after a failure."""
+"""One flight from the first heartbeat to the last: its phases, and the exit after a failure."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Coroutine
@@ -25,7 +25,7 @@ _MAX_CHECK_RUNS = 5
 
 
 class Flight:
-    """Runs the phases in order; the first failure ends the flight and selects the exit.
+    """Runs the phases in order; after the first failure, runs an exit, such as hold or land.
 
     Attributes:
         began: time when the flight began, s on our clock.
@@ -97,7 +97,7 @@ class Flight:
             self.note(reason)
 
     def interrupt(self, reason: str) -> None:
-        """End the flight for the user: hold if we fly, else leave by the exit of the phase.
+        """End the flight for the user: hold if the vehicle flies, else run the phase's usual exit.
 
         An exit that has already begun continues. While the user is asked whether to land, an
         interrupt answers no.
@@ -139,11 +139,11 @@ class Flight:
                 self._context.link.state.forget()
                 self._context.replacement_detector.begin()
                 self._end_future = self._new_end_future()
-                if self._interruption is not None:  # it came after the checks became void
+                if self._interruption is not None:  # after the checks became void
                     raise self._interruption from void
             except FlightEnded:
                 raise
-            except Exception as error:  # of the plan: the exit must still be flown
+            except Exception as error:  # a fault of the plan: the exit must still run
                 raise FlightEnded(fault_message(error, self._usual_exit())) from error
             else:
                 return
@@ -188,7 +188,7 @@ class Flight:
         return self.phase.exit_on_failure(standing=self._context.ground.standing)
 
     async def _leave(self, exit_: Exit) -> None:
-        """Fly the exit, then land if the user wants it; a failure is noted, not raised."""
+        """Run the exit, then land if the user wants to; a failure is noted, not raised."""
         try:
             await self._fly_exit(exit_)
             if exit_ is Exit.HOLD and self._interruption and await self._user_wants_landing():
@@ -197,7 +197,7 @@ class Flight:
             self.note(ended.reason)
 
     async def _fly_exit(self, exit_: Exit) -> None:
-        """Fly the phases of an exit; if one fails, fly the exit of that phase."""
+        """Run the phases of an exit; if a phase fails, run the exit of the failed phase."""
         self.note(exit_.value)
         self._end_future = self._new_end_future()
         try:

@@ -39,8 +39,8 @@ def advice(
 ) -> tuple[str, ...]:
     """Advice: what differs from the configuration and which key to set, one sentence each.
 
-    With `drag_kept` the vehicle's next flight begins with the learned drag, so no key is advised:
-    a configured drag would end that learning.
+    With `drag_kept`, the vehicle's next flight begins with the learned drag. So the advice names
+    no drag key: a configured drag would take precedence over the learned drag.
     """
     guidance_loop = assembled.context.guidance_loop
     warnings = (
@@ -116,7 +116,7 @@ def _silence_duration(context: FlightContext, now: float) -> float | None:
 def _early_end(
     assembled: AssembledFlight, takeoff: float | None, result: str, now: float
 ) -> EarlyEnd | None:
-    """The end of a flight that ended early; None: it did not.
+    """When and where a flight ended early; None if the flight did not end early.
 
     `takeoff` is in s since the flight began, `now` in s on our clock.
     """

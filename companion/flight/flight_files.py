@@ -23,7 +23,7 @@ from companion.recording.recorder import FlightRecorder
 from companion.recording.tlog import TLOG_FILE, TlogWriter
 
 _SUMMARY_RESERVE = 1 << 18
-"""Disk space reserved for `summary.json`, bytes; most need less than 10 kB."""
+"""Disk space reserved for `summary.json`, bytes; the file usually needs less than 10 kB."""
 
 
 class FlightFiles:
@@ -73,7 +73,7 @@ class FlightFiles:
             def on_failure(text: str) -> None:  # called in a writing thread
                 loop.call_soon_threadsafe(self._report_failure, text)
 
-            def on_bad_entry(text: str) -> None:  # the same
+            def on_bad_entry(text: str) -> None:  # called in a writing thread too
                 loop.call_soon_threadsafe(note, text)
 
             self.tap = TlogWriter(folder / TLOG_FILE, epoch, on_failure)
@@ -116,7 +116,7 @@ class FlightFiles:
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """An observer that records phases and events, also as STATUSTEXT, and passes them on."""
+        """Wrap `observer`: record phases and events, as STATUSTEXT too, and pass them to it."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:
@@ -138,10 +138,10 @@ class FlightFiles:
         result: str,
         grants: tuple[realtime.SettingResult, ...],
     ) -> Summary:
-        """The summary of a finished flight, before its log is closed. Also saves the learned drag.
+        """Make the summary of a finished flight before the log is closed; save the learned drag.
 
-        `result`: "ok", or the reason why it ended early. `grants`: which requested real-time
-        settings were granted.
+        `result`: "ok", or the reason why the flight ended early. `grants`: which requested
+        real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.measure_whole_flight()
@@ -181,7 +181,7 @@ class FlightFiles:
         events = list(summary.events)
         failures = [file.failure for file in (self.tap, self.mcap) if file and file.failure]
         if failures and not any(text in failures for _, text in events):
-            events.append((self._ended_at, failures[0]))  # it was found when the files were closed
+            events.append((self._ended_at, failures[0]))  # found when the files were closed
         completed = replace(summary, link={**summary.link, "not_recorded": dropped}, events=events)
         folder = self.folder
         if folder is None:

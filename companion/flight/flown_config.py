@@ -18,7 +18,7 @@ from companion.flight.plan import ConfiguredPlan, Plan
 
 _CONFIG_FILE = "config.yaml"
 _TRAJECTORY_FOLDER = "trajectory"
-"""Folder for the copies of the trajectory's file and of the table it names."""
+"""Folder for the copies of the trajectory file and of the table that the trajectory file names."""
 _TABLE_FILE = "table.csv"
 
 
@@ -29,7 +29,7 @@ def record(config: Config, folder: Path, *, flies_maneuvers: bool = True) -> Non
     copied; they are named by their absolute path.
 
     `config`: configuration of the flight, whose trajectory was read without error.
-    `flies_maneuvers`: whether the maneuvers of the configuration are flown, and its trajectory.
+    `flies_maneuvers`: whether the flight flies the maneuvers and the trajectory of `config`.
 
     Raises:
         ConfigError: the trajectory's file has changed and holds no trajectory.

@@ -107,10 +107,10 @@ class _LandingTimeLimit:
         self._extension_noted = False
 
     def check(self) -> None:
-        """Call this before each repetition.
+        """Check the time before each repetition of the landing command.
 
         Raises:
-            FlightEnded: the time allowed is over, and the vehicle does not need us.
+            FlightEnded: the time allowed is over, and the vehicle does not need our setpoints.
         """
         context, now = self._context, self._clock()
         allowed = context.config.flight.landing_timeout_s
@@ -173,9 +173,9 @@ async def _release_when_offboard_ends(context: FlightContext) -> None:
 
 
 async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
-    """Command hold mode, then release control.
+    """Command hold mode before the landing command is repeated, then release control.
 
-    Control is not released if the command fails or the autopilot has begun to land.
+    Control is not released if the hold command fails or the autopilot has begun to land.
     """
     try:
         await ask_to_hold(context, lambda: require_role(context.link, {Role.OFFBOARD}))

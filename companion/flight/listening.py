@@ -10,20 +10,20 @@ from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
 _LISTENING_TIMEOUT = 10.0
-"""Time to wait for a vehicle that is not heard any more, s."""
+"""Longest wait for a frame of the vehicle after the link was lost, s."""
 
 _HOLD_TIMEOUT = 10.0
-"""Time for a vehicle that is heard again to hold, s; then it is asked to land."""
+"""Time allowed to enter hold mode after the vehicle is heard again, s; then it is asked to land."""
 
 
 async def hold_when_heard(context: FlightContext) -> None:
     """Send nothing until the vehicle is heard; if it still obeys us, command it to hold.
 
-    A vehicle that we had asked to land or to take off, or that does not hold, is asked to land.
+    If a landing or a take-off was commanded before, or the vehicle does not hold, command landing.
     ArduPilot stays in GUIDED when setpoints end, and does not hold its position.
 
     Raises:
-        FlightEnded: it is not heard in time, or it must land, or somebody else has it.
+        FlightEnded: the vehicle is not heard in time, must land, or is controlled by others.
     """
     frames = context.link.stats.frames
     heard = False

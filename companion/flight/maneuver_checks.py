@@ -57,7 +57,7 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
 def require_inside(
     config: Config, parts: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
 ) -> None:
-    """Check that all maneuvers stay inside the fence, including one in latitude and longitude.
+    """Check that all maneuvers stay inside the fence, even if it is in latitude and longitude.
 
     `origin`: geographic position where control begins, or None.
 
@@ -75,8 +75,7 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
     where control began, m NED.
 
     Raises:
-        ConfigError: the trajectory cannot be computed, or not be flown within the limits and the
-            fence.
+        ConfigError: the trajectory cannot be computed, or leaves the limits or the fence.
     """
     if isinstance(maneuver, Follow | HeldHeadingManeuver):
         with naming_trajectory_errors(maneuver.name):
@@ -94,7 +93,7 @@ def slowed_from(
     Arguments as in `require_followable`.
 
     Raises:
-        ConfigError: it breaks a limit at any speed, or cannot be computed.
+        ConfigError: the trajectory breaks a limit at any speed, or cannot be computed.
     """
     envelope = with_reserve(config, _envelope_from(begin, config, drag))
     with naming_trajectory_errors(trajectory.name):
@@ -110,8 +109,7 @@ def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: Know
     maneuvers that were made when the flight began.
 
     Raises:
-        ConfigError: a maneuver cannot be computed, or not be flown within the limits and the
-            fence.
+        ConfigError: a maneuver cannot be computed, or leaves the limits or the fence.
     """
     for part in sequence.parts:
         if not isinstance(part, Follow):

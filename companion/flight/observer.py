@@ -7,7 +7,7 @@ from companion.flight.status import FlightStatus
 from companion.recording.recorder import FlightRecorder
 
 _LONGEST_CALL_S = 0.2
-"""Longest call of an observer that is not reported, s; the flight stands still during a call."""
+"""An observer's call that takes longer is reported, s: each call blocks the control loop."""
 
 
 class Observer(Protocol):
@@ -84,7 +84,7 @@ class EventRecorder:
     Attributes:
         phases: (begin in s on our clock, name) of each phase.
         write, file: as the arguments.
-        note: called once if the other observer fails, to make it an event of the flight.
+        note: called once if the other observer fails; must record the failure as an event.
 
     Args:
         clock: our clock, s.

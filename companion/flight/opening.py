@@ -51,7 +51,7 @@ def make_link(
 
 
 def realtime_settings(config: Config, environment: Environment) -> RealtimeSettings:
-    """The real-time settings to request from the operating system; on a virtual clock none."""
+    """The real-time settings to request from the operating system; none with a virtual clock."""
     if not environment.realtime:
         return RealtimeSettings()
     section = config.realtime

@@ -19,7 +19,7 @@ _MANEUVER_GRACE = 10.0
 _COMMAND_TIMEOUT = 10.0
 """Timeout for commands that the autopilot carries out at once or not at all, s."""
 _TAKEOVER_TIMEOUT = 15.0
-"""Timeout for the takeover with its preflight checks, s; a lossy link delays their parameters."""
+"""Timeout for preflight checks and takeover, s; reading parameters over a lossy link takes long."""
 
 HAND_BACK = Phase(
     "hand back",
@@ -34,19 +34,19 @@ HAND_BACK = Phase(
 _LAND = Phase(
     "land", "touchdown", control_phases.land, inf, allowed_roles=ROLES_BEFORE_LANDING | {Role.LAND}
 )
-"""The phase of the landing; its work limits the time to begin, and the time to touch down. A
-vehicle that would drift without our setpoints is held beyond the time limit."""
+"""The phase of the landing. `control_phases.land` itself limits the time until the landing begins,
+and until touchdown. A vehicle that would drift without our setpoints is held beyond this limit."""
 
 _DISARM = Phase("disarm", "the motors to stop", control_phases.disarm, 20.0)
 
 _UNDO_ARMING = Phase(
     "disarm", "the motors to stop", preflight_phases.undo_arming, _COMMAND_TIMEOUT, Exit.LAND
 )
-"""The phase of the exit that disarms. If it fails, the vehicle lands, because an autopilot that
-refuses to disarm is in the air."""
+"""The phase that disarms after a failure. If the autopilot refuses to disarm, the vehicle is in the
+air, so it is commanded to land."""
 
 _LISTEN = Phase("listen", "the vehicle to be heard and to hold", listening.hold_when_heard, inf)
-"""The phase after a lost link; its work limits the time to hear the vehicle, and to hold."""
+"""The phase after a lost link; `hold_when_heard` itself limits the time to hear the vehicle."""
 
 LANDING_PHASES = HAND_BACK, _LAND, _DISARM
 """The phases from our control back to the ground."""

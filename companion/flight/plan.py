@@ -28,7 +28,7 @@ class Plan(Protocol):
 
     @property
     def maneuvers(self) -> ManeuverSequence:
-        """The maneuvers known before the flight; the preflight checks judge them."""
+        """The maneuvers known before the flight, for the preflight checks."""
 
     def phases(self, context: FlightContext) -> AsyncGenerator[Phase, None]:
         """The phases of the flight; requested again when the checks must be repeated."""

@@ -28,15 +28,15 @@ _MAX_EVIDENCE_AGE = 1.0
 
 
 class PreflightChecks:
-    """Judges the vehicle as `companion doctor` does, for each stage of a flight.
+    """Checks the vehicle like `companion doctor`, for each stage of a flight.
 
     A pilot may arm minutes after the checks passed. So the same checks run in the phase `checks`,
-    before we arm, after anybody armed, before take-off, and before the takeover. They judge the
+    before we arm, after anybody armed, before take-off, and before the takeover. The checks use the
     newest status of the vehicle, and rates and parameters that are at most a second old.
 
     Attributes:
-        note: called once with each message that does not end the flight: warnings, accepted unsafe
-            findings, and rates that were not granted.
+        note: called once with each message that does not end the flight: warnings, unsafe findings
+            in `flight.accept`, and message rates that the autopilot refused.
         drag_of: called with the vehicle's identity; returns what is known of its drag.
 
     Args:
@@ -77,7 +77,7 @@ class PreflightChecks:
                 )
 
     async def require(self, stage: Stage) -> Evidence:
-        """Check the vehicle for `stage`; return the evidence.
+        """Check the vehicle for `stage`; return the data that were checked.
 
         Raises:
             ChecksVoid: the vehicle may have been replaced by another one.
@@ -109,7 +109,7 @@ class PreflightChecks:
         )
 
     def _report_low_rates(self, evidence: Evidence) -> bool:
-        """Report attitude or position that comes too rarely; return whether one of them does.
+        """Report low rates of attitude or position messages; return whether a rate is too low.
 
         A ground station that connects after the telemetry was requested lowers the rates.
         """
@@ -126,7 +126,7 @@ class PreflightChecks:
     def on_parameter(self, name: str, value: float) -> None:
         """Warn if a station sets a checked parameter of the armed vehicle to an unsafe value.
 
-        The flight goes on: to end it would need the failsafes that the change may have worsened.
+        The flight goes on, because its end may need the failsafe that the change has made unsafe.
         """
         before = self._evidence
         if before is None or self._link.state.armed is not True:
@@ -146,7 +146,7 @@ class PreflightChecks:
                 )
 
     def _act_on(self, findings: list[Finding]) -> None:
-        """End the flight for findings that block it; report other unsafe and ineffective ones."""
+        """End the flight if findings block it; report the other unsafe or ineffective findings."""
         refused = blocking_findings(self._config, findings)
         warnings = [
             finding.key

@@ -1,4 +1,4 @@
-"""The phases on the ground, one coroutine each, and the exit that disarms."""
+"""The phases on the ground, and the phase that disarms after a failure, one coroutine each."""
 
 from companion.config.known_drag import drag_before_connecting
 from companion.control.expected_response import gain_warning
@@ -56,7 +56,7 @@ async def request_telemetry(context: FlightContext) -> None:
 
 
 async def judge_vehicle(context: FlightContext, stage: Stage) -> Evidence:
-    """Run the preflight checks; set `FlightContext.heartbeat_limit` from the rate they counted."""
+    """Run the preflight checks; set `FlightContext.heartbeat_limit` from the heartbeat rate."""
     context.detail = "counting telemetry rates and reading the autopilot's parameters"
     evidence = await context.preflight.require(stage)
     heartbeats = evidence.streams.get("HEARTBEAT")  # not requested from PX4, whose rate is fixed
@@ -78,7 +78,7 @@ def use_evidence(context: FlightContext, evidence: Evidence) -> None:
 
 
 async def stream(context: FlightContext) -> None:
-    """Start to send setpoints (idle ones on the ground); wait until enough were sent."""
+    """Start to send setpoints, on the ground with zero thrust; wait until enough were sent."""
     context.loop.on = True
     wanted_count = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
     await context.until(lambda: context.loop.record.setpoints >= wanted_count, "setpoints to flow")
@@ -114,7 +114,7 @@ async def undo_arming(context: FlightContext) -> None:
 
     def require_ours() -> None:
         require_role(context.link, {Role.READY, Role.TAKEOFF})
-        if context.ground.lifted:  # while the tries before were lost
+        if context.ground.lifted:  # earlier tries may have been lost
             raise FlightEnded("the vehicle has left the ground, so it is not disarmed", Exit.LAND)
 
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.

@@ -11,14 +11,15 @@ from companion.vehicle.link import Link
 from companion.vehicle.records import MAX_TELEMETRY_AGE
 
 _REQUEST_SHARE = 0.5
-"""A status is requested again at this share of the age from which it counts as unknown."""
+"""A status message, such as SYS_STATUS, is requested again when its age exceeds this share of the
+age from which it counts as unknown."""
 _REQUEST_PERIOD = 5.0
 """Shortest time between two requests for one message, s. If the rate stays low, monitors end the
 flight sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
 _HEARD_AGE = 0.2
 """A status is requested only while positions are newer than this, s: else the link is silent."""
 _COUNTING_TIME = 0.1
-"""Time over which `set_rates` counts messages, s; the counts are not used."""
+"""Window in which `set_rates` counts messages, s; short, because the result is not used."""
 
 
 def low_rate_text(message: str, rate: float) -> str:
@@ -29,7 +30,8 @@ def low_rate_text(message: str, rate: float) -> str:
 class RateRequester:
     """Requests a message again if its rate has become too low: another station may have changed it.
 
-    It sends SET_MESSAGE_INTERVAL, at most every `_REQUEST_PERIOD` a message, and does not block.
+    It sends SET_MESSAGE_INTERVAL at most once in `_REQUEST_PERIOD` for each message, and does not
+    block.
 
     Attributes:
         note: called with messages about requests and their errors.

@@ -27,7 +27,7 @@ class Session:
     Args:
         folder: an existing folder for this flight's files; None: nothing is recorded.
         ask_landing: asks the user, after an interrupt when the vehicle holds, whether to land.
-        plan: plan of the flight; None: the configured one.
+        plan: plan of the flight; None: the configured plan (`ConfiguredPlan`).
         environment: clocks and transports of this computer, or their replacement in tests.
 
     Attributes:
@@ -68,7 +68,7 @@ class Session:
 
     @property
     def end_reason(self) -> str | None:
-        """Why the flight ends or ended early; None: it goes on, or ended as it should."""
+        """Why the flight ends or ended early; None: the flight goes on, or was completed."""
         return None if self._assembled is None else self._assembled.flight.end_reason
 
     def note(self, text: str) -> None:

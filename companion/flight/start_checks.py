@@ -28,11 +28,11 @@ def check_link(config: Config) -> None:
 
 
 def check_control(config: Config) -> None:
-    """Check that the planner, the guidance and the monitors of other packages can be made.
+    """Check that the planner, the guidance and the monitors from plug-in packages can be made.
 
     Raises:
-        ConfigError: they do not fit the vehicle or the limits, or a planner or guidance
-            of another package raises an exception.
+        ConfigError: one of them does not fit the vehicle or the limits, or the planner or
+            guidance of a plug-in package raises an exception.
     """
     planner(config)
     make_guidance(config)

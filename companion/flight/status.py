@@ -72,9 +72,9 @@ class StatusReporter:
     """Records the motion in all phases, and shows the state of the flight.
 
     Attributes:
-        takeoff: time when the vehicle left the ground, s on our clock; None: it has not.
-        battery_at_takeoff: remaining charge at that time, 0..1, or None.
-        real_time: whether latencies are meaningful: False if the vehicle waits for us.
+        takeoff: time when the vehicle left the ground, s on our clock; None before the take-off.
+        battery_at_takeoff: remaining charge at the take-off, 0..1; None: unknown.
+        real_time: whether latencies are meaningful; False in lockstep.
 
     Args:
         ladder: tells which safety monitors have raised an alarm.

@@ -119,7 +119,7 @@ class _FenceDrawing:
 def _edges(
     outline: Sequence[Corner], heights: tuple[float, float]
 ) -> Iterator[tuple[Corner, float]]:
-    """The two ends of each edge of a prism: floor, ceiling, and some upright edges."""
+    """Both ends (corner, m; height, m) of each edge of a prism, with only some upright edges."""
     edge_step = max(1, len(outline) // _UPRIGHT_EDGES)
     for number, (corner, next_corner) in enumerate(
         zip(outline, (*outline[1:], outline[0]), strict=True)

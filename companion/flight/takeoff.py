@@ -22,14 +22,14 @@ _LARGEST_DRIFT = 3.0
 """Largest distance by which wind carries a vehicle in its climb, m; else somebody flew it away."""
 
 _ARRIVAL_TIME = 2.0
-"""Time allowed to reach altitude after hold mode is shown, s; then the climb counts as stopped."""
+"""Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""
 
 _SMALLEST_RISE = 0.3
 """A vehicle that has risen less than this has not left the ground, m: the estimate drifts."""
 
 _TIPPED_TILT = radians(60.0)
-"""A vehicle on the ground that tilts more has tipped over, rad; PX4's failure detector acts there,
-too."""
+"""A vehicle on the ground that tilts more has tipped over, rad; the same limit as in PX4's failure
+detector."""
 
 _LIFT_OFF_TIME = 10.0
 """Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
@@ -44,7 +44,7 @@ need some seconds to spool up, and the height may read 1.5 m on the ground."""
 
 
 def climb_has_ended(context: FlightContext) -> bool:
-    """Whether the vehicle has ended its take-off or climb, by a fresh position."""
+    """Whether a fresh position shows that the vehicle has ended its take-off or climb."""
     position = context.fresh_position()
     return (
         position is not None
@@ -173,7 +173,7 @@ class _Climb:
         return self._start_down - motion.position_ned[2]
 
     def _require_leaving_ground(self, height: float) -> None:
-        """Raise `FlightEnded` if the vehicle is reported high, and on the ground, for too long."""
+        """Raise `FlightEnded` if, at this height (m), ground contact is reported for too long."""
         now = asyncio.get_running_loop().time()
         if self._high_on_ground_from is None:
             self._high_on_ground_from = now

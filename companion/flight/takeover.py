@@ -21,7 +21,7 @@ from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import ControlEntry, Role
 
 _ARMED_REPORT_TIMEOUT = 1.5
-"""Longest time from arming to the heartbeat that shows it, s: PX4 sends one a second."""
+"""Longest time from arming to a heartbeat with the armed flag, s: PX4 sends one a second."""
 
 _LARGEST_HELD_SPEED = 3.0
 """Largest horizontal speed of a vehicle that is taken over, m/s."""
@@ -37,7 +37,7 @@ _SETTLE_TIME = 1.0
 
 
 async def check_unless_flying(context: FlightContext) -> None:
-    """Run the checks on the ground; from a vehicle that flies only request telemetry.
+    """Run the checks if the vehicle is on the ground; if it flies, only request telemetry.
 
     Raises:
         FlightEnded: the vehicle is armed on the ground, or a finding blocks the flight.
@@ -54,8 +54,8 @@ async def check_unless_flying(context: FlightContext) -> None:
 async def wait_for_handover(context: FlightContext) -> None:
     """Wait until the vehicle flies high enough, and its pilot lets the autopilot hold it.
 
-    A vehicle that still takes off or climbs is not held yet; one that holds by a failsafe, as after
-    an offboard loss, was not handed over.
+    A vehicle that still takes off or climbs is not held yet. A vehicle that holds because of a
+    failsafe, such as offboard loss, was not handed over.
     """
     state, ready = context.link.state, context.link.autopilot.ready_mode
     lowest = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
@@ -92,7 +92,7 @@ async def check_airborne(context: FlightContext) -> None:
 async def check_armed_on_ground(context: FlightContext) -> None:
     """Check a vehicle that somebody else armed on the ground; only request telemetry.
 
-    The newest heartbeat may be older than the arming, so this function waits for one that shows it.
+    The newest heartbeat may be older than the arming, so this function waits for the armed flag.
 
     Raises:
         FlightEnded: the vehicle is not armed on the ground, or a finding blocks the take-off.
@@ -173,7 +173,7 @@ async def _wait_until_held(context: FlightContext) -> None:
 
 
 async def _require_learned_hover(context: FlightContext) -> None:
-    """Wait until the hover thrust that guidance would use holds the vehicle.
+    """Wait until the learned hover thrust is good enough to hold the vehicle's height.
 
     Raises:
         FlightEnded: the hover thrust is too far from the configured one, or our smallest thrust

@@ -24,7 +24,7 @@ def overview(trajectory: Trajectory) -> str:
 def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> tuple[str, ...]:
     """Messages for the user: where the trajectory was slowed down, and for which limit.
 
-    There are no messages if it was not slowed down.
+    There are no messages if the trajectory was not slowed down.
 
     Args:
         before: the trajectory before it was slowed down.

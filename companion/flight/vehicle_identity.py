@@ -56,7 +56,7 @@ class ReplacementDetector:
     def note_arming(self) -> None:
         """Note that the vehicle is being armed: from now on a replacement ends the flight.
 
-        From then on, only the watch and the safety monitors judge silence.
+        From now on, silence is no sign of a replacement; watch and safety monitors check silence.
         """
         self._arming_noted, self._long_silence = True, 0.0
 
@@ -105,7 +105,7 @@ class ReplacementDetector:
     def _sign_of_replacement(self) -> str | None:
         """The sign of a replacement, in words.
 
-        None: there is no sign, or a silence still lasts; a silence is judged when it ends.
+        None: there is no sign, or the vehicle is still silent; a silence counts when it ends.
         """
         if self._peers != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"

@@ -81,7 +81,7 @@ def _motion_values(context: FlightContext, now: float) -> dict[str, float | None
 
 
 def _reference(context: FlightContext, now: float) -> Reference | None:
-    """The reference that is flown, if the autopilot obeys us and there is one."""
+    """The reference that is flown; None: no reference, or the autopilot does not obey us."""
     guidance_loop = context.guidance_loop
     source, motion = guidance_loop.flown_source, guidance_loop.motion
     if not context.loop.offboard_active or source.pose is None or motion is None:

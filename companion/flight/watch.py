@@ -16,8 +16,8 @@ from companion.vehicle.autopilot import Role
 from companion.vehicle.records import is_outdated
 
 _CURRENT_MODE_PERIOD = 0.45
-"""A CURRENT_MODE that follows the last one sooner than this reports a change, s; without changes
-PX4 sends one every 0.5 s."""
+"""If a CURRENT_MODE comes earlier than this after the last one, it reports a change, s; without
+changes PX4 sends CURRENT_MODE every 0.5 s."""
 _HEARTBEAT_REQUEST_PERIOD = 0.15
 """Shortest time between two requests for a heartbeat, s."""
 
@@ -26,7 +26,7 @@ class Watch:
     """Detects what the control loop cannot: silence, pilot takeovers, breaches of safety limits.
 
     Args:
-        ladder: judges the snapshots while the autopilot obeys us.
+        ladder: runs the safety monitors while the autopilot obeys us.
         clock: our clock, s.
     """
 
@@ -72,8 +72,8 @@ class Watch:
     def on_current_mode(self, phase: Phase) -> None:
         """Check a CURRENT_MODE, which comes twice a second and at once after a status change.
 
-        An early one may mean that the vehicle disarmed or is in a failsafe. Only a heartbeat can
-        confirm this, so one is requested, at most every `_HEARTBEAT_REQUEST_PERIOD`.
+        An early CURRENT_MODE may mean that the vehicle disarmed or is in a failsafe. Only a
+        heartbeat can confirm it, so the watch requests a heartbeat.
 
         Raises:
             FlightEnded: the phase must end; see `judge`.
@@ -99,8 +99,8 @@ class Watch:
     async def _confirm_control(self) -> None:
         """Wait for a fresh heartbeat; resume the setpoints if its mode requires them.
 
-        That is offboard mode, or during the takeover a mode from which offboard can begin. A
-        queued heartbeat may carry an old mode.
+        Offboard mode requires setpoints, and during the takeover also a mode from which offboard
+        can begin. A queued heartbeat may carry an old mode.
         """
         await self._context.fresh_heartbeat()
         loop, state = self._context.loop, self._context.link.state
@@ -116,7 +116,7 @@ class Watch:
             loop.resume()
 
     def _judge_snapshot(self, now: float) -> None:
-        """Let the safety ladder judge a snapshot, and take the action that it demands."""
+        """Run the safety monitors on a snapshot, and take the action that they demand."""
         self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
         # A foreign setpoint may also be the autopilot's own, in a new mode.

@@ -24,8 +24,8 @@ async def connected(
 
     Only one flight at a time may be connected to a link.
 
-    `works`: coroutines to run meanwhile. An exception in one of them, or in the reporter, is noted
-    as an event and does not end the flight.
+    `works`: coroutines to run beside the flight. An exception in a coroutine, or in the reporter,
+    is noted as an event and does not end the flight.
     """
 
     async def run_guarded(work: Coroutine[Any, Any, None]) -> None:
@@ -99,7 +99,7 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
 class StateLogger:
     """Notes each change of mode and arming state, and each text of the autopilot, as an event.
 
-    The first call notes the present mode and arming state, but no text from before.
+    The first call notes the present mode and arming state, but no text that arrived earlier.
 
     Args:
         note: called with each change as a sentence.

@@ -6,8 +6,8 @@ from typing import NamedTuple
 from companion.guidance.reference import NorthEast, Reference, Vector, VehicleMotion
 
 _DECELERATION_SHARE = 0.47
-"""Mean deceleration of a smooth stop, as a share of what the tilt leaves beside the wind. The peak
-is a share of 0.7; the other 0.3 are for gusts and feedback."""
+"""Mean deceleration of a smooth stop, as a share of the deceleration that the tilt limit allows in
+the present wind. The peak is a share of 0.7; the other 0.3 are for gusts and feedback."""
 _LARGEST_JERK = 8.0
 """Largest jerk of a smooth stop, m/s³: the vehicle tilts and levels by less than 50°/s."""
 _REST_SPEED = 0.1
@@ -15,14 +15,14 @@ _REST_SPEED = 0.1
 _UPWIND_PEAK_ACCELERATION = 1.5
 """Largest acceleration of the move upwind, m/s²; it leaves tilt for braking and for the wind."""
 _DRIFT_TIME_SQUARED = 0.47
-"""Distance by which PX4 drifts when it takes over a vehicle that leans against wind, per
-acceleration by the wind, s². PX4 in simulation drifted by 1.40 and 1.42 m at 3.0 m/s² and was
-farthest after 3 s. The drift grows if MPC_XY_P, MPC_XY_VEL_P_ACC or MPC_XY_VEL_I_ACC is smaller."""
+"""Drift of a vehicle that leans against wind when PX4 takes over, m per m/s² of acceleration by
+wind, s². PX4 in simulation drifted by 1.40 and 1.42 m at 3.0 m/s² and was farthest after 3 s. The
+drift grows if MPC_XY_P, MPC_XY_VEL_P_ACC or MPC_XY_VEL_I_ACC is smaller."""
 _PEAK = 1.5
 """Peak deceleration of a smooth stop (`Braking`), per mean deceleration."""
 _LEAST_ACCELERATION = 0.3
-"""Acceleration that still counts as available in wind that uses up the tilt, m/s²: the stopping
-distance stays finite."""
+"""Lower bound of the acceleration assumed for braking, m/s², so that the stopping distance stays
+finite in wind that needs the whole tilt."""
 _NOTICE_TIME = 0.1
 """Time within which the fence's monitor and guidance notice a breach, s."""
 
@@ -41,7 +41,7 @@ class AssumedBraking(NamedTuple):
 
 
 def acceleration_beside_wind(largest: float, velocity: NorthEast, wind: NorthEast) -> float:
-    """Largest acceleration against the motion that the tilt leaves beside the wind, m/s².
+    """Largest deceleration that the tilt limit allows in wind, m/s²; at least 0.3 m/s².
 
     The tilt balances the wind's part across the motion first. Wind from ahead helps.
 
@@ -139,7 +139,7 @@ class Braking(NamedTuple):
 
 
 class BrakingUpwind(NamedTuple):
-    """Brakes, and meanwhile moves upwind; stays where both have ended.
+    """Brakes, and at the same time moves upwind; then stays at the end of both motions.
 
     The distance moved grows by the share 10u³ − 15u⁴ + 6u⁵, where u grows from 0 to 1 over the
     duration, so speed and acceleration begin and end with 0.
@@ -193,7 +193,8 @@ class BrakingUpwind(NamedTuple):
 def drift(wind: NorthEast) -> NorthEast:
     """How far the vehicle drifts downwind after the autopilot takes over, m north and east.
 
-    Its modes begin level, without the tilt that balances the wind (`Autopilot.modes_begin_level`).
+    The autopilot's modes begin level, without the tilt that balances the wind
+    (`Autopilot.modes_begin_level`).
 
     Args:
         wind: acceleration that the wind gives a vehicle at rest, m/s², north and east.
@@ -202,7 +203,7 @@ def drift(wind: NorthEast) -> NorthEast:
 
 
 def brake_upwind(now: float, braking: Braking, wind: NorthEast) -> BrakingUpwind | Braking:
-    """Add to a braking a move upwind that begins now, as far as the expected `drift`.
+    """Add a move upwind to `braking`: it begins now and is as long as the expected `drift`.
 
     Args:
         now: event-loop time, s.

@@ -20,7 +20,7 @@ _WIND_CHANGE = 0.2
 _CLAMP_DEVIATIONS = 3.0
 """An innovation is clamped to this many standard deviations, so that bumps do not count as drag."""
 _LARGEST_LINEAR_INCREASE = 2.0
-"""Largest estimated linear drag above that of the prior, 1/s."""
+"""Largest excess of the estimated linear drag over the prior's linear drag, 1/s."""
 _LARGEST_QUADRATIC = 0.3
 """Largest estimate of the quadratic drag, 1/m."""
 _AXIS_DRAG_DEVIATION, _LARGEST_AXIS_DRAG = 0.03, 0.1
@@ -147,7 +147,8 @@ class DragEstimate:
     def _drag_within_bounds(self) -> Drag:
         """The most likely drag within the bounds.
 
-        If the quadratic drag is clamped, the linear drag is the most likely one for that value.
+        If the quadratic drag is clamped, the linear drag is the most likely one for the clamped
+        quadratic drag.
         """
         (linear, quadratic), p = self._state[:2].tolist(), self._covariance
         clamped = min(max(quadratic, 0.0), _LARGEST_QUADRATIC)

@@ -20,7 +20,7 @@ class Weights:
         velocity: weight of the velocity error, 1/s².
 
     Raises:
-        ValueError: a weight is not finite or negative, or that of the position is 0.
+        ValueError: a weight is negative or not finite, or the position's weight is 0.
     """
 
     position: float

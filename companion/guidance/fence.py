@@ -20,7 +20,7 @@ EARTH_RADIUS = 6_371_000.0
 
 
 class Place(NamedTuple):
-    """A place in WGS84, degrees."""
+    """Latitude and longitude of a place (WGS84), degrees."""
 
     latitude: float
     longitude: float
@@ -76,8 +76,8 @@ class Fence:
         deceleration: deceleration that the vehicle reaches if its tilt allows it, m/s².
         reaction: assumed delay before the vehicle brakes, s.
         estimate_delay: delay of the estimated horizontal motion behind the true one, s.
-        tilt_acceleration: largest horizontal acceleration by tilt, m/s². It limits horizontal
-            braking, and the wind uses a part of it.
+        tilt_acceleration: largest horizontal acceleration by tilt, m/s². A part of it balances the
+            wind; the rest limits horizontal braking.
     """
 
     radius: float
@@ -97,7 +97,7 @@ class Fence:
 
     @property
     def levels(self) -> "Fence":
-        """Ceiling and floor alone."""
+        """The fence with only ceiling and floor."""
         return replace(self, radius=inf, polygon=(), places=())
 
     def breach(
@@ -145,10 +145,10 @@ class Fence:
     ) -> Components:
         """Where the vehicle stops if it brakes now, m NED from where control began.
 
-        From a horizontal or vertical velocity v, the vehicle stops after v·t + v²/(2b). b is the
-        deceleration; horizontally, `tilt_acceleration` and the wind may leave less. t is the
-        reaction time; horizontally, `estimate_delay` is added to it. A horizontal acceleration a
-        that makes the vehicle faster is assumed to last for t; the vehicle then stops after
+        From a horizontal or vertical velocity v, the vehicle stops after v·t + v²/(2b). b is
+        `deceleration`, or horizontally less if tilt limit and wind allow only less. t is
+        `reaction`, horizontally plus `estimate_delay`. A horizontal acceleration a that makes the
+        vehicle faster is assumed to last for the time t; the vehicle then stops after
         v·t + a·t²/2 + (v + a·t)²/(2b). An acceleration that brakes is ignored, because it may end
         at any moment.
 
@@ -158,7 +158,7 @@ class Fence:
             velocity: velocity, m/s NED; numbers, or arrays of them.
             acceleration: acceleration north and east, m/s²; numbers, or arrays of them.
             wind: acceleration that the wind gives a vehicle at rest, m/s², north and east. None: no
-                wind. It must be None if the other arguments are arrays.
+                wind; required if the other arguments are arrays.
         """
         north, east, down = velocity
         reaction = self.reaction + self.estimate_delay

@@ -25,7 +25,7 @@ def finite_vector(name: str, value: Iterable[float]) -> Vector:
     """Convert `value` to three finite floats; messages call it `name`.
 
     Raises:
-        ValueError: there are not three values, or one is no number or not finite.
+        ValueError: there are not three values, or a value is not a finite number.
     """
     try:
         x, y, z = (finite_number(name, component) for component in value)

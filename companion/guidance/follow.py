@@ -28,7 +28,7 @@ def circle(radius: float, speed: float, laps: float) -> "HeldHeadingManeuver":
 class HeldHeadingManeuver:
     """Flies a trajectory with constant heading, and never slows it down to keep limits.
 
-    Linear guidance always flies this maneuver, even where predictive guidance flies each `Follow`.
+    Linear guidance flies this maneuver, even with `guidance.kind: nmpc`.
 
     Attributes:
         trajectory: a trajectory whose `holds_heading` is true.

@@ -24,8 +24,8 @@ class ThrustSettings:
 
     Attributes:
         hover: configured normalised thrust at hover, 0..1.
-        correction_limit: limit of learning. The learned hover thrust in N is that of `hover` times
-            a factor between 1/(1 + correction_limit) and 1 + correction_limit.
+        correction_limit: limit of learning. The learned hover thrust in N is at most
+            (1 + correction_limit) times the configured one, and at least 1/(1 + correction_limit).
         correction_time: time constant with which the learned hover thrust follows a change, s.
         lowest: smallest normalised thrust that is sent, 0..1.
         highest: largest normalised thrust that is sent, 0..1.
@@ -52,7 +52,7 @@ class HoverThrust:
     """Normalised thrust for a wanted vertical acceleration, from a hover thrust that is learned.
 
     The caller calls `observe` only in the air, and passes to `note_thrust` the thrust setpoint that
-    the vehicle follows: in offboard control that of `companion`, before it the autopilot's.
+    the vehicle follows: our setpoint in offboard control, the autopilot's own before the takeover.
     """
 
     def __init__(self, settings: ThrustSettings) -> None:

@@ -25,6 +25,8 @@ _COVERED_SHARE = 1.0 - exp(-1.0)
 class InnerResponse:
     """Response of the coefficients c to their target c_d: ċ + lag·c̈ = gain·(c_d − c), delayed.
 
+    The acceleration coefficients c are the north and east parts of the unit vector of the thrust.
+
     Attributes:
         gain: gain p of the planner, 1/s.
         lag: lag of the rate loop, s; 0: the response is of first order.
@@ -105,16 +107,16 @@ class InnerResponse:
         return compared + self.lag * acceleration / self.gain, rate
 
     def _lead(self, before: float, then: float, after: float) -> float:
-        """How far the target leads a coefficient c on its path: (ċ + lag·c̈)/gain.
+        """Target minus coefficient c, so that c follows its path: (ċ + lag·c̈)/gain.
 
-        The arguments are three values of c, `_PATH_STEP` apart.
+        The arguments are three values of c on the path, `_PATH_STEP` seconds apart.
         """
         speed, acceleration = _derivatives(before, then, after)
         return (speed + self.lag * acceleration) / self.gain
 
 
 def _derivatives(before: float, then: float, after: float) -> tuple[float, float]:
-    """First and second derivative by central differences of three values, `_PATH_STEP` apart."""
+    """First and second derivative of three values, `_PATH_STEP` s apart, by central differences."""
     first = 0.5 * (after - before) / _PATH_STEP
     return first, (after - 2.0 * then + before) / (_PATH_STEP * _PATH_STEP)
 

@@ -29,7 +29,7 @@ class LinearSettings:
     Attributes:
         gains: gains of the horizontal feedback.
         height: gains of the height hold.
-        tilt: response of the coefficients to their targets.
+        tilt: response of the acceleration coefficients to their targets.
         heading: response of the heading to its target.
         max_horizontal: largest horizontal acceleration that is commanded, m/s².
         thrust_lag: lag of the rotors, s.
@@ -117,8 +117,8 @@ class Trim:
     """Mean of the planner's target coefficients in the latest pause of the position hold.
 
     In a pause the reference's `horizontal` is `HorizontalMode.ACCELERATION`. The mean balances wind
-    and the error of the estimated attitude. Added to the coefficients of an open-loop command, the
-    mean gives the vehicle the commanded acceleration in spite of both.
+    and the error of the estimated attitude. Guidance adds the mean to an open-loop command, so that
+    the vehicle gets the commanded acceleration in spite of wind and attitude error.
     """
 
     def __init__(self) -> None:

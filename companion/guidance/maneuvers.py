@@ -99,7 +99,7 @@ class Steps:
 
 @dataclass(frozen=True, slots=True)
 class Corners:
-    """Acceleration steps between the corners of a rectangle, none of them through level.
+    """Acceleration steps between the corners of a rectangle; no step passes through level.
 
     Such steps show the differences between the planners, as in figure 2 of Xu & Pei; a step through
     level is straight with every planner. Before the first step the position hold pauses, so that
@@ -110,7 +110,7 @@ class Corners:
 
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
-            √(north² + east²). 0.4 and 0.5 give the step of that figure 2.
+            √(north² + east²). 0.4 and 0.5 give the step in figure 2 of Xu & Pei.
         corner_time: duration of each corner, s; the corner at which the second round begins lasts
             twice as long.
         settle: time of position hold at the end, s.
@@ -171,7 +171,7 @@ class ManeuverSequence:
     def part_at(self, time: float) -> tuple[Maneuver, float]:
         """The part that is flown at `time`, and the time since that part began.
 
-        Before the beginning the first part is returned, after the end the last one.
+        Before the beginning, the first part is returned; after the end, the last part is returned.
 
         Raises:
             ValueError: the sequence is empty.

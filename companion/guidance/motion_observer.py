@@ -1,4 +1,4 @@
-"""Observer of horizontal position, velocity and disturbance (wind, bias); history of the slope."""
+"""Observer of horizontal motion and disturbance (wind, bias); history of the thrust's slope."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -10,9 +10,8 @@ from companion.attitude.history import locate_time
 from companion.guidance.reference import NorthEast, VehicleMotion, clamp_length, rotate
 
 _LARGEST_PULL_TIMES_STEP = 0.5
-"""Largest product of `ObserverSettings.pull` and the time between two measurements: with a larger
-one, the observer is unstable at low position rates, and a gap in the positions makes a false wind.
-"""
+"""Largest product of `ObserverSettings.pull` and the time between two measurements. With a larger
+product, the observer is unstable at low position rates, and takes a gap in positions for wind."""
 
 
 class ObserverGains(NamedTuple):
@@ -172,7 +171,7 @@ _KEPT_ATTITUDES = 200
 
 
 class SlopeHistory:
-    """History of the slope: horizontal thrust divided by vertical thrust.
+    """History of the thrust's slope: horizontal thrust divided by vertical thrust.
 
     The observer needs the mean slope between the time stamps of two positions. Positions come late
     and at other times than attitudes, so the history keeps the integral of the slope.

@@ -69,7 +69,7 @@ class Reach(NamedTuple):
 
     Attributes:
         place: point (north, east) of the stop if the last rates contain no feedback, m.
-        spread: radius around `place` in which the stop lies if they contain feedback, m.
+        spread: radius around `place` in which the stop lies if the last rates contain feedback, m.
         up: largest climb, m.
         down: largest fall, m.
     """

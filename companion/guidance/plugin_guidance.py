@@ -18,7 +18,7 @@ class PluginGuidance:
 
     @property
     def acts_after(self) -> float:
-        """Delay until feedback takes effect, s; see `Guidance.acts_after`. Raises as `command`."""
+        """Like `Guidance.acts_after`, s; raises `UserCodeError` like `command`."""
         with naming_user_code("guidance", self.guidance):
             return float(self.guidance.acts_after)
 

@@ -16,8 +16,8 @@ positions need a shorter one (`CorrectionSettings.filter_time`)."""
 _FILTER_TIME_PER_NOISE = 0.1
 """Growth of `filter_time` with the noise of r, s per m/s; r is defined in `PositionCorrection`."""
 _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
-"""Noise of r below which positions count as smooth, and above which as noisy, m/s. The noise of PX4
-and ArduPilot is at most 0.1 m/s; white noise of 3 mm at 50 Hz makes 0.5 m/s."""
+"""Noise of r below which positions count as smooth, and noise above which they count as noisy, m/s.
+PX4 and ArduPilot make at most 0.1 m/s; white position noise of 3 mm at 50 Hz makes 0.5 m/s."""
 _LARGEST_CHANGE = 0.08
 """Each new value of r is clamped to within this distance of the filtered r, m/s. ArduPilot stamps
 its position in whole milliseconds: at 5 m/s an error of 1 ms changes one value of r by 0.25 m/s.
@@ -26,8 +26,8 @@ _NOISE_TIME = 1.0
 """Time constant with which the noise of r is estimated, s."""
 _MOVING_SPEED = 2.0
 """Speed from which the positions are trusted fully, m/s. At lower speed, position errors are small
-and mostly noise. With less trust a real PX4 hovers as exactly as with full trust, and with half the
-body rates."""
+and mostly noise. With the reduced trust, a real PX4 hovers with the same accuracy, and with half
+the body rates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +51,8 @@ class CorrectionSettings:
 class PositionCorrection:
     """Adds to horizontal positions the correction that the estimator has not made yet.
 
-    The autopilot's Kalman filter moves its position by its velocity and towards GPS. The second
-    part, r = ṗ − v, is the filter's gain times the distance to GPS. So the distance to GPS
+    The autopilot's Kalman filter moves its position p by its velocity v and towards GPS. The motion
+    towards GPS, r = ṗ − v, is the filter's gain times the distance to GPS. So the distance to GPS
     is estimator_time·r. If GPS is later than the filter assumes, the position also lags by
     position_delay·v.
 
@@ -117,7 +117,7 @@ class PositionCorrection:
     def _filter_unexplained_velocity(
         self, before: VehicleMotion, now: VehicleMotion, dt: float
     ) -> None:
-        """Filter r, the change of position per time that the velocity does not explain."""
+        """Filter r = ṗ − v, the change of the position that the velocity does not explain."""
         settings = self._settings
         (p_before, v_before), (p_now, v_now) = before, now
         raw, filtered, correction = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
@@ -142,7 +142,7 @@ class PositionCorrection:
         self._correction = clamp_length(correction[0], correction[1], settings.largest_correction)
 
     def _filter_time(self, raw: list[float], dt: float) -> float:
-        """Time constant of the low-pass filters, s, for the new value `raw` of r and its noise."""
+        """Update the noise of r with its new value `raw`, m/s; return the filter time, s."""
         change = hypot(raw[0] - self._newest_r[0], raw[1] - self._newest_r[1])
         kept_share = exp(-dt / _NOISE_TIME)
         self._noise = change * change + kept_share * (self._noise - change * change)

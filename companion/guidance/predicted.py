@@ -1,7 +1,7 @@
 """Predicted motion of a maneuver, from its reference and its open-loop commands.
 
-In open loop the acceleration is that of the commanded tilt at constant height. The time until the
-tilt is reached is neglected: it delays the motion and hardly changes it.
+In open loop the acceleration follows from the commanded tilt at constant height. The delay of the
+tilt is neglected, because a delay hardly changes the motion.
 """
 
 from collections.abc import Iterator
@@ -23,8 +23,8 @@ class PredictedMotion(NamedTuple):
         time: time since the maneuver began, s.
         offset: position from where the maneuver began, m.
         velocity: velocity, m/s.
-        acceleration: acceleration, m/s². In open loop the horizontal part is that of the tilt
-            alone, without drag.
+        acceleration: acceleration, m/s². In open loop the horizontal part is the acceleration by
+            tilt alone, without drag.
     """
 
     time: float

@@ -67,7 +67,7 @@ class VerticalMode(Enum):
     Attributes:
         HEIGHT: guidance corrects errors of height and climb rate.
         HEIGHT_IN_STEPS: as HEIGHT, but the vertical acceleration jumps. The rotors do not follow
-            jumps, so the hover thrust is not learned meanwhile.
+            jumps, so the hover thrust is not learned in this mode.
         ACCELERATION: guidance commands the acceleration alone, without drag and feedback.
     """
 

@@ -48,7 +48,7 @@ def dead_time_by_correlation(
     """The dead time: the delay at which filtered commands and measurements correlate most.
 
     The commands first pass through the known lag, so that the remaining delay is the dead time.
-    With a `lag` of 0, the result is the whole delay: dead time plus most of a short lag.
+    With a `lag` of 0, the result is the dead time plus most of the lag, if the lag is short.
 
     Args:
         time: (n,), vehicle time of the sample to which each command responds, s.

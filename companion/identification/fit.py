@@ -42,7 +42,7 @@ _EXCITED_SHARE = 0.02
 """Share of the commands' range by which the modelled response must differ from the command at an
 excited sample."""
 _RESPONSE_DURATION_FACTOR = 4.0
-"""Duration of a response and of the correlation of noise, as a multiple of lag + dead time."""
+"""Duration of a step response, and correlation time of noise, as a multiple of lag + dead time."""
 _COARSE_SAMPLES = 500
 """Approximate number of samples used to find the start of the search."""
 _MOST_SAMPLES = 4000
@@ -64,7 +64,7 @@ class LagFit:
     lag: float
     """Time constant τ of the first-order lag, s."""
     gain: float
-    """Steady measurement per command; fitted even if lag and dead time are for a given gain."""
+    """Steady measurement per command; fitted even if lag and dead time assume a given gain."""
     slew: float | None
     """Slew limit of the command, before the lag, per second; None: no limit was found."""
     fit: FitQuality

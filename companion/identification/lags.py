@@ -60,7 +60,7 @@ def slew_limited(commands: Knots, slew: float) -> Knots:
 def _start_values(commands: Knots, slew: float) -> Floats:
     """(n,), output of the slew limit at the time of each command.
 
-    This needs a loop, because each ramp starts where the ramp before it ended.
+    The computation needs a loop, because each ramp starts where the previous ramp ended.
     """
     output = float(commands.value[0])
     outputs, largest_changes = [output], slew * np.diff(commands.time)

@@ -19,8 +19,8 @@ _WINDOW_DURATION = 10.0
 """A long record is cut into windows of this length, s; the fit uses those with the most
 excitation."""
 _WINDOW_LEAD = 1.5
-"""Duration before a window in which commands are kept, too, s: more than the longest dead time plus
-the longest slew-limited change of command that is searched."""
+"""Commands in this time before a window are kept too, s. The time is longer than the longest dead
+time plus the longest slew-limited change of command in the search."""
 
 
 class Stretch(NamedTuple):
@@ -68,7 +68,7 @@ def most_excited_windows(record: list[Stretch]) -> list[Stretch]:
     """The record or, if it is long, only the windows in which the commands varied most.
 
     Half an hour of flight contains hardly more information on the response than its most excited
-    half minute. A window also holds the commands of the `_WINDOW_LEAD` before it.
+    half minute. Each window also contains the commands from the `_WINDOW_LEAD` before the window.
     """
     if sum(stretch.time.size + stretch.measured_time.size for stretch in record) <= _MOST_ROWS:
         return record

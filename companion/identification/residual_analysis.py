@@ -1,8 +1,8 @@
 """Splits the residual of a fit: the part that the commands explain is misfit, the rest is noise.
 
-Misfit is an error of the model, the same in each flight. It limits how well the model predicts.
+Misfit is an error of the model, the same in each flight; misfit limits how well the model predicts.
 Noise makes the results of flights differ, and the standard errors come from noise alone. The split
-is a regression of the residual on the commands at many delays (a finite impulse response). It
+is a regression of the residual on the commands at many delays (a finite impulse response), which
 explains as much as a linear model of any order can (Ljung, System Identification, 16.6).
 """
 

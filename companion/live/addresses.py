@@ -11,7 +11,7 @@ from companion.files.yaml_file import ConfigError
 
 PAGE_PORT = 8090
 STREAM_PORT = 8765
-"""Port of the live stream; Foxglove and Lichtblick propose this one."""
+"""Default port of the live stream; also the default port in Foxglove and Lichtblick."""
 _ANSWER_TIMEOUT = 0.5
 """Time allowed for the helper process of an ended flight to answer `ask_to_release`, s."""
 _RELEASE_TIMEOUT = 8.0

@@ -57,7 +57,7 @@ class Channel:
     def received_messages(self, max_count: int = sys.maxsize) -> Iterator[Message | None]:
         """Yield up to `max_count` received messages, and None if the other end is closed.
 
-        If the socket blocks, wait for each message.
+        With a blocking socket, wait for each message.
         """
         for data in datagrams(self._socket, max_count):
             if not data:

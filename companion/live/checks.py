@@ -1,6 +1,6 @@
 """The slow checks of a change of values; they precede the flight's own checks.
 
-The helper process makes them, so that they do not delay the flight.
+The helper process runs these checks, so that they do not delay the flight.
 """
 
 from pathlib import Path
@@ -54,7 +54,7 @@ class ChangeChecks:
         )
 
     def check(self, values: Values, name: str) -> None:
-        """Check new values: valid, not too large a change, stable, and the maneuvers still flyable.
+        """Check new values: types and ranges, size of the change, stability margins, maneuvers.
 
         Args:
             values: the new values, by section and key.

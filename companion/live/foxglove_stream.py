@@ -49,7 +49,7 @@ class LiveStream:
     """
 
     def __init__(self, host: str, port: int) -> None:
-        # Kept, because the library closes the channels of a context that nobody refers to.
+        # Kept, because the library closes the channels of a context without references.
         self._context = foxglove.Context()
         self._subscriptions = _Subscriptions()
         self._channels = [

@@ -1,4 +1,4 @@
-"""The flight's side of the helper process: sends events, and makes requested changes."""
+"""The flight's interface to the helper process: sends events, and makes requested changes."""
 
 import asyncio
 import json

@@ -178,7 +178,7 @@ async def _serve(channel_fd: int, page_fd: int, feed_fd: int) -> None:
 
 
 async def _watch_until_ended(connection: FlightConnection) -> None:
-    """Wait for the end of the flight; meanwhile watch the file, if one is to be watched."""
+    """Wait for the end of the flight; until then watch the file, if a file is to be watched."""
     path = connection.first_message["watched_file"]
     watching = None if path is None else asyncio.create_task(watch(connection, Path(path)))
     await connection.flight_ended.wait()

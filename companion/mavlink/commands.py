@@ -31,7 +31,7 @@ class Command(NamedTuple):
 ARM = Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 """Arms, with all checks of the autopilot."""
 DISARM = Command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
-"""Disarms a vehicle on the ground; autopilots refuse it in the air."""
+"""Disarms a vehicle on the ground; autopilots refuse this command in the air."""
 
 _ACCEPTED, _IN_PROGRESS = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_IN_PROGRESS
 _IN_PROGRESS_TIMEOUT_S = 30.0  # from the ACK "in progress" to the final one
@@ -65,9 +65,8 @@ class CommandClient:
     """Sends commands and waits for their ACKs.
 
     An ACK names only the command, so a call waits until an earlier call with the same command ends.
-    ACKs come in the order of the tries, so each ACK counts for the oldest try that expects one. A
-    late ACK of a cancelled call, or of a call before a stall, is not taken for that of the next
-    call.
+    ACKs come in the order of the tries, so each ACK counts for the oldest try that expects an ACK.
+    A late ACK of a cancelled call, or of a call before a stall, does not count for the next call.
     """
 
     def __init__(
@@ -134,7 +133,7 @@ class CommandClient:
             except TimeoutError:  # the ACK is lost, or after a stall it may be in the backlog
                 deadline = time() + _BACKLOG_S if time() - deadline > _STALL_S else -inf
             except asyncio.CancelledError:
-                if time() > deadline:  # only a stall has kept it from timing out
+                if time() > deadline:  # a stall of this process delayed the timeout
                     deadline = time() + _BACKLOG_S
                 raise
             finally:

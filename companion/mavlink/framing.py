@@ -1,8 +1,8 @@
 """MAVLink framing: finds frames of versions 1 and 2 in bytes, and builds frames of version 2.
 
 Source: the MAVLink serialization guide. Only intact frames are delivered. The checksum includes the
-message's CRC_EXTRA, so a frame of an unknown message cannot be checked. It is skipped unless
-`keep_unknown` is true.
+message's CRC_EXTRA, so a frame of an unknown message cannot be checked. Frames of unknown messages
+are skipped unless `keep_unknown` is true.
 """
 
 import struct

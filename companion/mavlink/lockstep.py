@@ -2,8 +2,8 @@
 
 The vehicle ends each of its steps with a beacon, SYSTEM_TIME(time_boot_ms = t), and waits for the
 answer of `companion`. Between beacon and answer, everything that is due runs in vehicle time. The
-answer is the last datagram of the step. No result depends on the speed of either side, so a flight
-is bit-identical each time, and runs as fast as both can compute.
+answer is the last datagram of the step. No result depends on the speed of the two programs, so a
+flight is bit-identical each time, and runs as fast as both programs can compute.
 """
 
 import asyncio

@@ -1,7 +1,7 @@
 """Messages by name and id, and their payloads decoded and encoded by pymavlink.
 
-The dialect holds MAVLink common and ArduPilot's estimator status. It lacks CURRENT_MODE, which is
-defined here, and MAVLink's events, whose payloads are passed on undecoded.
+pymavlink's dialect holds MAVLink common and ArduPilot's estimator status. The dialect lacks
+CURRENT_MODE, which is defined here, and MAVLink's events, whose payloads are passed on undecoded.
 """
 
 import struct
@@ -69,8 +69,8 @@ _IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     and set(message_class.lengths) == {1}
     and "s" not in message_class.unpacker.format
 }
-"""By message id, functions that put a payload's values in the order of the constructor.
-They exist only for messages without arrays and texts, such as most telemetry.
+"""By message id, functions that put a payload's values in the order of the constructor; only for
+messages without arrays and texts, such as most telemetry.
 """
 
 

@@ -53,7 +53,7 @@ class Outbox:
         return was_sent
 
     def latch(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> None:
-        """Keep a setpoint as the answer of this lockstep step; a later one in the step replaces it.
+        """Keep a setpoint for `close_step`; a later setpoint in the same step replaces it.
 
         Raises:
             InvalidSetpoint: see `send_setpoint`; nothing was kept.

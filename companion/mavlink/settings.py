@@ -19,11 +19,11 @@ class LinkSettings:
     target_component: int = 1
     """Component id of the vehicle; 1 is the autopilot."""
     source_system: int = 1
-    """System id of this program; a companion computer has that of its vehicle."""
+    """System id of this program; a companion computer uses the system id of its vehicle."""
     source_component: int = MAV_COMP_ID_ONBOARD_COMPUTER
     """Component id of this program."""
     heartbeat_rate_hz: float = 1.0
-    """Rate of the heartbeats that are sent, Hz. No setpoint depends on it."""
+    """Rate of the heartbeats that this program sends, Hz; independent of the setpoints."""
     signing: Signing | None = None
     """Signs frames that are sent and checks received frames; `None`: no signing."""
     lockstep: bool = False

@@ -32,9 +32,9 @@ WRITE_PERIOD_S = 10.0
 _STAMP_RESERVE = 15 * TICKS_PER_S
 """Time added to the newest stamps in the file while the link is open, ticks.
 
-It is longer than `WRITE_PERIOD_S`. So even if this program is killed, its next run sends newer
-stamps, and accepts no frame of this run again. The next run refuses the vehicle's frames until
-their stamps are newer than those in the file, for 15 s at most.
+The reserve is longer than `WRITE_PERIOD_S`. So even if this program is killed, its next run sends
+newer stamps, and refuses recorded frames of this run. The next run also refuses the vehicle's
+frames until their stamps are newer than the stamps in the file, for 15 s at most.
 """
 _LAST_WRITE_TIMEOUT_S = 2.0
 """Time allowed for the last write of the stamps, s."""
@@ -64,7 +64,7 @@ class Signing:
         key: 32 bytes shared with the vehicle.
         link_id: link id in the signatures that are sent, 0..255.
         clock: returns Unix time in s; called once, at the start.
-        monotonic_clock: returns the time in s that the stamps follow after the start.
+        monotonic_clock: returns monotonic time in s, by which the stamps advance after the start.
 
     Attributes:
         file: keeps the newest stamps from one run to the next; `None`: they are not kept.

@@ -65,9 +65,9 @@ class StampJudge:
       including those on disk. On a stream not yet heard in this run it must also be less than a
       minute older than the date, and than the newest stamp of the other streams.
     - A stamp up to 5 years ahead may have three causes: this computer's clock is behind (no
-      battery), the frame is a recording, or the vehicle's clock is wrong. It is refused until the
-      vehicle has answered a TIMESYNC request of this run, which no recording can do. Such stamps
-      are kept apart, so that they do not make stamps near the date look old.
+      battery), the frame is a recording, or the vehicle's clock is wrong. The stamp is refused
+      until the vehicle has answered a TIMESYNC request of this run, which no recording can do.
+      Stamps far ahead are kept apart, so that they do not make stamps near the date look old.
     - A stamp further ahead is refused.
 
     Args:
@@ -177,7 +177,7 @@ class StampJudge:
     def _kept_stamp(self, stream: SignatureStream, ahead: bool) -> int:
         """The newest stamp of a stream on disk, ticks; 0 without one.
 
-        `ahead`: whether to search only the stamps far ahead of the date, or only the others.
+        `ahead`: True: only stamps far ahead of the date count; False: only the other stamps.
         """
         stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
         return max(stamps, default=0)

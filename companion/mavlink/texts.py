@@ -80,7 +80,7 @@ def _is_repetition(texts: deque[StatusText], text: str, now: float) -> bool:
 
 
 def status_texts(text: str, severity: int, text_id: int) -> list[Message]:
-    """The STATUSTEXTs of an ASCII text: a long one in pieces of 50 characters, the last shorter.
+    """The STATUSTEXTs of an ASCII text: a text over 50 characters is cut into pieces of 50.
 
     `severity`: MAV_SEVERITY. `text_id`: number that joins the pieces of one text, 1..65535; not
     used for a single piece.

@@ -23,7 +23,7 @@ _STAMP_BYTES = 8
 _SHORTEST_HEADER = 6
 _V1_OVERHEAD, _V2_OVERHEAD = 8, 12  # bytes of header and checksum
 _LONGEST_DAMAGED_BEGINNING = 1 << 16
-"""A file whose first frame begins later than this is no `.tlog`, bytes."""
+"""Largest offset of the first intact frame in a `.tlog` with a damaged beginning, bytes."""
 _OTHER_LOGS = {
     b"ULog\x01\x12\x35": "a ULog",
     b"\xa3\x95\x80": "a DataFlash log",
@@ -77,7 +77,7 @@ class _RecordReader:
         """The intact frames of the wanted messages, in order.
 
         Raises:
-            LogError: no record is near the beginning of the file.
+            LogError: the file has no intact record near its beginning.
         """
         start, end_of_data = self._first_record(), len(self._data)
         while start + _SHORTEST_HEADER <= end_of_data:
@@ -120,7 +120,7 @@ class _RecordReader:
     def _may_skip(self, start: int, end: int) -> bool:
         """Whether `start`..`end` may be a frame of a message that is unknown or not wanted.
 
-        Its checksum cannot tell: another dialect may use the same number for another message.
+        The checksum is not used: another dialect may use the same message id for another message.
         """
         if end == start or self._message_id(start) in self._wanted:
             return False

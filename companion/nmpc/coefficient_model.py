@@ -36,10 +36,10 @@ def coefficient_model(settings: Settings) -> Model:
     Limits: |c_d| ≤ sin(max_tilt), or ≤ |c| at the start if that is larger; the tilt rate of
     p·(c_d − c) is at most `max_tilt_rate`; the heading rate is at most `max_yaw_rate`.
 
-    The round limits of c_d and of the tilt rate are replaced by polygons inside them. This makes
-    the constraints linear in the control, so one iteration from any guess gives a first control
+    Inscribed polygons replace the round limits of c_d and of the tilt rate. The polygons make the
+    constraints linear in the control, so one iteration from any guess gives a first control
     within the limits, and only the first control is applied. The dead time is not part of the
-    model: `Predictor` integrates the motion to its end.
+    model: `Predictor` integrates the motion to the end of the dead time.
     """
     symbols = Symbols(size=11, own_constants=1)
     speeds, commanded_rates = symbols.state[9:11], symbols.commanded_rates(settings)
@@ -101,7 +101,7 @@ class Symbols:
         bounded_terms: ca.SX,
         constants_of: Callable[[Conditions, Motion], Numbers],
     ) -> Model:
-        """Make the `Model`; the arguments are its terms that these symbols do not determine."""
+        """Make the `Model` from these symbols and the terms given as arguments."""
         attitude_reference, size = ca.SX.sym("attitude_reference", 4), self.state.numel()
         return Model(
             state=self.state,

@@ -56,7 +56,7 @@ class Request(NamedTuple):
     """Time since the trajectory began, at `vehicle.time`, s."""
     start: Start
     inputs: tuple[ControlInput, ...]
-    """Latest control inputs, in order of time. They must cover the dead time before `vehicle.time`.
+    """Latest control inputs, in order of time; must cover the dead time before `vehicle.time`.
     The first input is assumed to have been in effect before its time, too. Without any input,
     attitude and vertical speed are assumed to be held."""
 

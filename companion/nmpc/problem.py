@@ -89,10 +89,9 @@ def parameters_of(
     nodes: Sequence[Node],
     attitude_references: Sequence[Sequence[float]],
 ) -> Floats:
-    """The numbers for `Program.parameters`.
+    """The numbers for `Program.parameters`: the constants, then the values of each node.
 
-    They are the constants, then for each node its position, velocity, thrust, and attitude
-    reference (`Model.attitude_reference`).
+    The values of a node are position, velocity, thrust, and `Model.attitude_reference`.
     """
     values = [*constants]
     for node, attitude_reference in zip(nodes, attitude_references, strict=True):

@@ -15,7 +15,7 @@ from companion.nmpc.settings import Settings
 
 
 class FirstControl(NamedTuple):
-    """First control of a new plan, as a target for the planner, and figures of the solver."""
+    """First control of a new plan, as a target for the planner, and the solver's statistics."""
 
     iterations: int
     """Number of SQP iterations."""
@@ -24,7 +24,7 @@ class FirstControl(NamedTuple):
     north: float
     east: float
     heading: float
-    """`north`, `east` and `heading`: target for the planner (coefficients; heading in rad)."""
+    """Target for the planner: acceleration coefficients `north` and `east`; `heading`, rad."""
     thrust: float
     """Specific thrust, m/s²."""
 
@@ -32,8 +32,8 @@ class FirstControl(NamedTuple):
 class RecedingHorizon:
     """Solves the optimal control problem at each request, starting from the previous plan.
 
-    The cost has the same weights for all models: on deviations of position, velocity, heading,
-    attitude rate and thrust from the reference; see `Weights`.
+    For all models the cost penalises the same errors: of position, velocity, heading, attitude rate
+    and thrust, each relative to the reference; see `Weights`.
     """
 
     def __init__(self, settings: Settings, make_model: Callable[[Settings], Model]) -> None:
@@ -86,7 +86,7 @@ class RecedingHorizon:
         return FirstControl(solution.iterations, solver_seconds, *(float(v) for v in target))
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
-        """The first guess: the previous plan shifted to `time`, or the reference."""
+        """The solver's initial guess: the previous plan shifted to `time`, or the reference."""
         if self._previous is None or not time >= self._previous_time:
             return plan_on_reference(self._model, nodes, self._settings)
         steps = (time - self._previous_time) / self._settings.step_duration

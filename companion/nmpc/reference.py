@@ -20,7 +20,7 @@ class Node(NamedTuple):
     """Velocity, m/s, NED."""
     north: float
     east: float
-    """`north` and `east`: acceleration coefficients."""
+    """`north` and `east`: acceleration coefficients (horizontal part of the thrust axis)."""
     speed_north: float
     speed_east: float
     """`speed_north` and `speed_east`: time derivative of the coefficients, 1/s."""

@@ -14,12 +14,12 @@ class Weights:
     heading: float = 2.0
     """Weight of the heading error, 1/rad²."""
     attitude_rate: float = 0.1
-    """Weight of the commanded attitude rate minus that of the reference, s²/rad²."""
+    """Weight of the error of the commanded attitude rate against the reference, s²/rad²."""
     thrust: float = 0.02
-    """Weight of the specific thrust minus that of the reference, s⁴/m²."""
+    """Weight of the error of the specific thrust against the reference, s⁴/m²."""
     final: float = 0.5
-    """Factor (s) from `position` and `velocity` to the weights of the same errors at the end of the
-    horizon."""
+    """Terminal cost: the weights of position and velocity error at the end of the horizon are
+    `position` and `velocity` times this factor, s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Settings:
     iterations: int = 1
     """Largest number of SQP iterations per solve; 1 is the real-time iteration."""
     lead: float = 0.02
-    """Time from a request to the use of its answer, s."""
+    """Time from sending a request to the solver until guidance uses the answer, s."""
     deadline: float = 0.02
     """Wall time allowed for an answer, s."""
     niceness: int = 5

@@ -37,7 +37,7 @@ _NO_CONTROL = FirstControl(0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Worker:
-    """Answers requests about one trajectory.
+    """Solves the optimal control problem for each request; all requests fly one trajectory.
 
     The dead time is not part of the problem. The motion is predicted to the time at which the
     answer takes effect, `Settings.lead` plus dead time after the state in the request. The plan
@@ -74,7 +74,7 @@ class Worker:
         self._horizon.forget()
 
     def answer(self, request: Request) -> Answer:
-        """Compute the answer to a request, to be used `Settings.lead` after the request."""
+        """Solve a request; guidance uses the answer `Settings.lead` after the request's time."""
         began = perf_counter()
         use_time = request.vehicle.time + self._settings.lead
         try:

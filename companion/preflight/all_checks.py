@@ -52,7 +52,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def run_checks(config: Config, evidence: Evidence, *, repeated: bool = False) -> list[Finding]:
-    """All findings, also safe ones; `repeated`: without the checks in `CHECKED_ONCE`."""
+    """Run all checks, without `CHECKED_ONCE` if `repeated`; return all findings, also safe ones."""
     return [
         finding
         for check in CHECKS

@@ -10,7 +10,7 @@ from companion.preflight.finding import INEFFECTIVE, SAFE, UNSAFE, Finding, Key
 from companion.vehicle.clock_estimates import MOST_DRIFT
 
 _UNSAFE_NOT_NEWER_SHARE = 0.2
-"""Unsafe above this share of samples whose stamp is not later than that of the sample before."""
+"""More than this share of samples stamped no later than the previous sample is unsafe."""
 _MIN_SAMPLES = 10
 """Smallest number of samples to judge the rate of the clock."""
 _UNSAFE_PRODUCT, _SAFE_PRODUCT = 0.3, 0.15
@@ -47,11 +47,11 @@ def age(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 
 def round_trip(config: Config, seconds: float) -> Finding:
-    """Judge whether the gain is too high for a round trip of this many seconds.
+    """Judge whether the planner's gain is too high for a round trip of `seconds`.
 
-    When a setpoint takes effect, the attitude that it answers is as old as the round trip. In
-    lockstep the vehicle waits, and the gain of another package's planner may mean something else:
-    in both cases, every round trip is accepted.
+    When a setpoint takes effect, the attitude sample from which the setpoint was computed is as old
+    as the round trip. Every round trip is accepted in lockstep, because the vehicle waits, and with
+    another package's planner, whose gain may have another meaning.
     """
     gain = config.planner.gain_per_s
     gain_matters = config.planner_name in PLANNER_NAMES and not config.link.lockstep
@@ -71,7 +71,7 @@ def round_trip(config: Config, seconds: float) -> Finding:
 
 
 def clocks(config: Config, evidence: Evidence) -> Iterator[Finding]:
-    """Whether the vehicle's clock runs steadily, at the rate of ours."""
+    """Whether the vehicle's clock runs steadily, at the same rate as this computer's clock."""
     samples, source = evidence.samples, "ATTITUDE_QUATERNION time_boot_ms"
     if samples.clock_change:
         yield Finding(

@@ -1,4 +1,4 @@
-"""Checks of our configuration; one compares it with what earlier flights measured."""
+"""Checks of our configuration, and of its dead times against those of earlier flights."""
 
 import json
 from collections.abc import Iterator
@@ -34,8 +34,8 @@ def planner(config: Config, _: Evidence) -> Iterator[Finding]:
 def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Compare the configured dead times with those of this vehicle's newest flight.
 
-    Only flights with the same planner and gain count: with another gain the response of the same
-    vehicle differs, and an oscillating hold gives a wrong dead time.
+    Only flights with the same planner and gain count. With another gain the vehicle responds
+    differently, and an oscillating position hold gives a wrong dead time.
     """
     if not config.vehicle.response_known:
         return

@@ -20,7 +20,7 @@ _POSITION_MESSAGES = frozenset(
 
 
 class Stage(Enum):
-    """State in which a vehicle is checked; the value says for what, as in "ready to take off"."""
+    """State in which a vehicle is checked; the value completes "the vehicle is ready …"."""
 
     GROUND = "to be armed"
     """The vehicle stands on the ground, disarmed."""
@@ -70,7 +70,7 @@ class LinkQuality(NamedTuple):
 
 
 class SampleTimes(NamedTuple):
-    """Times of the attitude samples received, by the vehicle's clock and by ours."""
+    """Times of the attitude samples received, by the vehicle's clock and by our clock."""
 
     sample_count: int = 0
     longest_pause: float = 0.0
@@ -78,7 +78,7 @@ class SampleTimes(NamedTuple):
     not_newer_count: int = 0
     """Number of samples stamped no later than the one before."""
     clock_rate: float | None = None
-    """Seconds of the vehicle's clock per second of ours; `None` for too few samples."""
+    """Seconds of the vehicle's clock per second of our clock; `None`: too few samples."""
     age: float | None = None
     """Median age of the samples at arrival, s; `None`: TIMESYNC does not measure it."""
     clock_change: str = ""
@@ -86,7 +86,8 @@ class SampleTimes(NamedTuple):
     unusable_count: int = 0
     """Number of samples that are not a unit quaternion or not finite."""
     rate: float | None = None
-    """Effective rate, Hz, lowered by bursts (`IntervalSums`); `None` for too few samples."""
+    """Effective sample rate, Hz: pauses between bursts lower the rate (`IntervalSums`). `None`: too
+    few samples."""
 
 
 @dataclass(slots=True)
@@ -98,7 +99,7 @@ class OtherNodes:
     companions: set[tuple[int, int]] = field(default_factory=set)
     """Nodes whose heartbeat has the type onboard controller."""
     autopilots: set[tuple[int, int]] = field(default_factory=set)
-    """Nodes whose heartbeat is that of an autopilot which this program flies."""
+    """Nodes whose heartbeat shows an autopilot that this program supports."""
     setpoint_senders: set[tuple[int, int]] = field(default_factory=set)
     target_is_foreign: bool = False
     """Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed, so that another
@@ -128,7 +129,7 @@ class Evidence:
     identity: Identity
     """The autopilot's version and hardware."""
     stage: Stage = Stage.GROUND
-    """The next step of the vehicle."""
+    """State in which the vehicle is checked."""
     warnings: tuple[str, ...] = ()
     """The autopilot's texts of severity warning or worse."""
     maneuvers: ManeuverSequence | None = None
@@ -147,7 +148,7 @@ class Evidence:
 
     @property
     def is_booting(self) -> bool:
-        """Whether no recent estimator status is known; ArduPilot sends little before the first."""
+        """Whether no recent estimator status is known; ArduPilot sends little while it boots."""
         return self.state.readiness.estimator_flags is None
 
     @property

@@ -1,8 +1,8 @@
 """Findings of the preflight checks: fact, consequence, remedy, and source.
 
-A finding about a parameter has the parameter's name as key. A finding about a message rate has the
-key `link.streams.MESSAGE`, or that of the limit that the rate does not reach:
-`link.min_attitude_rate_hz` or `link.min_position_rate_hz`. All other keys are in `Key`.
+The key of a finding about a parameter is the parameter's name. The key of a finding about a message
+rate is `link.streams.MESSAGE`; below a required minimum it is `link.min_attitude_rate_hz` or
+`link.min_position_rate_hz`. All other keys are in `Key`.
 """
 
 from dataclasses import dataclass, replace
@@ -95,7 +95,7 @@ class Finding:
     """The parameter change that would fix the problem; `None`: no such change."""
 
     def safe_unless(self, problem: bool) -> "Finding":
-        """This finding if there is a problem; else a safe one, of the same fact and source."""
+        """This finding if there is a problem; else a safe finding with the same fact and source."""
         return self if problem else replace(self, result=SAFE, because="", fix="")
 
     def sentence(self) -> str:

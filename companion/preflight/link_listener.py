@@ -33,7 +33,7 @@ class LinkListener:
     """Collects what comes over the link while its `with` block runs.
 
     Args:
-        link: link to listen on. The block replaces its `on_foreign`.
+        link: link to listen on. The `with` block replaces the link's `on_foreign`.
         clock: our clock, s.
 
     Attributes:

@@ -88,7 +88,8 @@ def worst_reach(
 ) -> WorstReach:
     """The `WorstReach` over all checked moments of the maneuvers.
 
-    `LossFailsafe` describes `hold_time`, `drag` and `brakes`.
+    `hold_time`: time for which the autopilot holds the last rates, s. `brakes`: whether the
+    failsafe brakes the vehicle; False: the vehicle drifts until its `drag` stops it.
     """
     fence = replace(config.fence, places=())
     max_tilt_rate = config.limits.max_tilt_rate

@@ -40,7 +40,7 @@ class Undo(Section):
     def meant_for(self, link: Link, identity: Identity) -> bool:
         """Whether the vehicle on the link is the one whose parameters were changed.
 
-        A hardware id that either side does not know is not compared.
+        Hardware ids are compared only if the undo file and the vehicle both have one.
         """
         same_hardware = None in (self.uid, identity.uid) or self.uid == identity.uid
         vehicle = link.autopilot.name, link.settings.target_system
@@ -89,7 +89,7 @@ class UndoFile:
 
 
 def _unused_path(directory: Path, name: str) -> Path:
-    """A path that does not exist yet, even if another run began within the same second."""
+    """The path `name`.yaml; a number is added if another run already made a file of this name."""
     path, number = directory / f"{name}.yaml", 1
     while path.exists():
         number += 1

@@ -25,8 +25,8 @@ class RetryPolicy(NamedTuple):
 
 
 _FIRST_ROUND = RetryPolicy(0.5, 3)
-"""First round. Old versions of PX4 do not answer for a parameter that they lack; each of these
-costs 1.5 s.
+"""First round. Old versions of PX4 do not answer for a parameter that they lack, so each missing
+parameter costs 1.5 s.
 """
 _SECOND_ROUND = RetryPolicy(0.75, 6)
 """Second round. If each direction loses one frame in five, 5 % of the parameters get no answer to

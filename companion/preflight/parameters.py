@@ -94,7 +94,7 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
 
 
 def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
-    """Whether the autopilot may have a parameter of the rule, although the survey read none."""
+    """Whether the autopilot may have the rule's parameter, although the survey did not read it."""
     names = {rule.name, rule.alternative}
     return names.isdisjoint(survey.values) and not names.isdisjoint(survey.unread_names)
 

@@ -1,7 +1,7 @@
 """One preflight session: connect, wait for readiness, listen, and judge.
 
-It reads, requests message rates, and has the autopilot run its pre-arm checks. Nothing here arms
-the vehicle or sends a setpoint.
+The session reads telemetry and parameters, requests message rates, and has the autopilot run its
+pre-arm checks. Nothing here arms the vehicle or sends a setpoint.
 """
 
 import asyncio
@@ -60,9 +60,9 @@ async def gather(
         link: link to a vehicle whose heartbeat was received.
         granted: the message rates that were requested and granted, by message.
         seconds: time for counting messages, s.
-        stage: the next step of the vehicle.
-        prearm_checks: also run the autopilot's pre-arm checks, so that it says what forbids arming.
-        notices: notices of the link; they are read at the end.
+        stage: state in which the vehicle is checked.
+        prearm_checks: also run the autopilot's pre-arm checks, whose texts say what forbids arming.
+        notices: notices of the link, read when listening ends.
         earlier_survey: the same vehicle's parameters, if they were read before.
 
     Raises:

@@ -24,7 +24,7 @@ _RATE_KEYS = {
 
 
 def minimum_rates(link: LinkConfig) -> dict[str, tuple[str, float]]:
-    """Key of `link` and smallest rate, Hz, of each message that has one."""
+    """Configuration key (section `link`) and minimum rate, Hz, of each message with a minimum."""
     return {
         "ATTITUDE_QUATERNION": ("min_attitude_rate_hz", link.min_attitude_rate_hz),
         "LOCAL_POSITION_NED": ("min_position_rate_hz", link.min_position_rate_hz),
@@ -106,12 +106,12 @@ def _is_countable(name: str, rate: StreamRate, evidence: Evidence) -> bool:
 
 
 def _expected_rate(name: str, rate: StreamRate) -> float:
-    """The rate to expect of a message, Hz: the requested one, unless it is sent on change."""
+    """Expected rate of a message, Hz: the requested rate, or less for a message sent on change."""
     return min(rate.requested, _SENT_ON_CHANGE.get(name, rate.requested))
 
 
 def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
-    """A rate without a fault, in words; if it is below the requested rate, why it suffices."""
+    """Describe a rate without a fault; say why a rate below the requested one suffices."""
     if name in _SENT_ON_CHANGE:
         return f"{name} on change, otherwise at {_SENT_ON_CHANGE[name]:g} Hz"
     if not _is_countable(name, rate, evidence):

@@ -34,14 +34,14 @@ _SYNC_PERIOD = 0.5
 class BackgroundFile(ABC, Generic[T]):
     """Writes items to a file in its own thread; it never delays or ends a flight.
 
-    `put` takes items also before `open`. They are written once the file is open. A subclass gives
-    the format of the file; only the thread calls its methods `_write`, `_sync` and `_end`.
+    Items that `put` takes before `open` are written once the file is open. A subclass defines the
+    format of the file; only the thread calls the subclass's `_write`, `_sync` and `_end`.
 
     Attributes:
         path: path of the file.
         dropped: number of items that were not written, because too many waited, writing had failed,
             or (`FlightRecorder`) an item could not be encoded.
-        failure: why writing stopped, for example a full disk; None: it has not failed.
+        failure: why writing stopped, for example a full disk; None: no failure.
 
     Args:
         path: path of the file.

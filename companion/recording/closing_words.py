@@ -1,6 +1,7 @@
 """The summary in words at the end of a flight.
 
-It says which maneuvers flew, whether all figures are within their limits, and what to do next.
+The summary says which maneuvers were flown, whether all figures are within their limits, and what
+to do next.
 """
 
 import shlex
@@ -42,7 +43,7 @@ class ClosingWords(NamedTuple):
     """The summary of a flight in words."""
 
     headline: str
-    """Which maneuvers flew, and whether all figures are within their limits; or the early end."""
+    """Which maneuvers were flown, and whether all figures are within limits; or the early end."""
     lines: tuple[str, ...]
     """The figures and advice for the headline, or how and why the flight ended early."""
     next_command: str | None
@@ -146,7 +147,7 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
 
 
 def _gain_warning(figures: Figures) -> list[str]:
-    """The warning of a gain above the largest sensible one; empty: no warning."""
+    """The warning that the planner's gain is too high; empty: no warning."""
     warning = figures.get("gain_warning")
     return [] if warning is None else [warning]
 
@@ -201,7 +202,7 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
 
 
 def _repetition_is_better(figures: Figures) -> bool:
-    """Whether a repetition would be better, because it knows the drag that this flight learned."""
+    """Whether the same flight would now be better, because the vehicle's drag has been learned."""
     if figures["early_end"] is not None or figures["settings"] or not figures.get("drag_learned"):
         return False
     return any(not check.good and check.fault.endswith(OFF_COURSE) for check in checks(figures))

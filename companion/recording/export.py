@@ -1,7 +1,7 @@
 """Exports a recorded flight as CSV or Parquet: one file for each channel of numbers that has rows.
 
 Three more tables join several channels: `tracking`, `rates` and `response` (see `FlightTrace`). The
-figures of the summary are computed from them.
+figures of the summary are computed from these three tables.
 """
 
 import csv

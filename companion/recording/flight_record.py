@@ -7,10 +7,10 @@
 The columns of each channel are in `companion.recording.mcap_file` (`loop_channels` and `channels`),
 with their units. A channel without messages has 0 rows. NaN: not known, or does not apply.
 
-Times are on one of three clocks. Our clock is event-loop time; on it the flight began at `began`.
-The vehicle's clock gives `vehicle_time_s`. Phases, events, alarms and the channel `motion` have the
-time since the flight began; `since_start` converts our clock to it. In a flight in lockstep or on a
-virtual clock, our clock is the vehicle's; then `epoch` is 0.
+There are three kinds of time. "Our clock" is event-loop time; the flight began when our clock read
+`began`. `vehicle_time_s` is the vehicle's clock. Phases, events, alarms and the channel `motion`
+have the time since the flight began; `since_start` converts our clock to this time. In lockstep or
+on a virtual clock, our clock is the vehicle's, and `epoch` is 0.
 """
 
 import json
@@ -93,7 +93,7 @@ class FlightRecord:
 
     @property
     def fault(self) -> str | None:
-        """Why the record holds less than the flight, as a sentence; None: it holds all.
+        """Why a part of the flight is missing in the record, as a sentence; None: none is missing.
 
         A record that ends because its flight was killed (no `summary.json`) has no fault.
         """

@@ -10,7 +10,7 @@ from companion.recording.tlog import TLOG_FILE
 _BYTES_PER_S = 160_000
 """Measured size of the recording of 1 s with 250 attitude samples, bytes."""
 _SHORTEST_RECORDING = 600.0
-"""A warning is given if the disk has room only for a shorter recording, s."""
+"""Duration of a recording, s; `space_warning` warns if the disk has room for less."""
 
 
 def flight_folder(directory: Path) -> Path:

@@ -2,7 +2,7 @@
 
 Memory does not grow with the flight. A separate thread writes the files in large chunks; the
 control loop only passes full chunks, and never waits for the disk. A flight without a folder has no
-such thread, and its rows stay in memory.
+thread, and its rows stay in memory.
 """
 
 import errno
@@ -28,7 +28,7 @@ _MOST_WAITING = 64
 
 
 class SpooledFile:
-    """A temporary file of doubles in `folder`, made at the first write, deleted with its object."""
+    """Temporary file of doubles in `folder`; created by the first `append`, deleted when freed."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -149,8 +149,8 @@ class Series:
     def rows(self, since: int = 0) -> NDArray[np.float64]:
         """(N, columns), the rows from number `since` on; lost rows are left out.
 
-        In flight, request only rows that are still in memory; for others this call waits for the
-        disk.
+        In flight, request only rows that are still in memory; for older rows this call waits for
+        the disk.
         """
         wanted = max(0, len(self) - since) * len(self.columns)
         parts: list[array[float]] = [self._chunk]

@@ -1,6 +1,6 @@
 """Rows of the control loop and of guidance, for the measurements in flight and after it.
 
-Their columns are those of the channels of `flight.mcap`, so a recorded flight gives the same rows
+The rows have the columns of the channels of `flight.mcap`, so a recorded flight gives the same rows
 (`recorded_summary.trace_of`).
 """
 
@@ -23,7 +23,7 @@ ANSWERED = (*rate_names("measured"), "age_s")
 """Columns of SAMPLE, with which a row of `FlightTrace.rates` ends."""
 RATES = SENT + ANSWERED
 RESPONSE = ("vehicle_time_s", *QUATERNION, "target_north", "target_east")
-"""Columns of SETPOINT."""
+"""Columns of SETPOINT, which form a row of `FlightTrace.response`."""
 TRACKING = ("vehicle_time_s", *vector_names("reference", "m"), *vector_names("measured", "m"))
 
 
@@ -51,8 +51,8 @@ class FlightTrace:
         response: rows of RESPONSE, only during steps.
         tracking: (vehicle time s, reference north, east, down, estimated north, east, down m) while
             offboard control is active; NaN: there is no reference along this axis.
-        rates: rows of RATES while the vehicle's heartbeats show offboard control; the age is NaN if
-            it is not known absolutely.
+        rates: rows of RATES while the vehicle's heartbeats show offboard control; `age_s` is NaN
+            unless the age is absolute (`AttitudeSample.age_known`).
         latencies_ns: latencies from sample to setpoint inside this process, ns.
         motion: rows of MOTION, ten times a second in all phases.
         maneuvers: beginning of each maneuver, and end of the last one.

@@ -62,8 +62,8 @@ _USER_CODE = "fix the code named above, and fly it on the mock vehicle (`compani
 def what_to_do(monitor: str | None, phase: str, result: str = "") -> str:
     """Advice as one sentence without a full stop.
 
-    It depends on the monitor that ended the flight (None: no monitor), else on the phase that
-    failed; an error in the user's code, named in `result`, has its own advice.
+    The advice depends on the monitor that ended the flight (None: no monitor), else on the phase
+    that failed; an error in the user's code, named in `result`, has its own advice.
     """
     if result.startswith(MESSAGE_START):
         return _USER_CODE

@@ -1,7 +1,7 @@
 """Reads the recorded inputs of the control loop and the guidance loop, in order.
 
-They are samples, guidance steps, actions of phases, changes of configuration values in flight, and
-the autopilot's ATTITUDE_TARGET.
+The inputs are samples, guidance steps, actions of phases, changes of configuration values in
+flight, and the autopilot's ATTITUDE_TARGET.
 """
 
 from collections import deque

@@ -36,7 +36,7 @@ class Setpoint(NamedTuple):
 
 
 class RecordedSample(NamedTuple):
-    """An attitude sample, and the flight's answer to it."""
+    """An attitude sample, and the setpoint that the flight sent for the sample, if any."""
 
     sample: AttitudeSample
     """The sample; `received_ns`, from which latencies are computed, is 0."""
@@ -45,7 +45,7 @@ class RecordedSample(NamedTuple):
     checked_at: float
     """Time when the sample's age was checked before sending, s on our clock; NaN: not checked."""
     reason: str
-    """"answered", or why it is unanswered; one of `UNANSWERED_CODES`."""
+    """"answered", or why no setpoint was sent; one of `UNANSWERED_CODES`."""
     setpoint: Setpoint | None
     """Setpoint that was sent; None: none was sent."""
 

@@ -1,9 +1,9 @@
 """Replays a recorded flight: the same control and guidance loops get the recorded inputs, in order.
 
 Guidance flies the maneuvers of the configuration again, unless a program or the solver process of
-predictive control commanded the flight. The record lacks their inputs, so then the recorded
-commands of guidance are used, and only the control loop is replayed. Changes of values in flight
-are repeated.
+predictive control commanded the flight. The record lacks the inputs of these two; guidance's
+recorded commands are used instead, and only the control loop is replayed. Changes of values in
+flight are repeated.
 """
 
 from math import isnan
@@ -42,7 +42,7 @@ from companion.replay.recorded import (
 
 
 class ReplayedSample(NamedTuple):
-    """The answers to one sample, in the flight and in the replay."""
+    """One sample, with the setpoints sent for the sample in the flight and in the replay."""
 
     received: float
     """Arrival of the sample, s on our clock."""
@@ -53,15 +53,15 @@ class ReplayedSample(NamedTuple):
     replayed_setpoint: Setpoint | None
     """Setpoint of the replay; None: no setpoint."""
     recorded_reason: str
-    """"answered", or why the flight did not answer; one of `UNANSWERED_CODES`."""
+    """"answered", or why the flight sent no setpoint; one of `UNANSWERED_CODES`."""
     replayed_reason: str
-    """"answered", or why the replay did not answer; one of `UNANSWERED_CODES`."""
+    """"answered", or why the replay sent no setpoint; one of `UNANSWERED_CODES`."""
 
     @property
     def same(self) -> bool:
-        """Whether flight and replay gave the same answer.
+        """Whether flight and replay answered the sample in the same way.
 
-        Either both sent a setpoint, equal to the bit, or neither sent one, for the same reason.
+        Either both sent bit-identical setpoints, or neither sent a setpoint, for the same reason.
         """
         return (
             self.recorded_setpoint == self.replayed_setpoint
@@ -217,7 +217,7 @@ def _assumed_drag(record: FlightRecord, config: Config) -> KnownDrag:
 class _RecordedSource:
     """Gives guidance the recorded references.
 
-    The commands that guidance computes from them are replaced by the recorded commands.
+    The commands that guidance computes from these references are replaced by the recorded commands.
 
     Attributes:
         step_reference: recorded reference of the next step; None: the step had none.

@@ -76,10 +76,10 @@ def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) 
 
 
 def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
-    """Sentences on samples whose answers differ in more than the setpoint.
+    """Sentences on samples for which flight and replay differ in more than the setpoint's values.
 
-    Only the flight or only the replay answered the sample, or both left it unanswered for different
-    reasons.
+    Only the flight or only the replay sent a setpoint for the sample, or neither sent one, for
+    different reasons.
     """
     changes = Counter(
         (each.recorded_reason, each.replayed_reason)
@@ -94,7 +94,7 @@ def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
 
 
 def write_csv(samples: Sequence[ReplayedSample], path: Path) -> None:
-    """Write the answers of flight and replay to each sample; an empty field: nothing was sent.
+    """Write the setpoints of flight and replay for each sample; an empty field: nothing was sent.
 
     Raises:
         OSError: the file cannot be written.

@@ -88,8 +88,8 @@ def _constant_limits(config: Config) -> dict[str, CrossedLimit]:
 def _fence_side(config: Config, reason: str, record: FlightRecord) -> CrossedLimit | None:
     """The side of the fence that `reason` names, in the coordinates of the plots.
 
-    Radius, ceiling and polygon are relative to the position where control began, the floor to home.
-    None: nothing was flown under control, or the polygon is given in degrees, which no plot shows.
+    Radius, ceiling and polygon are relative to the position where control began. The floor is
+    relative to home. None: control never began, or the polygon is in latitude and longitude.
     """
     guidance, limits = record.rows("guidance"), config.limits
     controlled = guidance[guidance["offboard_active"] == 1]

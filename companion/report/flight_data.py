@@ -63,7 +63,7 @@ class FlightData:
     "thrust": sent, 0..1. "hover_thrust": as learned, 0..1. "latency": from a sample's arrival to
     its setpoint, ms."""
     figures: Mapping[str, Any] | None = None
-    """The content of `summary.json`, or derived from the record; None for a `.tlog`."""
+    """The content of `summary.json`, or the same figures derived from the record; None: `.tlog`."""
     provisional: bool = False
     """Whether the flight wrote no summary, so that the figures come from its record."""
     fault: str | None = None

@@ -105,7 +105,7 @@ def _panels(flight: FlightData) -> "list[Callable[[Axes], None]]":
 
 
 def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
-    """The first doublet along its direction, with the nearest and the ideal model.
+    """The first doublet's component along its direction, with the nearest and the ideal model.
 
     `ideal` is the time constant of the ideal model, s.
     """
@@ -127,7 +127,7 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
 
 
 def _draw_plane(axes: "Axes", flight: FlightData) -> None:
-    """All doublets, north over east coefficient: a linear response moves on straight lines."""
+    """Plot the north over the east coefficient of all doublets; a linear response is straight."""
     for number, run in enumerate(flight.step_runs):
         style = _LINE_STYLES[number % len(_LINE_STYLES)]
         north, east = run.measured.T

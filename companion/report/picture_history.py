@@ -59,7 +59,7 @@ def draw_history(panels: Sequence["Axes"], flight: FlightData) -> None:
 
 
 def _name_maneuvers(axes: "Axes", flight: FlightData) -> None:
-    """Write above the first panel: the maneuvers, and the time and reason of an early end."""
+    """Write the maneuvers, and time and reason of an early end, above the first panel."""
     for span in flight.maneuvers:
         open_loop = " (open loop)" if _is_open_loop(flight, span) else ""
         axes.text(
@@ -92,7 +92,7 @@ def _is_open_loop(flight: FlightData, span: Span) -> bool:
 
 
 def _name_phases(axes: "Axes", phases: Sequence[Span], length: float) -> None:
-    """Write in the last panel: the phases; those that begin close together share a line."""
+    """Write the phases in the last panel; phases that begin close together share a line."""
     groups: list[tuple[float, list[str]]] = []
     for phase in phases:
         if groups and phase.begin - groups[-1][0] < _JOINED_BELOW * length:

@@ -186,7 +186,7 @@ def _maneuver_shade(span: Span, number: int) -> dict[str, Any]:
 
 
 def _name_above(span: Span) -> dict[str, Any]:
-    """Label of a maneuver; its field `name` is the duration, s: the page hides wider labels."""
+    """Label of a maneuver; `name` is the duration, s, so that the page can hide too wide labels."""
     return {
         "x": 0.5 * (span.begin + span.end),
         "y": 1.0,

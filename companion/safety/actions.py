@@ -16,7 +16,7 @@ class Action(Enum):
     HOLD = "hold"
     """Abort the maneuver, brake, and hold where the vehicle has stopped, still in offboard.
 
-    `SafetyLadder` says what follows.
+    `SafetyLadder` describes what follows the hold.
     """
     HAND_BACK = "hand_back"
     """Command the autopilot to hold, and end offboard control."""
@@ -25,7 +25,7 @@ class Action(Enum):
     LISTEN = "listen"
     """Stop sending setpoints; if the vehicle is heard again and still obeys us, command a hold.
 
-    A vehicle that was asked to land already is asked to land again."""
+    A vehicle that was already commanded to land is commanded to land again."""
     RELEASE = "release"
     """Stop sending setpoints: the pilot or the autopilot's failsafe flies the vehicle."""
 
@@ -55,14 +55,14 @@ class Exit(Enum):
 
 
 class StreamEffect(Enum):
-    """What a breach that ends control does to the stream of setpoints, before the exit begins."""
+    """How a breach that ends control changes the sending of setpoints, before the exit begins."""
 
     CONTINUES = "continues"
-    """The exit ends the stream, once the autopilot obeys the exit's command."""
+    """Setpoints are sent until the autopilot obeys the exit's command, such as to land."""
     ENDS = "ends"
-    """The stream ends with a setpoint of zero body rates: later ones would not arrive in time."""
+    """A setpoint of zero body rates is sent last, because later ones would not arrive in time."""
     STOPS = "stops"
-    """The stream stops at once: the data for another setpoint cannot be trusted."""
+    """No more setpoint is sent, because the data for another setpoint cannot be trusted."""
 
 
 EXIT_OF_ACTION = {
@@ -98,7 +98,7 @@ class ControlReleased(FlightEnded):
 
     @property
     def result(self) -> str:
-        """The result of the flight in its summary: it ended as it should."""
+        """The result of the flight in its summary: the flight ended normally."""
         return "ok"
 
 

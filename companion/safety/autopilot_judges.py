@@ -15,7 +15,7 @@ HORIZONTAL_POSITION_FLAGS = 0x8 | 0x10
 
 
 def disarmed(snapshot: Snapshot, _: bool) -> str | None:
-    """The vehicle is disarmed. No phase that disarms is monitored, so `companion` did not do it."""
+    """The vehicle is disarmed, and not by `companion`: phases that disarm are not monitored."""
     return None if snapshot.autopilot.armed else "the vehicle disarmed in flight"
 
 
@@ -80,7 +80,7 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
 
 def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
-    """The estimator was reset in the last 30 s; the references move with each reset."""
+    """The estimator was reset in the last 30 s; each reset shifts the references, too."""
     resets = snapshot.resets
     if resets.recent_count == 0:
         return None

@@ -6,22 +6,22 @@ from companion.attitude import BodyRates
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
 _MIN_REPETITIONS = 10
-"""Smallest number of newer messages in a row that repeat the same numbers."""
+"""Number of newer messages in a row that must repeat the same numbers to count as frozen."""
 _MAX_TURN = 0.05
-"""Largest turn that setpoints command while the attitude repeats itself, rad."""
+"""An attitude that repeats is frozen if setpoints command a rotation of more than this, rad."""
 _MAX_DISTANCE = 0.02
-"""Largest distance flown by the reported speed while the position repeats itself, m. Distances in
-opposite directions add up, because each one must change the numbers."""
+"""A position that repeats is frozen if the integral of the reported speed exceeds this, m. Motions
+in opposite directions add up, because each of them must change the position."""
 _POSITION_TIME = 0.5
-"""Shortest time for which a position must repeat itself, s: an estimate may be made at 5 Hz."""
+"""Time for which a position must repeat to be frozen, s; some estimators update at only 5 Hz."""
 _MAX_DRIFT = 0.05
-"""Largest distance of the position from where the repeated velocity would have led, m."""
+"""A velocity that repeats is frozen if its integral is off the position by more than this, m."""
 _LONGEST_INTERVAL = 0.1
 """A longer interval between two checks counts as this time, s."""
 
 
 class _Repetition:
-    """Counts for how long a message brings the same numbers."""
+    """Counts how many messages in a row repeat the same numbers, and since when."""
 
     def __init__(self) -> None:
         self.count, self.since = 0, 0.0
@@ -40,12 +40,12 @@ class _Repetition:
         return True
 
     def is_long(self, time: float) -> bool:
-        """Whether the numbers repeat often enough, and for long enough (`time`, s)."""
+        """Whether enough messages repeat the numbers, over a long enough `time` (s)."""
         return self.count >= _MIN_REPETITIONS and time >= _POSITION_TIME
 
 
 class _Axis:
-    """Compares position and velocity along one axis; each of the two may repeat itself alone."""
+    """Compares position and velocity along one axis, because only one of them may be frozen."""
 
     def __init__(self) -> None:
         self._position, self._velocity = _Repetition(), _Repetition()
@@ -78,17 +78,18 @@ class _Axis:
 class FrozenTelemetry:
     """Finds an attitude, position or velocity that repeats itself although it must change.
 
-    An estimator's numbers change with each message, by the noise of its sensors. Numbers that
-    repeat to the last bit count as frozen only if they contradict themselves: the setpoints turn
-    the vehicle, the reported speed moves it, or the position moves otherwise than the reported
-    velocity. So a simulated vehicle at perfect rest is not frozen. Each axis is judged alone.
+    Sensor noise changes an estimator's numbers with each message. Numbers that repeat to the last
+    bit count as frozen only if other data contradict them: an attitude although setpoints command
+    rotation, a position although the reported velocity is not zero, or a velocity that does not
+    match the positions. So a simulated vehicle at perfect rest is not frozen. Each axis is judged
+    separately.
     """
 
     def __init__(self) -> None:
         self.begin(0.0)
 
     def begin(self, now: float) -> None:
-        """Note that control begins at `now`, s of event-loop time: forget what was before."""
+        """Note that control begins at `now`, s of event-loop time; forget all earlier messages."""
         self._attitude = _Repetition()
         self._axes = _Axis(), _Axis(), _Axis()
         self._turn, self._checked_at = 0.0, now

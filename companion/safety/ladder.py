@@ -16,19 +16,19 @@ class Verdict(NamedTuple):
     reason: str
     """Description of the breach."""
     stream: StreamEffect = StreamEffect.CONTINUES
-    """What becomes of the setpoints if `action` ends control."""
+    """Whether setpoints continue, end or stop if `action` ends control."""
 
 
 class SafetyLadder:
     """Escalates to the action of the most severe breach, and never de-escalates.
 
-    The action HOLD aborts the maneuver and ends the flight. If all breaches with this action end
-    within `hold_time`, the vehicle lands once it rests, at the latest after this time. Otherwise
-    the most severe `Monitor.then` of the breaches that have not ended is the next action.
+    The action HOLD aborts the maneuver and ends the flight. If all breaches with the action HOLD
+    end within `hold_time`, the vehicle lands as soon as it is at rest, at the latest after
+    `hold_time`. Otherwise the most severe `Monitor.then` of the remaining breaches follows.
 
     Args:
         monitors: the monitors of the flight; among equally severe breaches the first one decides.
-        hold_time: time allowed for a hold to end its breach, s.
+        hold_time: time allowed for the breaches to end during a hold, s.
 
     Attributes:
         note: called with a message when an alarm is raised or ended.

@@ -16,7 +16,7 @@ def silence(limit: float, *, heard: bool, planner: str = "auto", guidance: str =
     """No setpoint was sent for longer than `limit` s.
 
     `heard`: True: the judge applies only while frames come from the vehicle; False: only while no
-    frames come. `planner` and `guidance`: their names in the configuration, for the message.
+    frames come. `planner`, `guidance`: names of both in the configuration, for the message.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:
@@ -97,8 +97,8 @@ def round_trip(max_seconds: float) -> Judge:
 def late_setpoints(max_sample_age: float) -> Judge:
     """Every probe answered in the last 0.7 s had a round trip over 1.5 times `max_sample_age`, s.
 
-    `max_sample_age` is the largest age of a sample that is answered. If setpoints take as long to
-    reach the vehicle, its attitude oscillates more and more, although all telemetry looks good.
+    `max_sample_age` is the largest age at which a sample is used. If setpoints also
+    arrive `max_sample_age` late, the attitude oscillates more and more, while telemetry looks good.
     """
     max_seconds = 1.5 * max_sample_age
     return above(
@@ -115,7 +115,7 @@ def late_setpoints(max_sample_age: float) -> Judge:
 def lost_setpoints(max_unanswered: int) -> Judge:
     """More than `max_unanswered` TIMESYNC probes in a row were sent and not answered.
 
-    Telemetry still arrives: without it, the judge `silence` would have ended control earlier.
+    Telemetry still arrives, else the judge `silence` would have ended control earlier.
     """
 
     def judge(snapshot: Snapshot, _: bool) -> str | None:

@@ -7,8 +7,8 @@ from companion.safety.actions import Action, StreamEffect
 from companion.safety.snapshot import Snapshot
 
 Judge = Callable[[Snapshot, bool], str | None]
-"""Returns the breach in words, or None. The flag: whether the alarm is already raised; judges that
-`above` and `below` make then have hysteresis, so that the alarm does not toggle at the limit."""
+"""Returns the breach in words, or None. The flag tells whether the alarm is already raised. `above`
+and `below` use the flag for hysteresis, so that the alarm does not toggle at the limit."""
 
 _HYSTERESIS = 0.9
 """A raised alarm ends only below this share of an upper limit, or above a lower limit divided by
@@ -76,7 +76,7 @@ class Monitor:
     then: Action = Action.LAND
     """Action that follows if a hold does not end the breach."""
     stream: StreamEffect = StreamEffect.CONTINUES
-    """What becomes of the setpoints if the breach ends control."""
+    """Whether setpoints continue, end or stop if the breach ends control."""
 
 
 class Alarm:

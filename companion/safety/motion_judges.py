@@ -2,9 +2,9 @@
 
 The docstring of each judge states its breach.
 
-The judge `braking` acts before the vehicle leaves the fence. It judges where the vehicle would stop
-with the deceleration `safety.braking_m_s2`, or with what tilt limit and wind leave of it, if it
-still accelerates for the reaction time (`Fence.stopping_point`).
+The judge `braking` reports a breach before the vehicle leaves the fence. `Fence.stopping_point`
+predicts where the vehicle would stop if a present acceleration lasted for the reaction time and the
+vehicle then braked with `safety.braking_m_s2`, or with less if tilt limit and wind allow no more.
 """
 
 from math import degrees, hypot

@@ -1,4 +1,4 @@
-"""Monitors of other packages: they run beside ours, and cannot stop or soften them.
+"""Monitors of other packages: they run beside our monitors, and cannot disable or weaken ours.
 
 The judge of a monitor is its function that looks for a breach in each snapshot. Each monitor has
 three rows in the table: the monitor itself, one for exceptions of its judge, and one for the time
@@ -84,7 +84,7 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
 
 
 class GuardedJudge:
-    """Asks the judge of another package until it fails.
+    """Calls the judge of another package until the judge fails.
 
     Attributes:
         fault: how the judge failed, or None.
@@ -117,7 +117,7 @@ class GuardedJudge:
         return None if self.fault is None else f"{self.fault}; the vehicle is handed back"
 
     def judge_time(self, snapshot: Snapshot, raised: bool) -> str | None:
-        """A breach if the latest call of the judge took too long; none after its fault."""
+        """A breach if the latest call of the judge took too long; None after the judge's fault."""
         if self.fault is not None or self._judging_time <= with_hysteresis(
             _MAX_JUDGING_TIME, raised
         ):

@@ -18,8 +18,8 @@ class SetpointEcho:
     """Compares the autopilot's ATTITUDE_TARGET with the setpoints that this program sent.
 
     While an autopilot obeys body rates, it reports the rates of the newest setpoint (PX4) or its
-    thrust (ArduPilot), as every report of recorded flights confirms. So a report that fits no
-    setpoint of ours shows that another program sends setpoints, too; the autopilot obeys both.
+    thrust (ArduPilot), as every report of recorded flights confirms. So a report that matches none
+    of our setpoints shows that another program sends setpoints, too; the autopilot obeys both.
 
     Attributes:
         any_foreign: whether a report since control began showed a setpoint of another program.

@@ -50,7 +50,7 @@ class Motion(NamedTuple):
     wind: NorthEast = (0.0, 0.0)
     """Estimated acceleration that the wind gives a vehicle at rest, m/s², NED."""
     moves_to_hold: bool = False
-    """Whether guidance still brakes, or moves, to the place that it then holds."""
+    """Whether guidance still brakes or moves to the position that it will hold."""
 
 
 class Control(NamedTuple):
@@ -81,7 +81,7 @@ class Control(NamedTuple):
     """Latest jump, stop or restart of the vehicle's clock since control began, in words, or
     None."""
     stall_time: float = 0.0
-    """Time for which this program did not run since the last answer, s."""
+    """Total time of the stalls of this program since `last_answer`, s."""
 
 
 class Health(NamedTuple):

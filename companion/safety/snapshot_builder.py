@@ -37,7 +37,7 @@ class SnapshotBuilder:
         echo: takes each ATTITUDE_TARGET.
         counters: the counters of the last second, and our own stalls.
         fence_centre_ned: centre of the fence in the frame without estimator resets, m NED; None:
-            not known. It is where control began, unless `begin` got another centre.
+            not known. The centre is where control began, unless `begin` got another one.
 
     Args:
         real_time: whether deadlines count; in lockstep they do not, because the vehicle waits.
@@ -84,7 +84,7 @@ class SnapshotBuilder:
         self._frozen.begin(now)
 
     def flown_fence_centre(self) -> FenceCentre | None:
-        """Centre of the fence in the frame without estimator resets; None: see `fence_centre`."""
+        """Centre of the fence in the frame without resets; None: no position, or no control yet."""
         if self.fence_centre_ned is None:
             return None
         return FenceCentre(self.fence_centre_ned, self._fence_place)

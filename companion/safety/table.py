@@ -19,12 +19,12 @@ _MAX_GAPS = 2
 """Largest number of gaps in the setpoints within 5 s."""
 _MAX_UNANSWERED = 7
 """Largest number of TIMESYNC probes in a row that the vehicle may leave unanswered; they are sent
-every 0.1 s. If single ones are lost at random, eight in a row are lost once in 50 s at a loss of
+every 0.1 s. If single probes are lost at random, eight in a row are lost once in 50 s at a loss of
 50 %, in 36 min at 30 %, in 13 h at 20 %."""
 _MAX_FOREIGN = 2
 """Largest number of foreign setpoints that the autopilot may report within 5 s."""
 _ESTIMATE_DELAY = 0.08
-"""Time by which the estimated horizontal motion is behind the vehicle, s. Measured on accelerating
+"""Delay of the estimated horizontal motion behind the true motion, s. Measured on accelerating
 mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
 _RELEASE, _HAND_BACK, _HOLD, _LAND = Action.RELEASE, Action.HAND_BACK, Action.HOLD, Action.LAND
 

@@ -1,6 +1,6 @@
 """This program as a MAVLink component on the clients' network.
 
-It sends heartbeats, texts, named values, and answers to commands.
+The component sends heartbeats, status texts, named values, and acknowledgements of commands.
 """
 
 import asyncio
@@ -24,8 +24,8 @@ _MAX_TEXT_LENGTH = 200
 _TEXT_REPEAT_PERIOD = 5.0
 """Shortest time between two equal texts to the same client, s."""
 _MAX_ANSWERS = 10
-"""Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`. Without this limit, a stream of
-refused setpoints could cause as many texts, because a text may contain the setpoint's numbers."""
+"""Largest number of texts to one client in `_TEXT_REPEAT_PERIOD`. Without this limit, each
+refused setpoint could cause a text, because the text may contain the setpoint's numbers."""
 _AUTOPILOT_INVALID, _STATE_ACTIVE, _MAVLINK_VERSION = 8, 4, 3
 
 WARNING, NOTICE = dialect.MAV_SEVERITY_WARNING, dialect.MAV_SEVERITY_NOTICE
@@ -95,14 +95,14 @@ class Component:
             self._network.send_to(client, self._frame(message, sender))
 
     def on_own_frame(self, client: Client, frame: Frame) -> None:
-        """Refuse a command to our component, which carries out none; ignore other frames."""
+        """Refuse every command to our component; ignore other frames."""
         if frame.message_id in COMMAND_IDS:
             self.acknowledge(client, frame, dialect.MAV_RESULT_UNSUPPORTED, self._own_address)
 
     def _note_unless_repeated(self, client: Client | None, text: str) -> bool:
         """Note that `text` is sent now; return False if it must not be sent.
 
-        A text must not be sent if it or too many others were sent to `client` in the last 5 s.
+        A text must not be sent if the same text or too many texts were sent to `client` within 5 s.
         """
         now = self._loop.time()
         self._sent_at = {

@@ -104,7 +104,7 @@ class ServedControl:
         """Pass a request to the flight, or begin a flight; return the reason of a refusal, or None.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous request stays in force.
+            UnplannableError: no motion fulfils the request; the previous request stays in force.
         """
         flight = self._flights.current_flight
         if flight is not None and not flight.is_ending and self._ownership.owner == owner:

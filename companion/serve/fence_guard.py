@@ -1,6 +1,7 @@
 """Stops a client's motion in front of the fence, so that the client stays in control.
 
-Otherwise the monitor `braking` would end the client's control, and land the vehicle where it is.
+Without this guard, the monitor `braking` would end the client's control, and land the vehicle where
+it is.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,15 +17,15 @@ from companion.serve.setpoints.motion import VERTICAL_ACCELERATION
 from companion.serve.setpoints.request import AxisDemand, MotionRequest
 
 _MARGIN = 0.5
-"""How far inside the fence the vehicle stops, m. It covers the tracking error at rest."""
+"""Distance inside the fence at which the vehicle stops, m; covers the tracking error at rest."""
 _BRAKING_LEAD = 0.6
 """Time by which the vehicle brakes earlier than the monitor `braking` requires, s. The deceleration
 needs this time to build up, because the jerk is limited and the vehicle follows late."""
 _REST_SPEED = 0.2
-"""Speed below which a stop is complete, m/s. While a request leads outward, a begun stop goes on
-until it is complete: if stop and request alternated, the vehicle would brake too late."""
+"""Speed below which a stop is complete, m/s. While a request leads outward, a stop once begun is
+completed, because the vehicle would brake too late if stop and request alternated."""
 _BRAKING_SHARE = 0.8
-"""Share of the largest acceleration of a client's motions that counts as their deceleration."""
+"""Deceleration assumed for a client's motions, as a share of their acceleration limit."""
 _LOOKAHEAD = 10.0
 """Time over which a commanded velocity is extrapolated to a destination, s."""
 _STEP = 0.1
@@ -68,7 +69,7 @@ class FenceGuard:
     def inside(
         self, request: MotionRequest, reference: Reference, actual: VehicleMotion, now: float
     ) -> MotionRequest:
-        """The request; each part of it that would lead beyond the fence is replaced by a stop.
+        """Return the request; a stop replaces each part that would lead beyond the fence.
 
         Args:
             request: command of the client.
@@ -147,7 +148,7 @@ class _State(NamedTuple):
 
 
 class _Destination(NamedTuple):
-    """Where a request leads."""
+    """The position to which a request leads, m NED."""
 
     position: Vector
     is_commanded: bool
@@ -173,7 +174,7 @@ class _FencePart:
     def breach(
         self, states: Sequence[_State], destination: _Destination, frame: _FenceFrame
     ) -> Breach | None:
-        """The breach to which a request leads, if the vehicle must stop now; None: it may go on.
+        """The breach to which a request leads, if the vehicle must stop now; None: no stop needed.
 
         Args:
             states: the state that is flown, and that of the vehicle.
@@ -212,7 +213,7 @@ def _worsened_breach(
 
 
 def _destination(request: MotionRequest, flown: _State, axes: tuple[bool, bool]) -> _Destination:
-    """Where a request leads, along the (horizontal, vertical) axes that are true."""
+    """Position to which a request leads; `axes`: whether (horizontal, vertical) motion counts."""
     place, is_commanded = list(flown.position), False
     for demand, begin, is_used in zip(request[:2], (0, 2), axes, strict=True):
         if not is_used:

@@ -29,7 +29,7 @@ class FlightRecords:
     Attributes:
         grants: results of requesting the real-time settings: each setting is granted or refused.
         on_recorded: called with the folder of each flight when its record is complete; returns a
-            sentence for the clients, or None. It runs in a thread, except on a virtual clock.
+            sentence for the clients, or None. Called in a thread, except on a virtual clock.
     """
 
     def __init__(

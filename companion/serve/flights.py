@@ -49,7 +49,7 @@ class ServedFlights:
         requested it. `from_ground`: whether the vehicle stands armed, and takes off first.
 
         Raises:
-            UnplannableError: no motion leads to the request.
+            UnplannableError: no motion fulfils the request.
         """
         self.current_flight = flight = ServedFlight(
             str(owner), self._vehicle, self.ownership, self.fence.centre, from_ground=from_ground

@@ -13,7 +13,7 @@ from companion.vehicle.link import Link
 class KeptFence:
     """Keeps the centre of the fence from one flight to the next.
 
-    Otherwise a client could move the fence by releasing control and requesting it again.
+    If each flight had its own centre, a client could move the fence by requesting control anew.
 
     The estimated position jumps, without a motion of the vehicle, when the estimator is reset or
     somebody sets another origin of the local frame. The centre moves with these jumps, as it does

@@ -39,8 +39,8 @@ def command_in(frame: Frame) -> Message | None:
 def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     """Whether a frame commands the mode in which the autopilot obeys setpoints.
 
-    This applies only to a mode entered by a command (PX4's OFFBOARD). Every form that PX4 accepts
-    counts: PX4 reads modes as bytes, and also accepts NAV_GUIDED_ENABLE.
+    Always false for an autopilot whose control begins with the first setpoint (ArduPilot). For PX4,
+    every form of the command counts: PX4 reads modes as bytes, and accepts NAV_GUIDED_ENABLE.
     """
     if autopilot.control_entry is not ControlEntry.BY_COMMAND:
         return False

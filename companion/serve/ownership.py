@@ -27,7 +27,7 @@ class Program(NamedTuple):
 
 
 class ControlState(Enum):
-    """State of the control by the owner, the program in control."""
+    """State of the control that the owner (the program in control) has over the vehicle."""
 
     FREE = "no client is in control"
     LIVE = "the owner's setpoints are flown"
@@ -52,7 +52,7 @@ class Ownership:
     _timeout: float
     """Time without a setpoint after which a program counts as silent, s."""
     _hold_time: float
-    """Time for which the vehicle is held for a silent owner, s."""
+    """Time for which the vehicle holds its position while the owner is silent, s."""
     owner: Program | None = field(default=None, init=False)
     """The program in control, or None."""
     _streams: dict[Program, _Stream] = field(default_factory=dict, init=False)

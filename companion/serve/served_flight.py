@@ -139,7 +139,7 @@ class ServedFlight:
         """Fly a request, at once if control has begun.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous request stays in force.
+            UnplannableError: no motion fulfils the request; the previous request stays in force.
         """
         self._source.give(request, self._clock())
         self._assembled.context.guidance_loop.step_at_once()

@@ -161,7 +161,7 @@ class ServeSession:
         return ServedControl(self._config, link, component, pose_tracker, self.flights)
 
     async def _tell_silence(self, link: Link) -> None:
-        """Say once that no vehicle is heard; clients are served all the same."""
+        """Say once that no vehicle is heard; clients are served nevertheless."""
         try:
             await link.wait_connected(self._config.flight.connect_timeout_s)
         except LinkError as error:

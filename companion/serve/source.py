@@ -63,7 +63,7 @@ class ServedSource:
         self._is_stopped = False
 
     def begin(self, now: float, pose: Pose) -> None:
-        """Start from the held pose, with the newest request unless the client is silent."""
+        """Start from `pose`, with the newest request unless the client is silent."""
         self.start_pose = pose
         is_live = self._ownership.state(now) is ControlState.LIVE
         self._ownership.begin(now)
@@ -77,7 +77,7 @@ class ServedSource:
         """Fly a request from now on; before `begin`, keep it.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous request stays in force.
+            UnplannableError: no motion fulfils the request; the previous request stays in force.
         """
         if self.start_pose is None:
             self._waiting_request = request

@@ -22,7 +22,7 @@ from companion.vehicle.link import Link
 
 _CHECK_PERIOD = 1.0
 _COUNTING_TIME = 0.1
-"""Time for which `Link.set_rates` counts messages after its request, s. It is short, because the
+"""Time for which `Link.set_rates` counts messages after its request, s; short, because the
 counts are not used here."""
 _MAX_TELEMETRY_AGE = 0.5
 """Largest age of a position or attitude that is used, s."""

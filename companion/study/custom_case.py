@@ -26,8 +26,8 @@ class CaseLimits(Section):
     max_yaw_rate_deg_s: Annotated[float, Field(ge=1.0, le=10_000.0)] | None = None
     """Largest yaw rate."""
     rate_limit: Literal["tight", "paper"] = "tight"
-    """How first-order and exact keep max_tilt_rate_deg_s. tight: only rates above it are scaled.
-    paper: equation 33, which needs max_tilt_deg."""
+    """How first-order and exact keep max_tilt_rate_deg_s. tight: only rates above the limit are
+    scaled. paper: equation 33, which needs max_tilt_deg."""
 
 
 class Case(Section):

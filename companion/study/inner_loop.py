@@ -46,8 +46,8 @@ class InnerLoop:
         """Fly from rest to a target; commanded rates are held until the next planner sample.
 
         The thrust holds the height at the tilt of each sample (`specific_thrust`, as in flight).
-        Thrust has no effect on the acceleration coefficients, but on the torque at which the rotors
-        saturate.
+        Thrust does not affect the acceleration coefficients directly, but it affects the torque at
+        which the rotors saturate.
 
         Args:
             planner: any planner of `companion.attitude`; it is not reset.

@@ -59,5 +59,5 @@ def planner_of(
     limits: Limits = Limits(),  # noqa: B008  (frozen)
     yaw_gain: float = 2.0,
 ) -> LawPlanner:
-    """The planner of any method but model-following; flights use the same code."""
+    """The planner of any method except model-following, with the code that flies a vehicle."""
     return cast(LawPlanner, make_planner(method.planner, gain, yaw_gain, limits))

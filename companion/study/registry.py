@@ -1,7 +1,7 @@
 """The table of studies. To add a study, write its module and add its entry to `STUDIES`.
 
-The command line, its help, `study all`, the page and the tests follow from the table. This module
-imports no study, so the command line needs none of the extras.
+The command line, its help, `study all`, the page and the tests are derived from the table. This
+module imports no study, so the command line needs none of the extras.
 """
 
 from typing import NamedTuple
@@ -29,8 +29,8 @@ class Study(NamedTuple):
     extra: str = ""
     """Extra of the package that the study needs besides `study`; empty: none."""
     in_all: bool = True
-    """Whether `all` includes the study: it takes seconds, and its files are the same on every
-    computer."""
+    """Whether `all` includes the study. False if the study takes minutes, times the computer, or
+    needs a case."""
     takes_case: bool = False
     """Whether the study reads a case from `--case FILE`."""
     prints_json: bool = False

@@ -22,7 +22,7 @@ class _Channels(NamedTuple):
     """Queue and event that a worker shares with the main process."""
 
     tick_queue: Any
-    """Queue of (study, part), put by the workers."""
+    """Queue of (study, part of the study that begins), filled by the workers."""
     stop_event: Any
     """Event, set when the run is interrupted."""
 
@@ -38,12 +38,12 @@ class _StoppedError(Exception):
 def run_in_workers(
     run_study: RunStudy, parts: Mapping[str, int], workers: int, tick: Callable[[str, str], None]
 ) -> dict[str, Outcome]:
-    """Run studies in worker processes; on Ctrl-C each ends after its part in progress.
+    """Run studies in worker processes. On Ctrl-C each study ends after its present part.
 
     Args:
         run_study: runs one study; a function at the top level of a module.
-        parts: number of parts by name of the study. Studies with more parts begin first, because
-            they take longer.
+        parts: number of parts, such as flights, by name of the study. Studies with more parts
+            begin first, because they take longer.
         workers: number of processes.
         tick: called in this process with study and part, soon after a part begins.
 

@@ -64,8 +64,8 @@ class Program(Client):
     Args:
         name: name in messages.
         ids: system and component of the program.
-        host: IP address that the program seems to have. Outside loopback it may only read, unless
-            `serve.trusted` names it or it signs its frames.
+        host: IP address that the program seems to have. With an address outside loopback, the
+            program may only read, unless `serve.trusted` names the address or the program signs.
 
     Attributes:
         heard: received messages, decoded by pymavlink, oldest first.

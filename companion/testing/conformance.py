@@ -30,21 +30,21 @@ _CASE_COUNT = 200
 _SETTLING_TIME = 3.0
 """Time allowed to reach a new target, s: 15 times the time constant 1/`_GAIN`."""
 _MAX_REMAINING_ERROR = 0.02
-"""Largest distance of the coefficients from their target after `_SETTLING_TIME`."""
+"""Largest distance of the acceleration coefficients from their target after `_SETTLING_TIME`."""
 _MAX_TRACKING_ERROR = 1.5
 """Largest distance of the vehicle from its reference in a hover and a circle, m."""
 
 
 def check_planner(planner: str | Law | type[Planner], seed: int = 0) -> None:
-    """Check that a planner may fly: finite, limited, equal for q and −q, and converging.
+    """Check that a planner may fly: finite, limited rates, equal for q and −q, that reach a target.
 
     Args:
         planner: a law, a class of planners, or the name of one, installed plug-ins included.
         seed: seed of the attitudes and targets.
 
     Raises:
-        AssertionError: the planner may not fly; the message gives the attitude or target at the
-            start, and the target to be reached.
+        AssertionError: the planner may not fly; the message gives the initial attitude (or the
+            target that describes it), and the target that the planner should have reached.
         PluginError: the plug-in cannot be loaded, or two packages give it.
         TypeError: `planner` is no planner: the law does not return three numbers, or the class has
             not the methods of a `Planner`.

@@ -60,7 +60,7 @@ async def _cancelled_by_ctrl_c(main: Coroutine[Any, Any, T]) -> T:
     """Return the result of `main`; raise CancelledError if Ctrl-C came meanwhile.
 
     After Ctrl-C a flight ends and returns normally. Without CancelledError, a campaign or a test
-    would go on with the next flight. `asyncio.Runner` turns it into KeyboardInterrupt.
+    would go on with the next flight. `asyncio.Runner` converts CancelledError to KeyboardInterrupt.
     """
     result = await main
     task = asyncio.current_task()

@@ -8,7 +8,7 @@ class ReceivedSetpoint(NamedTuple):
 
     Attributes:
         time: vehicle time when the setpoint was handled, s.
-        answers: `time_boot_ms` of the setpoint: the time stamp of the answered sample, ms.
+        answers: `time_boot_ms`: time stamp of the sample to which the setpoint responds, ms.
         rates: body rates about x, y, z (FRD), rad/s.
         thrust: normalised thrust, 0..1.
     """

@@ -25,8 +25,8 @@ def complete_mock(section: Mapping[str, Any]) -> dict[str, Any]:
 def mock_with(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """The complete section `mock` with some keys changed.
 
-    A key replaces only what it names: `wind.speed_m_s` leaves the gusts unchanged, and `airframe:
-    unlike-axes` with `airframe.mass_kg` is that airframe with another mass.
+    A change leaves all other keys unchanged: `wind.speed_m_s` keeps the gusts. The two changes
+    `airframe: unlike-axes` and `airframe.mass_kg` give the airframe `unlike-axes` another mass.
 
     Args:
         section: section before the changes.

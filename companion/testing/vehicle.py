@@ -34,10 +34,10 @@ def _plant_class(compiled: bool) -> type[Plant]:
 
 
 class MockVehicle:
-    """A multirotor with its autopilot, without sockets. Its state is kept between flights.
+    """A multirotor with its autopilot, without sockets. It keeps its state between flights.
 
     Args:
-        autopilot: "px4" or "ardupilot"; None: that of `config`, by default PX4.
+        autopilot: "px4" or "ardupilot"; None: the autopilot of `config`, by default PX4.
         config: a YAML file whose section `mock` is read.
         lockstep: whether the program answers each step before the next one, as with
             `link.lockstep`; a mapping sets more keys of `mock.lockstep`. Without lockstep the
@@ -58,8 +58,8 @@ class MockVehicle:
         setpoints: setpoints that reached the autopilot, oldest first. Clear the list to save
             memory.
         after_step: called after each step; `at` and `when` add to it.
-        to_companion: changes datagrams that the vehicle sends; None: they arrive unchanged.
-        from_companion: changes datagrams that the vehicle receives; None: they arrive unchanged.
+        to_companion: changes datagrams that the vehicle sends; None: no change.
+        from_companion: changes datagrams that the vehicle receives; None: no change.
 
     Raises:
         MissingExtraError: `compiled` is asked for, and numba is not installed.
@@ -112,7 +112,7 @@ class MockVehicle:
     def inject(self, fault: Mapping[str, Any]) -> None:
         """Inject a fault, given as an entry of `mock.faults`.
 
-        It begins in the next step, or at its `at_s` or `after_offboard_s`.
+        The fault begins in the next step, or at its `at_s` or `after_offboard_s`.
 
         Raises:
             sitl_mock.config.section.ConfigError: there is no such fault.
@@ -180,7 +180,7 @@ class MockVehicle:
         return self._simulation.next_us / 1e6
 
     def set_clock(self, clock_ns: Callable[[], int]) -> None:
-        """Set the clock (vehicle time, ns) that answers TIMESYNC.
+        """Set the clock (vehicle time, ns) with which the vehicle answers TIMESYNC.
 
         This clock also advances between two steps, unlike `time`.
         """

@@ -27,7 +27,7 @@ class VirtualClock:
         return self.now
 
     def advance(self, vehicle_time: float) -> bool:
-        """Set the time to that of a beacon, s; return False if the beacon is not newer."""
+        """Set the clock to the time of a lockstep beacon, s; False if the beacon is not newer."""
         if self._last_beacon is not None and vehicle_time <= self._last_beacon:
             return False
         self._last_beacon = self.now = vehicle_time
@@ -35,7 +35,7 @@ class VirtualClock:
 
 
 class World(Protocol):
-    """The vehicle and the wire to it: delivers datagrams, and moves the clock."""
+    """The vehicle and the wire to the vehicle: delivers datagrams, and advances the clock."""
 
     def deliver_due(self) -> object:
         """Deliver the datagrams that arrive at the present time."""
@@ -47,7 +47,7 @@ class World(Protocol):
 
 
 class _VirtualSelector(SettlingSelector):
-    """Lets the vehicle advance, instead of waiting, until the program has something to do.
+    """Advances the vehicle, instead of sleeping, until the program has something to do.
 
     Attributes:
         scheduled_count: number of callbacks and timers that were scheduled so far.
@@ -75,7 +75,7 @@ class _VirtualSelector(SettlingSelector):
 
 
 class VirtualEventLoop(LockstepEventLoop):
-    """An event loop on a virtual clock, which `world` moves. File descriptors are not watched."""
+    """An event loop on a virtual clock that `world` advances. File descriptors are not watched."""
 
     def __init__(self, clock: VirtualClock, world: World) -> None:
         self.clock, self.world = clock, world

@@ -64,7 +64,7 @@ class MemoryTransport:
 
 
 class Wire:
-    """Joins a vehicle, the transport to it, and their common clock, which the vehicle moves."""
+    """Joins a vehicle, the program's transport and their clock, which the vehicle advances."""
 
     def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
         self._vehicle, self._clock = vehicle, clock
@@ -91,18 +91,18 @@ class Wire:
 
 
 class LockstepWire(Wire):
-    """A wire in lockstep: the vehicle steps once nothing is due in the program.
+    """A wire in lockstep: the vehicle makes a step when the program has nothing left to do.
 
-    A beacon moves the clock.
+    Each beacon of the vehicle sets the clock.
     """
 
     def deliver_due(self) -> None:
         """Do nothing: no datagram arrives between two steps."""
 
     def advance(self, until: float) -> None:
-        """Let the vehicle make one whole step; timers due within the step run after it."""
+        """Let the vehicle make one whole step, ignoring `until`; due timers run after the step."""
         datagrams = self._vehicle.begin() or self._vehicle.step()
-        for datagram in datagrams:  # the beacon comes last, and moves the clock to this time
+        for datagram in datagrams:  # the beacon comes last, and sets the clock to this time
             self._deliver(datagram, self._vehicle.time)
         # Without an open link, or with one that does not accept the beacon, time passes as well.
         self._clock.now = max(self._clock.now, self._vehicle.time)

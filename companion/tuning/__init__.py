@@ -9,8 +9,8 @@
     >>> proposal.after.margins.gain_db >= 6.0, proposal.after.margins.phase_deg >= 30.0
     (True, True)
 
-`companion.tuning.flights` flies a proposal on the mock vehicle. It is not imported here, because it
-needs `companion.testing`.
+`companion.tuning.flights` flies a proposal on the mock vehicle. This package does not import
+`companion.tuning.flights`, because that module needs `companion.testing`.
 
 A proposal
     propose        a `Proposal` for a configuration

@@ -78,9 +78,10 @@ class Expectation:
     errors: Errors
     """Expected position errors and commanded rate."""
     peak_error: float
-    """Largest position error, m, after a gust that at once adds 1 m/s to the vehicle's velocity."""
+    """Largest position error after a gust that at once adds 1 m/s to the vehicle's velocity, m."""
     settling_time: float
-    """Time from that gust until the position error stays below 5 % of `peak_error`, up to 10 s."""
+    """Time from the gust of `peak_error` until the position error stays below 5 % of `peak_error`,
+    s; at most 10."""
 
     @property
     def margins(self) -> Margins:

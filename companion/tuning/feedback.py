@@ -13,9 +13,10 @@ Complex = NDArray[np.complex128]
 
 
 class Feedback(NamedTuple):
-    """Frequency responses of the commanded coefficient to the measurements, sign reversed.
+    """Responses of the commanded acceleration coefficient to the measurements, sign reversed.
 
-    The command is −(tilt·c + velocity·v + position·x), before it is held for a guidance period.
+    An acceleration coefficient c is a horizontal acceleration per specific thrust. The command is
+    −(tilt·c + velocity·v + position·x), before it is held for a guidance period.
     """
 
     tilt: Complex
@@ -41,8 +42,8 @@ def guidance_feedback(
 ) -> Feedback:
     """The feedback of `LinearGuidance` with the states of `MotionObserver`.
 
-    Both are linear while no limit is reached. A position is used until the next one arrives, so its
-    mean age is half a period; the prediction covers this age.
+    Guidance and observer are linear while no limit is reached. A position is used until the next
+    one arrives, so its mean age is half a period; the prediction covers this age.
 
     Args:
         s: (n,), frequencies, rad/s, none of them 0.

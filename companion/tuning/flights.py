@@ -66,8 +66,8 @@ class TrialResult:
             setting reduces this error.
         rate: RMS commanded roll-pitch rate, rad/s.
         rate_limited: share of the setpoints at the rate limit.
-        speed: largest speed of the reference, m/s; lower if the trajectory was slowed down.
-        wind: mean wind, m/s; weaker than that of the trial if the tilt limit requires it.
+        speed: largest speed of the reference, m/s; below the planned one if slowed down.
+        wind: mean wind, m/s; weaker than the trial's wind if the tilt limit requires so.
     """
 
     result: str
@@ -95,9 +95,9 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
     """Fly a trial on the mock vehicle, with the planner's configured gains, lag and dead time.
 
     The configured limits of tilt and tilt rate apply. The trajectory is slowed down if it would
-    exceed them, with a reserve for feedback and wind. Wind and gusts are both scaled down if the
-    vehicle could not hold its position in them within the tilt limit. Thrust, drag, take-off height
-    and fence are those of the mock vehicle and the trial. No message is signed.
+    exceed these limits less a reserve for feedback and wind. Wind and gusts are scaled down if the
+    tilt limit does not let the vehicle hold its position in the wind. Thrust and drag are set for
+    the mock vehicle, take-off height and fence for the trial. No message is signed.
 
     Args:
         config: the configuration.

@@ -1,7 +1,7 @@
 """The whole control loop on one horizontal axis as a linear model, built from the configuration.
 
-It contains planner, rate loop, tilt, motion and guidance near hover, while no limit is reached.
-`tests/tuning/test_loop.py` compares it with the program's own code.
+The model contains planner, rate loop, tilt, motion and guidance near hover, while no limit is
+reached. `tests/tuning/test_loop.py` compares the model with the program's own code.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,10 @@ EXACT = ModelMismatch()
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """Frequency responses of the control loop and of its parts, each (n,)."""
+    """Frequency responses of the control loop and of its parts, each (n,).
+
+    "Coefficient" is an acceleration coefficient: horizontal acceleration per specific thrust.
+    """
 
     s: Complex
     """Complex frequencies, rad/s."""
@@ -57,7 +60,7 @@ class Loop:
     rate_response: Complex
     """Response of the coefficient to the commanded body rate, s."""
     command_response: Complex
-    """Response of the coefficient to the commanded coefficient of guidance, without feedback."""
+    """Response of the coefficient to the coefficient that guidance commands, without feedback."""
     velocity_feedback: Complex
     """Response of the commanded coefficient to the measured velocity, sign reversed, s/m."""
     position_feedback: Complex
@@ -76,13 +79,13 @@ class Loop:
     def responses_to_error(self, feedback: Complex) -> tuple[Complex, Complex]:
         """Responses of position (m) and commanded rate (rad/s) to an error of a measurement.
 
-        `feedback` is that of the measurement: `velocity_feedback` (m/s) or `position_feedback` (m).
+        `feedback`: `velocity_feedback` for an error in m/s, `position_feedback` for an error in m.
         """
         tilt = self._closed_loop_tilt(feedback)
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rate_response
 
     def _closed_loop_tilt(self, subtracted: Complex) -> Complex:
-        """Coefficient in the closed loop if `subtracted` is subtracted from guidance's command."""
+        """Closed-loop response of the coefficient if `subtracted` reduces guidance's command."""
         return -self.command_response * subtracted / (1.0 + self.gain_at_rate)
 
 
@@ -145,9 +148,9 @@ def _planner_response(config: Config, s: Complex) -> tuple[Complex, float]:
 
     The first response is (n,); the second is a number, with reversed sign.
 
-    `model-following` commands the rates that compensate the lag in its reference model, and feeds
-    back the difference of the coefficient from this model one dead time ago. All other planners
-    command p times the error of the coefficient.
+    `model-following` commands the rates that make a lagging rate loop follow its reference model,
+    plus feedback of the difference between the coefficient and the model's coefficient one dead
+    time ago. All other planners command p times the error of the coefficient.
     """
     gain = config.planner.gain_per_s
     if config.planner_name != MODEL_FOLLOWING:

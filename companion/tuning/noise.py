@@ -107,7 +107,8 @@ def _densities(time: Floats, residual: Floats) -> tuple[float, float]:
     """Spectral density of a residual without measurement noise, and noise of one measurement.
 
     The density is an amplitude spectral density, averaged over `_HOLD_BAND`, in units of the
-    residual per √Hz. The noise is a standard deviation. Both are NaN if the record is too short.
+    residual per √Hz. The noise is a standard deviation. If the record is too short, the
+    density and the noise are NaN.
 
     Args:
         time: (n,), s.

@@ -10,7 +10,7 @@ from companion.tuning.margins import Margins
 from companion.tuning.search import Aims, Design, search, tolerated_mismatches
 
 _ANALYSED_MANEUVERS = ("hover",)
-"""Maneuvers that the analysis assumes; the maneuver `identify` would be flown with lower gains."""
+"""Maneuvers of the analysed flight. In a flight with `identify`, guidance has lower weights."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Proposal:
     def changes(self) -> dict[str, dict[str, float]]:
         """The proposed keys by section, in the form for `companion.config.files.changed`.
 
-        A known drag is among them, because the analysis assumes the feedforward of this drag.
+        A known drag is proposed too, because the analysis assumes the feedforward of this drag.
         """
         design, drag = self.design, self.tuned.guidance.drag
         known_drag = {}

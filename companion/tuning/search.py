@@ -30,7 +30,7 @@ class Aims:
     """Factor by which real lag and dead time may be larger or smaller than configured."""
     mismatch_gain_db: float = 3.0
     """Smallest gain margin when lag and dead time differ by the factor `mismatch`, dB. While the
-    rate loop is at its slew limit, half of each of the two `mismatch` margins is enough."""
+    rate loop is at its slew limit, half of both `mismatch` margins is enough."""
     mismatch_phase_deg: float = 15.0
     """Smallest phase margin when lag and dead time differ by the factor `mismatch`, degrees."""
     rate_share: float = 1.0
@@ -132,11 +132,11 @@ def _best_near(
 
 
 def _starting_designs(config: Config) -> Iterator[Design]:
-    """Three starts, because the pattern search finds only the nearest minimum.
+    """Three starting designs, because the pattern search finds only the nearest minimum.
 
-    The starts scale with the delay of the attitude, as the default weights do
-    (`hold_settings.hold_weights`). Velocity weights are lower than the default and observers
-    quicker.
+    The values scale with the delay of the attitude, as the default weights do
+    (`hold_settings.hold_weights`). The velocity weights are lower and the observers quicker than
+    the defaults.
     """
     for gain_share, position, velocity, bandwidth in (
         (1.0, 1.0, 0.5, 2.0),
@@ -189,7 +189,7 @@ def _cost(
 
 
 def tolerated_mismatches(config: Config, aims: Aims) -> list[ModelMismatch]:
-    """Model errors with which margins must remain: `Aims.mismatch`, and the delay by slewing."""
+    """Model errors that must leave a margin: wrong lag and dead time; delay by the slew limit."""
     errors = [ModelMismatch(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
     return [*errors, ModelMismatch(delay=delay)] if delay > 0.0 else errors

@@ -79,8 +79,8 @@ ATTITUDE_QUATERNION and LOCAL_POSITION_NED."""
 class Autopilot(Protocol):
     """How to command one kind of autopilot, and what its modes and parameters mean to a flight.
 
-    Every autopilot takes collective thrust as 0..1. When setpoints stop, it holds the last rates
-    for a while. It obeys a later setpoint again, unless a mode was commanded in between.
+    Every autopilot takes collective thrust as 0..1. When setpoints stop, the autopilot holds the
+    last rates for a while, and obeys a later setpoint unless a mode was commanded meanwhile.
 
     Attributes:
         name: name to show to users, such as `PX4`.
@@ -103,8 +103,8 @@ class Autopilot(Protocol):
         modes_begin_level: whether the autopilot's own modes begin level. A vehicle that leaned
             against the wind then drifts downwind until the integral of the mode has grown.
         offboard_loss_failsafe: what the autopilot does when setpoints stop.
-        fence_text: part of the text by which its geofence tells that it changes the mode; None:
-            HEARTBEAT or CURRENT_MODE report it as a failsafe.
+        fence_text: part of the STATUSTEXT by which the geofence announces a change of mode; None:
+            HEARTBEAT or CURRENT_MODE reports the change as a failsafe.
         cannot_arm_in: roles of the modes in which a disarmed vehicle cannot be armed.
         parameters: rules for the parameters that matter to a flight by body rates.
     """

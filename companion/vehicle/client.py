@@ -27,7 +27,8 @@ class VehicleClient:
         vehicle_clock: converts the time stamps of positions.
 
     Attributes:
-        settings, stats: see the arguments.
+        settings: settings of the link.
+        stats: counters of the link.
         state: the vehicle's telemetry.
     """
 
@@ -84,7 +85,7 @@ class VehicleClient:
         """Send a MAV_CMD with up to seven parameters and wait until it is accepted.
 
         Raises:
-            CommandRefused: the autopilot refused; the error has its result and its texts.
+            CommandRefused: the autopilot refused; the error has the MAV_RESULT and the texts.
             CommandTimeout: no answer came after `retries` repetitions.
             LinkLost: the connection dropped while waiting.
         """
@@ -131,7 +132,7 @@ class VehicleClient:
     def subscribe_parameters(self, callback: Callable[[str, float | int], None]) -> Unsubscribe:
         """Call `callback` with name and value of each parameter that the autopilot reports.
 
-        It also reports those that another station has read or changed.
+        The autopilot also reports parameters that another station reads or changes.
         """
 
         def on_payload(payload: bytes) -> None:

@@ -81,7 +81,7 @@ class VehicleClock:
     def age(self, vehicle_time: float, now: float) -> float | None:
         """Age at the event-loop time `now` of a message stamped with `vehicle_time`; all in s.
 
-        It is never negative, and None before the first sample.
+        The age is never negative, and None before the first sample.
         """
         offset = self.offset
         return None if offset is None else max(0.0, now + offset - vehicle_time)
@@ -167,7 +167,7 @@ class VehicleClock:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
     def _adapt_to(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Handle a stamp that may not fit the clock; return why it must not be used, or None."""
+        """Adapt the clock (expected offset `quickest`, s) to a stamp; return the misfit or None."""
         if self._began == inf:
             self._began = self._received = stamp.received
             self._quickest = 0.0 if self._lockstep else stamp.apparent_offset
@@ -190,15 +190,15 @@ class VehicleClock:
     def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
 
-        Then it is ahead by at most the delay that TIMESYNC measured on the slower link. Exchanges
-        after the last sample that fitted the clock do not count, because the clock may have jumped
-        before those exchanges.
+        A quicker link puts `stamp` ahead by at most the delay measured on the slower link.
+        Exchanges after the last sample that fitted the clock do not count, because the clock may
+        have jumped before these exchanges.
         """
         largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
         return stamp.time > self._newest_time and stamp.apparent_offset - quickest <= largest_delay
 
     def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Add a misfit; if the misfits show a jump of the clock, accept it and return None."""
+        """Add a sample that does not fit; if the misfits show a jump, adopt it and return None."""
         if not self._misfits.agrees_with(stamp):
             self._drop_misfits()
         self._misfits.stamps.append(stamp)

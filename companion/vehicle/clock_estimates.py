@@ -1,7 +1,7 @@
 """Two estimates about the vehicle's clock: its rate, and the delay of the quickest sample.
 
 `clock.py` explains "quickest" and "offset". The rate is the slope of the quickest samples' offset.
-The delay is the difference between TIMESYNC's offset and that of the quickest sample.
+The delay is TIMESYNC's offset minus the quickest sample's offset.
 """
 
 from collections import deque
@@ -15,9 +15,9 @@ MOST_DRIFT = 0.02
 _RATE_UNCERTAINTY = 0.005
 """Uncertainty of a measured rate, s per s."""
 _LATE_SAMPLES_RISE = 0.005
-"""If the offset rises by this (s) more than drift explains, the earlier samples were late, and the
-measurement of the rate restarts. Without a restart, a backlog of 68 ms at the start (measured on
-PX4) would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
+"""Rise of the offset beyond what drift explains, s, which shows that earlier samples were late. The
+measurement of the rate then restarts. Otherwise a backlog of 68 ms at the start (measured on PX4)
+would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
 """
 _NOTE_PERIOD = 1.0
 """Time between two offsets that are noted to measure the rate, s."""
@@ -125,10 +125,10 @@ class TelemetryDelay:
     def take_exchange(self, now: float, error: float, delay: float) -> float | None:
         """Take an exchange, and store it if its delay is plausible.
 
-        A single implausible delay is ignored. Two in a row that agree show that a clock changed. If
-        exchanges are stored and the new delay is negative, TIMESYNC has fallen behind the samples'
-        stamps, and the caller must find out why. Otherwise TIMESYNC uses another clock, and all
-        exchanges are forgotten.
+        A single implausible delay is ignored. Two implausible delays in a row that agree show that
+        a clock changed. If exchanges are stored and the new delay is negative, TIMESYNC has fallen
+        behind the samples' stamps, and the caller must find out why. Otherwise TIMESYNC uses
+        another clock, and all exchanges are forgotten.
 
         Args:
             now: event-loop time, s.
@@ -160,7 +160,7 @@ class TelemetryDelay:
     def largest_possible(self, before: float) -> float:
         """The largest delay that the exchanges up to event-loop time `before` (s) allow, s.
 
-        It is 0 without such an exchange.
+        The result is 0 if there was no exchange up to `before`.
         """
         earlier = [each for each in self._exchanges if each.answered_at <= before]
         if not earlier:

@@ -22,8 +22,7 @@ _BACKOFF_FIRST_S, _BACKOFF_MAX_S = 0.2, 3.0
 class Connection:
     """A connection that is opened again when it drops, with growing pauses.
 
-    When it drops, unsent frames and an incomplete frame received are discarded, and `on_dropped` is
-    called.
+    A drop discards unsent frames and an incomplete received frame, and calls `on_dropped`.
     """
 
     _endpoint: Endpoint
@@ -119,9 +118,9 @@ def no_beacon_message(settings: LinkSettings, stats: LinkStats) -> str:
 
 
 def _refusal_message(opening: str, stats: LinkStats) -> str | None:
-    """The error message, with this opening, if frames were refused for their sender or signature.
+    """The error message if frames were refused for their sender or signature; else None.
 
-    None: no frame was refused.
+    `opening`: the beginning of the message.
     """
     if stats.unclaimed:
         return (

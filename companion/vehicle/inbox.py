@@ -105,8 +105,8 @@ class Inbox:
     def claim(self, data: bytes, received_ns: int, sender: str) -> bool:
         """Take bytes of `sender`, who is not the peer; return whether `sender` becomes the peer.
 
-        If the bytes contain no valid claim (`PeerRule`), none of their frames is accepted. Never
-        raises.
+        If none of the frames entitles `sender` to become the peer (see `PeerRule`), no frame is
+        accepted. Never raises.
         """
         known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
         admitted = [frame for frame in known if self._is_admitted(frame)]
@@ -123,7 +123,7 @@ class Inbox:
         return True
 
     def may_prove_date(self, sender: str) -> bool:
-        """Whether `sender`, refused for the date of its signature, may prove the date by TIMESYNC.
+        """Whether to send frames to `sender`, so that TIMESYNC can prove its signing time stamps.
 
         See `Receiver`.
         """
@@ -159,7 +159,7 @@ class Inbox:
     def _pass_on(self, frame: Frame, received_ns: int) -> None:
         """Pass a frame to the tap, the control loop, the counter and the dispatcher.
 
-        The control loop comes early because each line before it adds latency.
+        The control loop comes early because all work before it adds latency.
         """
         now = self._loop.time()
         if self._tap is not None:

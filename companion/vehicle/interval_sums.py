@@ -35,7 +35,7 @@ class IntervalSums:
     def rate_since(self, before: "IntervalSums") -> float | None:
         """Effective rate since `before`, Hz; None if there was no interval since then.
 
-        It is the number of intervals per second, but at most 2·Σg/Σg², summed over the intervals g.
+        The rate is the number of intervals per second, but at most 2·Σg/Σg² of the intervals g.
         Long intervals dominate Σg², so pauses between bursts lower the rate.
         """
         intervals = self.intervals - before.intervals

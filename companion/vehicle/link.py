@@ -31,8 +31,8 @@ _LOG = logging.getLogger(__name__)
 class Link(VehicleClient, LinkCallbacks):
     """A MAVLink connection to one vehicle. Use it as `async with Link(settings) as link:`.
 
-    It sends heartbeats and TIMESYNC requests, and reopens a dropped connection. It never repeats a
-    setpoint: each one is sent by one call of `send_setpoint`.
+    The link sends heartbeats and TIMESYNC requests, and reopens a dropped connection. Each call of
+    `send_setpoint` sends one setpoint once; the link never repeats a setpoint.
 
     Args:
         tap: called with every frame accepted from and sent to the vehicle, for recordings.
@@ -152,9 +152,9 @@ class Link(VehicleClient, LinkCallbacks):
         self._dispatcher.on_error = callback
 
     def send_setpoint(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
-        """Send body rates and thrust once, now. It never blocks.
+        """Send body rates and thrust once, now, without blocking.
 
-        In lockstep, the setpoint for the sample of the open step is sent last and closes the step.
+        In lockstep, a setpoint for the sample of the open step is sent when the step is closed.
 
         Args:
             time_boot_ms: time stamp of the sample to which the setpoint responds, ms.
@@ -162,7 +162,7 @@ class Link(VehicleClient, LinkCallbacks):
             thrust: collective thrust, 0..1.
 
         Returns:
-            Whether it was sent; False if the connection is down or the kernel refuses it.
+            Whether the setpoint was sent; False if the connection is down or the kernel refuses it.
 
         Raises:
             InvalidSetpoint: a value is out of range, or not finite; nothing was sent.

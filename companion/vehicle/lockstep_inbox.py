@@ -1,4 +1,4 @@
-"""An inbox in lockstep: the frames of a step wait for the beacon that closes it."""
+"""An inbox in lockstep: the frames of a step wait for the beacon, which the vehicle sends last."""
 
 import asyncio
 from typing import Any
@@ -12,11 +12,11 @@ from companion.vehicle.records import AttitudeSample
 
 
 class LockstepInbox(Inbox):
-    """Runs one step of this program for each beacon of the vehicle, and answers.
+    """Runs one step of this program for each beacon of the vehicle, and answers the beacon.
 
-    A beacon is a SYSTEM_TIME without the time of day. It sets the event loop's clock, before the
-    frames of its step are passed on. Attitude samples then wait until the event loop has run the
-    tasks of the step. The outbox's answer closes the step.
+    A beacon is a SYSTEM_TIME without the time of day. The beacon sets the event loop's clock before
+    the frames of the step are passed on. Attitude samples then wait until the event loop has run
+    the tasks of the step. The answer, sent by the outbox, closes the step.
 
     Attributes:
         first_beacon: a future that is done when the first beacon has come.

@@ -22,7 +22,7 @@ class ModeState:
 
     Attributes:
         heartbeat: the newest HEARTBEAT of the autopilot.
-        current_mode: the newest CURRENT_MODE. The property `mode` takes the newer of the two.
+        current_mode: the newest CURRENT_MODE; `mode` is from HEARTBEAT or CURRENT_MODE, the newer.
         heartbeat_is_newest: whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
             `mode`.
         armings: number of times that a heartbeat showed a newly armed vehicle.

@@ -98,7 +98,7 @@ def bit_clear(result: CheckResult, bit: int, because: str) -> Check:
 def shortest_rate_hold(silence_limit: float) -> float:
     """Shortest time for which the autopilot must hold the last rates, s.
 
-    It is longer than `silence_limit` (s), so that `companion` releases control first.
+    The result is longer than `silence_limit` (s), so that `companion` releases control first.
     """
     return 1.5 * silence_limit
 
@@ -106,7 +106,7 @@ def shortest_rate_hold(silence_limit: float) -> float:
 def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """Check the time for which the autopilot holds the last rates after setpoints stop.
 
-    It must be longer than `silence_limit`, and at most `LONGEST_RATE_HOLD`.
+    The time must be longer than `silence_limit`, and at most `LONGEST_RATE_HOLD`.
     """
     set_to = shortest_rate_hold(settings.silence_limit)
     if value <= settings.silence_limit:

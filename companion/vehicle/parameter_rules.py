@@ -82,13 +82,13 @@ class ParameterRule:
     source: str
     """Source of the rule: a reference or a measurement."""
     vital: bool = False
-    """Whether a vehicle that does not send the parameter is not flown: without it, the effect of a
-    setpoint, or how long the autopilot holds it, is unknown."""
+    """Whether the flight is refused if the vehicle does not send the parameter, because the effect
+    of a setpoint, or how long the autopilot holds a setpoint, is then unknown."""
     universal: bool = False
-    """Whether every supported version has the parameter, and some of its values are unsafe. If it
-    was not received, because the link loses frames, it may have an unsafe value."""
+    """Whether every supported version has the parameter, and some of its values are unsafe. A
+    parameter that the link lost may then have an unsafe value."""
     alternative: str = ""
-    """Name of the rule for the parameter that other versions have in its place."""
+    """Name of the parameter that other versions have instead; that parameter has its own rule."""
     reboot: bool = False
     """Whether a change takes effect only after the autopilot restarts."""
 

@@ -31,10 +31,9 @@ class AttitudeSample(NamedTuple):
     time_boot_ms: int
     """The vehicle's time stamp as received, ms since its boot."""
     vehicle_time: float
-    """The time stamp in s, without jumps and restarts of the vehicle's clock. The control laws use
-    it."""
+    """Time stamp for the control laws, s, without jumps and restarts of the vehicle's clock."""
     received: float
-    """Event-loop time of arrival, s. The watchdogs use it."""
+    """Event-loop time of arrival, s, for the watchdogs."""
     received_ns: int
     """`time.perf_counter_ns()` of arrival, to measure latency. Over UDP it is the time at which the
     kernel received the datagram, otherwise the time of reading."""
@@ -121,8 +120,8 @@ class Battery(NamedTuple):
     def replaced_by(self, newer: "Battery") -> "Battery":
         """The newer record; if it lacks a charge, with the charge of this record.
 
-        Some vehicles send the charge in one of the two messages only. A charge is kept for
-        `_MAX_CHARGE_AGE`.
+        Some vehicles send the charge only in SYS_STATUS or only in BATTERY_STATUS. A charge is kept
+        for `_MAX_CHARGE_AGE`.
         """
         if newer.remaining is not None:
             return newer

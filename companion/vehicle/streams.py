@@ -25,8 +25,8 @@ class StreamRate(NamedTuple):
     granted: float
     """Rate that the autopilot accepted; 0 if it refused all rates."""
     achieved: float
-    """Measured rate. It may differ from `granted`: PX4 accepts requests (other than for HEARTBEAT)
-    at any rate, and sends as often as its loops allow."""
+    """Measured rate, which may differ from `granted`: PX4 accepts requests (other than for
+    HEARTBEAT) at any rate, and sends as often as its loops allow."""
     refusal: str = ""
     """Result of the last refused request if all were refused, otherwise empty."""
 

@@ -29,7 +29,7 @@ _MIN_PROBES = 6
 """Smallest number of probes sent in `_UPLINK_WINDOW` to judge the link: with fewer, probing has
 just begun."""
 _KEPT_REQUESTS = 16
-"""Number of unanswered requests of each kind that are kept, and of round trips."""
+"""Number of unanswered requests, and of round trips, that are kept for each kind of request."""
 
 
 class Uplink(NamedTuple):
@@ -59,7 +59,7 @@ class _Requests:
         self._unanswered.append(stamp)
 
     def take_answer(self, stamp: int, now: int) -> bool:
-        """Take the answer to the request sent at `stamp`; False if that request is not open."""
+        """Take the answer to the request sent at `stamp`; False if no such request is waiting."""
         if stamp not in self._unanswered:
             return False
         self._unanswered.remove(stamp)

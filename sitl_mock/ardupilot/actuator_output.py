@@ -30,7 +30,7 @@ class ActuatorOutput:
     _parameters: ParameterTable
     """The autopilot's parameters; MOT_THST_HOVER is written here."""
     _guided: Guided
-    """The task of GUIDED; during a take-off the rotors turn on the ground."""
+    """The task of GUIDED; a take-off allows thrust on the ground."""
     _hold: PositionHold
     """The position hold, whose climb rate shows whether the vehicle hovers."""
     _to_throttle: Callable[[float], float]

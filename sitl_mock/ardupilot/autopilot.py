@@ -62,7 +62,7 @@ class ArduPilot:
         return round(1e6 / settings.parameters.get("SCHED_LOOP_RATE", DEFAULT_LOOP_HZ))
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
-        """Return the streams of a link: those of the boot, until a client requests others."""
+        """Return the stream schedule of a link; it begins with HEARTBEAT and TIMESYNC only."""
         booting_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,

@@ -20,8 +20,8 @@ LANDED_DISARM_DELAY_US = 500_000
 """Delay from the landing until LAND disarms, us (recorded)."""
 _OWN_COMPONENT = 1
 YAW_ALIGNMENT_HEIGHT_M = 2.8
-"""Height above home at which the estimator realigns its heading, m (recorded: 2.7 to 2.9). It does
-so once per flight."""
+"""Height above home at which the estimator realigns its heading, once per flight, m (recorded: 2.7
+to 2.9)."""
 
 
 class ArduPilotCommander:

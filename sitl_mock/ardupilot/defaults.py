@@ -1,8 +1,8 @@
 """ArduCopter's parameters, and the defaults of its simulated vehicle (measured).
 
-The parameters have the types and defaults of ArduPilot's simulated quadrotor. The names that were
-recorded are those of ArduPilot 4.7. Parameters marked * have an effect in the mock. The others
-exist because clients read them or users look for them.
+The parameters have the types and defaults of ArduPilot's simulated quadrotor. Recorded names
+are those of ArduPilot 4.7. Parameters marked * have an effect in the mock. All others exist because
+clients read them or users look for them.
 """
 
 from typing import Any

@@ -19,8 +19,8 @@ STOPPING_S = 0.65
 _CLIMB_RATE_INTEGRAL_GAIN = 1.0
 """Integral gain of the climb rate, 1/s^2; chosen for a steady hover, not measured."""
 _CLIMB_LIMIT = 10.0
-"""Largest climb rate and sink rate of the height controller, m/s. It is high, because the callers
-limit the climb rate that they request."""
+"""Largest climb rate and sink rate of the height controller, m/s. The limit is high, because the
+callers limit the climb rate that they request."""
 
 _LEAST_COS_TILT = 0.3
 """Lower bound of cos(tilt) (73 degrees), so that the acceleration by the tilt stays bounded."""

@@ -33,7 +33,7 @@ PILOTED_MODES = frozenset({Mode.STABILIZE, Mode.ALT_HOLD, Mode.LOITER})
 def base_mode(*, armed: bool, position_controlled: bool) -> int:
     """Return HEARTBEAT.base_mode: 81, plus 8 in horizontal position control, plus 128 if armed.
 
-    When armed, it is 209 while GUIDED follows body rates, and 217 in a position hold (recorded).
+    Armed: 209 while GUIDED follows body rates, 217 in a position hold (recorded).
     """
     flags = (
         dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED

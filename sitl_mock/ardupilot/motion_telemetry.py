@@ -12,7 +12,7 @@ class ArduPilotMotionTelemetry(MotionTelemetry):
 
     airspeed = 0.0
     gauss_in_highres_imu = 1e6
-    """ArduPilot multiplies by 1000 although its field is in mgauss already; as recorded."""
+    """What HIGHRES_IMU sends for 1 gauss (recorded): ArduPilot multiplies its mgauss by 1000."""
 
     def builders(self) -> dict[int, Builder]:
         """Return message id -> builder; ArduCopter has no ODOMETRY and no ALTITUDE."""

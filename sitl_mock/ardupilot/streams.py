@@ -9,7 +9,7 @@ stays. A message is sent in the first cycle after it is due and keeps its phase:
 from collections.abc import Mapping
 
 MAX_INTERVAL_MS = 60_000
-"""Longest interval of a stream, ms; a longer request is reduced to it."""
+"""Longest interval of a stream, ms; a longer requested interval is shortened to this one."""
 
 
 class ArduPilotStreams:

@@ -1,6 +1,6 @@
 """The interface of a simulated autopilot: everything in which PX4 and ArduPilot differ.
 
-An autopilot has its own numbers and texts. It builds its `Behaviour` from the parts that every
+An autopilot has its own numbers and texts, and builds its `Behaviour` from the parts that every
 vehicle has (`VehicleParts`).
 """
 

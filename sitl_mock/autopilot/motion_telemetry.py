@@ -189,7 +189,7 @@ class MotionTelemetry:
         )
 
     def altitude(self) -> Message:
-        """Return ALTITUDE; the terrain is lower than the estimated height by the true clearance."""
+        """Return ALTITUDE; the terrain height is the estimated height minus the true clearance."""
         state = self._state
         up, altitude = -state.estimate.position_ned[2], self._altitude
         clearance = -self._vehicle.truth.position_ned[2]

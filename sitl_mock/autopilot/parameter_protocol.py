@@ -38,7 +38,7 @@ class ParameterProtocol:
     def request_read(self, message: Message, link: Link) -> None:
         """PARAM_REQUEST_READ: send one parameter, by index or, with index -1, by name.
 
-        If there is none, send PARAM_ERROR.
+        If the parameter does not exist, send PARAM_ERROR.
         """
         index = message.param_index
         if index == _NO_INDEX:
@@ -58,7 +58,7 @@ class ParameterProtocol:
     def set(self, message: Message, link: Link) -> None:
         """PARAM_SET: change the value and send the new one, or send PARAM_ERROR.
 
-        PX4's hash cannot be set; such a message is ignored.
+        A PARAM_SET of PX4's hash is ignored.
         """
         name = message.param_id
         if name == HASH_NAME and self._encoding.has_hash:

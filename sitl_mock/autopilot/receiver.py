@@ -38,7 +38,7 @@ class Receiver:
         self, state: State, behaviour: Behaviour, autopilot: Autopilot, system_id: int
     ) -> None:
         self.clock_ns: Callable[[], int] = lambda: state.stamp_us * 1000
-        """Clock that answers TIMESYNC: vehicle time, ns."""
+        """Clock for answers to TIMESYNC: vehicle time, ns."""
         self._commander = commander = behaviour.commander
         self._commands = behaviour.commands
         self._autopilot = autopilot

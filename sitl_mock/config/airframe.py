@@ -50,7 +50,7 @@ class AirframeConfig(Section):
     """Quadratic drag along body x, y, z: force in N per (m/s)^2 of the airspeed along that axis."""
     momentum_drag_n_s_per_m: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     """Momentum drag of the rotors along body x, y, z, at hover thrust: force in N per m/s of
-    airspeed. It grows with the square root of the thrust.
+    airspeed. The force grows with the square root of the thrust.
     """
     rotational_drag_n_m_s: NonNegative = 0.025
     """Aerodynamic damping torque in N m per rad/s, equal about all axes."""

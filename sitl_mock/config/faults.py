@@ -104,7 +104,7 @@ class PilotTakeover(TimedFault):
     kind: Literal["pilot_takeover"]
     mode: Literal["POSCTL", "ALTCTL", "STABILIZED", "MANUAL"] = "POSCTL"
     """Mode of the pilot, by PX4's name. ArduCopter enters LOITER for POSCTL, ALT_HOLD for ALTCTL,
-    and STABILIZE for the other two."""
+    and STABILIZE for STABILIZED and MANUAL."""
 
 
 class EstimatorReset(TimedFault):

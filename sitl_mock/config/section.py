@@ -49,7 +49,7 @@ def resolve_preset(presets: Mapping[str, object], value: object, plural: str) ->
     """Return the preset that a text names; return any other value unchanged.
 
     Raises:
-        ValueError: no preset has this name; ``plural`` says what they are, such as "airframes".
+        ValueError: no preset has this name. ``plural`` is the kind of presets, such as "airframes".
     """
     if not isinstance(value, str):
         return value

@@ -20,7 +20,7 @@ class EkfConfig(Section):
     fix_period_ms: Annotated[float, Field(ge=20.0, le=1000.0)] = 125.0
     """Time between two satellite fixes."""
     fix_delay_ms: Annotated[float, Field(ge=0.0, le=500.0)] = 110.0
-    """Delay with which the filter fuses a fix: it corrects its estimate for this time ago. A value
+    """Delay with which the filter fuses a fix; the fix corrects the state this long ago. A value
     below ``position_delay_ms`` has the effect of ``position_delay_ms``."""
     position_late_ms: Finite = 0.0
     """Mean delay of a fix's position beyond ``fix_delay_ms``; the filter does not correct it."""
@@ -143,7 +143,7 @@ class SensorConfig(Section):
     attitude_delay_ms: NonNegative = 0.0
     """Age of the estimated attitude and specific force."""
     rate_lag_ms: NonNegative = 5.0
-    """Age of the estimated body rates beyond that of the attitude: the delay of the gyro's low
+    """Age of the estimated body rates minus the age of the attitude: the delay of the gyro's low
     pass. The default is PX4's; ArduPilot's is 11."""
     position_delay_ms: NonNegative = 10.0
     """Age of the estimated position and velocity."""

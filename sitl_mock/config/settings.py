@@ -60,9 +60,9 @@ class VehicleSettings(Section):
     """Every key of one vehicle, with the defaults that do not depend on the autopilot."""
 
     autopilot: Literal["px4", "ardupilot"] = "px4"
-    """The autopilot simulated. It sets the default of ``sensors.ekf``; ArduPilot also sets those of
-    ``airframe``, ``battery``, ``rate_loop``, ``sensors.rate_lag_ms``, ``sensors.stamp_slips_hz``,
-    ``burst_ms`` and ``prearm_delay_s``."""
+    """The simulated autopilot, which sets the default of ``sensors.ekf``. ArduPilot has its own
+    defaults of ``airframe``, ``battery``, ``rate_loop``, ``sensors.rate_lag_ms``,
+    ``sensors.stamp_slips_hz``, ``burst_ms`` and ``prearm_delay_s`` too."""
     port: Annotated[int, Field(ge=1, le=65535 - PORT_OFFSET)] = 14540
     endpoint: str = "udp"
     """The companion link. udp: see ``port``. tcpin://HOST:PORT: for one client; the vehicle boots
@@ -75,7 +75,7 @@ class VehicleSettings(Section):
     speed: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     """Vehicle seconds per wall second; lockstep ignores it."""
     inner_loop_hz: Literal[100, 250, 800] = 250
-    """Inner loop rate. It limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE
+    """Inner loop rate, which limits the telemetry rates of PX4; ArduPilot uses SCHED_LOOP_RATE
     instead. The rate 100, which PX4's IMU_INTEG_RATE allows, was not recorded; it takes the least
     time to simulate."""
     exact_rates: bool | None = None

@@ -14,12 +14,12 @@ class ByteStream:
     """Reads and writes whole frames without blocking.
 
     Frames are never truncated: if the kernel takes only a part of a batch, the rest is kept and
-    written first. Until it is written, further frames are dropped, as an autopilot does when its
+    written first. Until the rest is written, further frames are dropped, as by an autopilot whose
     transmit buffer is full.
     """
 
     _descriptor: int
-    """Non-blocking; the caller closes it."""
+    """A non-blocking file descriptor; the caller closes it."""
     open: bool = field(default=True, init=False)
     """False after the other side closed, or reading or writing failed."""
     _frames: deque[bytes] = field(default_factory=deque, init=False)
@@ -35,7 +35,7 @@ class ByteStream:
     def send(self, frames: list[bytes]) -> None:
         """Send the frames; drop them all if the kernel takes none of their bytes now.
 
-        They are also dropped while an earlier batch is not completely written.
+        The frames are also dropped while an earlier batch is not completely written.
         """
         if self._unsent_bytes:
             self._unsent_bytes = self._unsent_bytes[self._write(self._unsent_bytes) :]

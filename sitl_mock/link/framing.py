@@ -1,7 +1,7 @@
 """Decodes and encodes MAVLink frames on the vehicle's side of a link.
 
-Messages are pymavlink's objects. The dialect is ``development`` (a superset of ``common``), that of
-PX4 main.
+Messages are pymavlink's objects. The dialect is ``development``, as in PX4 main: a superset of
+``common``.
 """
 
 import struct

@@ -1,7 +1,7 @@
 """Payloads of pymavlink's message classes: message to bytes and back.
 
-Field order, `struct` layout and CRC_EXTRA are pymavlink's. Its own ``pack`` and ``decode`` take
-about twice as long, because for every frame they work out again what depends only on the class.
+Field order, `struct` layout and CRC_EXTRA are pymavlink's. pymavlink's ``pack`` and ``decode`` take
+about twice as long, because they compute for every frame what depends only on the class.
 """
 
 from collections.abc import Callable, Iterable

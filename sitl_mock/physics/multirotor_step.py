@@ -148,7 +148,7 @@ def drive(
         step: number of the step, one more with each call.
         setpoint: body rates, rad/s, FRD. NaN and infinity hold the present rate. If the setpoints
             are shaped, NaN holds the shaped rate, and infinity lets it grow without limit.
-        throttle: collective; NaN or <= 0 stops the rotors, values above 1 mean 1.
+        throttle: collective throttle; NaN or <= 0 stops the rotors, values above 1 mean 1.
         controlled: whether the rate loop runs; otherwise it idles.
         conditions: battery, wind and attitude error; only the shaping uses the attitude error.
     """

@@ -1,6 +1,6 @@
 """The autopilot's body-rate controller: PI with feed-forward and damping on each axis.
 
-Its functions are pure, except for the ring of delayed setpoints.
+The functions are pure, except for the ring of delayed setpoints.
 """
 
 from math import exp, isfinite
@@ -146,7 +146,7 @@ def delay_setpoint(ring: Ring, delays: Delays, step: int, setpoint: Vector) -> V
     """Store the setpoint of a step in the ring; return the delayed setpoint.
 
     Args:
-        ring: the latest setpoints, longer than any delay. It is changed.
+        ring: the latest setpoints, longer than any delay; changed in place.
         delays: delays of roll, pitch and yaw, steps.
         step: number of the step, one more with each call.
         setpoint: body rates, rad/s.

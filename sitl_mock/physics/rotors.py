@@ -31,7 +31,7 @@ def allocate(throttle: float, roll: float, pitch: float, yaw: float) -> Allocati
     Saturation reduces thrust but never increases it (no airmode): at throttle 0 no rotor turns.
 
     Args:
-        throttle: collective, not negative; values above 1 mean 1.
+        throttle: collective throttle, not negative; values above 1 mean 1.
         roll: part of each rotor's throttle that gives the torque about body x.
         pitch: the same for body y.
         yaw: the same for body z.

@@ -102,7 +102,7 @@ class Px4:
         return SLOT_US[settings.inner_loop_hz]
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
-        """Return the recorded rates of the companion link, or those of the ground station link."""
+        """Return the stream schedule of a link, with the rates recorded on this link."""
         lockstep = settings.lockstep.enabled
         rates = dict(_GCS_RATES if link == "gcs" else _COMPANION_RATES)
         if lockstep and link == "companion":

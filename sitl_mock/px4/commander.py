@@ -21,7 +21,7 @@ from sitl_mock.px4.setpoints import decode_setpoint
 from sitl_mock.px4.sticks import Sticks
 
 STATUS_PERIOD_US = 500_000
-"""Period at which the vehicle status is published, us; also at every change (measured)."""
+"""Period at which PX4 publishes an unchanged vehicle status, us (measured)."""
 
 
 @dataclass(eq=False)
@@ -104,7 +104,7 @@ class Px4Commander:
         return ACCEPTED
 
     def land(self) -> int:
-        """Execute NAV_LAND, and return a MAV_RESULT. A mode request for LAND is not announced."""
+        """Execute NAV_LAND; return a MAV_RESULT. Unlike the mode LAND, NAV_LAND is announced."""
         result = self.request_mode(Mode.LAND)
         if result == ACCEPTED:
             self._announce(EventKind.LANDING_COMMANDED, "")

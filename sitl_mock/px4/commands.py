@@ -54,7 +54,7 @@ class Px4Commands(Commands):
         }
 
     def send(self, message_id: int, link: Link) -> int:
-        """Send a message once, PROTOCOL_VERSION too, which the dialect lacks; return MAV_RESULT."""
+        """Send a message (or PROTOCOL_VERSION, which the dialect lacks); return a MAV_RESULT."""
         if message_id == _PROTOCOL_VERSION_ID:
             link.send_raw(_PROTOCOL_VERSION_ID, _PROTOCOL_VERSION_CRC, _PROTOCOL_VERSION)
             return ACCEPTED

@@ -140,7 +140,7 @@ class FlightTasks:
         return land_speed + (max_speed - land_speed) * fraction
 
     def _begin_return(self) -> None:
-        """Choose the return height: that of the cone around home, at most RTL_RETURN_ALT.
+        """Choose the return height: the cone's height at this distance, at most RTL_RETURN_ALT.
 
         The vehicle never descends to this height: it keeps a higher present height, and within
         NAV_ACC_RAD of home it keeps any height.

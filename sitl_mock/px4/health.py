@@ -46,7 +46,7 @@ class _Check(NamedTuple):
 
 
 _HEADING = _Check(30203637, 0x7E00FC, 17, _ERROR)
-"""Recorded only while the heading is unknown. Only the id of this event is known, not its name."""
+"""Failed in recordings while the heading was unknown. The name behind the event's id is unknown."""
 _OFFBOARD = _Check(event_id("check_modes_offboard_signal_lost"), 0x4000, 20, _ERROR)
 _ATTITUDE = _Check(event_id("check_modes_attitude"), 0x7ED1FE, 16, _CRITICAL)
 _LOCAL_POSITION = _Check(event_id("check_modes_local_pos"), 0x7E00FC, 17, _ERROR)

@@ -53,9 +53,9 @@ def custom_mode(mode: Mode) -> int:
 
 
 def base_mode(mode: Mode, *, armed: bool, attitude_controlled: bool) -> int:
-    """Return HEARTBEAT.base_mode (recorded): 29 in automatic modes, 81 in those of a pilot.
+    """Return HEARTBEAT.base_mode (recorded): 29 in automatic modes, 81 in a pilot's modes.
 
-    In OFFBOARD it is 1 while PX4 follows body rates, else 17. When armed, it is 128 more.
+    In OFFBOARD: 1 while PX4 follows body rates, else 17. Arming adds 128.
     """
     flags = _CUSTOM | (_ARMED if armed else 0)
     if mode is Mode.OFFBOARD:

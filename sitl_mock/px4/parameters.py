@@ -1,7 +1,7 @@
 """PX4's parameters that matter to a companion, with PX4's types and defaults (SIH quadrotor X).
 
-An ``int`` is INT32, a ``float`` REAL32. Those marked * have an effect in the mock. The others exist
-because clients read them or users look for them.
+An ``int`` is INT32, a ``float`` REAL32. Parameters marked * have an effect in the mock. All others
+exist because clients read them or users look for them.
 """
 
 from sitl_mock.autopilot.parameters import Parameter

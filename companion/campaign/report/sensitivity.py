@@ -1,9 +1,9 @@
 """Which factor an outcome depends on, estimated from the flown cases with SALib.
 
 The first-order Sobol index of a factor is the share of the outcome's variance that would vanish on
-average if the factor were known. It is estimated from given samples: the cases are divided into
-bins by the value of the factor, and the variance between the bins is compared with the variance of
-all cases. The joint effect of two factors is in no first-order index.
+average if the factor were known. The index is estimated from given samples: the cases are divided
+into bins by the value of the factor, and the variance between the bins is compared with the
+variance of all cases. The joint effect of two factors is in no first-order index.
 """
 
 from typing import NamedTuple

@@ -122,7 +122,8 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Table:
 def two_factors(results: Results) -> Table | None:
     """Median error and success rate for each pair of values of two factors.
 
-    They are the first two factors with 2 to `_MOST_LEVELS` values; None if there are no two.
+    The table shows the first two factors with 2 to `_MOST_LEVELS` values. None: there are fewer
+    than two of these factors.
     """
     columns = results.columns
     factors_with_few_values = [

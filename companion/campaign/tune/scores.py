@@ -45,7 +45,7 @@ class Score(NamedTuple):
         return Score._make(values[:count] for values in self)
 
     def combined_with(self, rest: "Score") -> "Score":
-        """The score on these cases and those of `rest` together."""
+        """The score on the cases of this score and of `rest` together."""
         return Score._make(ours + theirs for ours, theirs in zip(self, rest, strict=True))
 
 

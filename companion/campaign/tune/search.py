@@ -42,9 +42,9 @@ _MOST_STARTS = 3
 _FEWEST_NEIGHBOURS = 4
 """Smallest number of candidates that are tried near the last start candidate."""
 _FIRST_CASES_DIVISOR = 4
-"""Number of all cases of a candidate divided by the number of its first cases.
+"""Divisor of the number of cases: a candidate first flies a quarter of its cases.
 
-A candidate flies the first cases alone, and the others only if it is not hopeless."""
+The candidate flies the others only if its error on the first cases is not too large."""
 _FEWEST_FIRST_CASES = 2
 _HOPELESS_FACTOR = 1.3
 """A candidate is abandoned when its error on the first cases is more than this factor times that of
@@ -63,9 +63,9 @@ class StorageError(Exception):
 
 @contextmanager
 def _storage_errors(path: Path) -> Iterator[None]:
-    """In the context, turn the errors of the storage at `path` into a `StorageError`.
+    """While the block runs, turn errors of the storage at `path` into a `StorageError`.
 
-    Optuna wraps SQLAlchemy's errors in its own, and their text only guesses at the cause.
+    Optuna wraps SQLAlchemy's errors in its own errors, whose text only guesses at the cause.
     """
     from optuna.exceptions import StorageInternalError  # noqa: PLC0415  an extra
     from sqlalchemy.exc import DBAPIError  # noqa: PLC0415  comes with Optuna

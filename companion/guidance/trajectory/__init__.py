@@ -16,7 +16,7 @@ has its own page: `help(companion.guidance.trajectory.waypoints)`.
 A trajectory
     Trajectory       protocol: any class with its members is a trajectory
     Sample           position, velocity, acceleration, jerk, heading and heading rate at one instant
-    TrajectoryError  it cannot be made or flown; its text is for the user
+    TrajectoryError  a trajectory cannot be made or flown; the text is for the user
     Vector           (north, east, down)
 
 Made from a shape

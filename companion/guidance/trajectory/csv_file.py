@@ -138,8 +138,8 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
 def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str) -> None:
     """Refuse rows with more values than the header has names; decimal commas make such rows.
 
-    Such rows of some published files are accepted: all rows have equally many values, and decimals
-    have points.
+    Some published files have rows that are too long. These files are accepted if all rows have the
+    same number of values, and decimals have points.
 
     Raises:
         TrajectoryError: a row has too many values; the message names its line.

@@ -8,7 +8,7 @@ from companion.guidance.trajectory.sample import TrajectoryError
 from companion.guidance.trajectory.septic_spline import Floats
 
 _LARGEST_YAW_STEP = 6.5
-"""Largest change of yaw between two rows, rad: a bit more than the jump by 2π where it wraps."""
+"""Largest change of yaw between two rows, rad: a bit more than 2π, by which a wrapped yaw jumps."""
 
 _LARGEST_FIRST_YAW = 6.5
 """Largest magnitude of the first yaw, rad: a bit more than a turn. More is a yaw in degrees."""
@@ -22,8 +22,7 @@ def yaw_of(data: Mapping[str, Floats], name: str) -> Floats | None:
         name: the file's name, for error messages.
 
     Raises:
-        TrajectoryError: the yaw begins at more than a turn, or jumps by more than one between two
-            rows.
+        TrajectoryError: the first yaw, or the change between two rows, is more than a turn.
     """
     if "yaw" in data:
         yaw = data["yaw"][:, 0]

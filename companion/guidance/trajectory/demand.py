@@ -95,8 +95,8 @@ class Demand:
 
     The rotors must produce the specific thrust f = a + d − g, where d is the deceleration by drag.
     The body's vertical axis points along f, and turns with the part of ḟ = jerk + ḋ that is
-    perpendicular to f. This is differential flatness as in Faessler, Franchi & Scaramuzza, RA-L
-    2018, for drag that is the same along all axes.
+    perpendicular to f: differential flatness as in Faessler, Franchi & Scaramuzza, RA-L 2018, for
+    drag that is the same along all axes.
 
     Attributes:
         tilt: angle between f and the vertical, rad.

@@ -18,8 +18,8 @@ class Slowed:
     Attributes:
         trajectory: the original trajectory.
         law: the time of the original trajectory as a function of the time of the slowed one.
-        moments: times of the original trajectory at which to check, s. Empty: its own check times,
-            which are enough if it is slowed down evenly.
+        moments: times of the original trajectory at which to check the slowed one, s. Empty: the
+            check times of `trajectory`, which are enough if it is slowed down evenly.
     """
 
     trajectory: Trajectory
@@ -42,7 +42,7 @@ class Slowed:
         return self.trajectory.holds_heading
 
     def check_times(self) -> list[float]:
-        """Times at which to check it; see `Trajectory.check_times`."""
+        """Times at which to check the slowed trajectory, s; see `Trajectory.check_times`."""
         times, _ = self.law.stretched(np.array(self.moments or self.trajectory.check_times()))
         require_duration(float(times[-1]))
         return [float(time) for time in times]

@@ -27,14 +27,14 @@ SLOWER_REMEDY = (
 
 
 class Violation(NamedTuple):
-    """A limit that a trajectory breaks; its text is for the user.
+    """A limit that a trajectory breaks, with the message for the user.
 
     Attributes:
         limit: configuration key of the limit.
-        begins: time when it is first broken, s.
-        time: time when it is broken most, s.
+        begins: time when the limit is first broken, s.
+        time: time when the limit is exceeded most, s.
         text: the message for the user.
-        remedy: what to do about it, as the end of a sentence.
+        remedy: what the user should do, as the end of a sentence.
         slowing_helps: whether it makes sense to try the trajectory more slowly.
     """
 
@@ -119,7 +119,8 @@ class _Need(NamedTuple):
         unit_text: unit and quantity as messages show them after the number, such as "° of tilt".
         message_scale: factor from the unit of `allowed` to the unit in messages.
         is_lower_limit: whether `allowed` is a lower limit.
-        key_scale: `allowed` divided by the value of the key; None: messages do not give that value.
+        key_scale: `allowed` divided by the value of the configuration key, which messages then show
+            too; None: messages show only `allowed`.
     """
 
     limit: str

@@ -102,8 +102,8 @@ class Laps:
     Attributes:
         speed: speed at the fastest place, m/s.
         laps: number of laps; both ramps are part of them.
-        acceleration: intended largest acceleration along the path on a ramp, m/s²; it is exceeded
-            if the laps are too short for it.
+        acceleration: largest acceleration along the path on a ramp, m/s²; exceeded if the laps are
+            too short for a ramp with this acceleration.
         direction: direction from the start to the figure, clockwise from north, rad.
         face_path: whether the vehicle faces along the path. Otherwise it holds its heading.
     """
@@ -128,13 +128,13 @@ def steady_circle(radius: float, speed: float, laps: float, longest: float) -> T
     """Laps of a circle north of the start; the vehicle leaves eastwards and holds its heading.
 
     The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s², or more if the
-    laps are too short for that.
+    laps are too short for 1 m/s².
 
     Args:
         radius: radius, m.
         speed: speed between the ramps, m/s.
         laps: number of laps; both ramps are part of them.
-        longest: longest duration that a check allows, s.
+        longest: longest duration that the checks permit, s.
     """
     length = tau * radius * laps
     ramp = min(speed / _RAMP_ACCELERATION, length / speed)

@@ -32,7 +32,7 @@ _CHECKS_PER_PIECE = 16
 """Checks of each piece of the spline; a piece lasts half a period of the cutoff frequency."""
 
 _MOST_PIECES = 4500
-"""Largest number of pieces of the spline. Fitting so many takes a second."""
+"""Largest number of pieces of the spline; the fit then takes a second."""
 
 _LONGEST_RAMP_SHARE = 0.5
 """Longest ramp from or to rest, as a share of the duration of the samples."""
@@ -125,8 +125,8 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     Raises:
         TrajectoryError: velocity or acceleration is not the derivative of the position, the samples
             last too long, or the heading should follow a path that never moves horizontally; the
-            table names another frame than the options, its arrays have other shapes than `Table`
-            says or a number that is not finite; an option is out of range.
+            table names another frame than the options, has arrays of other shapes than in `Table`,
+            or a number that is not finite; an option is out of range.
         ArithmeticError, numpy.linalg.LinAlgError: numerical errors; see `computable`.
     """
     table = checked_table(table)

@@ -31,9 +31,9 @@ def require_trajectory(trajectory: Trajectory) -> None:
     by `violations`.
 
     Raises:
-        TypeError: it lacks a member of `Trajectory`, or `at` returns no `Sample`.
-        TrajectoryError: it does not begin at (0, 0, 0) or not at rest, does not end at rest, has a
-            number that is not finite, a duration that is negative, check times that do not ascend
+        TypeError: the class lacks a member of `Trajectory`, or `at` returns no `Sample`.
+        TrajectoryError: the trajectory does not begin at rest at (0, 0, 0), does not end at rest,
+            has a number that is not finite, a negative duration, check times that do not ascend
             from 0 to the duration, or a derivative that does not fit.
     """
     for member in _MEMBERS:

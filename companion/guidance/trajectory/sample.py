@@ -78,7 +78,7 @@ class Trajectory(Protocol):
 def computable() -> Iterator[None]:
     """Turn numerical errors in the block into an error for the user.
 
-    The checks of files exclude the known causes; this catches the others.
+    The checks of files exclude the known causes; this context manager catches the others.
 
     Raises:
         TrajectoryError: an overflow, a division by zero, or equations without a solution.

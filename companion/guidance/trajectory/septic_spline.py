@@ -38,7 +38,7 @@ class SepticSpline:
     """Septic pieces between knots, three times continuously differentiable by construction."""
 
     def __init__(self, knots: Floats, states: Floats) -> None:
-        """Join the states.
+        """Compute the polynomial of each piece from the states at both ends.
 
         Args:
             knots: (k,), times of the knots, increasing, s.

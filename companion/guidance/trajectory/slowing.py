@@ -6,9 +6,9 @@ The path stays the same; only its timing changes. Limits are checked at times ca
    moment would keep all limits except the fence.
 2. Find a smooth function of time, the stretch factor (`SlowerTime`), that is nowhere below the
    needed factor. With it the vehicle brakes before a slow part and speeds up after it.
-3. Braking needs acceleration: check limits again, and raise the stretch factor where one breaks.
+3. Braking needs acceleration: check limits again; where one is broken, raise the stretch factor.
 
-If slowing down evenly is as quick, the whole trajectory is slowed down by one factor.
+If slowing down in parts saves hardly any time, the whole trajectory is slowed down by one factor.
 """
 
 from collections.abc import Iterator
@@ -67,7 +67,7 @@ class SlowedPart(NamedTuple):
         begin, end: times in the slowed trajectory, s.
         factor: the largest factor by which the speed is divided.
         time: time in the slowed trajectory at which `limit` requires the largest factor, s.
-        limit: configuration key of the limit that requires this factor; empty: none was found.
+        limit: configuration key of the limit that requires this factor; empty: unknown.
     """
 
     begin: float
@@ -84,7 +84,7 @@ class SlowDown(NamedTuple):
         trajectory: the trajectory that keeps the limits.
         parts: the parts that were slowed down, in order; empty if none was.
         even: whether the whole trajectory was slowed down by one factor.
-        reason: why it was slowed down evenly, as the end of a sentence.
+        reason: why the whole trajectory was slowed down, as the end of a sentence.
     """
 
     trajectory: Trajectory
@@ -215,7 +215,7 @@ def _law_with_pieces(
 
 
 def _largest_of_four(values: Floats, outside: float) -> Floats:
-    """Largest of four `values` (n,) for each coefficient (n + 3,); `outside` beyond the ends."""
+    """(n + 3,), largest of 4 `values` (n,) for each B-spline coefficient; padded with `outside`."""
     padded = np.pad(values, 3, constant_values=outside)
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
 
@@ -240,7 +240,7 @@ def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterat
 
 
 def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """Key of the limit that `motion` exceeds most at `moments`; if none, of the fence limit."""
+    """Key of the limit exceeded most at `moments`, else of the breached fence limit, else ""."""
     most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
     limit = max(most, key=most.__getitem__, default="")
     if limit and most[limit] > 0.0:

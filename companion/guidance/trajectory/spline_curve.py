@@ -38,7 +38,7 @@ class SplineCurve:
         spline: the spline, three times continuously differentiable.
         checks_per_piece: smallest number of check points in each piece; an extreme between two of
             them is missed by less than 0.3 %.
-        longest_step: largest phase between two check points, s; a heading may need a short one.
+        longest_step: largest phase between two check points, s; a heading may need a short step.
     """
 
     spline: SepticSpline

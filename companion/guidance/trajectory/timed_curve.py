@@ -1,7 +1,7 @@
 """A curve with a time law along it, and the times at which to check it against limits.
 
 Where the rate of the time law is constant, all laps of a figure are alike. So only the first and
-the last lap are checked; a helix is lowest and highest there. The ramps are checked completely.
+the last lap are checked; they contain a helix's lowest and highest point. All ramps are checked.
 Neighbouring check times are so close in phase and path length that an extreme between them is
 missed by less than 0.3 %; `tests/trajectory/test_check_times.py` compares them with a finer grid.
 """
@@ -22,11 +22,11 @@ from companion.guidance.trajectory.time_laws import Piece, TimeLaw, derivatives
 _FEWEST_CHECKS = (16, 256)
 """Fewest check times in a short and in a long piece of a time law whose rate changes."""
 _CHECK_PERIOD = 0.005
-"""Time between two checks of a short piece, s: shorter than a vehicle's response by far."""
+"""Time between two checks of a short piece, s; much shorter than a vehicle's response."""
 
 _TABLE_ROWS = (64, 2048)
-"""Least and most rows of the table from which the time at a phase is interpolated; this time need
-not be exact."""
+"""Smallest and largest number of rows of the table (time, phase) from which the check times are
+interpolated; check times need not be exact."""
 _ROWS_PER_PHASE = 8
 
 
@@ -66,7 +66,7 @@ def require_duration(seconds: float, longest: float = LONGEST_DURATION) -> None:
 
 
 def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
-    """The parts to check: the whole piece, or only the first and last lap of a long steady one."""
+    """The parts to check: the first and last lap of a long steady piece, else the whole piece."""
     if piece.steady and sampling.period is not None:
         lap = sampling.period / law.at(piece.begin).first
         if piece.end - piece.begin > 2.0 * lap:
@@ -123,7 +123,7 @@ class HeldHeading:
     """Keeps the heading that the vehicle has at the start."""
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
-        """Both 0: the heading counts from the heading at the start, and does not change."""
+        """(0, 0): the heading counts from the heading at the start, and does not change."""
         return 0.0, 0.0
 
 
@@ -192,7 +192,7 @@ class TimedCurve:
         return isinstance(self.heading, HeldHeading)
 
     def check_times(self) -> list[float]:
-        """Times at which to check it; see `Trajectory.check_times`."""
+        """Times at which to check the trajectory, s; see `Trajectory.check_times`."""
         return check_times(self.curve.sampling(), self.law, self.longest)
 
     def at(self, time: float) -> Sample:

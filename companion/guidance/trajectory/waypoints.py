@@ -50,7 +50,7 @@ def waypoints(
         acceleration: largest acceleration, m/s².
         face_path: face along the path instead of holding the heading.
         headings: heading at each point, rad from north, or None for any. The vehicle turns the
-            short way from one to the next. The heading at the start follows from them.
+            short way between headings. The spline of the headings gives the heading at the start.
 
     Raises:
         TrajectoryError: there are no points, two consecutive points are equal, a limit is not

@@ -48,7 +48,7 @@ LostCallback = Callable[[str], None]
 """Called with the reason when the connection is lost."""
 
 Tap = Callable[[float, bytes], None]
-"""Called with the event-loop time (s) and one whole frame, received or sent. It must be quick."""
+"""Called with the event-loop time (s) and one whole frame, received or sent; must be quick."""
 
 OPEN_TIMEOUT_S = 5.0
 """Time allowed to open a TCP connection, s."""

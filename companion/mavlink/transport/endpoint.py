@@ -55,7 +55,7 @@ class TcpClient:
 
 @dataclass(frozen=True)
 class TcpServer:
-    """Listen for one vehicle that connects; if `peers` are given, only from one of them."""
+    """Listen for one vehicle that connects; if `peers` are given, only a peer may connect."""
 
     host: str
     port: int

@@ -20,7 +20,7 @@ _counter = itertools.count()
 def free_port(*offsets: int) -> int:
     """Find a port for UDP and TCP that is free on 127.0.0.1.
 
-    The ports above it by each of the `offsets` are free, too.
+    The port numbers larger by each of the `offsets` are free, too.
 
     Another program could open the port before the caller does. So a process gets the same port
     again only after all others, and processes with neighboring process ids begin 50 ports apart.

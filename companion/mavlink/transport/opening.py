@@ -22,8 +22,8 @@ OpenTransport = Callable[[Endpoint, Receiver, LostCallback], Awaitable[Transport
 async def open_transport(endpoint: Endpoint, receiver: Receiver, lost: LostCallback) -> Transport:
     """Open the transport that the endpoint describes.
 
-    `lost`: called with the reason when an open connection drops, by a TCP server each time that its
-    peer drops. Never called for UDP, nor after `close`.
+    `lost`: called with the reason when an open connection drops; a TCP server calls `lost` each
+    time a client disconnects. Never called for UDP, nor after `close`.
 
     Raises:
         EndpointError: the transport cannot be opened; the message says why and what to do.

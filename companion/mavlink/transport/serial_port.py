@@ -40,7 +40,7 @@ class SerialTransport:
     """A serial port, read and written without blocking.
 
     No frame is sent in part. If the driver takes only part of a frame, the rest is sent as soon as
-    there is room, and frames sent meanwhile are dropped.
+    there is room; until then, new frames are dropped.
 
     Raises:
         EndpointError: the device is missing, in use or not permitted, or refuses the baud rate.

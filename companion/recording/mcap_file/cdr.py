@@ -91,7 +91,7 @@ Pose = tuple[float, float, float, float, float, float, float]
 
 
 class CdrMessage:
-    """A growing CDR message. Values are aligned to their size, counted after the header."""
+    """Builds a CDR message. Each value is aligned to its size; offsets count after the header."""
 
     def __init__(self) -> None:
         self._bytes = bytearray(CDR_HEADER)

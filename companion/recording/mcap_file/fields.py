@@ -39,10 +39,10 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class CodeField(Field):
-    """A column of codes: small numbers that each have a name."""
+    """A column of codes: small integers, each with a name."""
 
     names: tuple[str, ...] = ("no", "yes")
-    """The name of each number; the first is that of 0."""
+    """The names of the codes 0, 1, 2 and so on."""
 
 
 @dataclass(frozen=True)

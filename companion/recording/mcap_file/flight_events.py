@@ -38,11 +38,11 @@ class AlarmChange(NamedTuple):
     reason: str
     """Description of the breach; empty when the alarm ended."""
     action: str
-    """Action of the flight, in words; empty when the alarm ended."""
+    """Safety action that the alarm causes, in words; empty when the alarm ended."""
 
 
 class ValuesChange(NamedTuple):
-    """A change of configuration values in flight, at its beginning."""
+    """A change of configuration values in flight, recorded when the change begins."""
 
     time: float
     """Time on our clock, s."""

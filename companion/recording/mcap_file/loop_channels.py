@@ -1,10 +1,10 @@
 """The channels with the inputs and outputs of the loops; `companion replay` reads them.
 
-This table is the reference of their columns. Times end with `_s`. `time_s` and `received_s` are on
-our clock (event-loop time). `vehicle_time_s` is the vehicle's clock without its jumps. Positions
-are NED, in the frame of LOCAL_POSITION_NED. The jumps of the autopilot's estimator are removed,
-except in INPUT, in ATTITUDE_TARGET and in the attitude of SAMPLE, which hold what was received.
-Rates are about the axes of the body (FRD).
+This module documents the columns of the channels. Times end with `_s`. `time_s` and `received_s`
+are on our clock (event-loop time). `vehicle_time_s` is the vehicle's clock without its jumps.
+Positions are NED, in the frame of LOCAL_POSITION_NED. The jumps of the autopilot's estimator are
+removed, except in INPUT, in ATTITUDE_TARGET and in the attitude of SAMPLE, which are recorded as
+received. Rates are about the axes of the body (FRD).
 """
 
 from companion.recording.mcap_file.fields import Channel, CodeField, Field

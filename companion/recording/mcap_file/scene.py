@@ -27,7 +27,7 @@ class Arrow(NamedTuple):
 
 
 class Cube(NamedTuple):
-    """A box about its pose; its size along x, y and z in m."""
+    """A box centred at `pose`; `size` along x, y and z, m."""
 
     pose: Pose
     size: tuple[float, float, float]
@@ -35,7 +35,7 @@ class Cube(NamedTuple):
 
 
 class Cylinder(NamedTuple):
-    """A cylinder about its pose, along z; its size along x, y and z in m."""
+    """A cylinder centred at `pose`, with its axis along z; `size` along x, y and z, m."""
 
     pose: Pose
     size: tuple[float, float, float]

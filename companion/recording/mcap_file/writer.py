@@ -17,8 +17,8 @@ _CHUNK_LENGTH = 1 << 20
 class McapWriter:
     """A `.mcap` file open for writing. Only one thread may use it.
 
-    Each `flush` writes a chunk, and so does each MiB of messages. A file that ends after a chunk
-    can be read without the index, which `close` writes at its end.
+    `flush` writes the messages as a chunk; a chunk is also written whenever it reaches 1 MiB. A
+    file that ends after a chunk can be read without the index, which `close` writes at the end.
 
     Args:
         path: file to create.
@@ -75,7 +75,7 @@ class McapWriter:
     def close(self, *, complete: bool = True) -> None:
         """Close the file; if `complete`, write its index first.
 
-        A reader takes a file without an index for one that was cut off.
+        Readers treat a file without an index as cut off.
 
         Raises:
             OSError: the disk is full, or failed.

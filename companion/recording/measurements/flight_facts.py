@@ -16,11 +16,11 @@ class EarlyEnd:
     phase: str
     """The phase that failed."""
     maneuver: str | None = None
-    """The maneuver that ran, or the last one before the vehicle held; None: another phase ran, or
-    no maneuver had begun."""
+    """The maneuver that ran, or the last one before a safety hold; None: another phase ran, or no
+    maneuver had begun."""
     time_in_maneuver: float | None = None
-    """Time from the beginning of `maneuver` to the end of the flight, or to the hold, s; None: no
-    maneuver."""
+    """Time from the beginning of `maneuver` to the end of the flight or to the safety hold, s;
+    None: no maneuver."""
     monitor: str | None = None
     """Name of the safety monitor that ended the flight, or None."""
 
@@ -73,12 +73,12 @@ class FlightFacts:
     """Sentences on what differs from the configuration (hover thrust, drag, dead time), and on rows
     of the figures that were lost."""
     gain_warning: str | None = None
-    """A sentence if the gain is above the largest sensible one, or None."""
+    """A sentence if the planner's gain is too high, or None."""
     settings: dict[str, str] = field(default_factory=dict)
     """Keys of hover thrust and drag that the advice names, with values for `--set`."""
     drag_learned: str | None = None
-    """A sentence if the drag was far from the assumed drag, and is stored for the vehicle's next
-    flight; or None."""
+    """A sentence if the learned drag differs much from the assumed drag and is stored for the
+    vehicle's next flight; or None."""
     changes: tuple[dict[str, Any], ...] = ()
     """Changes in flight, each with `time_s`, `by` and `keys` (values before and after)."""
 

@@ -139,7 +139,7 @@ def _settling_time(rows: Floats) -> float:
 
 
 def _swing(rates: Floats, time: Floats, settling_time: float, speed: float) -> Swing:
-    """Oscillation of roll and pitch in a maneuver with these times; `speed` as in the figures."""
+    """Oscillation of roll and pitch in a maneuver; `speed`: largest reference speed, m/s."""
     begin, end = time[0], time[-1]
     if float(end - begin) - settling_time >= SHORTEST_PART:
         begin += settling_time

@@ -38,7 +38,7 @@ def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
     """The summary of a flight with the keys of `summary.json`, and whether it is provisional.
 
     A provisional summary is derived from the record, and `result` says that the record ends early.
-    Values that are not recorded are null or empty: the dead times, the realtime grants, the advice,
+    Values that are not recorded are null or empty: the dead times, `realtime`, the advice,
     and whether the vehicle is armed.
 
     Raises:
@@ -129,9 +129,9 @@ def _tracking(guidance: Rows) -> NDArray[np.float64]:
 
 
 def reference_positions(guidance: Rows) -> NDArray[np.float64]:
-    """(N, 3), positions of the reference, m, NED; NaN where there is none, as in open loop.
+    """(N, 3), positions of the reference, m, NED; NaN where no position is commanded.
 
-    While the autopilot does not obey our setpoints, the recorded reference is the vehicle itself.
+    Also NaN while offboard control is inactive: the vehicle's own position was recorded then.
     """
     positions = matrix(guidance, vector_names("reference", "m"))
     positions[guidance["offboard_active"] == 0] = np.nan
@@ -159,7 +159,7 @@ def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
 
 
 def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> EarlyEnd:
-    """The end of the record as an early end of the flight, in the phase that ran."""
+    """The end of the record, reported as an early end of the flight in its last phase."""
     end = record.duration
     since = None if takeoff is None else end - takeoff
     latest = record.maneuvers[-1] if record.maneuvers else None

@@ -32,7 +32,7 @@ class StepRun(NamedTuple):
     measured: Floats
     """(n, 2), coefficients north and east."""
     target: Floats
-    """(n, 2), target coefficients when the sample of that row was answered."""
+    """(n, 2), target coefficients when the setpoint for the row's sample was computed."""
 
     @property
     def changes(self) -> Floats:
@@ -101,12 +101,12 @@ class SecondOrderModel:
     damping: float
     """Damping ratio ζ."""
     dead_time: float
-    """Time from the sample at which the target changed to the first effect, s."""
+    """Time from a change of the target (its first sample) until the response begins, s."""
 
     def path(self, run: StepRun) -> Floats:
         """(n, 2) coefficients of the model at the rows of `run`.
 
-        The path starts with the measured coefficients and their measured rate of change. It keeps
+        The path starts with the measured coefficients and their measured rate of change, and keeps
         this rate until the first target has an effect.
         """
         return self.path_at_rows(RunData.of(run))

@@ -44,7 +44,7 @@ class LoopCounts:
     setpoints: int = 0
     """Setpoints sent."""
     missed_deadlines: int = 0
-    """Answers that took longer than `deadman.deadline_ms`."""
+    """Setpoints sent more than `deadman.deadline_ms` after their sample arrived."""
     stale: int = 0
     """Samples not answered for other reasons than `refused`: the sample or the target was too old
     or out of order, there was no target, the mode was not confirmed after a gap, or the sample may
@@ -83,7 +83,7 @@ class Summary:
     result: str
     """"ok", or the reason why the flight ended early."""
     phase: str
-    """The phase that failed, else the last one."""
+    """The phase that failed; the last phase if none failed."""
     planner: str
     gain: float
     """Gain p of the planner, 1/s."""
@@ -135,7 +135,7 @@ class Summary:
     def extent(self) -> dict[str, float]:
         """The largest height (m), speed (m/s) and tilt (°), and the time under control (s).
 
-        Speed and tilt are given for the whole flight and for its maneuvers. They come from rows ten
+        Speed and tilt are given for the whole flight and for its maneuvers, from rows recorded ten
         times a second; during steps, the tilt comes from every sample.
         """
         rows, tracked = self.trace.motion.rows(), self.trace.tracking.rows()

@@ -1,9 +1,9 @@
 """Detects whether a vehicle swings: an oscillation of roll and pitch with a short period.
 
-Body rates are integrated to angles. A moving mean removes slow motion, because wind and slow
-corrections are not a swing. The autocorrelation of the rest shows what repeats. In hovers of 3 to
-8 s of the mock vehicles, gusts of 1 to 2 m/s gave an autocorrelation of at most 0.71, mostly less
-than 0.4. Weights of the position hold that were 2.5 times too large gave 0.8 to 1.
+Body rates are integrated to angles. The moving mean is subtracted, because wind and slow
+corrections are not a swing. The autocorrelation of the remaining fast motion is high if the motion
+is periodic. In hovers of 3 to 8 s of the mock vehicles, gusts of 1 to 2 m/s gave an autocorrelation
+of at most 0.71, mostly less than 0.4. Position-hold weights 2.5 times too large gave 0.8 to 1.
 """
 
 from math import nan
@@ -105,7 +105,7 @@ def _without_slow_motion(angles: Floats, half: int) -> Floats:
 def _autocorrelation(angles: Floats) -> Floats:
     """Autocorrelation (N,) of both angles (N, 2) together, by lag in rows: 1 at lag 0.
 
-    It is unbiased: at long lags it is divided by the number of rows that overlap.
+    The estimate is unbiased: each lag is divided by the number of rows that overlap.
     """
     count = len(angles)
     spectrum = np.fft.rfft(angles - angles.mean(axis=0), 2 * count, axis=0)

@@ -10,12 +10,12 @@ Figures = Mapping[str, Any]
 """Figures of a flight: the result of `Summary.as_dict`."""
 
 MAX_HORIZONTAL_RMS, MAX_HORIZONTAL_RMS_PER_SPEED = 0.15, 0.02
-"""Largest RMS of the horizontal error of a maneuver: with the reference at rest, m; and the
-increase for each m/s of its speed, m."""
+"""Largest RMS of the horizontal error of a maneuver: m with the reference at rest, plus m for each
+m/s of the reference speed."""
 MAX_HEIGHT_RMS = 0.15
 """Largest RMS error of the height, m."""
 MIN_CONSTANT_SHARE = 0.7
-"""Smallest |mean| / RMS of a height error that is mostly constant."""
+"""A height error counts as constant if its |mean| is more than this share of its RMS."""
 MAX_SWING_RMS = 3.0
 """Largest RMS of a swing of roll and pitch, °."""
 MIN_SWING_REGULARITY = 0.7
@@ -25,18 +25,18 @@ MAX_LINE_DISTANCE = 0.03
 MAX_MODEL_DEVIATION = 0.20
 """Largest distance from the nearest second-order model, as a share of the step."""
 MAX_UNANSWERED_SHARE = 0.01
-"""Largest share of attitude samples without an answer."""
+"""Largest share of attitude samples for which no setpoint was sent."""
 MAX_LOST_SHARE = 0.02
 """Largest share of the vehicle's frames that may be lost."""
 MIN_BATTERY_MARGIN = 0.10
-"""Smallest charge at the end beyond `limits.min_battery_percent`, 0..1."""
+"""Smallest margin of the charge at the end above `limits.min_battery_percent`, 0..1."""
 
 LATENCY = "latency"
-"""`Check.what` of the time from sample to setpoint."""
+"""Value of `Check.what` in the check of the latency from sample to setpoint."""
 OFF_COURSE = "too far from its path"
-"""End of `Check.fault` of a maneuver whose horizontal error was too large."""
+"""Last words of `Check.fault` for a maneuver whose horizontal error was too large."""
 LOST_ROWS = "rows of the flight's figures were lost"
-"""Words that mark the advice about lost rows; their cause is the disk, not the configuration."""
+"""Words that identify the advice about lost rows, which the disk causes, not the configuration."""
 
 
 class Check(NamedTuple):
@@ -56,7 +56,7 @@ class Check(NamedTuple):
 
 
 def checks(figures: Figures) -> list[Check]:
-    """All checks that the figures of a flight permit; empty if nothing was measured."""
+    """All checks whose figures were measured in the flight; empty if nothing was measured."""
     return [
         *_maneuvers(figures),
         *_steps(figures),
@@ -101,7 +101,7 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
 
 
 def _horizontal_remedy(speed: float, *, learned: bool) -> str:
-    """The remedy at `speed`, m/s; `learned`: the next flight knows a drag that this one did not."""
+    """The remedy at `speed`, m/s; `learned`: whether this flight learned drag for the next one."""
     if learned:
         return "the next flight knows the drag that this one learned: fly again"
     first = "fly it slower" if speed > 0.0 else "fly in less wind"
@@ -166,7 +166,7 @@ def _steps(figures: Figures) -> Iterator[Check]:
 
 
 def cut_steps(figures: Figures) -> list[Check]:
-    """A failed check if the tilt limit cut a step by more than `MAX_LINE_DISTANCE`; or empty."""
+    """A failed check if the tilt limit cut a step by more than `MAX_LINE_DISTANCE`; else empty."""
     response, limit = figures["response"], figures.get("max_tilt_deg")
     target_tilt = response.get("asked_tilt_deg")
     if target_tilt is None or limit is None:  # nothing was measured, or the summary is older

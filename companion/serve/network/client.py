@@ -41,7 +41,7 @@ class ClientListener(Protocol):
 
 
 class Client(ABC):
-    """A client's channel. It queues frames until `flush`; it may drop whole frames, never parts.
+    """A client's channel: queues frames until `flush`; may drop whole frames, never parts.
 
     Args:
         name: name for messages, such as `udp 127.0.0.1:14550`.
@@ -119,7 +119,7 @@ class FloodDetector:
     _MAX_COUNT = 64
     """Largest number of frames or datagrams in one window."""
     _BYTES_PER_COUNT = 64
-    """Number of received bytes that count as a frame, because searching noise costs time, too."""
+    """Received bytes that count as one frame, because scanning noise for frames takes time, too."""
 
     def __init__(self) -> None:
         self._window_start = 0.0

@@ -14,7 +14,7 @@ _MAX_CLIENTS = 16
 _MAX_UNSENT_BYTES = 65_536
 """Number of unsent bytes to one client above which further frames are dropped."""
 _KERNEL_BUFFER = 65_536
-"""Size of the kernel's send buffer for a client, bytes. It is small, because a client that paused
+"""Size of the kernel's send buffer for a client, bytes; small, because a client that paused
 must read all old bytes in the buffer before it reads anything new."""
 _READ_BYTES = 4096
 """Largest number of bytes that are read at once; asyncio would read 256 KiB, whose handling would

@@ -91,7 +91,7 @@ class Approach:
         by_velocity: whether only the velocity error must become zero, not the position error.
 
     Raises:
-        UnplannableError: Ruckig finds no such motion.
+        UnplannableError: Ruckig finds no motion within the limits.
     """
 
     def __init__(

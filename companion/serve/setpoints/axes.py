@@ -38,7 +38,7 @@ _MAX_LEAD_SPEED = 2.0
 commanded, m/s."""
 
 _MIN_LIMIT_SHARE = 0.25
-"""Smallest share of its limits that an axis gets, even if the motion is perpendicular to it."""
+"""Every axis gets at least this share of its limits, whatever the direction of the motion."""
 
 
 class JumpLimits(NamedTuple):
@@ -110,7 +110,7 @@ class CommandFollower:
         Without a commanded position, the state stays close to `actual`, the motion of the vehicle.
 
         Raises:
-            UnplannableError: no motion leads to the command; the previous command stays in force.
+            UnplannableError: no motion fulfils the command; the previous command stays in force.
         """
         if demand == self._newest_demand:
             self._repeat(demand, now, actual)
@@ -188,8 +188,8 @@ class CommandFollower:
     def _derivatives(self, demand: AxisDemand, now: float) -> tuple[AxisValues, AxisValues]:
         """Acceleration and jerk of a demand.
 
-        If the demands are a stream of positions and velocities, what is not commanded is estimated
-        from the last two; otherwise it is 0.
+        A derivative that is not commanded is estimated from the last two demands if they are a
+        stream of positions and velocities; otherwise it is 0.
         """
         before, interval = self._newest_demand, now - self._commanded_at
         commanded = demand.acceleration

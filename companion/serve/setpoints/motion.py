@@ -84,7 +84,7 @@ class CommandedMotion:
         """Follow a request; `actual` is the motion of the vehicle.
 
         Raises:
-            UnplannableError: no motion leads to the request; the previous request stays in force.
+            UnplannableError: no motion fulfils the request; the previous request stays in force.
         """
         state_before = (
             copy(self._horizontal),

@@ -79,7 +79,7 @@ _MIN_TAKEOFF_HEIGHT, _MIN_TAKEOFF_SPEED = 1.0, 0.1
 def requests_takeoff(request: Request, pose: VehiclePose) -> bool:
     """Whether a request makes a vehicle on the ground take off.
 
-    Requests of an attitude or of body rates never do.
+    Requests of an attitude or of body rates never begin a take-off.
     """
     if not isinstance(request, MotionRequest):
         return False

@@ -167,7 +167,7 @@ class CompleteLoopFlights(NamedTuple):
 
 
 def in_percent(error: float) -> str:
-    """A relative error for tables and legends, such as `+50 %`; `right` for no error."""
+    """A relative error for tables and legends, such as `+50 %`; `right` if the error is 0."""
     return f"{100.0 * error:+.0f} %".replace("-", "−") if error else "right"
 
 

@@ -39,7 +39,7 @@ def proposed(settings: Settings) -> Model:
 
     State: position, velocity V, c, heading. Control: c_d, commanded heading, specific thrust T.
     V̇ = [T·c_N, T·c_E, g − T·√(1 − c_N² − c_E²)] − d(V) + w, with drag d and disturbance w.
-    ċ = p·(c_d − c), the heading likewise. Only the products with T and the root are nonlinear.
+    ċ = p·(c_d − c), as for the heading. Only the products with T and the root are nonlinear.
     """
     symbols = Symbols(size=9)
     return symbols.model(

@@ -55,7 +55,7 @@ ColdStarts = dict[ModelName, dict[str, float]]
 
 
 def count_iterations() -> ColdStarts:
-    """Count the iterations of every model from every state; the first guess is the circle."""
+    """Count the iterations of every model from every state; the initial guess is the reference."""
     counts: ColdStarts = {}
     for model in MODELS:
         solver = Variant(model, _COLD_ITERATIONS).solver(CIRCLE.trajectory)

@@ -41,7 +41,7 @@ _STILL_AIR: LineStyle = {"linestyle": "-", "marker": "o", "markersize": 4.0, "li
 _IN_WIND: LineStyle = {"linestyle": ":", "marker": "s", "markersize": 4.0, "linewidth": 1.6}
 _ERROR_TICKS_MM = (10, 20, 50, 100, 200, 500, 1000)
 _MARKERS = ("o", "s")
-"""Marker of each of `GUIDANCES`."""
+"""Plot marker of each guidance in `GUIDANCES`."""
 
 
 def draw_figure(flights: TrackedFlights) -> Figure:

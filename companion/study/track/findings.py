@@ -19,7 +19,7 @@ from companion.study.track.tasks import (
 )
 
 _EQUALITY_TOLERANCE_M = 2e-4
-"""Errors that differ by at most this count as equal, m: another noise seed changes them as much."""
+"""Largest difference of errors that count as equal, m; a new noise seed changes them as much."""
 _OTHER_PLANNERS = tuple(planner for planner in PLANNER_NAMES if planner != MODEL_FOLLOWING)
 _REQUIRED_RATIO = 3.0
 """Smallest allowed ratio of the error without lead to the error with lead."""

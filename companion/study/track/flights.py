@@ -69,7 +69,7 @@ TrackedFlights = dict[Task, TrackedFlight]
 
 
 def fly_all(tasks: Sequence[Task], tick: Tick) -> TrackedFlights:
-    """Fly every task, with as many flights at a time as cores; call `tick` as each begins.
+    """Fly every task, one flight on each CPU core at a time; call `tick` before each flight.
 
     The result of a flight does not depend on other flights. On Ctrl-C this function waits for the
     flights in progress, so that no process is left behind.

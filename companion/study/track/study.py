@@ -102,7 +102,7 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
 
 
 def _tables(flights: TrackedFlights) -> tuple[Table, ...]:
-    """The tables: all planners in still air, by telemetry and by true position; lead and wind."""
+    """The tables: errors of all planners in still air, and the effects of lead and wind."""
     return (
         _planners_table(
             "track",

@@ -77,7 +77,7 @@ def tasks() -> tuple[Task, ...]:
     """All flights of the study.
 
     Linear guidance flies every planner in still air, two planners in wind, and one planner without
-    lead in both. Predictive guidance flies one planner in still air.
+    lead in still air and in wind. Predictive guidance flies one planner in still air.
     """
     calm = [
         Task(trajectory, planner, guidance)

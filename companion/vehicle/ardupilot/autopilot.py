@@ -44,8 +44,8 @@ class ArduPilot:
     """ArduCopter's `Autopilot`.
 
     GUIDED is the mode of both take-off and offboard control. The first setpoint ends the take-off,
-    so no setpoint may be sent during the climb. The guided bit of `base_mode` tells the two apart:
-    it is set while the position controller runs, and clear while body rates are obeyed.
+    so no setpoint may be sent during the climb. The guided bit of `base_mode` shows which one is
+    active: take-off, with the position controller (set), or control by body rates (clear).
     """
 
     name = "ArduPilot"

@@ -45,8 +45,8 @@ _MODES = {
     "STABILIZED": _custom_mode(7),
 }
 _DESCEND = "AUTO.DESCEND"
-"""Mode in which PX4's failsafe lands without a position; it cannot be commanded. It replaces
-AUTO.LAND 4.8 s after GPS is lost (measured)."""
+"""Mode in which PX4's failsafe lands without a position; it cannot be commanded. PX4 changes from
+AUTO.LAND to this mode 4.8 s after GPS is lost (measured)."""
 _NAMES = {number: name for name, number in _MODES.items()} | {
     _custom_mode(_AUTO_MAIN_MODE, 20): _DESCEND
 }
@@ -62,10 +62,10 @@ _ROLES = {
 class Px4:
     """PX4's `Autopilot`.
 
-    OFFBOARD can be entered after setpoints have streamed at 2 Hz or more for a second. When they
-    stop, PX4 holds the last rates for COM_OF_LOSS_T, so the last setpoint must command zero rates.
-    While the intended mode is OFFBOARD, a later setpoint enters it again; only a mode command
-    releases control for good.
+    OFFBOARD can be entered after setpoints have streamed at 2 Hz or more for a second. When
+    setpoints stop, PX4 holds the last rates for COM_OF_LOSS_T, so the last setpoint must command
+    zero rates. While the intended mode is OFFBOARD, PX4 enters OFFBOARD again at a later setpoint;
+    only a mode command releases control for good.
     """
 
     name = "PX4"

@@ -1,7 +1,7 @@
 """PX4's events (EVENT, 410) as texts, for a link on which PX4 sends no STATUSTEXT.
 
-PX4 sends STATUSTEXT only on links on which it receives heartbeats of type GCS. It numbers an event
-by a hash of its name. The texts are in metadata that is not sent over the link, so this module has
+PX4 sends STATUSTEXT only on links on which it receives heartbeats of type GCS. An event's number is
+a hash of its name. The texts are in metadata that is not sent over the link, so this module has
 the texts that matter to a flight (source: PX4 main, 2026; checked against recorded events). Any
 other event that is meant for users is reported by its number, once.
 """
@@ -63,7 +63,7 @@ class _Template(NamedTuple):
     layout: str = ""
     """`struct` format of the values in the event's arguments."""
     meanings: tuple[dict[int, str] | None, ...] = ()
-    """For each value, the words for each number; None shows the number itself."""
+    """For each value: the text for each number, or None to show the number itself."""
 
 
 _EVENTS = {

@@ -1,6 +1,6 @@
 """Checks of PX4's parameters that compare them with the configuration.
 
-Each is a `Check`: it returns the problem of a value, or None.
+Each function is a `Check`: it returns the problem of a value, or None.
 """
 
 from math import degrees
@@ -69,7 +69,7 @@ def failure_tilt(value: float, values: Values, settings: CompanionSettings) -> P
 def signing(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """Check that `companion` signs if PX4 requires it.
 
-    The reverse needs no rule: with signing, unsigned frames of the vehicle are refused anyway.
+    If only `companion` signs, no check is needed: it refuses unsigned frames of the vehicle anyway.
     """
     if not value or settings.signing:
         return None
