@@ -117,7 +117,7 @@ class Server:
                 return
 
     def _await_answer(self) -> None:
-        """Wait for the answer to the latest beacon; after ``patience_s`` continue in real time."""
+        """Wait for the answer to the latest beacon; after ``patience_s`` leave lockstep."""
         self._collect_until_answer(BEACON_PERIOD_S)
         if self._beacon_answered:
             return

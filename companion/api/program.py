@@ -173,7 +173,7 @@ def flight_ended(result: str) -> FlightEnded:
 
 
 def mark_error_retrieved(ended: asyncio.Future[Any]) -> None:
-    """Done-callback that stops asyncio's warning; another call raises the error in the program."""
+    """Done-callback without which asyncio would warn; the program's calls raise the error."""
     if not ended.cancelled():
         ended.exception()
 

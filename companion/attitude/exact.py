@@ -92,12 +92,12 @@ def _rotation(
     max_angle: float,
     max_yaw_angle: float,
 ) -> tuple[float, float, float]:
-    """Rotation vector (rad, at heading 0) of one sample: Log(d ⊗ yaw(heading_change)).
+    """Rotation vector of one sample, rad, at heading 0: Log(q) with q = d ⊗ yaw(heading_change).
 
     The rotation d changes the tilt (a, x, y, 0) so that the coefficients move by `wanted_share` of
-    the remaining way (north, east) to the target, or less if `max_angle` (rad) is reached. A
-    component of Log is f = θ/sin(θ/2) times a component of the quaternion. The limits depend on f,
-    and f on the angle θ of the result, so f is found by fixed-point iteration.
+    the remaining way (north, east) to the target, or less if `max_angle` (rad) is reached. Log(q)
+    is f = θ/sin(θ/2) times the vector part of q, where θ is the angle of q. The limits depend on
+    f, and f depends on θ, so f is found by fixed-point iteration.
     """
     f = 2.0
     r_x = r_y = r_z = 0.0

@@ -105,7 +105,7 @@ class HeadingChange(NamedTuple):
     """The predicted change of the body's heading when a plan takes effect.
 
     Attributes:
-        angle: change of the heading since the start of the plans, rad.
+        angle: change of the heading since planning began, rad.
         rate: rate of the heading, rad/s.
     """
 

@@ -32,7 +32,7 @@ def split(w: float, x: float, y: float, z: float) -> tuple[float, float, float, 
 
 
 def cos_tilt(x: float, y: float) -> float:
-    """Cosine of the tilt from `x`, `y` of `split` or of the whole quaternion (equation 10)."""
+    """Cosine of the tilt (equation 10); `x`, `y`: of the tilt by `split`, or of the attitude."""
     return 1.0 - 2.0 * (x * x + y * y)
 
 

@@ -163,12 +163,16 @@ class ModelFollowingPlanner:
         if previous is None or previous == target or hold.lateness < SHORTEST_PERIOD:
             return forward.advance(target, start_heading, yaw_feedback, hold.plan_dt)
         lateness, remaining = hold.lateness, hold.plan_dt - hold.lateness
-        first_roll, first_pitch, _ = forward.advance(
-            previous, start_heading, yaw_feedback, lateness
+        first = forward.advance(previous, start_heading, yaw_feedback, lateness)
+        roll_rate, pitch_rate, yaw_rate = forward.advance(
+            target, start_heading, yaw_feedback, remaining
         )
-        roll, pitch, yaw = forward.advance(target, start_heading, yaw_feedback, remaining)
         share = lateness / hold.plan_dt
-        return roll + share * (first_roll - roll), pitch + share * (first_pitch - pitch), yaw
+        return (
+            roll_rate + share * (first[0] - roll_rate),
+            pitch_rate + share * (first[1] - pitch_rate),
+            yaw_rate,
+        )
 
     def _feedback(
         self,

@@ -93,7 +93,7 @@ class LawPlanner:
         self._last_target = _NO_TARGET  # the old constants limited this target
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
-        """Do nothing: the law sends rates along the axes of the body."""
+        """Do nothing: only `model-following` uses the attitude target."""
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """Do nothing: a law has no memory."""

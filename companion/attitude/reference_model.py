@@ -182,9 +182,12 @@ class ReferenceModel:
         self._v_north, self._v_east = v_north, v_east
 
     def _limit_tilt(self, north: float, east: float, dt: float) -> None:
-        """Keep the coefficients within the largest tilt after a step of `dt` s from (north, east).
+        """Limit the coefficients after a step to the largest tilt, or to the tilt before the step.
 
-        If they were beyond the largest tilt before the step, they move no further out.
+        Args:
+            north: coefficient before the step, north.
+            east: coefficient before the step, east.
+            dt: duration of the step, s.
         """
         length = hypot(self.north, self.east)
         if length <= self._constants.longest_target:

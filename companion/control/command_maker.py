@@ -63,12 +63,14 @@ class CommandMaker:
         # Target and heading are made from references at the same times.
         reference_at = cache(self._flown_source.reference(now, inputs.now, heading))
         reference = reference_at(now)
-        linear = self.guidance.command(reference_at, now, inputs)
+        guidance_output = self.guidance.command(reference_at, now, inputs)
         if self.predictive_control is not None:
             vehicle = self._estimate.vehicle(now, inputs)
             followed = self._flown_source.followed_trajectory(now)
-            linear = self.predictive_control.replacement_for(linear, frame, vehicle, followed)
-        target, later, down = linear
+            guidance_output = self.predictive_control.replacement_for(
+                guidance_output, frame, vehicle, followed
+            )
+        target, later, down = guidance_output
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
         target, later = (self._learning.limit_tilt(each, down) for each in (target, later))
         if not all(map(isfinite, (*target, *later, down))):

@@ -93,7 +93,7 @@ class FlownSource:
         return lambda _: held_reference
 
     def part(self, now: float) -> FlownPart | None:
-        """The maneuver or source that is flown at `now`, s of event-loop time; None: neither is."""
+        """The maneuver or other source that is flown at `now`, s of loop time; None: nothing is."""
         source, begun_at = self.source, self.begun_at
         if source is None or begun_at is None or source.finished(now):
             return None

@@ -64,7 +64,7 @@ class StepRecorder:
         self._recorder.add(now, self._rows.step, StepEntry(inputs, output, command))
 
     def action(self, now: float, name: str) -> None:
-        """Record at `now` (event-loop time, s) a call by which a flight phase controls guidance."""
+        """Record that a flight phase called `name` of the guidance loop at `now`, s (loop time)."""
         if self._recorder is not None:
             self._recorder.action(now, name, self._vehicle.clock.offset)
 

@@ -43,7 +43,7 @@ def roles_of(link: Link) -> frozenset[Role]:
 
 
 def in_role(link: Link, role: Role) -> bool:
-    """Whether the present mode has this role."""
+    """Whether the vehicle's mode has this role, such as `Role.HOLD`."""
     return role in roles_of(link)
 
 

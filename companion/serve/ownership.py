@@ -151,8 +151,8 @@ class NewestRequests:
         """The program that sent a command.
 
         A program may use different component ids for commands and setpoints. If no setpoint came
-        from the address of `frame`, the command counts as sent by the program with the newest
-        setpoint at the same client.
+        from the address of `frame`, the sender is assumed to be the program of this client that
+        sent a setpoint last.
         """
         program = Program(client, source_of(frame))
         if program in self._newest:

@@ -39,9 +39,10 @@ _LONGEST_RAMP_SHARE = 0.5
 
 
 class _Quantity(NamedTuple):
-    """A derivative in a file, and its largest RMS error: floor + share · RMS of the derivative.
+    """A derivative in a file, and the RMS by which it may differ from the spline's derivative.
 
-    The tolerance is needed because published accelerations may jump where the spline is smooth.
+    The tolerance is floor + share · RMS of the derivative. It is needed because published
+    accelerations may jump, and the acceleration of a spline cannot.
 
     Attributes:
         name: name of the derivative in messages.

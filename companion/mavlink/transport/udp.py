@@ -120,7 +120,7 @@ class UdpTransport:
 
     def _read(self) -> None:
         if not self._connected:
-            self._read_first()
+            self._read_unconnected()
             return
         receive, read, peer = self._receiver.receive, self._socket.recvmsg, self._peer
         try:
@@ -131,7 +131,7 @@ class UdpTransport:
         except OSError:
             return  # nothing left to read, or an ICMP refusal of something sent before
 
-    def _read_first(self) -> None:
+    def _read_unconnected(self) -> None:
         try:
             data, stamps, _, address = self._socket.recvmsg(_MAX_DATAGRAM, _STAMP_SPACE)
             if self._take_unconnected(data, _arrival_ns(stamps), address):

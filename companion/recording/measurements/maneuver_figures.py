@@ -100,7 +100,7 @@ def measure_maneuvers(
 
 
 def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
-    """The rows of each maneuver in closed loop, without the time left out at its beginning.
+    """The rows of each maneuver in closed loop, without the settling time at its beginning.
 
     `rows` are the (N, 7) rows of `FlightTrace.tracking`.
     """

@@ -214,10 +214,10 @@ def _euler_rates(roll: Any, pitch: Any, x: Any, y: Any, z: Any) -> tuple[Any, An
 
 def _thrust_axis(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
     """(3,): coefficients north and east, cos(tilt); body z in NED is (−north, −east, cos(tilt))."""
-    pitch_part = ca.sin(pitch) * ca.cos(roll)
+    sin_pitch_cos_roll = ca.sin(pitch) * ca.cos(roll)
     return ca.vertcat(
-        -(ca.cos(yaw) * pitch_part + ca.sin(yaw) * ca.sin(roll)),
-        ca.cos(yaw) * ca.sin(roll) - ca.sin(yaw) * pitch_part,
+        -(ca.cos(yaw) * sin_pitch_cos_roll + ca.sin(yaw) * ca.sin(roll)),
+        ca.cos(yaw) * ca.sin(roll) - ca.sin(yaw) * sin_pitch_cos_roll,
         ca.cos(pitch) * ca.cos(roll),
     )
 

@@ -90,7 +90,7 @@ def _draw_planners(
 def _draw_lead_and_wind(
     axes: Axes, errors: dict[Task, float], trajectories: Sequence[TrajectoryAtSpeed]
 ) -> None:
-    """Draw the error over speed, mm, with and without lead, in still air and in wind."""
+    """Draw the error (mm) over the speed, with and without `Task.lead`, without and with wind."""
     for wind, style in ((CALM, _STILL_AIR), (WINDY, _IN_WIND)):
         wind_label = f", wind of {wind:g} m/s" if wind else ""
         for lead, colour in ((True, MODEL_FOLLOWING_METHOD.colour), (False, _COLOUR_WITHOUT_LEAD)):
