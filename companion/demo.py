@@ -140,5 +140,5 @@ def _await_ready(process: "subprocess.Popen[bytes]", log: Path) -> None:
 def _check_running(process: "subprocess.Popen[bytes]", log: Path) -> None:
     if process.poll() is not None:
         last_line = log.read_text(errors="replace").strip().rpartition("\n")[2]
-        last_line = last_line or "it could not write there; is the disk full?"
+        last_line = last_line or "the log is empty; is the disk full?"
         raise VehicleStoppedError(f"the mock vehicle stopped, see {log}: {last_line}")

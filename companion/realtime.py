@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _FIFO_REMEDY = (
-    "run companion by docs/companion.service, or allow `rtprio` to its user in "
+    "run companion as docs/companion.service does, or allow `rtprio` to its user in "
     "/etc/security/limits.conf"
 )
 _MEMORY_REMEDY = (
-    "run companion by docs/companion.service, or allow `memlock unlimited` to its user in "
+    "run companion as docs/companion.service does, or allow `memlock unlimited` to its user in "
     "/etc/security/limits.conf"
 )
 

@@ -181,7 +181,7 @@ class Control:
         self._flight.program.require_flight()
         if self._control_end.done():
             self._control_end.result()
-            raise FlightEnded("the program has ended its control")
+            raise FlightEnded("this control has ended; begin another with `vehicle.control()`")
 
 
 @asynccontextmanager

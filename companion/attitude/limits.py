@@ -130,7 +130,9 @@ def make_constants(
         raise ValueError(f"recovery_angle must be in (0, 80°], not {recovery_angle} rad")
     max_tilt = recovery_angle if limits.max_tilt is None else limits.max_tilt
     if max_tilt > recovery_angle:
-        raise ValueError("max_tilt must not exceed the recovery angle")
+        raise ValueError(
+            f"max_tilt {max_tilt:.4g} rad must not exceed recovery_angle {recovery_angle:.4g} rad"
+        )
     max_speed = limits.coefficient_speed
     return Constants(
         gain=gain,

@@ -210,5 +210,8 @@ def _failure_reason(error: BaseException) -> str:
     if isinstance(error, ConfigError):
         raise error
     if isinstance(error, KilledWorker):
-        return "its worker died each time it was tried"
+        return (
+            "every worker that flew these cases died, perhaps for lack of memory; read the logs of "
+            "the workers"
+        )
     return f"{type(error).__name__}: {error}"

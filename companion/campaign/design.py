@@ -50,8 +50,8 @@ def few_samples_warning(file: CampaignFile) -> str | None:
         return None
     values = "only one value" if samples == 1 else f"at most {samples} values"
     return (
-        f"samples: {samples} gives {values} of {', '.join(names)}; raise samples, or replace "
-        "the distribution by a list: every value of a list is flown"
+        f"with samples: {samples} the campaign flies {values} of {', '.join(names)}; raise "
+        "samples, or replace the distribution by a list, because every value of a list is flown"
     )
 
 

@@ -109,6 +109,6 @@ def run_on_cluster(
     rows: dict[int, list[Row]] = {}
     for ended_unit in run_tasks(client, tasks):
         if ended_unit.result is None:
-            raise ClusterError(f"a unit of work was given up: {ended_unit.reason}")
+            raise ClusterError(f"some cases could not be flown: {ended_unit.reason}")
         rows[ended_unit.number] = ended_unit.result.rows
     return [row for number in range(len(units)) for row in rows[number]]

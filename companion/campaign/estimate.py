@@ -60,7 +60,7 @@ def check_size(campaign: Campaign, seconds_per_case: float, workers: int) -> Non
         return
     raise ConfigError(
         f"{campaign.file_path}: {size_text(campaign, seconds, workers)}, more than {key} allows"
-        f" ({allowed}): reduce it, raise {key}, or add --yes"
+        f" ({allowed}); fly fewer cases, raise {key}, or add --yes"
     )
 
 

@@ -106,7 +106,9 @@ def read_description(folder: Path) -> Description:
     except FileRefusedError as error:
         raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise ConfigError(f"{path}: is damaged") from error
+        raise ConfigError(
+            f"{path} is damaged; start the campaign again with another --out"
+        ) from error
     return description
 
 
@@ -138,7 +140,7 @@ def _require_same_campaign(folder: Path, campaign: Campaign) -> None:
     except (FileRefusedError, YamlError) as error:
         raise ConfigError(f"{path}: {error}") from error
     if not isinstance(stored_keys, Mapping):
-        raise ConfigError(f"{path}: is damaged")
+        raise ConfigError(f"{path} is damaged; start the campaign again with another --out")
     changed_keys = [
         key
         for key in new_keys

@@ -43,10 +43,11 @@ def check_key(key: str, base: Config, where: str) -> None:
         raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, such as limits.max_tilt_deg")
     if any(f"{key}.".startswith(f"{other}.") for other in _KEYS_WITHOUT_EFFECT):
         raise ConfigError(
-            f"{where}: `{key}` has no effect in a campaign, or the campaign sets it itself"
+            f"{where}: `{key}` has no effect in a campaign, or the campaign sets the key itself; "
+            "take it out"
         )
     if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING_KEYS):
-        raise ConfigError(f"{where}: `{key}`: campaigns fly without signing")
+        raise ConfigError(f"{where}: `{key}`: campaigns fly without signing; take it out")
     if section == "mock":
         _check_mock_key(name, base.mock or {}, where)
     elif name not in getattr(type(getattr(base, section, None)), "model_fields", ()):

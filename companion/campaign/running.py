@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
     if path.is_dir():
         if out is not None:
             raise ConfigError(
-                "--out needs a campaign file; a folder is continued in place: leave out --out"
+                "a campaign's folder is continued in place, so --out cannot be given; leave it out"
             )
         path, out = path / folder.CAMPAIGN_FILE_NAME, path
     campaign = load(path)
@@ -164,7 +164,9 @@ class _Run:
             say(f"not flown: {sentence}")
         if progress.flown_cases < description.cases:
             count = len(progress.given_up_units)
-            return self._report_stop(f"{count} unit{'s were' if count > 1 else ' was'} given up")
+            return self._report_stop(
+                f"{count} unit{'s' if count > 1 else ''} of cases could not be flown"
+            )
         errors = engine.internal_errors(self._folder, self._campaign.file)
         for error, count in errors.most_common(_MOST_SHOWN_LINES):
             say(f"{count} of the {self._noun} ended by an {error}")

@@ -130,7 +130,10 @@ def read(folder: Path) -> "pa.Table":
     numbers = sorted(finished_units(folder))
     if not numbers:
         raise ConfigError(f"{folder}: there are no results of a campaign")
-    message = f"{folder / RESULTS_FOLDER}: its files are of different campaigns"
+    message = (
+        f"{folder / RESULTS_FOLDER} holds files of different campaigns; start the campaign again "
+        "with another --out"
+    )
     units = [read_unit(folder, number) for number in numbers]
     if any(not (unit.schema.metadata or {}).get(METADATA_KEY) for unit in units):
         raise ConfigError(message)

@@ -45,7 +45,9 @@ def _add_run(kinds: Commands) -> None:
         "FOLDER",
     )
     _add_cluster_options(run)
-    add_flag(run, "--yes", "run it regardless of its number of cases and its duration")
+    add_flag(
+        run, "--yes", "run the campaign even if it exceeds limits.max_cases or limits.max_hours"
+    )
     run.set_defaults(run="campaign.running.run")
 
 

@@ -42,7 +42,9 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
         SigningError: the signing key cannot be used.
     """
     if options.maneuvers and options.trajectory:
-        raise ConfigError("--trajectory flies only its file; leave out --maneuvers")
+        raise ConfigError(
+            "--trajectory flies only its file, so --maneuvers has no effect; leave out one of them"
+        )
     keys = {
         "link": {"endpoint": options.endpoint, "lockstep": options.lockstep},
         "flight": {

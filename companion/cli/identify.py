@@ -188,8 +188,8 @@ def _how_to_include(out: Path, config: Path | None) -> str:
         include_path = Path(os.path.relpath(include_path, config.resolve().parent))
     return "\n".join(
         (
-            f"Written to {out}. Add this line to your configuration, and remove `vehicle` and",
-            "`thrust.hover_thrust` from it, because its keys override those of an included file:",
+            f"Written to {out}. Remove `vehicle` and `thrust.hover_thrust` from your configuration",
+            "(its keys override those of an included file), and add this line to it:",
             f"  include: {include_path}",
         )
     )

@@ -22,7 +22,9 @@ def require_writable(output: Path, option: str, *, force: bool) -> None:
             f"{output} exists; choose another file with {option}, or replace it with --force"
         )
     if not folder.is_dir():
-        raise ConfigError(f"{output}: there is no folder {folder}")
+        raise ConfigError(
+            f"{output}: there is no folder {folder}; make it, or choose another file with {option}"
+        )
     if not os.access(folder, os.W_OK | os.X_OK):
         raise ConfigError(
             f"{output}: the folder {folder} cannot be written; choose another file with {option}"

@@ -18,8 +18,8 @@ A Ctrl-C that comes sooner is ignored, because a key may bounce.
 """
 
 HOW_TO_LEAVE = (
-    f"Ctrl-C again, {SECOND_CTRL_C_AFTER:g} s later or more, stops the setpoints at once: then the "
-    "pilot or the autopilot's offboard-loss failsafe flies the vehicle"
+    f"to stop the setpoints at once, press Ctrl-C again after {SECOND_CTRL_C_AFTER:g} s or more; "
+    "then the pilot or the autopilot's offboard-loss failsafe flies the vehicle"
 )
 
 

@@ -50,7 +50,9 @@ class LinkConfig(Section):
         if self.min_position_rate_hz > self.position_rate_hz:
             raise ValueError("min_position_rate_hz must not exceed position_rate_hz")
         if self.backend == "mavsdk" and (self.lockstep or self.signing_key_file is not None):
-            raise ValueError("backend: mavsdk can neither fly in lockstep nor sign; use direct")
+            raise ValueError(
+                "backend: mavsdk can neither fly in lockstep nor sign; set link.backend: direct"
+            )
         ours, theirs = self.source_component, self.target_component
         if (self.source_system, ours) == (self.target_system, theirs):
             raise ValueError(

@@ -64,8 +64,8 @@ class FlightConfig(Section):
     def _check_who_arms(self) -> "FlightConfig":
         if self.arm and self.take_over:
             raise ValueError(
-                "flight.take_over and flight.arm (--arm) exclude each other: a pilot who hands "
-                "over in the air has armed the vehicle"
+                "flight.take_over and flight.arm (--arm) exclude each other, because a pilot who "
+                "hands over in the air has armed the vehicle; leave out one of them"
             )
         return self
 

@@ -106,6 +106,6 @@ class DeadmanConfig(Section):
     def _consistent(self) -> "DeadmanConfig":
         if self.silence_limit_ms < max(self.telemetry_stale_ms, self.target_stale_ms):
             raise ValueError(
-                "silence_limit_ms must not be less than telemetry_stale_ms and target_stale_ms"
+                "silence_limit_ms must be at least telemetry_stale_ms and target_stale_ms"
             )
         return self

@@ -154,8 +154,8 @@ def _maneuver_contradictions(config: Config) -> Iterator[str]:
     corner = hypot(corners.north_coefficient, corners.east_coefficient)
     if "corners" in flight.maneuvers and corner > largest_coefficient:
         yield (
-            "√(north² + east²) of corners' coefficients must not exceed the sine of "
-            "limits.max_tilt_deg"
+            f"√(corners.north_coefficient² + corners.east_coefficient²) is {corner:.3g}, and must "
+            "not exceed the sine of limits.max_tilt_deg"
         )
     slows_down = "trajectory" in flight.maneuvers and flight.slow_down
     if slows_down and flight.slow_down_reserve_m_s2 >= limits.max_horizontal_acceleration:

@@ -118,5 +118,7 @@ class SafetyConfig(Section):
             if 0 < len(corners) < 3:
                 raise ValueError("a polygon has at least three corners")
         if self.fence_polygon_m and not inside(0.0, 0.0, self.fence_polygon_m):
-            raise ValueError("fence_polygon_m: [0, 0], where control begins, lies outside")
+            raise ValueError(
+                "fence_polygon_m must surround [0, 0], where control begins; move its corners"
+            )
         return self

@@ -66,7 +66,7 @@ class ExpectedResponse:
         clauses = [
             f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
             f"expected to have a time constant of {self.time_constant:.2f} s",
-            f"{self.limited_by} limits it most ({changes})",
+            f"{self.limited_by} lengthens the time constant most ({changes})",
         ]
         shortest = self.shortest_time_constant
         if shortest is not None:

@@ -77,7 +77,8 @@ class Hold:
                 f"the {degrees(largest_tilt):.0f}° up to which limits.max_thrust holds the height"
             )
         self.give_up_reason = (
-            f"{name} was given up at {degrees(tilt):.0f}° of tilt, more than {limit}"
+            f"{name} was ended, because the vehicle tilts by {degrees(tilt):.0f}°, more than "
+            f"{limit}"
         )
         self.begin(now, heading)
 

@@ -89,15 +89,15 @@ class HoverLearning:
         measured, learned, (lowest, _) = thrust.measured_hover, thrust.learned_hover, thrust.limits
         if thrust.smallest_specific_thrust * learned / measured > _LARGEST_IDLE_SHARE * GRAVITY:
             return (
-                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}: "
-                f"limits.min_thrust {lowest:g} leaves nothing to descend with; set it to "
+                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}, so with "
+                f"limits.min_thrust {lowest:g} it cannot descend; set limits.min_thrust to "
                 f"{0.4 * measured:.2f}, and thrust.hover_thrust to {measured:.2f}"
             )
         if abs(measured - learned) > _BEYOND_LEARNING_SHARE * learned:
             return (
-                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}, farther from "
-                f"thrust.hover_thrust {thrust.configured_hover:.2f} than thrust.correction_limit "
-                f"lets us correct; set thrust.hover_thrust to {measured:.2f}"
+                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}, and "
+                f"thrust.hover_thrust {thrust.configured_hover:.2f} differs by more than "
+                f"thrust.correction_limit allows; set thrust.hover_thrust to {measured:.2f}"
             )
         return None
 

@@ -191,8 +191,8 @@ class MotionEstimate:
         speed, learned, assumed = mismatch
         return (
             f"the vehicle's drag at {speed:.1f} m/s is {learned:.2f} 1/s; this "
-            f"flight began with {assumed:.2f} and learned it, and the "
-            "vehicle's next flight begins with it"
+            f"flight began with {assumed:.2f} 1/s, and the vehicle's next flight begins with the "
+            "drag that this flight learned"
         )
 
     def _drag_mismatch(self) -> tuple[float, float, float] | None:

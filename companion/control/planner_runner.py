@@ -60,7 +60,9 @@ class PlannerRunner:
             TypeError: the planner is of another package and cannot change them.
         """
         if not isinstance(self._planner, LawPlanner | ModelFollowingPlanner):
-            raise TypeError(f"{type(self._planner).__name__} cannot be retuned")
+            raise TypeError(
+                f"the values of {type(self._planner).__name__} cannot be changed in flight"
+            )
         self._planner.retune(constants)
         self._limits = limits
 

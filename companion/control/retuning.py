@@ -80,7 +80,7 @@ class Retuning:
         guidance_loop = self._guidance_loop
         guidance = guidance_loop.maker.guidance
         if not isinstance(guidance, LinearGuidance):
-            raise TypeError(f"{type(guidance).__name__} cannot be retuned")
+            raise TypeError(f"the values of {type(guidance).__name__} cannot be changed in flight")
         self._loop.retune(values.constants, values.limits)
         guidance.retune(values.guidance)
         guidance_loop.estimate.retune(values.observer, values.correction)

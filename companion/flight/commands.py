@@ -194,7 +194,8 @@ async def leave_offboard(
         return
     mode = context.link.state.mode
     context.note(
-        f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold"
+        f"the vehicle is disarmed in {mode}, in which it cannot be armed again: asking the "
+        "autopilot to hold"
     )
     context.detail = f"the autopilot to leave {mode}"
 

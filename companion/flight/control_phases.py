@@ -121,16 +121,17 @@ class _TiltMargin:
         tilt, hover = max(each for _, each in tilts), learning.hover_thrust.present_hover
         if tilt < _MIN_HOLDING_TILT:
             raise FlightEnded(
-                f"the vehicle hovers at a thrust of {hover:.2f}: limits.max_thrust "
-                f"{limits.max_thrust:g} leaves nothing to steer with; raise it, or make "
-                "the vehicle lighter"
+                f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "
+                f"{limits.max_thrust:g} leaves no thrust to steer with; raise limits.max_thrust, "
+                "or make the vehicle lighter"
             )
         if tilt < limits.max_tilt_deg and not self._reported:
             self._reported = True
             self._context.note(
                 f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "
-                f"{limits.max_thrust:g} holds the height only up to {tilt:.0f}° of tilt: the tilt "
-                f"is limited to that, although limits.max_tilt_deg is {limits.max_tilt_deg:g}"
+                f"{limits.max_thrust:g} holds the height only up to {tilt:.0f}° of tilt; the "
+                "flight is limited to this tilt, although limits.max_tilt_deg is "
+                f"{limits.max_tilt_deg:g}"
             )
 
 
@@ -166,8 +167,8 @@ async def land(context: FlightContext) -> None:
             await context.until(touched_down)
     except TimeoutError:
         raise FlightEnded(
-            f"waited {allowed:g} s for {context.detail}: watch it land, and if it stands with its "
-            "motors turning, disarm it by transmitter or ground station"
+            f"waited {allowed:g} s for {context.detail}: watch the vehicle land, and if it stands "
+            "with turning motors, disarm it by transmitter or ground station"
         ) from None
 
 
@@ -211,7 +212,9 @@ def _require_not_falling(context: FlightContext) -> None:
     falls = position is not None and position.velocity_ned[2] > _FALLING_SPEED
     if falls and not context.armed():
         raise FlightEnded(
-            "the vehicle disarmed in the landing, not by this program, and fell", Exit.RELEASE
+            "the pilot, the autopilot or another station disarmed the vehicle in the air during "
+            "the landing, and it fell",
+            Exit.RELEASE,
         )
 
 

@@ -149,7 +149,7 @@ class Flight:
                 return
         raise FlightEnded(
             f"the vehicle was lost, restarted or replaced {_MAX_CHECK_RUNS} times before arming; "
-            "check the link and its power"
+            "check the link and the vehicle's power"
         )
 
     async def _fly(self, phase: Phase) -> None:

@@ -27,7 +27,7 @@ _PILOT_WARNING_TIME = 10.0
 """Time after which the pilot of a vehicle that has not begun to land is warned, s; also the time
 between two warnings."""
 
-_PILOT_WARNING = "Companion: it does not land. Switch its mode!"
+_PILOT_WARNING = "Companion: vehicle does not land. Switch its mode!"
 """Text for the pilot's ground station; it fits into one STATUSTEXT."""
 
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
@@ -126,7 +126,8 @@ class _LandingTimeLimit:
             self._extension_noted = True
             context.note(
                 f"the vehicle has not begun to land for {allowed:g} s, and would drift without "
-                "setpoints: it is held and asked to land until its pilot switches its mode"
+                "setpoints, so the program holds it and asks it to land; switch its mode by "
+                "transmitter"
             )
 
 

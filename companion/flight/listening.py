@@ -55,7 +55,7 @@ def _note_left_alone(context: FlightContext, reason: str = "") -> None:
 
 async def _hold_if_ours(context: FlightContext) -> None:
     """Command a vehicle that is heard again, and still obeys us, until it holds."""
-    context.detail = "its heartbeat"
+    context.detail = "the vehicle's heartbeat"
     await context.fresh_heartbeat()  # only now, because a request during the silence is lost
     mode = context.link.state.mode
     lost_in_takeoff = context.armed() and await is_in_our_takeoff(context)
@@ -68,7 +68,7 @@ async def _hold_if_ours(context: FlightContext) -> None:
     if lost_in_takeoff:
         raise FlightEnded(f"the vehicle is heard again after its take-off, in {mode}", Exit.LAND)
     context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
-    context.detail = "its report that it holds"
+    context.detail = "the vehicle's report that it holds"
     while True:
         try:
             await ask_to_hold(context, lambda: require_role(context.link, {Role.OFFBOARD}))

@@ -119,8 +119,8 @@ def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: Know
             found = violations(part.trajectory, envelope_of(config, drag))
         if found:
             raise ConfigError(
-                f"{part.name}: {found[0]}; a trajectory is not slowed down again in flight, so "
-                f"choose a value with which it keeps the limits{drag.assumption}"
+                f"{part.name}: {found[0]}; choose a value with which the trajectory keeps the "
+                f"limits, because it is not slowed down again in flight{drag.assumption}"
             )
 
 

@@ -141,7 +141,7 @@ class PreflightChecks:
         for finding in unsafe_findings(parameters(self._config, self._evidence)):
             if finding not in known:
                 self._note_once(
-                    f"another station changed a parameter in flight, which is unsafe now: "
+                    "another station set a parameter to an unsafe value in flight: "
                     f"{finding.sentence()}"
                 )
 

@@ -116,7 +116,9 @@ class _Climb:
         context, state = self._context, self._context.link.state
         if not context.armed():
             raise FlightEnded(
-                "the vehicle disarmed in the take-off, not by this program", Exit.RELEASE
+                "the pilot, the autopilot or another station disarmed the vehicle during the "
+                "take-off",
+                Exit.RELEASE,
             )
         height, position = state.height, context.fresh_position()
         if height is None or position is None:
@@ -131,7 +133,8 @@ class _Climb:
         is_near_height = height > self._height - MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
             raise self._jump(height) or FlightEnded(
-                f"the climb was stopped at {height:.1f} m, not by this program", Exit.RELEASE
+                f"the pilot, the autopilot or another station stopped the climb at {height:.1f} m",
+                Exit.RELEASE,
             )
         if is_near_height and state.landed:
             self._require_leaving_ground(height)

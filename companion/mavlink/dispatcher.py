@@ -76,7 +76,7 @@ class MessageDispatcher:
         try:
             self.on_error(error)
         except Exception:
-            _LOG.exception("on_error of the link failed itself")
+            _LOG.exception("the callback on_error of the link raised an error")
 
 
 def _add(table: dict[int, list[C]], message_id: int, callback: C) -> Unsubscribe:

@@ -112,7 +112,7 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
     because = "time limits, such as those of `deadman`, are longer or shorter than configured"
     if too_slow:
         because = (
-            f"within {stale_after:.0f} s its samples would count as older than "
+            f"within {stale_after:.0f} s the vehicle's samples would count as older than "
             "deadman.telemetry_stale_ms"
         )
     return Finding(

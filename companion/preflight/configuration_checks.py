@@ -44,9 +44,9 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
         yield Finding(
             Key.DEAD_TIME,
             SAFE,
-            f"no flight of this vehicle in {config.recording.directory} with this planner and gain "
-            "measured the dead time yet",
-            fix="it can only be measured in flight; every flight reports it at its end",
+            "the dead time with this planner and gain was not measured yet by any flight of this "
+            f"vehicle in {config.recording.directory}",
+            fix="fly: every flight measures the dead time, and reports it at its end",
             source="summary.json",
         )
         return

@@ -62,7 +62,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     worst = worst_reach(config, maneuvers, hold_time, drag, brakes=failsafe.brakes)
     reach_text = (
         f"if our setpoints stop, the autopilot holds the last rates for {hold_time:g} s "
-        f"({failsafe.parameter}); that can carry the vehicle "
+        f"({failsafe.parameter}); these rates can carry the vehicle "
         f"{worst.largest_distance:.0f} m away, {worst.climb:.0f} m up and {worst.fall:.0f} m down"
     )
     source = "worst case of docs/exits.md"
@@ -75,7 +75,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
         Key.OFFBOARD_LOSS,
         CheckResult.INEFFECTIVE,
         reach_text,
-        f"if that happens {worst.time:.1f} s after control begins, the vehicle can end "
+        f"if the setpoints stop {worst.time:.1f} s after control begins, the vehicle can end "
         f"{worst.breach}",
         f"{shorter_hold}fly more slowly or with a lower limits.max_tilt_rate_deg_s, or farther "
         "from the fence and the ground",

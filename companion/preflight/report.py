@@ -68,7 +68,7 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
     if refused:
         fixable = sum(finding.change is not None for finding in refused)
         fix = f"; `companion doctor --fix` fixes {fixable} of them" if fixable else ""
-        return Text(f"{len(refused)} unsafe: `companion fly` refuses{fix}", style="bold red")
+        return Text(f"{len(refused)} unsafe: `companion fly` refuses to fly{fix}", style="bold red")
     if result is CheckResult.NOT_READY:
         return Text(
             "not ready: run again when the vehicle is ready; some checks could not be made",
@@ -78,7 +78,9 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
         return Text(f"{unsafe_count} unsafe, each excepted by flight.accept", style="bold yellow")
     ineffective = sum(finding.result is CheckResult.INEFFECTIVE for finding in findings)
     ending = (
-        f"; {ineffective} ineffective, see above" if ineffective else ": `companion fly` flies it"
+        f"; {ineffective} ineffective, see above"
+        if ineffective
+        else ": `companion fly` flies this vehicle"
     )
     return Text(f"nothing unsafe was found{ending}", style="bold green")
 

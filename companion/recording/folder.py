@@ -31,7 +31,10 @@ def flight_folder(directory: Path) -> Path:
                 f"recording.directory: cannot make {folder}: {error.strerror}"
             ) from error
         return folder
-    raise ConfigError(f"recording.directory: {base} and 98 more like it exist already")
+    raise ConfigError(
+        f"recording.directory: {base} and 98 more folders of this second exist already; start the "
+        "flight again"
+    )
 
 
 def make_named_folder(folder: Path) -> Path:

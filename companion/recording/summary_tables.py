@@ -71,7 +71,9 @@ def _response(summary: Summary) -> RenderableType:
     table.add_row("nearest second order: frequency ω", f"{model.frequency:.1f} rad/s", "")
     table.add_row("damping ζ", f"{model.damping:.2f}", "")
     table.add_row("dead time", f"{1e3 * model.dead_time:.0f} ms", "")
-    table.add_row("largest deviation from it", f"{response.second_order_deviation_max:.4f}", "0")
+    table.add_row(
+        "largest deviation from this model", f"{response.second_order_deviation_max:.4f}", "0"
+    )
     return table
 
 
@@ -127,7 +129,9 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
         words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
     replaced = ", ".join(f"{count} {name}" for name, count in figures.unused_answers.items())
     if replaced:
-        words += f"; linear guidance replaced {sum(figures.unused_answers.values())}: {replaced}"
+        words += (
+            f"; linear guidance replaced {sum(figures.unused_answers.values())} others: {replaced}"
+        )
     return Text(words)
 
 

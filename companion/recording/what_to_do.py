@@ -10,7 +10,7 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "frozen": "find what repeats old telemetry: a relay, a bridge, or the autopilot's estimator",
     "clock": "find why the autopilot restarted or its clock jumped; check its power supply",
     "disarmed": "find who disarmed the vehicle in flight: the pilot's switch or the autopilot",
-    "landed": "check the autopilot's land detector, or fly higher: it reported the ground",
+    "landed": "check the autopilot's land detector, which reported the ground, or fly higher",
     "failsafe": "fix what the autopilot's failsafe names in the events",
     "battery": "charge the battery; the limit is limits.min_battery_percent",
     "gps": "wait for a better GPS fix, or fly where more of the sky is seen",
@@ -21,7 +21,7 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "if it swung more and more, lower planner.gain_per_s, then run `companion identify`",
     "body rate": "check the autopilot's rate loop; the limit is safety.max_body_rate_deg_s",
     "fence": "make the maneuver smaller, fly in less wind, or widen the fence: limits.fence_*",
-    "braking": "make the maneuver smaller or slower near the fence, or widen it: limits.fence_*",
+    "braking": "make the maneuver smaller or slower, or widen the fence: limits.fence_*",
     "speed": "fly slower; the limit is safety.max_speed_m_s",
     "tracking": "fly slower or in less wind; the limit is safety.max_tracking_error_m",
     "thrust": "carry less or fly in less wind; the limits are limits.min_thrust and max_thrust",
@@ -43,7 +43,7 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
 ADVICE_BY_PHASE: Mapping[str, str] = {
     "connect": "check power, cable and link.endpoint; nothing else may use the same port",
     "checks": "fix what the message names; `companion doctor` explains each check",
-    "stream": "check the link: the autopilot sent too little telemetry to answer",
+    "stream": "check the link: the autopilot sent too few attitude samples to begin the setpoints",
     "arm": "fix what the autopilot names in the events; --arm lets the program arm",
     "hand over": "fly at flight.takeoff_height_m or higher, and switch to the mode that holds",
     "takeoff": "read the autopilot's messages in the events; the pilot may have taken over",
@@ -52,7 +52,8 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
     "hand back": "read the events before the end; the pilot may have taken over",
     "listen": ADVICE_BY_MONITOR["unheard"],
     "land": "read the events before the end; the pilot may have taken over",
-    "disarm": "if it is still armed, disarm by the pilot's switch; read the events before the end",
+    "disarm": "if the vehicle is still armed, disarm it by the pilot's switch; read the events "
+    "before the end",
 }
 """Advice by the name of the phase."""
 

@@ -38,8 +38,8 @@ def result_lines(
         )
     if not different:
         lines.append(
-            f"identical: {recorded} setpoints to the bit, {len(samples) - recorded} unanswered"
-            " samples with the same reasons"
+            f"identical: all {recorded} setpoints are equal to the bit, and all"
+            f" {len(samples) - recorded} unanswered samples have the same reasons"
         )
         return lines
     lines.append(

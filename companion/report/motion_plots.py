@@ -106,7 +106,7 @@ def _track_in_space(flights: Sequence[FlightData]) -> Plot:
     scene["aspectratio"] = {
         axis: _LONGEST_EDGE * (high - low) / longest for axis, (low, high) in ranges.items()
     }
-    return Plot("Track in space", "Drag to turn it.", traces, {"scene": scene}, 520)
+    return Plot("Track in space", "Drag to turn the view.", traces, {"scene": scene}, 520)
 
 
 def _cube_ranges(traces: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:

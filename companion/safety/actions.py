@@ -43,8 +43,8 @@ class Exit(Enum):
     HOLD = "handing back: asking the autopilot to hold"
     LAND = "handing back: asking the autopilot to land"
     LISTEN = (
-        "releasing control, and listening: if the vehicle is heard again and nobody else has it, "
-        "it is asked to hold or to land"
+        "releasing control, and listening: if the vehicle is heard again and nobody else controls "
+        "it, it is asked to hold or to land"
     )
     RELEASE = "releasing control: the vehicle is left to its pilot and its autopilot"
 

@@ -122,4 +122,4 @@ class GuardedJudge:
             _MAX_JUDGING_TIME, raised
         ):
             return None
-        return f"it takes {1e3 * self._judging_time:.0f} ms to judge, and delays the setpoints"
+        return f"this monitor takes {1e3 * self._judging_time:.0f} ms, and delays the setpoints"

@@ -168,7 +168,9 @@ class MockVehicle:
         end = self.time + seconds
         while not condition(state := self.state()):
             if self.time >= end:
-                raise AssertionError(f"not within {seconds:g} s; still {state}")
+                raise AssertionError(
+                    f"the condition did not hold within {seconds:g} s; the state is {state}"
+                )
             self.step()
         return state
 

@@ -58,8 +58,8 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         *_comparison_lines(before, after),
         f"disturbances: gusts of {proposal.disturbances.gust:g} m/s, noise: "
         f"{proposal.disturbances.source}",
-        f"required: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°; reached with errors of "
-        "the vehicle model:",
+        f"required: margins of {aims.gain_db:g} dB and {aims.phase_deg:g}°; reached in spite of "
+        "errors of the vehicle model:",
     ]
     lines += [
         f"margin {_error_text(error)}: {reached.sentence()}"
@@ -80,7 +80,9 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         lines += [_flight_line(name, *pair) for name, pair in flights.items()]
     if flights and warning is None:
         percent = 100.0 * (_WORSE_FACTOR - 1.0)
-        lines.append(f"No flight was worse by {percent:.0f} % and {_WORSE_DISTANCE:g} m.")
+        lines.append(
+            f"No flight was worse by more than {percent:.0f} % and more than {_WORSE_DISTANCE:g} m."
+        )
     return lines
 
 
@@ -98,7 +100,7 @@ def worse_flights_warning(flights: Flights) -> str | None:
         faults.append(f"failed, as it did without the proposal: {'; '.join(failed_as_before)}")
     if not faults:
         return None
-    return f"DO NOT USE IT: with the proposal the mock vehicle {', and '.join(faults)}"
+    return f"DO NOT USE THE PROPOSAL: with it the mock vehicle {', and '.join(faults)}"
 
 
 def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
@@ -110,14 +112,15 @@ def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
         f"{after.margins_at_acceleration.sentence()}",
         f"position error by gusts {old.gusts:.3f} -> {new.gusts:.3f} m, on a path at 5 m/s "
         f"{old.path:.3f} -> {new.path:.3f} m, by noise {old.noise:.3f} -> {new.noise:.3f} m",
-        f"after a gust that adds 1 m/s: {before.peak_error:.2f} -> {after.peak_error:.2f} m off, "
+        f"after a gust that adds 1 m/s: {before.peak_error:.2f} -> {after.peak_error:.2f} m from "
+        f"the reference, "
         f"settled after {before.settling_time:.1f} -> {after.settling_time:.1f} s",
     ]
 
 
 def _error_text(error: ModelMismatch) -> str:
     if error.delay:
-        return f"with {1e3 * error.delay:.0f} ms of added delay, as while the rate loop slews"
+        return f"with {1e3 * error.delay:.0f} ms of added delay, as at the rate loop's slew limit"
     percent = round(100.0 * abs(error.time_factor - 1.0))
     change = "larger" if error.time_factor > 1.0 else "smaller"
     return f"with lag and dead time {percent} % {change}"
@@ -153,7 +156,7 @@ def _reasons(proposal: Proposal) -> dict[str, str]:
             "a change of that limit"
         )
     else:
-        gain_reason = f"below {limit:.2f}, the largest sensible gain, for the margins"
+        gain_reason = f"below {limit:.2f}, the largest sensible gain, to keep the margins"
     drag = "as configured, or learned in an earlier flight of this vehicle"
     return {
         "drag_per_s": drag,

@@ -60,7 +60,7 @@ class VehicleClient:
             NotConnected: no heartbeat of an autopilot that this program flies has come yet.
         """
         if self.state.autopilot is None:
-            raise NotConnected("no heartbeat yet; wait_connected() comes first")
+            raise NotConnected("no heartbeat yet; call wait_connected() first")
         return self.state.autopilot
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:

@@ -100,7 +100,7 @@ class Link(VehicleClient, LinkCallbacks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
         self._tasks.clear()
-        self._registry.fail("this program closed it")
+        self._registry.fail("this program closed the link")
         await self._connection.close()
         if self._stamp_writer is not None:
             self._stamp_writer.stop()

@@ -194,7 +194,7 @@ def acceleration_limit(unit: float, axis: str) -> Check:
             return None
         actual_text = "null" if actual == 0.0 else f"{actual:g}"
         return Problem(
-            INEFFECTIVE, f"the planner assumes {key} {assumed_text}; set that to {actual_text}"
+            INEFFECTIVE, f"the planner assumes {key} {assumed_text}; set this key to {actual_text}"
         )
 
     return check

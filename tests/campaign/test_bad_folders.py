@@ -71,7 +71,9 @@ def test_a_damaged_description_is_one_sentence(begun, told, capsys):
     path.write_text(told if isinstance(told, str) else json.dumps({**whole, **told}))
     for command in (["campaign", str(out)], ["campaign", "rerun", str(out), "0"]):
         assert main(command) == 2
-        assert capsys.readouterr().err == f"companion: {path}: is damaged\n"
+        assert capsys.readouterr().err == (
+            f"companion: {path} is damaged; start the campaign again with another --out\n"
+        )
 
 
 def test_unknown_versions_are_other_versions(begun, capsys):
@@ -150,15 +152,15 @@ def test_results_that_cannot_be_read_are_named(begun, capsys):
     with pytest.raises(ConfigError, match=r"unit-00001.*cannot be read"):
         again._stored_row(out, campaign, SimpleNamespace(unit=1), 1)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)
-    with pytest.raises(ConfigError, match="are of different campaigns"):
+    with pytest.raises(ConfigError, match="holds files of different campaigns"):
         store.read(out)
     other = store.schema(campaign.file).metadata
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}).replace_schema_metadata(other), path)
-    with pytest.raises(ConfigError, match="are of different campaigns"):
+    with pytest.raises(ConfigError, match="holds files of different campaigns"):
         store.read(out)
     pyarrow.parquet.write_table(pyarrow.table({"a": [1]}), path)
     store.unit_file(out, 0).unlink()
-    with pytest.raises(ConfigError, match="are of different campaigns"):
+    with pytest.raises(ConfigError, match="holds files of different campaigns"):
         Results.read(out)
     path.unlink()
     with pytest.raises(ConfigError, match="there are no results"):

@@ -144,7 +144,7 @@ FAULTS = {"gone": {"inject": [{"kind": "gps_los"}]}}
         ({"sweep": {"limit.max_tilt_deg": [20]}}, ("`limit`", "`limits`?")),
         ({"sweep": {"mock.wind.speed": [2]}}, ("mock.wind.speed", "speed_m_s?")),
         ({"set": {"mock.parameters.COM_OF_LOS_T": 2}}, ("COM_OF_LOS_T", "COM_OF_LOSS_T?")),
-        ({"sweep": {"mock.seed": [2]}}, ("mock.seed", "the campaign sets it")),
+        ({"sweep": {"mock.seed": [2]}}, ("mock.seed", "the campaign sets the key")),
         ({"sweep": {"realtime.scheduler": ["fifo"]}}, ("realtime.scheduler", "no effect")),
         ({"sweep": {"max_tilt_deg": [20]}}, ("SECTION.KEY",)),
         ({"sweeps": {}}, ("`sweeps`", "`sweep`?")),
@@ -178,10 +178,11 @@ def test_too_few_samples_are_said(tmp_path):
         return few_samples_warning(load(tmp_path, samples=samples, sweep=sweep).file)
 
     assert said(1, {**wind, **laws}).startswith(
-        "samples: 1 gives only one value of mock.wind.speed_m_s, planner.name; raise samples"
+        "with samples: 1 the campaign flies only one value of mock.wind.speed_m_s, planner.name; "
+        "raise samples"
     )
     assert said(2, {**wind, **laws}).startswith(
-        "samples: 2 gives at most 2 values of planner.name; raise samples"
+        "with samples: 2 the campaign flies at most 2 values of planner.name; raise samples"
     )
     assert said(3, {**wind, **laws}) is None
     assert said(1, {"limits.max_tilt_deg": [20, 30]}) is None

@@ -46,12 +46,15 @@ def config(tmp_path, text):
         ("limits: {max_tilt_deg: 0,35}", "a number has a point for decimals, not a comma"),
         ("planner: {gain_per_s: .nan}", "finite"),
         ("planner: {name: model-following}", "needs vehicle.lag_ms and vehicle.dead_time_ms"),
-        ("flight: {maneuvers: [corners]}\nlimits: {max_tilt_deg: 25}", "of corners' coefficients"),
+        (
+            "flight: {maneuvers: [corners]}\nlimits: {max_tilt_deg: 25}",
+            "east_coefficient²) is 0.495, and must not",
+        ),
         ("flight: {maneuvers: [loop]}", "`flight.maneuvers.0`"),
         ("flight: {maneuvers: []}", "`flight.maneuvers`"),
         ("steps: {settle_s: .inf}", "`steps.settle_s`"),
         ("deadman: {silence_limit_ms: 10000}", "`deadman.silence_limit_ms`"),
-        ("deadman: {silence_limit_ms: 90}", "must not be less than telemetry_stale_ms"),
+        ("deadman: {silence_limit_ms: 90}", "must be at least telemetry_stale_ms"),
         ("deadman: {target_stale_ms: 30}", "two periods of guidance.rate_hz"),
         (
             "link: {attitude_rate_hz: 100}\ndeadman: {telemetry_stale_ms: 10}",
@@ -67,7 +70,7 @@ def config(tmp_path, text):
         ),
         (
             "safety: {fence_polygon_m: [[1, 1], [1, 5], [5, 1]]}",
-            "[0, 0], where control begins, lies outside",
+            "must surround [0, 0], where control begins; move its corners",
         ),
         (
             "limits: {max_tilt_deg: 10}\n"

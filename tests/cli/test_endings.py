@@ -406,7 +406,10 @@ def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        (["--maneuvers", "hover", "--trajectory", str(FIGURE8)], "leave out --maneuvers"),
+        (
+            ["--maneuvers", "hover", "--trajectory", str(FIGURE8)],
+            "so --maneuvers has no effect; leave out one",
+        ),
         (["--slow-down"], "--slow-down needs a trajectory; add --trajectory FILE"),
     ],
 )

@@ -67,7 +67,7 @@ def test_what_limits_the_response_is_what_makes_it_quicker_when_changed(gain, ra
     config = configured("model-following", gain, rate, **vehicle)
     found = expected_response(config)
     assert found.limited_by == limit
-    assert f"{limit} limits it most (" in found.sentence()
+    assert f"{limit} lengthens the time constant most (" in found.sentence()
     changes = {
         "planner.gain_per_s": {"planner": {"gain_per_s": 2.0 * gain}},
         "limits.max_tilt_rate_deg_s": {"limits": {"max_tilt_rate_deg_s": 1000.0}},
@@ -110,8 +110,8 @@ def test_the_words_about_a_response():
     found = ExpectedResponse(0.25, 0.5, time_constants_without, 5.0, 5.0)
     assert found.sentence() == (
         "a step from -0.25 to 0.25 (±14° of tilt) is expected to have a time constant of 0.50 s; "
-        "limits.max_tilt_rate_deg_s limits it most (0.30 s without limits.max_tilt_rate_deg_s, "
-        "0.40 s with twice planner.gain_per_s)"
+        "limits.max_tilt_rate_deg_s lengthens the time constant most (0.30 s without "
+        "limits.max_tilt_rate_deg_s, 0.40 s with twice planner.gain_per_s)"
     )
     assert not found.gain_is_too_high
     assert found.gain_sentence() == (

@@ -104,9 +104,8 @@ def test_a_doublet_that_tilts_too_far_is_given_up_for_good():
     assert bench.guidance_loop.hold.give_up_reason is None
     command = bench.fly(IN_FIRST_DOUBLET + 0.02, tilt=31.0)
     assert command.body_rates is None
-    assert (
-        bench.guidance_loop.hold.give_up_reason
-        == "identify was given up at 31° of tilt, more than limits.max_tilt_deg = 30"
+    assert bench.guidance_loop.hold.give_up_reason == (
+        "identify was ended, because the vehicle tilts by 31°, more than limits.max_tilt_deg = 30"
     )
     assert bench.guidance_loop.flown_source.pose.position_ned == pytest.approx(HERE, abs=0.01)
     assert bench.fly(IN_FIRST_DOUBLET + 0.04).body_rates is None

@@ -102,14 +102,14 @@ def test_a_change_of_values_reaches_both_loops():
         "max_tilt": pytest.approx(radians(20.0)),
     }
     others = SimpleNamespace(maker=SimpleNamespace(guidance="another package's"))
-    with pytest.raises(TypeError, match="str cannot be retuned"):
+    with pytest.raises(TypeError, match="values of str cannot be changed in flight"):
         Retuning(SimpleNamespace(), others).apply(values)
 
 
 def test_a_planner_of_another_package_keeps_its_gains():
     values = loop_settings(CONFIG)
     runner = PlannerRunner(SimpleNamespace(), EstimatorResets(), values.limits)
-    with pytest.raises(TypeError, match="SimpleNamespace cannot be retuned"):
+    with pytest.raises(TypeError, match="values of SimpleNamespace cannot be changed in flight"):
         runner.retune(values.constants, values.limits)
 
 

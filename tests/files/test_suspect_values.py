@@ -59,7 +59,9 @@ def test_check_config_says_what_to_expect_and_what_to_look_at_again(tmp_path, ca
     path.write_text("vehicle: {lag_ms: 47, dead_time_ms: 40}\nplanner: {gain_per_s: 10}\n")
     assert main(["check-config", str(path)]) == 0
     out = capsys.readouterr().out
-    assert "expected to have a time constant of 0.29 s\n  limits.max_tilt_rate_deg_s limits" in out
+    assert (
+        "expected to have a time constant of 0.29 s\n  limits.max_tilt_rate_deg_s lengthens" in out
+    )
     assert "5.2 is the largest sensible one" in out
     assert "the hold has gains of " in out
     assert (

@@ -21,7 +21,10 @@ from companion.vehicle.state import VehicleState
 from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
 
-HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot to hold"
+HOLD_ASKED = (
+    "the vehicle is disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot "
+    "to hold"
+)
 
 
 class OnEvent(SilentObserver):
@@ -252,7 +255,7 @@ def test_a_hold_that_somebody_else_commands_in_the_climb_is_respected(tmp_path):
         observer = When("takeoff", lambda: mock.command(SET_MODE, 1, 4, 3), after=1.0)
         summary = fly(mock, tmp_path / "log", observer, flight={"takeoff_height_m": 20.0})
         assert mock.state()["mode"] == "LOITER"
-    assert "the climb was stopped" in summary.result
+    assert "another station stopped the climb" in summary.result
     asked = [command for _, command, _ in commands(summary)]
     assert [command for command in asked if command != dialect.MAV_CMD_REQUEST_MESSAGE][
         -1
@@ -367,7 +370,7 @@ def test_a_hold_near_the_top_of_the_climb_is_respected(tmp_path, monkeypatch):
     with mock_vehicle(tmp_path, parameters={"MPC_TKO_SPEED": 1.0}) as mock:
         summary = fly(mock, tmp_path / "log", flight={"takeoff_height_m": 5.0})
         assert mock.state()["mode"] == "LOITER"
-    assert "the climb was stopped" in summary.result
+    assert "another station stopped the climb" in summary.result
     assert LAND not in [command for _, command, _ in commands(summary)]
 
 

@@ -62,7 +62,11 @@ def test_a_landing_in_which_the_vehicle_crashed_is_not_called_good():
     ("phase", "result"),
     [
         ("maneuvers", "the vehicle disarmed in flight"),
-        ("land", "the vehicle disarmed in the landing, not by this program, and fell"),
+        (
+            "land",
+            "the pilot, the autopilot or another station disarmed the vehicle in the air during "
+            "the landing, and it fell",
+        ),
     ],
 )
 def test_motors_that_somebody_stops_in_the_air_end_no_good_flight(autopilot, phase, result):

@@ -98,8 +98,8 @@ def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):
 
     result, _ = Bench(monkeypatch, judge).fly()
     assert result == (
-        "the vehicle was lost, restarted or replaced 5 times before arming; check the link and its "
-        "power"
+        "the vehicle was lost, restarted or replaced 5 times before arming; check the link and the "
+        "vehicle's power"
     )
 
 

@@ -98,6 +98,6 @@ def test_a_failsafe_that_a_station_makes_unsafe_in_flight_is_told(autopilot, nam
         change = When("maneuvers", lambda: mock.transmit(changed), after=3.0)
         summary = fly(mock, None, change, **HOVER)
     assert summary.result == "ok", summary.events
-    (told,) = [text for _, text in summary.events if "changed a parameter" in text]
-    assert "which is unsafe now" in told
+    (told,) = [text for _, text in summary.events if "set a parameter" in text]
+    assert "to an unsafe value in flight" in told
     assert f"{name.decode()} is 10: when setpoints stop, the last rates are held for 10 s" in told

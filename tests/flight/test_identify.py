@@ -210,8 +210,10 @@ def test_a_doublet_that_tilts_too_far_is_given_up_and_the_vehicle_lands():
     wind = {"speed_m_s": 5.0}  # it leans by 27° against this wind, and a doublet adds 15°
     with mock_vehicle(wind=wind) as mock:
         summary = fly(mock, flight={"maneuvers": ["identify"]})
-        assert "identify was given up at 3" in summary.result, summary.events
-        assert "° of tilt, more than limits.max_tilt_deg" in summary.result
+        assert "identify was ended, because the vehicle tilts by 3" in summary.result, (
+            summary.events
+        )
+        assert "°, more than limits.max_tilt_deg" in summary.result
         assert summary.phase == "maneuvers"
         state = mock.until(lambda state: not state["armed"])
         assert not state["crashed"]

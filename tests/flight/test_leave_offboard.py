@@ -16,7 +16,10 @@ from companion.vehicle.px4.autopilot import Px4
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
-HOLD_ASKED = "disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot to hold"
+HOLD_ASKED = (
+    "the vehicle is disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot "
+    "to hold"
+)
 
 
 def test_after_a_failsafe_landing_the_next_flight_begins():

@@ -109,8 +109,8 @@ def test_a_hover_thrust_that_is_far_off_is_told_after_control(learned):
     [
         (0.4, None),
         (0.3, None),
-        (0.13, "farther from thrust.hover_thrust 0.50 than thrust.correction_limit lets us"),
-        (0.105, "limits.min_thrust 0.1 leaves nothing to descend with; set it to 0.04, and"),
+        (0.13, "thrust.hover_thrust 0.50 differs by more than thrust.correction_limit allows"),
+        (0.105, "with limits.min_thrust 0.1 it cannot descend; set limits.min_thrust to 0.04, and"),
     ],
 )
 def test_a_hover_thrust_that_cannot_be_held_forbids_the_takeover(told, refusal):
@@ -213,7 +213,8 @@ def test_a_moving_vehicle_whose_thrust_is_used_up_is_landed_under_control():
             flight={"maneuvers": ["circle"], "takeoff_height_m": 6.0},
             circle={"radius_m": 5.0, "speed_m_s": 3.0, "laps": 2.0},
         )
-    told = re.match(r"the vehicle hovers at a thrust of (.+): .* leaves nothing", summary.result)
+    pattern = r"the vehicle hovers at a thrust of (.+), so .* leaves no thrust"
+    told = re.match(pattern, summary.result)
     assert float(told[1]) > 0.98 * 0.95 * 0.63, "the thrust at the present voltage"
     assert not [text for _, text in summary.events if "internal error" in text]
 

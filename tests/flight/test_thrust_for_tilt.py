@@ -90,7 +90,9 @@ def test_a_vehicle_heavier_than_configured_keeps_its_height(
     assert summary.result == "ok", summary.events
     rows = summary.trace.tracking.rows()
     assert np.abs(rows[:, 6] - rows[:, 3]).max() < 0.15, np.abs(rows[:, 6] - rows[:, 3]).max()
-    (told,) = [text for _, text in summary.events if "of tilt: the tilt is limited to that" in text]
+    (told,) = [
+        text for _, text in summary.events if "of tilt; the flight is limited to this tilt" in text
+    ]
     assert any(f"the vehicle hovers at a thrust of {hover}" in told for hover in hovers), told
     assert told.endswith("although limits.max_tilt_deg is 45")
     assert not [text for _, text in summary.events if text.startswith("safety: thrust")]
@@ -105,7 +107,7 @@ def test_a_vehicle_that_only_just_hovers_is_not_flown():
             flight={"takeoff_height_m": 3.0},
         )
         state = mock.state()
-    assert "limits.max_thrust 0.75 leaves nothing to steer with" in summary.result
+    assert "limits.max_thrust 0.75 leaves no thrust to steer with" in summary.result
     assert "disarmed" in [text for _, text in summary.events]
     assert (state["on_ground"], state["crashed"]) == (True, False)
 

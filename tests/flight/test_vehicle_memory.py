@@ -42,7 +42,7 @@ def test_a_flight_begins_with_what_was_learned_and_leaves_what_it_learned(tmp_pa
     # A key would end the learning, so none is advised and the flight is not called bad for it.
     figures = flown.as_dict()
     assert (figures["advice"], figures["settings"]) == ([], {})
-    assert "began with 0.70 and learned it" in figures["drag_learned"]
+    assert "began with 0.70 1/s, and the vehicle's next flight begins" in figures["drag_learned"]
     kept, _ = LearnedFile(tmp_path, BUNDLED).load()
     assert kept.drag.per_velocity(3.0) == pytest.approx(1.0, abs=0.08)
 

@@ -186,7 +186,7 @@ def held_until_the_pilot_has_it(flown):
     assert flown.autopilot.vehicle.mode == "PILOT"
     texts = [sent for sent in flown.autopilot.sent if sent.name == "STATUSTEXT"]
     assert len(texts) >= 2, flown.events
-    assert "until its pilot switches its mode" in flown.events
+    assert "switch its mode by transmitter" in flown.events
 
 
 def for_ever(kind):

@@ -447,7 +447,7 @@ def test_the_newest_flight_that_measured_tells_the_dead_time(tmp_path, roll, exp
     if roll is None:
         (tmp_path / "2026-01-01" / "summary.json").unlink()
         (finding,) = configuration_checks.dead_time(config, GOOD)
-        assert "no flight of this vehicle" in finding.found
+        assert "was not measured yet by any flight of this vehicle" in finding.found
     assert found(configuration_checks.dead_time, config=config) == expected
 
 

@@ -56,7 +56,7 @@ def flying(*changes):
 def test_a_circle_that_stays_inside_whatever_happens_is_safe_and_says_how_far():
     finding = judged(flying())
     assert finding.result is SAFE
-    assert "for 1 s (COM_OF_LOSS_T); that can carry the vehicle 17 m away" in finding.found
+    assert "for 1 s (COM_OF_LOSS_T); these rates can carry the vehicle 17 m away" in finding.found
 
 
 @pytest.mark.parametrize(

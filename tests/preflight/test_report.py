@@ -28,13 +28,13 @@ def test_the_worst_stands_last_with_its_remedy_beside_the_summary() -> None:
     assert lines[4:6] == ["- the gain is 8: it overshoots", "  What to do: lower it"]
     assert lines[-4:] == [
         *("  What to do: a better link", "  Source: counted", ""),
-        "1 unsafe: `companion fly` refuses",
+        "1 unsafe: `companion fly` refuses to fly",
     ]
     assert max(map(len, lines)) <= 80
 
 
 def test_without_anything_unsafe_the_summary_says_that_it_may_be_flown() -> None:
-    assert shown([FINE])[-1] == "nothing unsafe was found: `companion fly` flies it"
+    assert shown([FINE])[-1] == "nothing unsafe was found: `companion fly` flies this vehicle"
     assert shown([FINE, WEAK])[-1] == "nothing unsafe was found; 1 ineffective, see above"
 
 

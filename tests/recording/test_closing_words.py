@@ -184,7 +184,9 @@ def test_a_drag_that_the_next_flight_begins_with_makes_no_flight_bad_and_is_flow
     off_course = changed(["maneuvers", 2, "level_rms_m"], 0.26, figures)
     told, text = words(off_course)
     assert (told.good, told.next_command) == (False, "companion demo --lockstep")
-    assert "the next flight knows the drag that this one learned: fly again" in told.lines[0]
+    assert (
+        "fly again: the next flight begins with the drag that this flight learned" in told.lines[0]
+    )
     other_fault = changed(["battery", "end"], 0.29, figures)
     assert words(other_fault)[0].next_command == "companion plot flights/one"
 

@@ -54,7 +54,7 @@ def test_straightness_and_the_nearest_second_order_stand_in_it():
     assert cells(lines, "nearest second order: frequency ω")[0] == f"{model.frequency:.1f} rad/s"
     assert cells(lines, "damping ζ")[0] == f"{model.damping:.2f}"
     assert cells(lines, "dead time")[0] == f"{1e3 * model.dead_time:.0f} ms"
-    deviation = cells(lines, "largest deviation from it")[0]
+    deviation = cells(lines, "largest deviation from this model")[0]
     assert float(deviation) == pytest.approx(response.second_order_deviation_max, abs=1e-4)
 
 
@@ -150,6 +150,6 @@ def test_predictive_control_is_counted_with_what_it_left_to_linear_guidance():
 
     assert told(PredictiveFigures(3, {"late": 2, "failed": 1}, (0.001, 0.002, 0.009))) == (
         "predictive control: 3 answers flown, computed in 2.0 ms (p99 8.9 ms); linear guidance "
-        "replaced 3: 2 late, 1 failed"
+        "replaced 3 others: 2 late, 1 failed"
     )
     assert told(PredictiveFigures(0, {}, ())) == "predictive control: 0 answers flown"

@@ -238,7 +238,7 @@ def test_the_record_alone_gives_the_figures_of_the_summary(good):
 def test_the_command_tells_what_is_the_same_and_what_differs(good, tmp_path, capsys):
     folder, summary = good
     assert main(["replay", str(folder)]) == 0
-    assert f"identical: {summary['setpoints']} setpoints to the bit" in capsys.readouterr().out
+    assert f"identical: all {summary['setpoints']} setpoints are equal" in capsys.readouterr().out
     table = tmp_path / "both.csv"
     changes = ["--set", "planner.gain_per_s=4", "--csv", str(table)]
     assert main(["replay", str(folder), *changes]) == 0
@@ -333,7 +333,8 @@ def test_answers_that_only_one_of_both_gave_are_told_by_their_reasons():
     same = result_lines(samples[1:], 1.5, follows_record=True)
     assert same[0].startswith("Only the control loop is replayed, with the recorded commands")
     assert same[1] == (
-        "identical: 0 setpoints to the bit, 1 unanswered samples with the same reasons"
+        "identical: all 0 setpoints are equal to the bit, and all 1 unanswered samples have the "
+        "same reasons"
     )
 
 

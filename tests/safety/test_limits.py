@@ -117,7 +117,7 @@ SAID = [
     (
         lambda: autopilot_judges.any_estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
-        "the estimator was reset: 0.5 m and 17° of heading in total; the references moved with it",
+        "the estimator was reset: 0.5 m and 17° of heading in total; the references moved as much",
     ),
     (
         lambda: autopilot_judges.battery(0.2),

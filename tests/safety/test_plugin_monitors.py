@@ -200,7 +200,7 @@ def test_a_judge_that_is_always_slow_is_named_in_a_warning(monkeypatch):
         ladder.step(Snapshot(10.0 + 0.02 * step))
         assert ("slow (its time)" in ladder.raised_alarms) is (step >= 51)
     assert notes[-1] == (
-        "safety: slow (its time): it takes 15 ms to judge, and delays the setpoints → warn"
+        "safety: slow (its time): this monitor takes 15 ms, and delays the setpoints → warn"
     )
 
 

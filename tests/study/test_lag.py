@@ -151,8 +151,8 @@ def test_the_complete_inner_loop_leaves_model_following_straight_and_of_second_o
     following = table["model-following"]
     assert across(following) <= 0.3 * across(table["first-order"])
     assert across(following) <= 0.5 * across(table["quaternion"])
-    best = min(float(table[name]["largest deviation from it"]) for name in OTHERS)
-    assert float(following["largest deviation from it"]) <= 0.5 * best
+    best = min(float(table[name]["largest deviation from this model"]) for name in OTHERS)
+    assert float(following["largest deviation from this model"]) <= 0.5 * best
 
 
 @pytest.mark.parametrize("hz", ["50 Hz", "100 Hz", "250 Hz"])

@@ -115,7 +115,7 @@ def test_a_ground_station_commands():
     mock.run(1.0)
     mock.command(400, 1)  # MAV_CMD_COMPONENT_ARM_DISARM
     assert mock.until(lambda state: state["armed"], 1.0)["time"] < 1.1
-    with pytest.raises(AssertionError, match="not within"):
+    with pytest.raises(AssertionError, match="did not hold within"):
         mock.until(lambda state: not state["armed"], 0.5)
 
 

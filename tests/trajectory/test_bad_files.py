@@ -75,7 +75,7 @@ def yaml_of(tmp_path, text):
         (rows(step=1.0, count=1000, scale=100.0), "450 s is the longest with cutoff_hz 5"),
         (rows(count=5, step=2e-4), "lasts less than 0.1 s"),
         (rows(scale=1e300), "x is 8e+294, more than 10000 m"),
-        (rows(scale=-1e5), "more than 10000 m from where it begins"),
+        (rows(scale=-1e5), "more than 10000 m from the first position"),
         (rows(offset=1e300), "line 3: 0 s after|time does not increase"),
         ([*rows(20), "9,1e400,0,0"], "x is '1e400', not a number"),
         ([*rows(20), "9,nan,0,0"], "'nan', not a number"),

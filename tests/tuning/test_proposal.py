@@ -131,7 +131,7 @@ def test_the_reason_of_a_gain_names_what_limits_it():
 
 
 def test_each_error_of_the_model_has_its_words():
-    assert _error_text(ModelMismatch(delay=0.02)).startswith("with 20 ms of added delay, as while ")
+    assert _error_text(ModelMismatch(delay=0.02)).startswith("with 20 ms of added delay, as at ")
     assert _error_text(ModelMismatch(time_factor=1.3)) == "with lag and dead time 30 % larger"
     assert _error_text(ModelMismatch(time_factor=0.7)) == "with lag and dead time 30 % smaller"
 
@@ -154,12 +154,12 @@ def test_a_proposal_that_flies_worse_says_so_first(after, said):
     if said is None:
         assert first.startswith("Expected by linear analysis")
     else:
-        assert first == f"DO NOT USE IT: with the proposal the mock vehicle flew worse: {said}"
+        assert first == f"DO NOT USE THE PROPOSAL: with it the mock vehicle flew worse: {said}"
 
 
 def test_a_course_that_no_values_fly_to_its_end_is_not_called_worse():
     proposal, lost = proposed("px4"), TrialResult("no attitude")
-    opening = "DO NOT USE IT: with the proposal the mock vehicle "
+    opening = "DO NOT USE THE PROPOSAL: with it the mock vehicle "
     first = summary_lines(proposal, {"the circle": (lost, lost), "the eight": (FLOWN, FLOWN)})[0]
     assert first == f"{opening}failed, as it did without the proposal: the circle no attitude"
     first = summary_lines(proposal, {"the circle": (lost, lost), "the eight": (FLOWN, lost)})[0]

@@ -83,12 +83,12 @@ def test_rates_are_held_neither_too_briefly_nor_too_long(value, words, set_to):
     [
         ("roll", 1.0, None),
         ("roll", 1.14, None),
-        ("roll", 1.2, "vehicle.acceleration_limit_deg_s2 1000; set that to 1200"),
-        ("roll", 0.0, "vehicle.acceleration_limit_deg_s2 1000; set that to null"),
+        ("roll", 1.2, "vehicle.acceleration_limit_deg_s2 1000; set this key to 1200"),
+        ("roll", 0.0, "vehicle.acceleration_limit_deg_s2 1000; set this key to null"),
         ("pitch", 0.0, None),
-        ("pitch", 0.9, "vehicle.pitch_acceleration_limit_deg_s2 null; set that to 900"),
+        ("pitch", 0.9, "vehicle.pitch_acceleration_limit_deg_s2 null; set this key to 900"),
         ("yaw", 0.27, None),
-        ("yaw", 0.5, "vehicle.yaw_acceleration_limit_deg_s2 270; set that to 500"),
+        ("yaw", 0.5, "vehicle.yaw_acceleration_limit_deg_s2 270; set this key to 500"),
     ],
 )
 def test_the_planner_assumes_the_autopilots_limit(axis, value, words):

@@ -200,8 +200,8 @@ def _few_samples_warning(results: Results) -> Iterator[str]:
     largest = max(distinct, default=0)
     if _MOST_GRID_VALUES < largest < _ENOUGH_SAMPLES:
         yield (
-            f"Only {largest} different samples of the distributions were flown, so the influence "
-            "of one sampled factor may show for the others, too; raise `samples`."
+            f"Only {largest} different samples of the distributions were flown, too few to tell "
+            "the influences of the sampled factors apart; raise `samples`."
         )
 
 

@@ -58,7 +58,7 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
         yield (
             f"Of {unseen_flights} flights that the search has not seen, {early_counts[0]} ended "
             f"early with the configuration before the search, and {early_counts[1]} with the "
-            "result; samples with such a flight are not compared."
+            "result; a sample with a flight that ended early is not compared."
         )
     comparison = result.comparison
     if comparison is None:
@@ -140,15 +140,17 @@ def _reason(key: str, swept: SweptValues, result: CheckedResult, before: Any) ->
     pair = swept.uniform or swept.loguniform
     if pair is None:
         same_count = sum(value == result.best.values[key] for value in near_values)
-        return f"{before_text}; {same_count} of the best {len(near_values)} candidates have it"
+        return (
+            f"{before_text}; {same_count} of the best {len(near_values)} candidates have this value"
+        )
     low, high = pair
     text = f"{before_text}; the best {len(near_values)} candidates have {min(near_values):.3g}"
-    text += f" to {max(near_values):.3g} of {low:g} to {high:g}"
+    text += f" to {max(near_values):.3g}, searched from {low:g} to {high:g}"
     value = float(result.best.values[key])
     if min(value - low, high - value) < _EDGE_SHARE * (high - low):
-        return f"{text}; it lies at an end of its range: widen the range"
+        return f"{text}; this value lies at an end of the searched range: widen the range"
     is_wide = max(near_values) - min(near_values) > 0.5 * (high - low)
-    return f"{text}; it matters little here" if is_wide else text
+    return f"{text}; this key matters little here" if is_wide else text
 
 
 def _value_text(value: Any) -> str:

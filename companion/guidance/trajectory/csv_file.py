@@ -40,7 +40,7 @@ _SHORTEST_DURATION = 0.1
 
 _LARGEST_VALUES = {
     "time": (1e10, "s"),
-    "position": (LARGEST_COORDINATE, "m from where it begins; write positions in m"),
+    "position": (LARGEST_COORDINATE, "m from the first position; write positions in m"),
     "velocity": (LARGEST_SPEED, "m/s"),
     "acceleration": (1000.0, "m/s²"),
     "yaw": (1e4, "rad"),

@@ -113,7 +113,8 @@ class TcpTransport:
                 return False
             connection_before = self._connection
             self.connection_dropped(
-                connection_before, "another client replaced one that sends no valid heartbeat"
+                connection_before,
+                "this client sends no valid heartbeat, and another client replaced it",
             )
             connection_before.abort()
         sock = connection.get_extra_info("socket")

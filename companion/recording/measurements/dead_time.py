@@ -66,6 +66,6 @@ class DeadTimes:
             return None
         return (
             f"dead time is not as configured: {', '.join(wrong)}; the link or this "
-            "computer is slow, or the configured lag is wrong, which appears as dead time: find "
-            "what slows them, or measure both anew with `companion identify`"
+            "computer is slow, or the configured lag is wrong: find what delays the messages, or "
+            "measure lag and dead time anew with `companion identify`"
         )

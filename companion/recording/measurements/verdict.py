@@ -103,9 +103,9 @@ def _maneuvers(figures: Figures) -> Iterator[Check]:
 def _horizontal_remedy(speed: float, *, learned: bool) -> str:
     """The remedy at `speed`, m/s; `learned`: whether this flight learned drag for the next one."""
     if learned:
-        return "the next flight knows the drag that this one learned: fly again"
+        return "fly again: the next flight begins with the drag that this flight learned"
     first = "fly it slower" if speed > 0.0 else "fly in less wind"
-    return f"{first}; against wind and drag see guidance and `companion identify`"
+    return f"{first}, set guidance.drag_per_s to the vehicle's drag, or run `companion identify`"
 
 
 def _height_remedy(rms: float, mean: float | None) -> str:

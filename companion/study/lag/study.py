@@ -170,7 +170,7 @@ def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _FittedModel]
                 "method": method.label,
                 **scores[method].cells,
                 **fit_cells(fit),
-                "largest deviation from it": deviation,
+                "largest deviation from this model": deviation,
             }
             for method, (fit, deviation) in fitted.items()
         ),

@@ -86,7 +86,7 @@ def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
                 "cross-track": loop.cross_track(method),
                 "time to 5 %, s": float(settling_time(loop.responses[method]).max()),
                 **fit_cells(loop.fits[method]),
-                "largest deviation from it": loop.deviation_from_second_order(method),
+                "largest deviation from this model": loop.deviation_from_second_order(method),
                 "difference between headings": heading_effect(loop.responses[method]),
             }
             for loop in (quick, measured)

@@ -76,7 +76,7 @@ class ArduPilot:
     modes_begin_level = False  # landings from a hover in wind of 3 m/s drifted by 0.01 and 0.03 m
     offboard_loss_failsafe = OffboardLossFailsafe(
         "GUID_TIMEOUT",
-        "it levels and keeps its height, but drifts: it does not hold its position",
+        "the vehicle levels and keeps its height, but drifts: it does not hold its position",
         brakes=False,
     )
     fence_text: str | None = " breached"  # AC_Fence.cpp, as in "Circle fence breached"

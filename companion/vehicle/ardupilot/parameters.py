@@ -70,7 +70,7 @@ def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem 
     if value >= settings.attitude_rate_hz:
         return None
     wanted = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
-    return Problem(INEFFECTIVE, f"the main loop is slower, so {wanted} is denied; lower this key")
+    return Problem(INEFFECTIVE, f"the main loop is slower, so {wanted} is refused; lower the key")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
@@ -175,7 +175,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("FLTMODE_GCSBLOCK",),
         "which modes ArduPilot lets nobody command over MAVLink",
-        bit_clear(INEFFECTIVE, 4096, "BRAKE (4096) is refused: asked to hold, it lands instead"),
+        bit_clear(INEFFECTIVE, 4096, "BRAKE (4096) is refused: a vehicle asked to hold lands"),
         _REFERENCE,
     ),
     ParameterRule(("MOT_THST_HOVER",), "at which thrust ArduPilot hovers", hover_thrust, _MEASURED),
@@ -221,8 +221,8 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         forbidden(
             UNSAFE,
             {
-                0.0: "it only reports that it does not know where it is",
-                2.0: "it goes to ALT_HOLD, and drifts unless a pilot acts at once",
+                0.0: "ArduPilot only reports that the vehicle does not know where it is",
+                2.0: "ArduPilot goes to ALT_HOLD, and drifts unless a pilot acts at once",
             },
             1.0,
         ),

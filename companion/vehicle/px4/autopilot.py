@@ -94,7 +94,7 @@ class Px4:
     can_compensate_tilt = False
     modes_begin_level = True
     offboard_loss_failsafe = OffboardLossFailsafe(
-        "COM_OF_LOSS_T", "it takes the action that COM_OBL_RC_ACT sets", brakes=True
+        "COM_OF_LOSS_T", "PX4 takes the action that COM_OBL_RC_ACT sets", brakes=True
     )
     fence_text: str | None = None
     cannot_arm_in = frozenset({Role.OFFBOARD, Role.LAND})
