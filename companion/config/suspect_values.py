@@ -9,6 +9,12 @@ from companion.config.root import Config
 from companion.files.value_faults import mistaken_unit
 
 BODY_RATE = "safety.max_body_rate_deg_s"
+_CLIMB_SPEED, _LIFT_OFF_TIME = 1.5, 4.0
+"""Speed of a take-off, m/s, and time before the vehicle leaves the ground, s; by the defaults of
+the autopilot with the slower climb."""
+_DESCENT_SPEED, _LANDING_SPEED, _LANDING_HEIGHT = 1.5, 0.5, 10.0
+"""Speeds of a landing above and below this height, m/s and m; by the defaults of the autopilot with
+the slower landing."""
 _USUAL_VALUES = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the suffix of the key."""
 _MAX_SUSPECT_SHARE = 1.0 / 20.0
@@ -38,6 +44,7 @@ def suspect_values(config: Config) -> Iterator[SuspectValue]:
     """All suspect values of a configuration."""
     yield from _mistaken_units(config)
     yield from _low_body_rate_limit(config)
+    yield from _short_times(config)
     if config.vehicle.response_known and config.vehicle.identified is None and config.mock is None:
         yield SuspectValue(
             "vehicle.identified",
@@ -59,6 +66,36 @@ def _low_body_rate_limit(config: Config) -> Iterator[SuspectValue]:
             "a turn at the commanded rate trips the body-rate monitor, which ends the flight",
             f"raise {BODY_RATE}, or lower limits.max_tilt_rate_deg_s and max_yaw_rate_deg_s",
         )
+
+
+def _short_times(config: Config) -> Iterator[SuspectValue]:
+    """Times for take-off and landing that are too short for the height of the take-off."""
+    flight = config.flight
+    if flight.take_over:
+        return
+    height = flight.takeoff_height_m
+    low, high = min(height, _LANDING_HEIGHT), max(0.0, height - _LANDING_HEIGHT)
+    for key, allowed, needed, end in (
+        (
+            "flight.takeoff_timeout_s",
+            flight.takeoff_timeout_s,
+            _LIFT_OFF_TIME + height / _CLIMB_SPEED,
+            "the vehicle is landed before it has reached its height",
+        ),
+        (
+            "flight.landing_timeout_s",
+            flight.landing_timeout_s,
+            low / _LANDING_SPEED + high / _DESCENT_SPEED,
+            "the flight ends while the vehicle still sinks",
+        ),
+    ):
+        if allowed < needed:
+            yield SuspectValue(
+                key,
+                f"{key} is {allowed:g} s, and flight.takeoff_height_m {height:g} m",
+                f"at the autopilot's default speeds that takes about {needed:.0f} s, so {end}",
+                f"raise {key} if the speeds are not higher",
+            )
 
 
 def _mistaken_units(config: Config) -> Iterator[SuspectValue]:

@@ -50,6 +50,7 @@ class EstimatorResets:
         position_shift: sum of the position jumps, m NED.
         heading_corrections: sum of the estimator's gradual heading corrections, rad: heading
             changes that the body rates do not explain, without the jumps; see `StepFrame`.
+        turned: sum of all turns about the body's z axis, in either direction, rad.
         rate_lag: learned lag of the body rates behind the attitude.
         largest_tilt_jump: largest jump of the thrust axis, rad; it is not compensated.
         newest_attitude: the newest attitude, or None.
@@ -59,7 +60,7 @@ class EstimatorResets:
     def __init__(self) -> None:
         self.frame = HeadingFrame()
         self.position_shift: Vector = (0.0, 0.0, 0.0)
-        self.heading_corrections = 0.0
+        self.heading_corrections = self.turned = 0.0
         self.rate_lag = RateLag()
         self.largest_tilt_jump = 0.0
         self.reset_times: deque[float] = deque(maxlen=32)
@@ -86,6 +87,7 @@ class EstimatorResets:
         elif not jumped:
             if dt <= _LONGEST_CORRECTED_GAP:
                 self.heading_corrections += yaw
+                self.turned += abs(rates[2]) * dt
                 self.rate_lag.learn(before.body_rates, sample.body_rates, predicted, sample.q)
             return False
         self._count_reset(sample.received)

@@ -37,9 +37,11 @@ def roles_of(link: Link) -> frozenset[Role]:
     A hold that a failsafe chose is not ready for a take-off or takeover: PX4 holds for
     COM_FAIL_ACT_T before it returns or lands, and a command of ours would end the failsafe.
     """
-    mode = link.state.mode
-    roles = frozenset[Role]() if mode is None else link.autopilot.roles(mode)
-    return roles - {Role.READY} if link.state.mode_not_intended else roles
+    state = link.state
+    roles = frozenset[Role]() if state.mode is None else link.autopilot.roles(state.mode)
+    # If the vehicle held already, only HEARTBEAT tells. On the ground it may be disarmed.
+    holds_in_failsafe = Role.HOLD in roles and state.mode_by_failsafe and state.flying
+    return roles - {Role.READY} if holds_in_failsafe or state.mode_not_intended else roles
 
 
 def in_role(link: Link, role: Role) -> bool:

@@ -31,6 +31,9 @@ _UPRIGHT_TILT = radians(45.0)
 _MIN_HOLDING_TILT = 5.0
 """Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
 
+_TOLD_REDUCTION = 0.5
+"""Largest reduction of the tilt that is not told, °: in whole degrees it would be none."""
+
 _MARGIN_WINDOW = 1.0
 """Window over which `_TiltMargin` takes the maximum of the allowed tilt, s."""
 
@@ -125,7 +128,7 @@ class _TiltMargin:
                 f"{limits.max_thrust:g} leaves no thrust to steer with; raise limits.max_thrust, "
                 "or make the vehicle lighter"
             )
-        if tilt < limits.max_tilt_deg and not self._reported:
+        if tilt < limits.max_tilt_deg - _TOLD_REDUCTION and not self._reported:
             self._reported = True
             self._context.note(
                 f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "

@@ -69,8 +69,8 @@ async def wait_for_handover(context: FlightContext) -> None:
             height = "unknown" if state.height is None else f"{state.height:.1f} m"
             context.detail = f"a height of {lowest:.1f} m (flight.takeoff_height_m), now {height}"
             return False
-        if state.mode != ready or state.mode_not_intended:
-            by_failsafe = " by the autopilot's failsafe" if state.mode_not_intended else ""
+        if state.mode != ready or not in_role(context.link, Role.READY):
+            by_failsafe = " by the autopilot's failsafe" if state.mode == ready else ""
             context.detail = f"the pilot to switch to {ready}, now {state.mode}{by_failsafe}"
             return False
         context.detail = "the vehicle to keep its height"
@@ -168,7 +168,7 @@ async def _wait_until_held(context: FlightContext) -> None:
     except TimeoutError:
         raise FlightEnded(
             f"not taken over: waited {_BRAKING_TIME:g} s for {context.detail}; fly in less wind, "
-            "or take over a vehicle that hovers"
+            "check the compass if it flew in circles, or take over a vehicle that hovers"
         ) from None
 
 

@@ -71,7 +71,7 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
 def doubtful_values(config: Config, _: Evidence) -> Iterator[Finding]:
     """Values that are probably a mistake, or not measured on this vehicle."""
     for value in suspect_values(config):
-        key = value.key if value.key in (Key.IDENTIFIED, Key.BODY_RATE) else Key.UNITS
+        key = value.key if value.key in frozenset(Key) else Key.UNITS
         yield Finding(key, INEFFECTIVE, value.description, value.consequence, value.fix, value.key)
 
 

@@ -52,6 +52,8 @@ class Key(StrEnum):
     OFFBOARD_LOSS = "safety.offboard_loss"
     FENCE = "safety.fence_polygon_deg"
     MANEUVERS = "flight.maneuvers"
+    TAKEOFF_TIME = "flight.takeoff_timeout_s"
+    LANDING_TIME = "flight.landing_timeout_s"
     PLANNER = "planner.name"
     DEAD_TIME = "vehicle.dead_time_ms"
     TILT_COMPENSATION = "thrust.autopilot_compensates_tilt"

@@ -17,13 +17,15 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "estimator": "let the autopilot's estimator settle; check its sensors and calibration",
     "reset": "check GPS and compass: the autopilot's estimate jumped",
     "resets": "check GPS and compass; the limits are safety.max_reset_m, max_reset_deg, max_resets",
+    "heading": "check the compass: its calibration, and currents and metal near it",
     "tilt": "find what tilted the vehicle beyond limits.max_tilt_deg: wind, a collision, a motor; "
     "if it swung more and more, lower planner.gain_per_s, then run `companion identify`",
     "body rate": "check the autopilot's rate loop; the limit is safety.max_body_rate_deg_s",
     "fence": "make the maneuver smaller, fly in less wind, or widen the fence: limits.fence_*",
     "braking": "make the maneuver smaller or slower, or widen the fence: limits.fence_*",
     "speed": "fly slower; the limit is safety.max_speed_m_s",
-    "tracking": "fly slower or in less wind; the limit is safety.max_tracking_error_m",
+    "tracking": "fly slower or in less wind; check the compass if the vehicle flew in curves that "
+    "grew; the limit is safety.max_tracking_error_m",
     "thrust": "carry less or fly in less wind; the limits are limits.min_thrust and max_thrust",
     "answer gaps": "find what interrupts the telemetry or this computer",
     "answer rate": "find what slows ATTITUDE_QUATERNION; the limit is link.min_attitude_rate_hz",

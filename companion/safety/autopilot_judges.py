@@ -5,7 +5,7 @@ The docstring of each judge states its breach.
 
 from math import degrees
 
-from companion.safety.monitor import Judge
+from companion.safety.monitor import Judge, above
 from companion.safety.snapshot import Snapshot
 from companion.vehicle.records import gps_fault, is_outdated
 
@@ -87,6 +87,18 @@ def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
     return (
         f"the estimator was reset: {resets.position_shift:.1f} m and "
         f"{degrees(resets.heading_shift):.0f}° of heading in total; the references moved as much"
+    )
+
+
+def heading_drift(limit: float) -> Judge:
+    """The estimated heading turned by more than `limit` in 20 s, rad; the vehicle did not."""
+    return above(
+        limit,
+        lambda snapshot: snapshot.resets.heading_drift,
+        lambda drift: (
+            f"the heading changed by {degrees(drift):.0f}° in 20 s, and the body rates show no "
+            "such turn: the compass or the estimator is wrong"
+        ),
     )
 
 

@@ -123,6 +123,8 @@ class Resets(NamedTuple):
     """Sum of the heading jumps, with their signs, rad."""
     largest_tilt_jump: float = 0.0
     """Largest jump of the thrust axis, rad."""
+    heading_drift: float = 0.0
+    """Gradual change of the heading in 20 s that the body rates do not explain, rad."""
 
 
 class Snapshot(NamedTuple):

@@ -10,6 +10,7 @@ from companion.guidance.fence import FenceCentre, Place
 from companion.guidance.reference import Vector, minus
 from companion.safety.counter_window import CounterWindow
 from companion.safety.frozen_telemetry import FrozenTelemetry
+from companion.safety.heading_drift import HeadingDrift
 from companion.safety.setpoint_echo import SetpointEcho
 from companion.safety.snapshot import (
     UNHEARD_S,
@@ -50,6 +51,7 @@ class SnapshotBuilder:
         self.echo = SetpointEcho(loop.record.sent_setpoints)
         self.counters = CounterWindow(link, loop.record, real_time=real_time)
         self._frozen = FrozenTelemetry()
+        self._heading_drift = HeadingDrift(loop.resets)
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
@@ -82,6 +84,7 @@ class SnapshotBuilder:
         self.counters.clear()
         self.echo.begin(self._link.autopilot)
         self._frozen.begin(now)
+        self._heading_drift.begin()
 
     def flown_fence_centre(self) -> FenceCentre | None:
         """Centre of the fence in the frame without resets; None: no position, or no control yet."""
@@ -195,6 +198,7 @@ class SnapshotBuilder:
             dist(resets.position_shift, self._shift_at_begin),
             wrap_angle(resets.frame.offset - self._frame_at_begin.offset),
             resets.largest_tilt_jump,
+            self._heading_drift.drift(now),
         )
 
     def _place(self, now: float) -> Place | None:

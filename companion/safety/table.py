@@ -5,6 +5,7 @@ To add a monitor, write its judge beside the others (`*_judges.py`), its row her
 """
 
 from dataclasses import replace
+from math import radians
 
 from companion.config import Config
 from companion.guidance.fence import Fence
@@ -23,6 +24,10 @@ every 0.1 s. If single probes are lost at random, eight in a row are lost once i
 50 %, in 36 min at 30 %, in 13 h at 20 %."""
 _MAX_FOREIGN = 2
 """Largest number of foreign setpoints that the autopilot may report within 5 s."""
+_LARGEST_HEADING_DRIFT = radians(30.0)
+"""Largest gradual change of the heading in 20 s that the body rates do not explain, rad. From 45°
+on position control swings, from 60° on it diverges; real autopilots in simulation drift by up to
+2.5°."""
 _ESTIMATE_DELAY = 0.08
 """Delay of the estimated horizontal motion behind the true motion, s. Measured on accelerating
 mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
@@ -72,6 +77,7 @@ def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
     resets = autopilot_judges.too_many_estimator_resets(
         safety.max_resets, safety.max_reset_m, safety.max_reset_angle
     )
+    drift = autopilot_judges.heading_drift(_LARGEST_HEADING_DRIFT)
     battery = autopilot_judges.battery(config.limits.min_battery)
     position = Action(safety.position_action)
     return (
@@ -80,6 +86,7 @@ def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
         Monitor("estimator", autopilot_judges.estimator_flags, position, lasts=0.5),
         Monitor("reset", autopilot_judges.any_estimator_reset, Action.WARN, lasts=0.1),
         Monitor("resets", resets, Action(safety.reset_action)),
+        Monitor("heading", drift, Action(safety.reset_action)),
     )
 
 

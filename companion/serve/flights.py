@@ -3,10 +3,13 @@
 import asyncio
 import gc
 
+from companion.flight.commands import in_role
+from companion.mavlink.errors import LinkError
 from companion.serve.kept_fence import KeptFence
 from companion.serve.ownership import Ownership, Program
 from companion.serve.served_flight import ControlRequest, ServedFlight, ServedVehicle
 from companion.serve.setpoints.request import Request
+from companion.vehicle.autopilot import Role
 
 _RETRY_PAUSE = 2.0
 """Time after a failed takeover during which setpoints alone do not begin another takeover, s."""
@@ -29,6 +32,8 @@ class ServedFlights:
         self._clock, self._retry_time = asyncio.get_running_loop().time, 0.0
         self._task: asyncio.Task[None] | None = None
         self._unfinished: set[asyncio.Task[None]] = set()
+        self._controlled_since_arming = False
+        vehicle.link.subscribe("HEARTBEAT", self._leave_offboard)
 
     @property
     def in_control(self) -> bool:
@@ -56,8 +61,7 @@ class ServedFlights:
         )
         flight.give(request)
         self._task = task = asyncio.create_task(self._fly(flight, command))
-        self._unfinished.add(task)
-        task.add_done_callback(self._unfinished.discard)
+        self._finish_before_close(task)
 
     async def close(self, reason: str) -> None:
         """End the flight, if there is one: hand the vehicle back, and complete all records."""
@@ -80,8 +84,37 @@ class ServedFlights:
             self.ownership.release()
             self.fence.keep(flight.fence_centre)
             self.current_flight = self._task = None
+            self._controlled_since_arming |= has_begun
             if not has_begun:
                 self._retry_time = self._clock() + _RETRY_PAUSE
             await flight.save()
             if self.current_flight is None and self._vehicle.config.realtime.freeze_gc:
                 gc.collect()  # between two flights
+
+    def _finish_before_close(self, task: asyncio.Task[None]) -> None:
+        self._unfinished.add(task)
+        task.add_done_callback(self._unfinished.discard)
+
+    def _leave_offboard(self, _: object) -> None:
+        """Ask a vehicle that a client has landed to hold, if it could not be armed again.
+
+        PX4 returns to OFFBOARD, because this program chose that mode; see
+        `companion.flight.commands.leave_offboard`.
+        """
+        if self._vehicle.link.state.armed is not False or self.current_flight is not None:
+            return
+        controlled, self._controlled_since_arming = self._controlled_since_arming, False
+        if controlled and in_role(self._vehicle.link, Role.OFFBOARD):
+            self._finish_before_close(asyncio.create_task(self._ask_to_hold()))
+
+    async def _ask_to_hold(self) -> None:
+        link, tell = self._vehicle.link, self._vehicle.component.tell
+        mode = link.state.mode
+        tell(f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold")
+        try:
+            await link.command(*link.autopilot.hold())
+        except LinkError as error:
+            tell(
+                f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "
+                f"command another mode ({error})"
+            )

@@ -82,3 +82,21 @@ def test_a_limit_of_body_rates_below_the_commanded_ones_is_doubted():
     assert doubt.key == "safety.max_body_rate_deg_s"
     assert "the planner may command 108 °/s" in doubt.sentence()
     assert doubted(109.0) == []
+
+
+@pytest.mark.parametrize(
+    ("flight", "doubted"),
+    [
+        ({"takeoff_height_m": 53.0}, []),
+        ({"takeoff_height_m": 56.0}, ["flight.takeoff_timeout_s"]),
+        ({"takeoff_height_m": 56.0, "take_over": True}, []),
+        ({"landing_timeout_s": 9.0}, ["flight.landing_timeout_s"]),
+        ({"landing_timeout_s": 11.0}, []),
+        ({"takeoff_height_m": 25.0, "landing_timeout_s": 29.0}, ["flight.landing_timeout_s"]),
+        ({"takeoff_height_m": 25.0, "landing_timeout_s": 31.0}, []),
+    ],
+)
+def test_times_that_are_too_short_for_the_height_are_doubted(flight, doubted):
+    """They were found in the air: the vehicle was landed on its way up."""
+    found = suspect_values(Config.model_validate({"flight": flight}))
+    assert [doubt.key for doubt in found] == doubted

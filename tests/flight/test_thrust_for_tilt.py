@@ -1,12 +1,15 @@
 """Height has priority: no more tilt is asked for than the thrust holds the height at."""
 
-from math import cos
+import asyncio
+from math import cos, radians
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from companion.config import Config
 from companion.files.yaml_file import ConfigError, parse
+from companion.flight.control_phases import _TiltMargin
 from companion.guidance import GRAVITY
 from companion.guidance.thrust import TILT_THRUST_SHARE, largest_tilt
 from tests.flight.fly import fly, merged, mock_vehicle
@@ -128,3 +131,23 @@ def test_setpoints_that_are_lost_for_a_moment_make_no_vehicle_too_heavy():
         summary = fly(mock, flight=flight, steps=steps)
     assert summary.result == "ok", summary.events
     assert not [text for _, text in summary.events if "hovers at a thrust" in text]
+
+
+@pytest.mark.parametrize(("tilt", "told"), [(34.6, 0), (34.4, 1)])
+def test_a_reduction_by_less_than_the_told_degrees_is_not_told(tilt, told):
+    """It said that the tilt is limited to 35°, although limits.max_tilt_deg is 35."""
+    notes = []
+    hover = SimpleNamespace(present_hover=0.7)
+    learning = SimpleNamespace(largest_tilt=lambda: radians(tilt), hover_thrust=hover)
+    limits = SimpleNamespace(max_tilt_deg=35.0, max_thrust=0.9)
+    context = SimpleNamespace(
+        config=SimpleNamespace(limits=limits),
+        guidance_loop=SimpleNamespace(learning=learning),
+        note=notes.append,
+    )
+
+    async def check():
+        _TiltMargin(context).check()
+
+    asyncio.run(check())
+    assert len(notes) == told, notes

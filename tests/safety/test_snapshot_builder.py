@@ -52,6 +52,8 @@ class Flight:
             position_shift=(1.0, 2.0, 3.0),
             frame=HeadingFrame(3.0),
             largest_tilt_jump=0.7,
+            heading_corrections=0.0,
+            turned=0.0,
             on_counter=lambda *seen: self.counted.append(seen),
         )
         self.record = LoopRecord(sent_setpoints=deque([(BodyRates(0.0, 0.0, 0.0), 0.45)]))
