@@ -27,7 +27,7 @@ _MAX_FOREIGN = 2
 _LARGEST_HEADING_DRIFT = radians(30.0)
 """Largest gradual change of the heading in 20 s that the body rates do not explain, rad. From 45°
 on position control swings, from 60° on it diverges; real autopilots in simulation drift by up to
-2.5°."""
+2.8°."""
 _ESTIMATE_DELAY = 0.08
 """Delay of the estimated horizontal motion behind the true motion, s. Measured on accelerating
 mock vehicles: ArduPilot's position 0.055 s and velocity up to 0.09 s, PX4's 0.02 s."""
