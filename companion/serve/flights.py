@@ -110,7 +110,10 @@ class ServedFlights:
     async def _ask_to_hold(self) -> None:
         link, tell = self._vehicle.link, self._vehicle.component.tell
         mode = link.state.mode
-        tell(f"disarmed in {mode}, in which it cannot be armed again: asking the autopilot to hold")
+        tell(
+            f"the vehicle is disarmed in {mode}, in which it cannot be armed again: asking the "
+            "autopilot to hold"
+        )
         try:
             await link.command(*link.autopilot.hold())
         except LinkError as error:
