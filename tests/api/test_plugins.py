@@ -255,8 +255,9 @@ def test_the_rest_of_a_planner_is_passed_on():
 
 @pytest.fixture
 def quick(monkeypatch):
-    """The vehicles of `check_guidance` boot, climb and land quickly, and fly half a circle."""
-    short = {"hover": {"duration_s": 1.0}, "circle": {"laps": 0.5}, "link": QUICK_FLIGHT["link"]}
+    """The vehicles of `check_guidance` boot, climb and land quickly, and fly a quarter of a circle."""
+    short = {"hover": {"duration_s": 0.5}, "circle": {"laps": 0.25}, "link": QUICK_FLIGHT["link"]}
+    short["flight"] = {"takeoff_height_m": 2.0}
     monkeypatch.setattr(conformance, "MockVehicle", QuickVehicle)
     monkeypatch.setattr(
         conformance, "fly", lambda changes, vehicle: fly(merged(short, changes), vehicle)
