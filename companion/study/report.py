@@ -7,6 +7,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import jinja2
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from companion.files.write_whole import write_whole
@@ -57,12 +58,16 @@ def write_page(outcomes: Sequence[Outcome], path: Path) -> None:
 
 
 def _lay_out(figure: Figure) -> None:
-    """Lay out the figure once and for all; otherwise each `savefig` lays it out twice."""
+    """Lay out the figure once and for all; otherwise each `savefig` lays it out and draws it twice.
+
+    The layout engine "none" still lets `savefig` draw twice; without an engine it draws once.
+    """
     figure.set_dpi(_DPI)
     engine = figure.get_layout_engine()
     if engine is not None:
         engine.execute(figure)
-    figure.set_layout_engine("none")
+    with mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)
 
 
 def _image(figure: Figure, extension: str) -> bytes:

@@ -4,6 +4,7 @@ The model contains planner, rate loop, tilt, motion and guidance near hover, whi
 reached. `tests/tuning/test_loop.py` compares the model with the program's own code.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -90,12 +91,18 @@ class Loop:
 
 
 def control_loop(config: Config, s: Complex, error: ModelMismatch = EXACT) -> Loop:
-    """The frequency responses of a configuration's control loop.
+    """The frequency responses of a configuration's control loop; see `control_loops`."""
+    return control_loops(config, s)(error)
+
+
+def control_loops(config: Config, s: Complex) -> Callable[[ModelMismatch], Loop]:
+    """A function that returns the control loop of a configuration for each model error.
+
+    What does not depend on the error, most of the work, is computed once.
 
     Args:
         config: gains, weights and the assumed vehicle.
         s: (n,), frequencies, rad/s, none of them 0.
-        error: difference between the real rate loop and the configured one.
 
     Raises:
         ConfigError: the model does not support the configured planner or guidance.
@@ -107,32 +114,42 @@ def control_loop(config: Config, s: Complex, error: ModelMismatch = EXACT) -> Lo
         )
     guidance, drag = linear_settings(config), drag_prior(config).drag.linear
     target_gain, rate_feedback = _planner_response(config, s)
-    axis, factor = _slower_axis(config), error.time_factor
-    dead_time = np.exp(-s * (factor * axis.dead_time + error.delay))
-    lag = 1.0 + factor * s * (axis.lag + factor * s * axis.sigma)
-    rate_response = error.gain * dead_time / lag / s
+    axis = _slower_axis(config)
     hold = hold_element(s, 1.0 / config.link.attitude_rate_hz)
+    target_hold = hold_element(s, guidance.period)
     feedback = guidance_feedback(
         s, guidance, observer_settings(config), drag, 1.0 / config.link.position_rate_hz
     )
-    command_response = rate_response * target_gain * hold_element(s, guidance.period)
-    attitude_path = rate_response * hold * rate_feedback
     position_delay = np.exp(-s * POSITION_LATENESS)
     velocity, position = feedback.velocity * position_delay, feedback.position * position_delay
-    velocity_per_tilt = GRAVITY / (s + drag)
-    guidance_path = command_response * (
-        feedback.tilt + velocity_per_tilt * (velocity + position / s)
-    )
-    return Loop(
-        s=s,
-        gain_at_rate=attitude_path + guidance_path,
-        gain_at_acceleration=guidance_path / (1.0 + attitude_path),
-        rate_response=rate_response,
-        command_response=command_response,
-        velocity_feedback=velocity,
-        position_feedback=position,
-        drag=drag,
-    )
+    measured_tilt = feedback.tilt + GRAVITY / (s + drag) * (velocity + position / s)
+
+    def with_error(error: ModelMismatch) -> Loop:
+        rate_response = _rate_response(axis, s, error)
+        command_response = rate_response * target_gain * target_hold
+        attitude_path = rate_response * hold * rate_feedback
+        guidance_path = command_response * measured_tilt
+        return Loop(
+            s=s,
+            gain_at_rate=attitude_path + guidance_path,
+            gain_at_acceleration=guidance_path / (1.0 + attitude_path),
+            rate_response=rate_response,
+            command_response=command_response,
+            velocity_feedback=velocity,
+            position_feedback=position,
+            drag=drag,
+        )
+
+    return with_error
+
+
+def _rate_response(axis: AxisResponse, s: Complex, error: ModelMismatch) -> Complex:
+    """Response (n,) of the coefficient to the commanded body rate, s."""
+    factor = error.time_factor
+    dead_time = np.exp(-s * (factor * axis.dead_time + error.delay))
+    lag = 1.0 + factor * s * (axis.lag + factor * s * axis.sigma)
+    response: Complex = error.gain * dead_time / lag / s
+    return response
 
 
 def _slower_axis(config: Config) -> AxisResponse:

@@ -1,5 +1,6 @@
 """Stability margins of a loop from its frequency response (Nyquist)."""
 
+from functools import cache
 from math import degrees, inf, log10
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ _HIGHEST_FREQUENCY = 150.0
 _FREQUENCY_COUNT = 120
 
 
+@cache
 def frequencies() -> Complex:
     """Complex frequencies s (n,) for margins and errors, rad/s.
 
@@ -23,6 +25,7 @@ def frequencies() -> Complex:
     low = np.geomspace(1e-3, 0.05, 12)[:-1]
     high = np.geomspace(0.05, _HIGHEST_FREQUENCY, _FREQUENCY_COUNT)
     s: Complex = _REAL_PART + 1j * np.concatenate([[0.0], low, high])
+    s.setflags(write=False)
     return s
 
 

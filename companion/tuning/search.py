@@ -9,7 +9,7 @@ from companion.config import Config
 from companion.control.hold_settings import attitude_delay, slewing_delay
 from companion.control.inner_loop import sensible_gain, with_gain
 from companion.tuning.expectation import Disturbances, expected_errors, loop_margins
-from companion.tuning.loop import ModelMismatch, control_loop
+from companion.tuning.loop import EXACT, ModelMismatch, control_loops
 from companion.tuning.margins import Margins, frequencies, margins
 
 _FIRST_STEP, _LAST_STEP = 0.4, 0.08
@@ -105,7 +105,7 @@ def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
         aims: requirements of the proposal.
 
     Raises:
-        ConfigError: see `control_loop`.
+        ConfigError: see `control_loops`.
     """
     best_designs = [
         _best_near(config, start, disturbances, aims) for start in _starting_designs(config)
@@ -170,7 +170,8 @@ def _cost(
     """
     candidate = design.apply_to(config)
     s = frequencies()
-    loop = control_loop(candidate, s)
+    loop_with = control_loops(candidate, s)
+    loop = loop_with(EXACT)
     expected_error = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
     shortfall = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
     shortfall += max(
@@ -181,7 +182,7 @@ def _cost(
     for error in tolerated_mismatches(candidate, aims):
         if cost >= stop_at:
             break
-        loop = control_loop(candidate, s, error)
+        loop = loop_with(error)
         share = _SLEWING_SHARE if error.delay else 1.0
         required_margins = share * aims.mismatch_gain_db, share * aims.mismatch_phase_deg
         cost += _COST_OF_MISSED_AIM * _shortfall(margins(s, loop.gain_at_rate), *required_margins)

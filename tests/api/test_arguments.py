@@ -41,26 +41,86 @@ class NoEnd(Own):
     duration = nan
 
 
-def test_references_are_copied_so_that_a_program_may_reuse_its_arrays():
-    """A program wrote into the array that it had passed, and guidance flew what stood there."""
-    off = []
+async def reuses_arrays(vehicle):
+    """How far a program that writes into the arrays of its references is off, m."""
+    off, start = [], vehicle.state.position_ned
+    place, still = np.array(start), np.zeros(3)
+    async with vehicle.control() as control:
+        for _ in range(30):
+            control.follow(Reference(place, still, still), jerk_ned=still)
+            place += (5.0, 0.0, 0.0)  # the next place, which is not commanded yet
+            still += 5.0
+            await asyncio.sleep(0.06)
+            off.append(dist(vehicle.state.position_ned, start))
+            place[:], still[:] = start, 0.0
+    return off
+
+
+async def is_refused(vehicle):
+    """What each call with a wrong argument says, and how far it was moved, m."""
+    refused = {}
+    north, east, down = vehicle.state.position_ned
+    there = (north + 1.0, east, down)
+    calls = {
+        "two numbers": lambda: vehicle.go_to((north, east)),
+        "a word": lambda: vehicle.go_to("abc"),
+        "speed": lambda: vehicle.go_to(there, speed=nan),
+        "heading": lambda: vehicle.go_to(there, heading="north"),
+        "degrees": lambda: vehicle.go_to(there, heading=90.0),
+        "forever": lambda: vehicle.hold(nan),
+        "a number": lambda: vehicle.follow(5),
+        "elsewhere": lambda: vehicle.follow(Elsewhere()),
+        "no end": lambda: vehicle.follow(NoEnd()),
+    }
+    for name, call in calls.items():
+        try:
+            await call()
+        except (ConfigError, TypeError, ValueError) as error:
+            refused[name] = str(error)
+    await vehicle.follow(Own())
+    return {**refused, "moved": dist(vehicle.state.position_ned, (north, east, down))}
+
+
+async def states_for_nan(vehicle):
+    """What the states of a time that is no number say."""
+    async with vehicle.control() as control:
+        control.accelerate(REST)
+        try:
+            async for _ in control.states(seconds=nan):
+                pass
+        except ValueError as error:
+            return str(error)
+    return ""
+
+
+async def stays(vehicle):
+    """Where and how the vehicle is after it was sent where it was: distance, m, heading, rad."""
+    place = vehicle.state.position_ned
+    await vehicle.go_to(place)
+    await vehicle.go_to(place)
+    await vehicle.go_to(place, heading=1.0)
+    return dist(vehicle.state.position_ned, place), vehicle.state.heading
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """What each of the programs above saw, all in one flight."""
+    found = {}
 
     async def program(vehicle):
         await vehicle.take_off()
-        start = vehicle.state.position_ned
-        place, still = np.array(start), np.zeros(3)
-        async with vehicle.control() as control:
-            for _ in range(30):
-                control.follow(Reference(place, still, still), jerk_ned=still)
-                place += (5.0, 0.0, 0.0)  # the next place, which is not commanded yet
-                still += 5.0
-                await asyncio.sleep(0.06)
-                off.append(dist(vehicle.state.position_ned, start))
-                place[:], still[:] = start, 0.0
+        for part in (reuses_arrays, is_refused, states_for_nan, stays):
+            found[part] = await part(vehicle)
         await vehicle.land()
 
-    flown(program, QuickVehicle())
-    assert max(off) < 0.2
+    summary, _ = flown(program, QuickVehicle())
+    assert summary.result == "ok"
+    return found
+
+
+def test_references_are_copied_so_that_a_program_may_reuse_its_arrays(seen):
+    """A program wrote into the array that it had passed, and guidance flew what stood there."""
+    assert max(seen[reuses_arrays]) < 0.2
 
 
 def test_a_copied_reference_holds_plain_numbers():
@@ -117,36 +177,9 @@ def test_a_reference_is_a_reference(what):
         checked_copy(what)
 
 
-def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on():
-    refused = {}
-
-    async def program(vehicle):
-        await vehicle.take_off()
-        north, east, down = vehicle.state.position_ned
-        there = (north + 1.0, east, down)
-        calls = {
-            "two numbers": lambda: vehicle.go_to((north, east)),
-            "a word": lambda: vehicle.go_to("abc"),
-            "speed": lambda: vehicle.go_to(there, speed=nan),
-            "heading": lambda: vehicle.go_to(there, heading="north"),
-            "degrees": lambda: vehicle.go_to(there, heading=90.0),
-            "forever": lambda: vehicle.hold(nan),
-            "a number": lambda: vehicle.follow(5),
-            "elsewhere": lambda: vehicle.follow(Elsewhere()),
-            "no end": lambda: vehicle.follow(NoEnd()),
-        }
-        for name, call in calls.items():
-            try:
-                await call()
-            except (ConfigError, TypeError, ValueError) as error:
-                refused[name] = str(error)
-        await vehicle.follow(Own())
-        refused["moved"] = dist(vehicle.state.position_ned, (north, east, down)) > 0.3
-        await vehicle.land()
-
-    summary, _ = flown(program, QuickVehicle())
-    assert summary.result == "ok"
-    assert refused.pop("moved") is False
+def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on(seen):
+    refused = dict(seen[is_refused])
+    assert refused.pop("moved") < 0.3
     words = {
         "two numbers": "position_ned must be three finite numbers",
         "a word": "position_ned must be three finite numbers",
@@ -163,37 +196,13 @@ def test_arguments_that_cannot_be_flown_are_refused_and_the_vehicle_holds_on():
         assert text in refused[name]
 
 
-def test_states_for_a_time_that_is_no_number_are_refused():
+def test_states_for_a_time_that_is_no_number_are_refused(seen):
     """The loop ended before it began, without a word."""
-
-    async def program(vehicle):
-        await vehicle.take_off()
-        async with vehicle.control() as control:
-            with pytest.raises(ValueError, match="seconds must be a number"):
-                async for _ in control.states(seconds=nan):
-                    pass
-            control.accelerate(REST)
-        await vehicle.land()
-
-    summary, _ = flown(program, QuickVehicle())
-    assert summary.result == "ok"
+    assert "seconds must be a number" in seen[states_for_nan]
 
 
-def test_to_go_where_the_vehicle_is_turns_it_or_does_nothing():
-    found = []
-
-    async def program(vehicle):
-        await vehicle.take_off()
-        place = vehicle.state.position_ned
-        await vehicle.go_to(place)
-        await vehicle.go_to(place)
-        await vehicle.go_to(place, heading=1.0)
-        found.append((dist(vehicle.state.position_ned, place), vehicle.state.heading))
-        await vehicle.land()
-
-    summary, _ = flown(program, QuickVehicle())
-    assert summary.result == "ok"
-    ((off, heading),) = found
+def test_to_go_where_the_vehicle_is_turns_it_or_does_nothing(seen):
+    off, heading = seen[stays]
     assert off < 0.2
     assert heading == pytest.approx(1.0, abs=0.05)
 

@@ -117,14 +117,14 @@ def test_a_refused_go_to_says_what_helps_in_a_program(slow_down):
     async def program(vehicle):
         await vehicle.take_off()
         north, east, down = vehicle.state.position_ned
-        below = north, east, down + 4.0
+        below = north, east, down + 2.0
         with pytest.raises(ConfigError, match=r"max_descent.*lower speed") as refused:
             await vehicle.go_to(below, speed=2.0)  # above limits.max_descent_m_s
         assert "--slow-down" not in str(refused.value)
         await vehicle.go_to(below, speed=0.9)
         await vehicle.land()
 
-    flight = {"takeoff_height_m": 6.0, "slow_down": slow_down}
+    flight = {"takeoff_height_m": 4.0, "slow_down": slow_down}
     summary, events = flown(program, QuickVehicle(), flight=flight)
     assert summary.result == "ok", events
 

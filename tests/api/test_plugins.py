@@ -255,8 +255,9 @@ def test_the_rest_of_a_planner_is_passed_on():
 
 @pytest.fixture
 def quick(monkeypatch):
-    """The vehicles of `check_guidance` boot, climb and land quickly, and fly half a circle."""
-    short = {"hover": {"duration_s": 1.0}, "circle": {"laps": 0.5}, "link": QUICK_FLIGHT["link"]}
+    """Vehicles of `check_guidance` boot, climb and land quickly, and fly a quarter of a circle."""
+    short = {"hover": {"duration_s": 0.5}, "circle": {"laps": 0.25}, "link": QUICK_FLIGHT["link"]}
+    short["flight"] = {"takeoff_height_m": 2.0}
     monkeypatch.setattr(conformance, "MockVehicle", QuickVehicle)
     monkeypatch.setattr(
         conformance, "fly", lambda changes, vehicle: fly(merged(short, changes), vehicle)
@@ -337,7 +338,7 @@ def test_what_cannot_fly_is_found_before_the_vehicle_is_asked(text, why, tmp_pat
 )
 def test_a_planner_that_fails_in_flight_is_named_and_the_vehicle_is_landed(name, raised, line):
     vehicle = QuickVehicle("px4")
-    flight = {"planner": {"name": name}, "flight": {"maneuvers": ["steps"]}}
+    flight = {"planner": {"name": name}, "flight": {"maneuvers": ["circle"]}}
     summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
     assert summary.result == told("planner", name, raised, line)
     assert not vehicle.state()["crashed"]
@@ -356,7 +357,7 @@ def test_a_planner_that_fails_before_take_off_is_named_and_nothing_is_handed_bac
 @pytest.mark.parametrize("name", ["blank", "refusing"])
 def test_a_planner_without_rates_is_named_and_the_attitude_is_not_blamed(name):
     vehicle = QuickVehicle("px4")
-    flight = {"planner": {"name": name}, "flight": {"maneuvers": ["steps"]}}
+    flight = {"planner": {"name": name}, "flight": {"maneuvers": ["circle"]}}
     summary = fly(merged(QUICK_FLIGHT, flight), vehicle)
     assert summary.result == (
         f"the planner (planner.name: {name}) gives no body rates: they are NaN or infinite, or it "

@@ -15,7 +15,7 @@ from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, QuickVehicle, merged
 
 
 class Ahead:
-    """Flies 4 m north in some 4 s; from 2 s on it does what `does` says."""
+    """Flies 4 m north in some 4 s; from 1 s on it does what `does` says."""
 
     name, holds_heading = "ahead", True
 
@@ -25,7 +25,7 @@ class Ahead:
 
     def at(self, time):
         sample = self.path.at(time)
-        return sample if self.does is None or time < 2.0 else self.does(sample)
+        return sample if self.does is None or time < 1.0 else self.does(sample)
 
 
 def raising(error):
@@ -44,7 +44,7 @@ def result_of(autopilot, made, own, does):
         async with connect(config, mock) as vehicle:
             await vehicle.take_off()
             flight = asyncio.ensure_future(vehicle.follow(made))
-            await asyncio.sleep(1.0)
+            await asyncio.sleep(0.5)
             own.does = does
             await flight
 

@@ -124,7 +124,7 @@ async def frozen_motion(scene):
 
 async def frozen_velocity(scene):
     """hangs while MAVSDK repeats a velocity"""
-    await stream(3.0, lambda _: scene.local(VELOCITY, velocity=(-1.5, 0.0, 0.0)), 0.05)
+    await stream(2.0, lambda _: scene.local(VELOCITY, velocity=(-1.5, 0.0, 0.0)), 0.05)
     assert scene.speed == pytest.approx(1.5, abs=0.3)
     assert scene.flights.in_control
     return "flown on, up to the fence"
@@ -150,7 +150,7 @@ async def reconnects(scene):
 
 async def reconnects_all_the_time(scene):
     """connects anew for each few setpoints"""
-    for number in range(12):
+    for number in range(8):
         scene.session.network.detach(scene.script)
         scene.script = MemoryClient(f"script {number}").connect(scene.session)
         await stream(0.2, scene.hover)
@@ -167,7 +167,7 @@ async def flood(scene):
         for _ in range(20):
             scene.hover()
 
-    await stream(1.5, many, 0.01)
+    await stream(0.7, many, 0.01)
     assert scene.judge.count - before < 260 * (scene.vehicle.time - began), "one for each sample"
     return await scene.is_flown(0.2)
 
@@ -188,7 +188,7 @@ async def not_finite(scene):
         scene.script.attitude(7, (1.0, 0.0, 0.0, 0.0), NAN)
         scene.script.attitude(128, (1.0, 0.0, 0.0, 0.0), 0.5, (NAN, 0.0, 0.0))
 
-    await stream(1.0, send, 0.05)
+    await stream(0.5, send, 0.05)
     scene.is_said("not finite")
     await scene.is_flown()
     return REFUSED
@@ -220,7 +220,7 @@ async def contradictions(scene):
         scene.script.attitude(7 | 128, (1.0, 0.0, 0.0, 0.0), 0.5)  # neither
         scene.script.attitude(7 | 64, (1.0, 0.0, 0.0, 0.0), 0.5)  # no thrust
 
-    await stream(1.0, send, 0.05)
+    await stream(0.5, send, 0.05)
     scene.is_said("also needs a velocity")
     await scene.is_flown()
     return REFUSED
@@ -238,7 +238,7 @@ async def no_place(scene):
                 )
             )
 
-    await stream(1.0, send, 0.05)
+    await stream(0.5, send, 0.05)
     scene.is_said("the position is more than")
     scene.is_said("position is not finite")
     await scene.is_flown()
@@ -257,13 +257,13 @@ async def clock_jumps(scene):
             )
         )
 
-    await stream(1.0, send)
+    await stream(0.5, send)
     return await scene.is_flown()
 
 
 async def another_id(scene):
     """changes its component id"""
-    await stream(0.5, scene.hover)
+    await stream(2.5, scene.hover)  # until the same sentence may be told again
     scene.script.packer.srcComponent = 191 - scene.script.packer.srcComponent
     await stream(TIMEOUT - 0.1, lambda _: scene.script.local(ALL, scene.home))
     scene.is_said("is in control")
@@ -282,7 +282,7 @@ async def all_kinds(scene):
         lambda: scene.local(0x0C3F, acceleration=(0.5, 0.0, -0.2)),
         lambda: scene.local(VELOCITY, velocity=(0.5, 0.0, 0.0), frame=8),
     )
-    await stream(3.0, lambda time: kinds[round(time / 0.02) % len(kinds)]())
+    await stream(1.5, lambda time: kinds[round(time / 0.02) % len(kinds)]())
     assert scene.flights.in_control
     assert math.dist(scene.place, scene.home) < 3.0
     await scene.recover()
@@ -337,7 +337,7 @@ async def two_at_once(scene):
         rival.local(ALL, away)
         stranger.local(ALL, away)
 
-    await stream(1.0, both)
+    await stream(0.5, both)
     scene.is_said("is in control", rival)
     scene.is_said("read-only", stranger)
     await scene.is_flown()
@@ -381,7 +381,7 @@ async def wrong_ids(scene):
         for thief in thieves:
             thief.local(ALL, away)
 
-    await stream(1.0, send)
+    await stream(0.5, send)
     scene.is_said("target_system is 2")
     scene.is_said("target_component is 7")
     await scene.is_flown()
@@ -403,7 +403,7 @@ async def damaged(scene):
         for data in (bytes(raw), bytes(raw[:17]), bytes(range(256))):
             scene.session.network.receive_frames(scene.script, scene.script.scan(data))
 
-    await stream(1.0, send)
+    await stream(0.5, send)
     return await scene.is_flown()
 
 

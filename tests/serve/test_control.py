@@ -90,7 +90,7 @@ def test_a_streamed_circle_is_flown_as_it_is(autopilot):
         start = place(session)
         centre = (start[0] - 5.0, start[1], start[2])
         await begin_control(session, script, autopilot, lambda _: script.local(ALL, start))
-        await stream(1.0, lambda _: script.local(ALL, start))
+        await stream(0.5, lambda _: script.local(ALL, start))
         errors = []
 
         def send(time):
@@ -100,7 +100,7 @@ def test_a_streamed_circle_is_flown_as_it_is(autopilot):
             error = None if flight is None else flight.tracking_error
             errors.extend([error] if time > 4.0 else [])
 
-        await stream(9.0, send)
+        await stream(7.0, send)
         assert math.sqrt(sum(error**2 for error in errors) / len(errors)) < 0.10
         assert {each.name for each in script.of("NAMED_VALUE_FLOAT")} == {"trk_err_m", "answer_ms"}
 
@@ -134,7 +134,7 @@ def test_positions_velocities_and_attitudes_are_flown(autopilot):
             tilt, abs=0.03
         )
         assert abs(place(session)[2] - height) < 1.5
-        await stream(3.0, lambda _: script.local(POSITION, there), 0.1)
+        await stream(0.7, lambda _: script.local(POSITION, there), 0.1)
         assert session.flights.in_control, script.texts()
 
     fly(autopilot, scene)
@@ -269,7 +269,7 @@ def test_px4_takes_off_for_a_client_that_asks_for_offboard_on_the_ground(tmp_pat
     async def whole():
         async with serving(vehicle, "px4", directory=tmp_path) as session:
             script = MemoryClient().connect(session)
-            await asyncio.sleep(10.0)
+            await asyncio.sleep(3.0)
             await stream(0.5, lambda _: script.local(POSITION, up))
             assert await script.offboard() == REJECTED
             assert "arm it first" in " ".join(script.texts())
@@ -304,7 +304,7 @@ def test_what_stops_the_takeoff_for_a_client_ends_it():
         async with serving(vehicle, "px4") as session:
             script = MemoryClient().connect(session)
             station = MemoryClient("station", (255, 190)).connect(session)
-            await asyncio.sleep(10.0)
+            await asyncio.sleep(3.0)
             hold = lambda _: script.local(POSITION, (0.0, 0.0, -8.0))  # noqa: E731
             for stop, height in (((400, 0), 0.0), ((176, 1, 4, 3), 0.8)):
                 script.command(400, 1)

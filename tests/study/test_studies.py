@@ -16,7 +16,7 @@ from rich.console import Console
 
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError
-from companion.study import registry, runner
+from companion.study import registry, report, runner
 from companion.study.custom_case import Case
 from companion.study.paper import fig2, fig3, fig4, fig5_flights, kmax, rates
 from companion.study.registry import STUDIES
@@ -60,6 +60,13 @@ def results(tmp_path_factory):
         patch.setattr(fig5_flights, "FIGURE_2", replace(fig5_flights.FIGURE_2, seconds=0.5))
         page, _ = runner.run("all", None, out, Console(quiet=True))
     return out, page, ticks
+
+
+@pytest.fixture
+def unpainted(monkeypatch):
+    """Figures are made and not painted, which is most of a study's time; `results` paints them."""
+    monkeypatch.setattr(report, "_lay_out", lambda _: None)
+    monkeypatch.setattr(report, "_image", lambda *_: b"")
 
 
 def rows(results, name):
@@ -222,6 +229,7 @@ def test_a_case_of_ones_own(tmp_path, capsys):
     assert "max_tilt_deg 40.0" in (tmp_path / "out" / "custom.html").read_text()
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_a_case_with_the_inner_loop_and_the_limit_of_equation_33(tmp_path, capsys):
     limits = {"max_tilt_deg": 40.0, "max_tilt_rate_deg_s": 90.0, "rate_limit": "paper"}
     changes = {"limits": limits, "headings_deg": [0.0], "rates_hz": [100.0], "seconds": 0.4}
@@ -271,6 +279,7 @@ def test_custom_wants_a_case_and_the_others_have_theirs(tmp_path):
         runner.run("fig2", CASE, tmp_path, Console(quiet=True))
 
 
+@pytest.mark.usefixtures("unpainted")
 def test_what_is_interrupted_leaves_no_broken_page(tmp_path, capsys, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt

@@ -20,6 +20,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.cli.main import main
 from companion.config.files import shipped
 from companion.files.yaml_file import ConfigError
+from companion.study import report
 from companion.study.track import flights, study
 from companion.study.track.findings import find
 from companion.study.track.flights import PositionError, TrackedFlight
@@ -207,6 +208,7 @@ def test_the_findings_follow_from_the_numbers():
 
 
 def test_a_flight_that_failed_is_told_as_such_everywhere(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(report, "_image", lambda *_: b"")  # the test above paints this figure
     lost = {"circle, 7 m/s, model-following": inf, "circle, 7 m/s, euler": inf}
     said = studied(monkeypatch, capsys, tmp_path, "--json", **lost)
     failed = [row for row in json.loads(said.out) if row["result"] != "ok"]

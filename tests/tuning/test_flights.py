@@ -65,6 +65,7 @@ def started(autopilot, factor=1.0):
     return changed(config, {"vehicle": times, "limits": LIMITS}, "test")
 
 
+@pytest.mark.parametrize("few_laps", [0.5], indirect=True)
 def test_in_gusts_the_error_is_much_smaller(few_laps):
     config = started("px4")
     before = fly_trial(config, CIRCLE_IN_GUSTS, "px4")
