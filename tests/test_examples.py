@@ -184,9 +184,7 @@ def test_a_mavsdk_script_flies_through_us(folder: Path) -> None:
 
 
 def test_model_following_is_straighter_behind_a_rate_loop(folder: Path) -> None:
-    lines = [
-        line.split() for line in output(folder, "compare_planners.py", full_rate=True).splitlines()
-    ]
+    lines = [line.split() for line in output(folder, "compare_planners.py").splitlines()]
     straightness = {name: float(figure) for name, *_, figure, result in lines if result == "ok"}
     assert list(straightness) == ["first-order", "model-following"]
     assert straightness["model-following"] < 0.01

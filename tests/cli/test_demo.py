@@ -30,7 +30,7 @@ def quick_demo(folder: Path) -> str:
     content = yaml.safe_load(file.read_text())
     mine = {
         "include": str(file.with_name(content["include"])),
-        "steps": {"duration_s": 0.5, "settle_s": 0.3},
+        "steps": {"duration_s": 0.5, "settle_s": 0.5},
         "flight": {"takeoff_height_m": 2.0},
         "link": {"attitude_rate_hz": float(LOOP_HZ)},
         "mock": {**QUICK_MOCK, "parameters": QUICK_PARAMETERS["px4"]},

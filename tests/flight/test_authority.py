@@ -4,7 +4,6 @@ import asyncio
 from math import inf
 
 import pytest
-from pymavlink import mavutil
 
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
@@ -18,6 +17,7 @@ from companion.vehicle.link import Link
 from companion.vehicle.px4.autopilot import Px4
 from companion.vehicle.records import LandedState
 from companion.vehicle.state import VehicleState
+from tests.flight import tlog
 from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
 
@@ -75,8 +75,7 @@ def test_interrupted_on_the_ground_it_never_arms(phase):
 
 def commands(summary):
     """(time, command, first parameter) of each command that we sent."""
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    found = iter(lambda: log.recv_match(type=["COMMAND_LONG"]), None)
+    found = tlog.messages(summary, "COMMAND_LONG")
     return [(m._timestamp, m.command, m.param1) for m in found if m.get_srcComponent() == 191]
 
 
@@ -162,9 +161,8 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
         summary = run(mock, session.fly())
         assert not mock.state()["crashed"]
     assert summary.result == "the autopilot says that it has landed"
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
     took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
-    setpoints = iter(lambda: log.recv_match(type=["SET_ATTITUDE_TARGET"]), None)
+    setpoints = tlog.messages(summary, "SET_ATTITUDE_TARGET")
     assert min(m.thrust for m in setpoints if m._timestamp > took_over) > 0.3
 
 

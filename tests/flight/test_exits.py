@@ -16,12 +16,11 @@ from typing import NamedTuple
 
 import pytest
 import yaml
-from pymavlink import mavutil
 
 from companion.cli.signals import HOW_TO_LEAVE, SECOND_CTRL_C_AFTER
 from companion.control.guidance_loop import GuidanceLoop
 from tests.flight import fly as memory
-from tests.flight import sockets
+from tests.flight import sockets, tlog
 from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, merged
 from tests.flight.others import When
 from tests.flight.programs import Program
@@ -341,5 +340,4 @@ def test_interrupted_in_full_tilt_it_streams_until_the_autopilot_holds(tmp_path)
 
 
 def setpoints(summary):
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    return list(iter(lambda: log.recv_match(type=["SET_ATTITUDE_TARGET"]), None))
+    return list(tlog.messages(summary, "SET_ATTITUDE_TARGET"))

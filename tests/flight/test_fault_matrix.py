@@ -135,7 +135,7 @@ def excess(state):
 
 @pytest.mark.parametrize(("autopilot", "fault", "phase", "end"), list(cells()))
 def test_a_fault_in_a_phase_ends_as_documented(autopilot, fault, phase, end):
-    with mock_vehicle(autopilot=autopilot, full_rate=True, in_lockstep=True) as mock:
+    with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
         observer = Begin(mock, fault, phase)
         summary = fly(mock, None, observer, **SHORT)
         assert observer.wanted is None, summary.events

@@ -37,7 +37,9 @@ def obeyed(mock):
 @BOTH
 def test_a_vehicle_that_its_pilot_holds_is_taken_over_flown_and_given_back(autopilot):
     mock = in_the_air(autopilot)
-    summary = testing.fly(handed_over(autopilot, maneuvers=["hover", "circle"]), mock)
+    changes = {"hover": {"duration_s": 1.0}, "circle": {"radius_m": 1.5}}
+    config = changed(handed_over(autopilot, maneuvers=["hover", "circle"]), changes, "test")
+    summary = testing.fly(config, mock)
     state = mock.state()
     assert summary.result == "ok", summary.events
     assert [part.name for part in summary.maneuvers()] == ["hover", "circle"]
