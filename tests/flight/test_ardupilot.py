@@ -127,7 +127,7 @@ def test_a_take_off_whose_answer_was_lost_is_not_repeated_once_it_flies(monkeypa
     monkeypatch.setattr(CommandClient, "_on_ack", hear)
     monkeypatch.setattr(CommandClient, "send", send)
     with mock_vehicle(autopilot="ardupilot") as mock:
-        summary = fly(mock)
+        summary = fly(mock, hover={"duration_s": 0.5})
     assert acks == [0]  # MAV_RESULT: accepted
     assert summary.result == "ok", summary.events
 

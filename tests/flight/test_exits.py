@@ -132,7 +132,7 @@ def test_other_signals_hand_back_too(tmp_path, ways, number):
 def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
     """As `companion fly | head -1`: nobody reads any more, and every line fails."""
     with PX4.mock(tmp_path) as mock:
-        short = {"hover": {"duration_s": 3.0}, "recording": PAGE}
+        short = {"hover": {"duration_s": 0.5}, "recording": PAGE}
         process = start(mock, tmp_path, "--lockstep", as_users_do=True, **short)
         process.stderr.close()
         out = process.stdout.read()

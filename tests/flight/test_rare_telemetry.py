@@ -18,6 +18,7 @@ CIRCLE = {
     "circle": {"radius_m": 4.0, "speed_m_s": 3.5, "laps": 1},
     "limits": {"fence_radius_m": 30.0},
 }
+SHORT = {"hover": {"duration_s": 0.5}}
 HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
 
 
@@ -100,8 +101,9 @@ def test_attitude_lowered_by_one_program_after_another_is_asked_for_each_time(au
 @pytest.mark.parametrize(("phase", "after"), [("arm", 0.0), ("takeoff", 0.0), ("takeoff", 2.5)])
 def test_a_station_that_connects_before_the_takeover_does_not_end_the_flight(phase, after):
     """The vehicle was landed for positions at 3 Hz, as if its link were too slow."""
+    hover = {"duration_s": 1.5}
     with mock_vehicle(autopilot="ardupilot") as mock:
-        summary = fly(mock, None, When(phase, lambda: connects(mock), after))
+        summary = fly(mock, None, When(phase, lambda: connects(mock), after), hover=hover)
     assert summary.result == "ok", summary.events
     (told,) = asked_again(summary)
     assert told == "LOCAL_POSITION_NED comes too rarely: requesting 50 Hz again"
@@ -139,7 +141,7 @@ def test_a_heartbeat_that_a_station_stopped_ends_neither_take_off_nor_landing(ph
     """The vehicle was left to its pilot, and armed after the landing."""
     with mock_vehicle(autopilot="ardupilot") as mock:
         stop = When(phase, lambda: mock.command(SET_MESSAGE_INTERVAL, 0, -1.0), 1.0)
-        summary = fly(mock, None, stop)
+        summary = fly(mock, None, stop, **SHORT)
         assert not mock.state()["armed"]
     assert summary.result == "ok", summary.events
 
@@ -154,7 +156,8 @@ def test_a_serial_link_that_restarts_ends_neither_take_off_nor_landing(autopilot
             for direction in ("to_companion", "from_companion"):
                 mock.inject({"kind": "drop", "direction": direction, "duration_s": 1.5})
 
-        summary = fly(mock, None, When(phase, restart, 0.8), flight={"takeoff_height_m": 6.0})
+        high = {"flight": {"takeoff_height_m": 6.0}}
+        summary = fly(mock, None, When(phase, restart, 0.8), **high, **SHORT)
         assert not mock.state()["armed"]
     assert summary.result == "ok", summary.events
 
@@ -162,7 +165,7 @@ def test_a_serial_link_that_restarts_ends_neither_take_off_nor_landing(autopilot
 def test_a_silence_of_the_whole_link_is_no_reason_to_ask_for_a_status_again():
     with mock_vehicle(autopilot="ardupilot") as mock:
         lose = lambda: mock.inject({"kind": "drop", "direction": "to_companion", "duration_s": 0.7})  # noqa: E731
-        summary = fly(mock, None, When("land", lose, 1.0))
+        summary = fly(mock, None, When("land", lose, 1.0), **SHORT)
     assert summary.result == "ok", summary.events
     assert not asked_again(summary)
 
