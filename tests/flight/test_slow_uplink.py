@@ -11,8 +11,6 @@ from tests.flight.others import When
 HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
 WIND = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 HOVER = {"flight": {"takeoff_height_m": 4.0}, "hover": {"duration_s": 12.0}}
-SHORTER = {**HOVER, "hover": {"duration_s": 6.0}}
-"""As long as it takes until the faults that end control have ended it, and longer."""
 
 
 class Extent:
@@ -31,8 +29,9 @@ class Extent:
         self.lowest = min(self.lowest, -state["position"][2])
 
 
-def flown(autopilot, kind, hover=HOVER, **fault):
+def flown(autopilot, kind, hover_s=12.0, **fault):
     """A hover in wind whose uplink has the fault from its first second on."""
+    hover = {"hover": {"duration_s": hover_s}}
     with mock_vehicle(autopilot=autopilot, wind=WIND) as mock:
         extent = Extent(mock)
 
@@ -40,7 +39,7 @@ def flown(autopilot, kind, hover=HOVER, **fault):
             extent.begin()
             mock.inject({"kind": kind, "direction": "from_companion", **fault})
 
-        summary = fly(mock, None, When("maneuvers", begin, after=1.0), **hover)
+        summary = fly(mock, None, When("maneuvers", begin, after=1.0), **HOVER | hover)
         return summary, mock.state(), extent
 
 
@@ -57,7 +56,7 @@ def test_setpoints_that_become_late_end_control_before_the_vehicle_swings_far(
 
 
 def test_a_hiccup_of_the_uplink_is_flown_on():
-    summary, _, _ = flown("px4", "delay", SHORTER, delay_ms=300.0, duration_s=0.4)
+    summary, _, _ = flown("px4", "delay", 5.0, delay_ms=300.0, duration_s=0.4)
     assert summary.result == "ok", summary.events
 
 
@@ -81,7 +80,7 @@ def test_setpoints_that_do_not_reach_the_vehicle_end_control(autopilot, fault):
 
 
 def test_a_way_that_loses_three_of_ten_setpoints_is_flown_on():
-    summary, _, _ = flown("ardupilot", "drop", SHORTER, probability=0.3)
+    summary, _, _ = flown("ardupilot", "drop", probability=0.3)
     assert summary.result == "ok", summary.events
 
 
