@@ -27,7 +27,7 @@ def takeover(after, **settings):
         at = ceil(mock.state()["time"]) + 2.0 + after
         mock.inject({"kind": "pilot_takeover", "mode": "POSCTL", "at_s": at})
 
-    with mock_vehicle(**settings, in_lockstep=True) as mock:
+    with mock_vehicle(full_rate=True, **settings, in_lockstep=True) as mock:
         summary = fly(mock, None, When("maneuvers", begin))
         state = mock.state()
     assert "took over: mode POSCTL" in summary.result
