@@ -56,7 +56,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "my-path.csv").write_text("\n".join(["t,x,y,z", *rows]) + "\n")
     px4 = shipped("mock-px4.yaml")
     short = {"flight": {"maneuvers": ["hover"]}, "hover": {"duration_s": 1.0}}
-    vehicle = QuickVehicle(config=px4, full_rate=True)
+    vehicle = QuickVehicle(config=px4)
     fly(changed(load(px4), short, "short"), vehicle, folder / RECORDED)
     return folder
 

@@ -5,7 +5,6 @@ Those of docs/extending.md run in `test_extending`, `api/test_plugins` and
 """
 
 import re
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -52,7 +51,7 @@ def test_a_program_of_ones_own_is_tested_as_the_page_on_serving_shows():
 
 
 def test_a_flight_of_ones_own_is_tested_as_the_page_on_python_shows(monkeypatch):
-    monkeypatch.setattr(testing, "MockVehicle", partial(QuickVehicle, full_rate=True))
+    monkeypatch.setattr(testing, "MockVehicle", QuickVehicle)
     (block,) = [block for block in blocks("docs/python.md") if "def test_" in block]
     flown = []
 

@@ -8,13 +8,12 @@ import re
 import runpy
 import subprocess
 import sys
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from companion import testing
-from tests.flight.fly import QuickVehicle
+from tests.flight.fly import LOOP_HZ, QuickVehicle
 from tests.serve.serving import free_ports, mock, serving
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -44,17 +43,16 @@ def as_users_do(folder: Path, program: str, *arguments: str) -> str:
     return done.stdout
 
 
-def output(folder: Path, program: str, *, full_rate: bool = False) -> str:
+def output(folder: Path, program: str) -> str:
     """Standard output of one example, run in this process: the imports cost more than the rest.
 
-    Its vehicle boots, climbs and lands quickly: that is most of the time of most examples. Those
-    that measure a response need the full rate of the vehicle's loop.
+    Its vehicle boots, climbs and lands quickly: that is most of the time of most examples.
     """
     said = io.StringIO()
     with pytest.MonkeyPatch.context() as patch, contextlib.chdir(folder):
         patch.setattr(sys, "argv", [program])
         patch.setattr(sys, "path", [str(EXAMPLES), *sys.path[1:]])
-        patch.setattr(testing, "MockVehicle", partial(QuickVehicle, full_rate=full_rate))
+        patch.setattr(testing, "MockVehicle", QuickVehicle)
         with contextlib.redirect_stdout(said):
             runpy.run_path(str(EXAMPLES / program), run_name="__main__")
     return said.getvalue()
@@ -184,9 +182,7 @@ def test_a_mavsdk_script_flies_through_us(folder: Path) -> None:
 
 
 def test_model_following_is_straighter_behind_a_rate_loop(folder: Path) -> None:
-    lines = [
-        line.split() for line in output(folder, "compare_planners.py", full_rate=True).splitlines()
-    ]
+    lines = [line.split() for line in output(folder, "compare_planners.py").splitlines()]
     straightness = {name: float(figure) for name, *_, figure, result in lines if result == "ok"}
     assert list(straightness) == ["first-order", "model-following"]
     assert straightness["model-following"] < 0.01
@@ -197,14 +193,14 @@ def test_model_following_is_straighter_behind_a_rate_loop(folder: Path) -> None:
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder in which a flight of doublets was recorded, by the example that identifies."""
     folder = tmp_path_factory.mktemp("recorded")
-    (folder / "said.txt").write_text(output(folder, "identify_from_log.py", full_rate=True))
+    (folder / "said.txt").write_text(output(folder, "identify_from_log.py"))
     return folder
 
 
 def test_the_vehicle_is_identified(flown: Path) -> None:
     lines = (flown / "said.txt").read_text().splitlines()[-5:]
     setpoints, rates = numbers(lines[0])
-    assert 5000 < setpoints < rates
+    assert 2500 < setpoints < rates
     roll, pitch = numbers(lines[1]), numbers(lines[2])
     assert roll[0] == pytest.approx(50.0, abs=5.0)
     assert roll[1] == pytest.approx(42.0, abs=5.0)
@@ -220,7 +216,7 @@ def test_the_tlog_is_read(flown: Path) -> None:
     assert ("OFFBOARD", "armed") in modes
     assert modes[-1][1] == "not armed"
     (rate,) = re.findall(r"ATTITUDE_QUATERNION +\d+ +([\d.]+) Hz", said)
-    assert float(rate) == pytest.approx(250.0, abs=1.0)
+    assert float(rate) == pytest.approx(LOOP_HZ, abs=1.0)
 
 
 def test_the_flight_is_plotted(flown: Path) -> None:

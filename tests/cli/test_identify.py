@@ -50,7 +50,7 @@ def config_for(folder, endpoint, **changes):
 def flown(tmp_path_factory):
     """A folder with a configuration and one flight of `identify`, and what that printed."""
     folder = tmp_path_factory.mktemp("identify")
-    with mock_vehicle(folder, full_rate=True, seed=2) as mock:
+    with mock_vehicle(folder, seed=2) as mock:
         config = config_for(folder, f"udpin://127.0.0.1:{mock.port}")
         arguments = "identify", "--config", config, "--json"
         program = Program("companion.cli.main", *arguments, environment={"COLUMNS": "80"})

@@ -5,11 +5,14 @@ And standard output that is closed, full, or not read to its end.
 
 import json
 import os
+import re
 import subprocess
 import sys
+from itertools import product
 
 import pytest
 
+from companion.cli.main import main
 from companion.files.ascii_text import ascii_for
 from companion.mavlink.transport.free_port import free_port
 from tests.cli.test_demo import quick_demo
@@ -20,41 +23,51 @@ C_LOCALE = {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}
 
 
 def companion(folder, environment, *arguments):
-    return subprocess.run(
+    """A command as users start it; its exit code, and its output with its errors."""
+    done = subprocess.run(
         [sys.executable, "-m", "companion", *arguments],
         cwd=folder,
         env={**os.environ, **environment},
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         check=False,
     )
+    return done.returncode, done.stdout
 
 
 IN_ONE_PROCESS = """
 import sys
+from glob import glob
 from companion.cli.main import main
-codes, commands = [], " ".join(sys.argv[1:]).split(" ; ")
-for command in commands:
-    sys.argv[1:] = command.split()
-    codes.append(main())
-print(codes)
+for command in " ".join(sys.argv[1:]).split(" ; "):
+    sys.argv[1:] = [path for word in command.split() for path in glob(word) or [word]]
+    print(f"\\nend {main()}", flush=True)
 """
 
 
 def in_one_process(folder, environment, *commands):
-    """Like `companion`, several commands one after another: their imports cost more than they."""
+    """Like `companion`, several commands one after another: their imports cost more than they.
+
+    Returns:
+        the exit code and the output of each, standard output and error as a terminal shows them.
+    """
     words = " ; ".join(map(" ".join, commands)).split()
-    return subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", IN_ONE_PROCESS, *words],
         cwd=folder,
         env={**os.environ, **environment},
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         check=False,
     )
+    assert done.returncode == 0, done.stdout
+    outputs = re.split(rb"\nend (\d)\n", done.stdout)[:-1]
+    return [(int(code), out) for out, code in zip(outputs[::2], outputs[1::2], strict=True)]
 
 
 def assert_said(done, code, *words):
-    out = done.stdout + done.stderr
-    assert done.returncode == code, out
+    returned, out = done
+    assert returned == code, out
     for sign in (b"internal error", b"Traceback", b"codec"):
         assert sign not in out
     for word in words:
@@ -92,24 +105,40 @@ def test_no_character_is_written_as_one_that_would_break_json():
     ],
 )
 def test_a_good_flight_is_good_on_any_terminal(tmp_path, environment):
-    options = ("--config", quick_demo(tmp_path), "--lockstep", "--maneuvers", "steps")
-    done = companion(tmp_path, environment, "demo", *options)
-    assert_said(done, 0, b"The flight was good", b"open loop", b"landing")
-    assert b"Recorded in" in done.stdout  # to the very end
+    flight = f"demo --config {quick_demo(tmp_path)} --lockstep --maneuvers steps"
+    done, told = in_one_process(
+        tmp_path, environment, flight.split(), ("identify", "--log", "flights/2*")
+    )
+    assert_said(done, 0, b"The flight was good", b"open loop", b"landing", b"Recorded in")
     if environment is not LATIN:
-        assert done.stdout.isascii()
-        assert b" deg tilted" in done.stdout
-        assert b"?" not in done.stdout
-    (log,) = (path for path in (tmp_path / "flights").iterdir() if path.is_dir())
-    told = companion(tmp_path, environment, "identify", "--log", log)
+        assert done[1].isascii()
+        assert b" deg tilted" in done[1]
+        assert b"?" not in done[1]
     assert_said(told, 0, b"Response to body rates", b"vehicle.yaml")
 
 
-def test_refusals_are_told_on_any_terminal(tmp_path):
-    (tmp_path / "wrong.yaml").write_text("limits: {max_tilt_deg: 200}\nlink: {größe: °}\n")
-    refused = companion(tmp_path, ASCII, "check-config", "wrong.yaml")
-    assert_said(refused, 2, b"max_tilt_deg", b"gro")
-    assert_said(companion(tmp_path, {}, "check-config", b"\xff\xc3.yaml"), 2, b"cannot read")
+@pytest.fixture(scope="module")
+def on_ascii(tmp_path_factory):
+    """What the commands say on an ASCII terminal: a refusal, help, and the doctor's word."""
+    folder = tmp_path_factory.mktemp("ascii")
+    (folder / "wrong.yaml").write_text("limits: {max_tilt_deg: 200}\nlink: {größe: °}\n")
+    (folder / "nobody.yaml").write_text(
+        f"link: {{endpoint: 'udpin://127.0.0.1:{free_port()}'}}\n"
+        "flight: {connect_timeout_s: 0.2}\n"
+    )
+    return in_one_process(
+        folder,
+        ASCII,
+        ("check-config", "wrong.yaml"),
+        ("doctor", "--config", "nobody.yaml", "--wait", "0.1"),
+    )
+
+
+def test_refusals_are_told_on_any_terminal(on_ascii, tmp_path, monkeypatch, capsys):
+    assert_said(on_ascii[0], 2, b"max_tilt_deg", b"gro")
+    monkeypatch.chdir(tmp_path)
+    code = main(["check-config", os.fsdecode(b"\xff\xc3.yaml")])
+    assert_said((code, capsys.readouterr().err.encode()), 2, b"cannot read")
 
 
 @pytest.mark.parametrize("environment", [ASCII, C_LOCALE, {**C_LOCALE, **ASCII}])
@@ -122,60 +151,124 @@ def test_files_whose_names_are_not_ascii_are_found_in_any_locale(tmp_path, envir
         "include: grün.yaml\nflight: {maneuvers: [trajectory], trajectory: höhe.yaml}\n",
         encoding="utf-8",
     )
-    done = in_one_process(
+    found, shown, missing, schema = in_one_process(
         tmp_path,
         environment,
         ("check-config", "flüge/übung.yaml"),
         ("config", "flüge/übung.yaml", "--get", "limits.max_tilt_deg"),
         ("check-config", "nö.yaml"),
+        ("config", "--schema"),
     )
-    assert_said(done, 0, b"bung.yaml: ok", b"max_tilt_deg: 21", b"cannot read it", b"[0, 0, 2]")
-    assert done.stdout.isascii()
-
-
-def test_help_and_the_schema_are_told_on_any_terminal(tmp_path):
-    assert_said(companion(tmp_path, ASCII, "identify", "--help"), 0, b"of tilt")
-    schema = companion(tmp_path, C_LOCALE, "config", "--schema")
+    assert_said(found, 0, b"bung.yaml: ok")
+    assert_said(shown, 0, b"max_tilt_deg: 21")
+    assert_said(missing, 2, b"cannot read it")
+    assert all(out.isascii() for _, out in (found, shown, missing))
     assert_said(schema, 0)
-    json.loads(schema.stdout)
+    json.loads(schema[1])
 
 
-def test_the_doctor_is_told_on_any_terminal(tmp_path):
-    (tmp_path / "nobody.yaml").write_text(
-        f"link: {{endpoint: 'udpin://127.0.0.1:{free_port()}'}}\n"
-        "flight: {connect_timeout_s: 0.2}\n"
-    )
-    done = companion(tmp_path, ASCII, "doctor", "--config", "nobody.yaml", "--wait", "0.1")
-    assert_said(done, 1, b"no heartbeat", b"Source: HEARTBEAT")
+def test_help_is_told_on_any_terminal(tmp_path):
+    assert_said(companion(tmp_path, ASCII, "identify", "--help"), 0, b"of tilt")
+
+
+def test_the_doctor_is_told_on_any_terminal(on_ascii):
+    assert_said(on_ascii[1], 1, b"no heartbeat", b"Source: HEARTBEAT")
 
 
 FULL = "companion: standard output cannot be written: No space left on device\n"
+OUTPUTS = {">&-": "", ">/dev/full": FULL, "| true": ""}
+"""What a shell does with standard output, and what is said of it."""
+COMMANDS = "config", "check-config c.yaml"
+"""Long and short: a long output fails while it is printed, a short one at the end."""
+
+FORKS = """
+import gc, io, json, os, sys
+import companion.cli.run, companion.cli.config
+from companion.cli.main import main
+
+gc.freeze()  # the end of a process would look for garbage among all that is imported
+
+def redirect(output, unbuffered):
+    if output == ">&-":
+        os.close(1)
+        sys.stdout = sys.__stdout__ = None
+        return
+    if output == "| true":
+        reader, writer = os.pipe()
+        os.close(reader)
+    else:
+        writer = os.open("/dev/full", os.O_WRONLY)
+    os.dup2(writer, 1)
+    raw = io.FileIO(1, "w", closefd=False)
+    raw.name = "<stdout>"
+    stream = raw if unbuffered else io.BufferedWriter(raw)
+    sys.stdout = sys.__stdout__ = io.TextIOWrapper(stream, write_through=unbuffered)
+
+results = []
+for number, (command, output, unbuffered) in enumerate(json.loads(sys.argv[1])):
+    process = os.fork()
+    if process == 0:
+        os.dup2(os.open(f"{number}.txt", os.O_WRONLY | os.O_CREAT), 2)
+        redirect(output, bool(unbuffered))
+        sys.argv[1:] = command.split()
+        sys.exit(main())
+    results.append(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+print(json.dumps(results))
+"""
+
+
+@pytest.fixture(scope="module")
+def without_output(tmp_path_factory):
+    """The exit code and the errors of each command whose output cannot be written.
+
+    Each ends as a program does, in a process of its own, forked from one that has imported them.
+    """
+    folder = tmp_path_factory.mktemp("output")
+    (folder / "c.yaml").write_text("limits: {max_tilt_deg: 20}\n")
+    cases = list(product(COMMANDS, OUTPUTS, ["", "1"]))
+    done = subprocess.run(
+        [sys.executable, "-c", FORKS, json.dumps(cases)],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    errors = [(folder / f"{number}.txt").read_text() for number in range(len(cases))]
+    return dict(zip(cases, zip(json.loads(done.stdout), errors, strict=True), strict=True))
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("command", ["config", "check-config c.yaml", "--version"])
-@pytest.mark.parametrize(("output", "words"), [(">&-", ""), (">/dev/full", FULL), ("| true", "")])
-def test_output_that_cannot_be_written_is_no_traceback(
-    tmp_path, command, output, words, unbuffered
-):
-    (tmp_path / "c.yaml").write_text("limits: {max_tilt_deg: 20}\n")
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_output_that_cannot_be_written_is_no_traceback(without_output, command, output, unbuffered):
+    code, errors = without_output[command, output, unbuffered]
+    assert_no_traceback(errors)
+    words = OUTPUTS[output]
+    assert words in errors
+    assert errors.count("No space left on device") == bool(words), "it is told once"
+    if output != "| true":
+        assert code == (1 if words else 0)
+
+
+def assert_no_traceback(errors):
+    for sign in ("internal error", "Traceback", "Exception ignored", "Errno"):
+        assert sign not in errors
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("output", OUTPUTS)
+def test_a_version_that_cannot_be_written_is_no_traceback(output, unbuffered):
+    """It is printed by argparse, which goes on without an output."""
     done = subprocess.run(
-        f"{sys.executable} -m companion {command} {output}",
+        f"{sys.executable} -m companion --version {output}",
         shell=True,
-        cwd=tmp_path,
         env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
         capture_output=True,
         text=True,
         check=False,
     )
-    for sign in ("internal error", "Traceback", "Exception ignored", "Errno"):
-        assert sign not in done.stderr
-    if command == "--version":  # printed by argparse, which goes on without an output
-        return
-    assert words in done.stderr
-    assert done.stderr.count("No space left on device") == bool(words), "it is told once"
-    if output != "| true":  # that is the code of `true`
-        assert done.returncode == (1 if words else 0)
+    assert_no_traceback(done.stderr)
 
 
 @pytest.mark.slow
@@ -183,4 +276,4 @@ def test_output_that_cannot_be_written_is_no_traceback(
 def test_figures_are_told_on_any_terminal(tmp_path, command):
     done = companion(tmp_path, ASCII, *command)
     assert_said(done, 0)
-    assert done.stdout.isascii()
+    assert done[1].isascii()

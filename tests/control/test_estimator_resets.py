@@ -4,13 +4,13 @@ from math import atan2, cos, radians, sin
 
 import numpy as np
 import pytest
-from pymavlink import mavutil
 from scipy.spatial.transform import Rotation
 
 from companion.attitude import BodyRates, Target, coefficients, heading
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.heading_frame import HeadingFrame
 from companion.vehicle.records import AttitudeSample, LocalPosition
+from tests.flight import tlog
 from tests.flight.fly import fly, mock_vehicle
 
 
@@ -143,10 +143,8 @@ def test_a_jump_in_position_is_20_cm_and_what_a_change_of_acceleration_explains(
 
 def flown(summary):
     """Positions (s, m NED) and headings (s, rad), as the autopilot estimated them."""
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
     positions, headings = [], []
-    names = ["LOCAL_POSITION_NED", "ATTITUDE_QUATERNION"]
-    for m in iter(lambda: log.recv_match(type=names), None):
+    for m in tlog.messages(summary, "LOCAL_POSITION_NED", "ATTITUDE_QUATERNION"):
         if m.get_type() == "LOCAL_POSITION_NED":
             positions.append((m.time_boot_ms / 1e3, m.x, m.y, m.z))
         else:

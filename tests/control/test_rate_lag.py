@@ -1,5 +1,6 @@
 """Body rates behind a low pass: their lag is learned, and no heading is corrected because of it."""
 
+from functools import cache
 from math import cos, degrees, radians, sin
 
 import numpy as np
@@ -11,23 +12,38 @@ from companion.control.estimator_resets import EstimatorResets
 from companion.control.rate_lag import RateLag
 from companion.vehicle.records import AttitudeSample
 
+FINE = 0.0005
+"""Step of the integrated attitude, s."""
+
+
+def rates_at(time):
+    """Body rates of the tumble, rad/s."""
+    return np.array([2.0 * sin(9.0 * time), 2.0 * cos(7.0 * time), sin(3.0 * time)])
+
+
+@cache
+def tumble(seconds):
+    """Time and attitude of each fine step."""
+    time, rotation, way = 0.0, Rotation.identity(), []
+    while time < seconds + 0.01:  # the last sample may come later
+        rotation *= Rotation.from_rotvec(FINE * rates_at(time + 0.5 * FINE))
+        time += FINE
+        way.append((time, rotation))
+    return way
+
 
 def tumbled(lag, *, steps=(0.004, 0.008), seconds=4.0, noise=0.0, correction_deg_s=0.0):
     """The resets after a tumble whose rates are late; the attitude is integrated at 2000 Hz."""
-    resets, rotation, random = EstimatorResets(), Rotation.identity(), np.random.default_rng(1)
-    fine, time, turn, history = 0.0005, 0.0, 0.0, []
-
-    def rates(at):
-        return np.array([2.0 * sin(9.0 * at), 2.0 * cos(7.0 * at), sin(3.0 * at)])
-
+    resets, random = EstimatorResets(), np.random.default_rng(1)
+    way = iter(tumble(seconds))
+    time, turn, history = 0.0, 0.0, []
     while time < seconds:
         step = steps[len(history) % len(steps)]
-        for _ in range(round(step / fine)):
-            rotation *= Rotation.from_rotvec(fine * rates(time + 0.5 * fine))
-            time += fine
+        for _ in range(round(step / FINE)):
+            time, rotation = next(way)
         turn += radians(correction_deg_s) * step
         x, y, z, w = (Rotation.from_euler("z", turn) * rotation).as_quat()
-        told = BodyRates(*(rates(time - lag) + random.normal(0.0, noise, 3)))
+        told = BodyRates(*(rates_at(time - lag) + random.normal(0.0, noise, 3)))
         resets.on_attitude(AttitudeSample(0, time, time, 0, (w, x, y, z), told))
         history.append(degrees(resets.heading_corrections))
     return resets, history

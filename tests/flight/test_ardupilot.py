@@ -2,9 +2,9 @@
 
 import pytest
 import yaml
-from pymavlink import mavutil
 
 from companion.mavlink.commands import CommandClient
+from tests.flight import tlog
 from tests.flight.fly import CONFIGS, fly, mock_vehicle
 from tests.flight.others import When
 
@@ -13,8 +13,8 @@ MANEUVERS = {
     **VEHICLE,
     "flight": {"maneuvers": ["hover", "steps", "circle"]},
     "hover": {"duration_s": 1.0},
-    "steps": {"settle_s": 1.5},
-    "circle": {"radius_m": 2.0},
+    "steps": {"duration_s": 0.8, "settle_s": 1.5},
+    "circle": {"radius_m": 1.5},
 }
 IN_AIR = 2
 GUIDED, BRAKE = 4, 17
@@ -22,14 +22,9 @@ ARM, SET_MODE, TAKE_OFF = (400, 1.0), (176, 1.0), (22, 0.0)
 REQUESTS = {511, 512}
 
 
-def recorded(summary, *names):
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    return list(iter(lambda: log.recv_match(type=list(names)), None))
-
-
 def commands(summary):
     """(command, first parameter) of all that we commanded, requests for telemetry left out."""
-    sent = recorded(summary, "COMMAND_LONG")
+    sent = tlog.messages(summary, "COMMAND_LONG")
     return [(m.command, m.param1) for m in sent if m.command not in REQUESTS]
 
 
@@ -50,14 +45,14 @@ def test_the_maneuver_is_flown_and_the_vehicle_lands(flown):
     assert flown.events[-1][1] == "disarmed"
     assert any("last rates for 1 s (GUID_TIMEOUT)" in text for _, text in flown.events)
     assert commands(flown) == [SET_MODE, ARM, TAKE_OFF, SET_MODE, SET_MODE]
-    assert flown.counts.setpoints == flown.counts.samples > 6000
+    assert flown.counts.setpoints == flown.counts.samples > 4500
 
 
 def test_no_setpoint_leaves_before_the_take_off_is_over_nor_after_the_hand_back(flown):
     """The first one would end the climb; and it must not be an idle one of the ground."""
     landed, setpoints, told = None, [], ("SET_ATTITUDE_TARGET", "EXTENDED_SYS_STATE", "HEARTBEAT")
     mode = None
-    for message in recorded(flown, *told):
+    for message in tlog.messages(flown, *told):
         if message.get_type() == "EXTENDED_SYS_STATE":
             landed = message.landed_state
         elif message.get_type() == "SET_ATTITUDE_TARGET":
@@ -132,7 +127,7 @@ def test_a_take_off_whose_answer_was_lost_is_not_repeated_once_it_flies(monkeypa
     monkeypatch.setattr(CommandClient, "_on_ack", hear)
     monkeypatch.setattr(CommandClient, "send", send)
     with mock_vehicle(autopilot="ardupilot") as mock:
-        summary = fly(mock)
+        summary = fly(mock, hover={"duration_s": 0.5})
     assert acks == [0]  # MAV_RESULT: accepted
     assert summary.result == "ok", summary.events
 

@@ -4,7 +4,6 @@ import asyncio
 from math import inf
 
 import pytest
-from pymavlink import mavutil
 
 from companion.control.guidance_loop import GuidanceLoop
 from companion.flight import control_phases, takeoff
@@ -18,9 +17,11 @@ from companion.vehicle.link import Link
 from companion.vehicle.px4.autopilot import Px4
 from companion.vehicle.records import LandedState
 from companion.vehicle.state import VehicleState
+from tests.flight import tlog
 from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
 
+SHORT = {"hover": {"duration_s": 0.5}}
 HOLD_ASKED = (
     "the vehicle is disarmed in OFFBOARD, in which it cannot be armed again: asking the autopilot "
     "to hold"
@@ -51,7 +52,7 @@ def interrupted(mock, folder, phase, ask_landing=None, after=0.0):
 
 def test_interrupted_in_flight_and_told_to_land_it_lands():
     with mock_vehicle() as mock:
-        summary, observer = interrupted(mock, None, "maneuvers", accept, after=2.0)
+        summary, observer = interrupted(mock, None, "maneuvers", accept, after=0.5)
         state = mock.state()
     assert summary.result == "interrupted by the user"
     assert observer.phases[-4:] == ["maneuvers", "hand back", "land", "disarm"]
@@ -60,7 +61,7 @@ def test_interrupted_in_flight_and_told_to_land_it_lands():
 
 def test_interrupted_and_not_told_to_land_it_holds():
     with mock_vehicle() as mock:
-        summary, observer = interrupted(mock, None, "maneuvers", after=2.0)
+        summary, observer = interrupted(mock, None, "maneuvers", after=0.5)
         state = mock.state()
     assert observer.phases[-1] == "hand back"
     assert (state["armed"], state["mode"]) == (True, "LOITER")
@@ -78,8 +79,7 @@ def test_interrupted_on_the_ground_it_never_arms(phase):
 
 def commands(summary):
     """(time, command, first parameter) of each command that we sent."""
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    found = iter(lambda: log.recv_match(type=["COMMAND_LONG"]), None)
+    found = tlog.messages(summary, "COMMAND_LONG")
     return [(m._timestamp, m.command, m.param1) for m in found if m.get_srcComponent() == 191]
 
 
@@ -105,7 +105,7 @@ def test_interrupted_once_armed_it_disarms(tmp_path):
 
 
 def test_interrupted_in_an_emergency_landing_it_goes_on_landing():
-    fault = {"kind": "low_battery", "remaining": 0.15, "after_offboard_s": 3.0}
+    fault = {"kind": "low_battery", "remaining": 0.15, "after_offboard_s": 1.5}
     with mock_vehicle(faults=[fault]) as mock:
         summary, observer = interrupted(mock, None, "land", after=0.0)
         state = mock.state()
@@ -165,9 +165,8 @@ def test_a_false_landing_in_control_is_not_made_true(tmp_path):
         summary = run(mock, session.fly())
         assert not mock.state()["crashed"]
     assert summary.result == "the autopilot says that it has landed"
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
     took_over = next(at for at, text in summary.events if text == "mode OFFBOARD")
-    setpoints = iter(lambda: log.recv_match(type=["SET_ATTITUDE_TARGET"]), None)
+    setpoints = tlog.messages(summary, "SET_ATTITUDE_TARGET")
     assert min(m.thrust for m in setpoints if m._timestamp > took_over) > 0.3
 
 
@@ -324,7 +323,7 @@ def test_a_landing_is_not_repeated_over_a_pilot(tmp_path, monkeypatch):
 
     with mock_vehicle(tmp_path) as mock:
         LostAnswer(monkeypatch, LAND, take)
-        summary = fly(mock, tmp_path / "log")
+        summary = fly(mock, tmp_path / "log", **SHORT)
         assert mock.state()["mode"] == "POSCTL"
     assert [command for _, command, _ in commands(summary)].count(LAND) == 1
     assert "took over: mode POSCTL" in summary.result
@@ -333,7 +332,7 @@ def test_a_landing_is_not_repeated_over_a_pilot(tmp_path, monkeypatch):
 def test_a_pilot_who_keeps_it_armed_after_our_landing_is_not_disarmed(tmp_path):
     with mock_vehicle(tmp_path, parameters={"COM_DISARM_LAND": -1.0}) as mock:
         observer = When("disarm", lambda: mock.take_over("STABILIZED"), after=1.0)
-        summary = fly(mock, tmp_path / "log", observer)
+        summary = fly(mock, tmp_path / "log", observer, **SHORT)
         state = mock.state()
     assert "took over: mode STABILIZED" in summary.result
     assert (state["mode"], state["armed"]) == ("STABILIZED", True)
@@ -385,7 +384,7 @@ def test_a_pilots_mode_just_before_the_end_is_seen_before_the_hand_back(monkeypa
 
     monkeypatch.setattr(control_phases, "hand_over_to_hold", taking)
     with mock_vehicle() as mock:
-        summary = fly(mock)
+        summary = fly(mock, **SHORT)
         assert mock.state()["mode"] == "POSCTL"
     assert "took over: mode POSCTL" in summary.result
 
@@ -412,7 +411,7 @@ def test_a_link_that_is_always_late_is_refused_before_takeoff():
 def test_without_being_told_to_it_waits_for_the_pilot_to_arm():
     with mock_vehicle() as mock:
         observer = When("arm", lambda: mock.command(ARM, 1), after=3.0)
-        summary = fly(mock, None, observer, flight={"arm": False})
+        summary = fly(mock, None, observer, flight={"arm": False}, **SHORT)
     assert summary.result == "ok", summary.events
     assert next(at for at, text in summary.events if text == "armed") > 5.0
 
@@ -491,7 +490,7 @@ def test_an_autopilot_that_gives_no_heartbeat_on_demand_is_waited_for(monkeypatc
 
     monkeypatch.setattr(Link, "command", refuse)
     with mock_vehicle() as mock:
-        summary = fly(mock)
+        summary = fly(mock, **SHORT)
         assert not mock.state()["crashed"]
     assert summary.result == "ok", summary.events
 
@@ -542,5 +541,5 @@ def test_an_error_at_every_sample_does_not_stop_the_landing(monkeypatch):
 def test_the_vehicle_is_armed_in_a_mode_of_ours():
     """With the sticks in POSCTL before the checks, as a transmitter leaves it."""
     with mock_vehicle(faults=[{"kind": "pilot_takeover", "at_s": 0.1}]) as mock:
-        summary = fly(mock, hover={"duration_s": 1.0})
+        summary = fly(mock, **SHORT)
     assert summary.result == "ok", summary.events

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from pymavlink import mavutil
 
 from companion.config.files import load
 from companion.config.vehicle import AxisKeys
@@ -13,6 +12,7 @@ from companion.flight.dead_time_watch import DeadTimeWatch
 from companion.recording.flight_record import read_flight
 from companion.recording.measurements.recorded_summary import trace_of
 from companion.recording.trace import FlightTrace
+from tests.flight import tlog
 from tests.flight.fly import fly, mock_vehicle
 from tests.identification.vehicles import RATE_NOISE, lag_with_dead_time
 
@@ -202,9 +202,8 @@ def test_a_flight_measures_what_is_configured_and_keeps_its_rates(tmp_path):
     assert (told["roll"], told["pitch"]) == pytest.approx((0.04, 0.04), abs=0.004)
     assert told["yaw"] == pytest.approx(0.102, rel=0.2)
     assert warnings(summary) == []
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
     asked = {}
-    while (message := log.recv_match(type="SET_ATTITUDE_TARGET")) is not None:
+    for message in tlog.messages(summary, "SET_ATTITUDE_TARGET"):
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
         asked[message.time_boot_ms] = (*rates, message.thrust)
     rows = trace_of(read_flight(summary.log)).rates.rows()

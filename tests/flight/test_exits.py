@@ -16,12 +16,11 @@ from typing import NamedTuple
 
 import pytest
 import yaml
-from pymavlink import mavutil
 
 from companion.cli.signals import HOW_TO_LEAVE, SECOND_CTRL_C_AFTER
 from companion.control.guidance_loop import GuidanceLoop
 from tests.flight import fly as memory
-from tests.flight import sockets
+from tests.flight import sockets, tlog
 from tests.flight.fly import OTHER_VEHICLES, QUICK_FLIGHT, merged
 from tests.flight.others import When
 from tests.flight.programs import Program
@@ -133,7 +132,7 @@ def test_other_signals_hand_back_too(tmp_path, ways, number):
 def test_a_terminal_that_goes_away_does_not_end_the_flight(tmp_path):
     """As `companion fly | head -1`: nobody reads any more, and every line fails."""
     with PX4.mock(tmp_path) as mock:
-        short = {"hover": {"duration_s": 3.0}, "recording": PAGE}
+        short = {"hover": {"duration_s": 0.5}, "recording": PAGE}
         process = start(mock, tmp_path, "--lockstep", as_users_do=True, **short)
         process.stderr.close()
         out = process.stdout.read()
@@ -341,5 +340,4 @@ def test_interrupted_in_full_tilt_it_streams_until_the_autopilot_holds(tmp_path)
 
 
 def setpoints(summary):
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    return list(iter(lambda: log.recv_match(type=["SET_ATTITUDE_TARGET"]), None))
+    return list(tlog.messages(summary, "SET_ATTITUDE_TARGET"))

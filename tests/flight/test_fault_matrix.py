@@ -89,7 +89,9 @@ def cells():
                 expected = ELSE.get((autopilot, phase, name), end.strip("*+"))
                 label = f"{autopilot}-{name}-{phase}"
                 marks = () if always else (pytest.mark.slow,)
-                yield pytest.param(autopilot, fault, phase, expected, marks=marks, id=label)
+                # Those that are flown always end alike at 100 Hz; of the others some do not.
+                case = autopilot, fault, phase, expected, not always
+                yield pytest.param(*case, marks=marks, id=label)
 
 
 class Begin(SilentObserver):
@@ -133,9 +135,9 @@ def excess(state):
     }
 
 
-@pytest.mark.parametrize(("autopilot", "fault", "phase", "end"), list(cells()))
-def test_a_fault_in_a_phase_ends_as_documented(autopilot, fault, phase, end):
-    with mock_vehicle(autopilot=autopilot, full_rate=True, in_lockstep=True) as mock:
+@pytest.mark.parametrize(("autopilot", "fault", "phase", "end", "full_rate"), list(cells()))
+def test_a_fault_in_a_phase_ends_as_documented(autopilot, fault, phase, end, full_rate):
+    with mock_vehicle(autopilot=autopilot, full_rate=full_rate, in_lockstep=True) as mock:
         observer = Begin(mock, fault, phase)
         summary = fly(mock, None, observer, **SHORT)
         assert observer.wanted is None, summary.events

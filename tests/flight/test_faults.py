@@ -1,19 +1,17 @@
 """Every fault, in flight: a stated reason, the autopilot in charge, no setpoint out of turn."""
 
 import pytest
-from pymavlink import mavutil
 
+from tests.flight import tlog
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 
-CONTROL = {"after_offboard_s": 3.0}
+CONTROL = {"after_offboard_s": 2.0}
 HANDED_BACK = {"LOITER", "LAND", "RTL"}
 
 
 def setpoint_times(summary):
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    messages = iter(lambda: log.recv_match(type=["SET_ATTITUDE_TARGET"]), None)
-    return [message._timestamp for message in messages]
+    return [message._timestamp for message in tlog.messages(summary, "SET_ATTITUDE_TARGET")]
 
 
 FAULTS = [
@@ -118,7 +116,7 @@ def test_a_fault_in_flight_ends_in_its_stated_way(tmp_path, fault, words, modes,
             since_control.add(mock.state()["mode"])
 
         observer = When("maneuvers", lambda: mock.after_step.append(note_mode))
-        summary = fly(mock, tmp_path / "log", observer, hover={"duration_s": 5.0})
+        summary = fly(mock, tmp_path / "log", observer, hover={"duration_s": 4.0})
         assert words in summary.result, summary.events
         assert summary.phase == "maneuvers"
         # Where nothing is heard nothing is commanded: the autopilot's own failsafe comes by itself.
@@ -126,7 +124,7 @@ def test_a_fault_in_flight_ends_in_its_stated_way(tmp_path, fault, words, modes,
         assert not state["crashed"]
     times = setpoint_times(summary)
     began = next(at for at, text in summary.events if text == "mode OFFBOARD")
-    struck = began + 3.0  # at the latest: the mode was told up to 0.1 s after it was entered
+    struck = began + 2.0  # at the latest: the mode was told up to 0.1 s after it was entered
     assert times[-1] <= struck + latest + 0.02
 
 

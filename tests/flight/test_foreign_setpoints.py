@@ -68,7 +68,8 @@ def test_one_setpoint_in_seconds_is_told_once_and_flown_on():
             loop.call_later(AFTER_OURS_S, mock.transmit, other, OTHER_PROGRAM)
             mock.at(mock.time + 5.5, send)
 
-        summary = fly(mock, None, When("maneuvers", send, after=1.0), **HOVER)
+        hover = {"duration_s": 7.5}  # two of them
+        summary = fly(mock, None, When("maneuvers", send, after=1.0), hover=hover)
     assert summary.result == "ok", summary.events
     (told,) = [text for _, text in summary.events if "rare setpoint" in text]
     assert "may send setpoints to the vehicle now and then" in told
@@ -94,9 +95,13 @@ def test_a_failsafe_that_a_station_makes_unsafe_in_flight_is_told(autopilot, nam
     changed = dialect.MAVLink_param_set_message(1, 1, name, 10.0, 9)
     harmless = dialect.MAVLink_param_set_message(1, 1, name, 0.9, 9)
     with mock_vehicle(autopilot=autopilot) as mock:
-        mock.at(13.0, lambda: mock.transmit(harmless))
-        change = When("maneuvers", lambda: mock.transmit(changed), after=3.0)
-        summary = fly(mock, None, change, **HOVER)
+
+        def change():
+            for after, message in ((0.0, harmless), (1.0, changed), (2.0, harmless)):
+                mock.at(mock.time + after, lambda message=message: mock.transmit(message))
+
+        begin = When("maneuvers", change, after=0.5)
+        summary = fly(mock, None, begin, hover={"duration_s": 4.0})
     assert summary.result == "ok", summary.events
     (told,) = [text for _, text in summary.events if "set a parameter" in text]
     assert "to an unsafe value in flight" in told

@@ -68,7 +68,7 @@ def test_a_simulated_vehicle_at_perfect_rest_is_not_frozen(autopilot):
     noises = ("attitude_noise_deg", "rate_noise_rad_s", "position_noise_m", "velocity_noise_m_s")
     quiet = {**dict.fromkeys(noises, 0.0), "ekf": "none"}
     with mock_vehicle(autopilot=autopilot, sensors=quiet) as mock:
-        summary = fly(mock, hover={"duration_s": 20.0})
+        summary = fly(mock, hover={"duration_s": 8.0})
     assert summary.result == "ok", summary.events
 
 

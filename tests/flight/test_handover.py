@@ -21,7 +21,7 @@ HELD = ("LOITER", "BRAKE")
 def handed_over(autopilot, **flight):
     """The configuration of a flight that begins in the air."""
     keys = {"take_over": True, "arm": False, "takeoff_height_m": HEIGHT, **flight}
-    return quick_flight(autopilot, {"flight": keys})
+    return quick_flight(autopilot, {"flight": keys, "hover": {"duration_s": 1.0}})
 
 
 def hold(mock):
@@ -37,7 +37,9 @@ def obeyed(mock):
 @BOTH
 def test_a_vehicle_that_its_pilot_holds_is_taken_over_flown_and_given_back(autopilot):
     mock = in_the_air(autopilot)
-    summary = testing.fly(handed_over(autopilot, maneuvers=["hover", "circle"]), mock)
+    changes = {"circle": {"radius_m": 1.5}}
+    config = changed(handed_over(autopilot, maneuvers=["hover", "circle"]), changes, "test")
+    summary = testing.fly(config, mock)
     state = mock.state()
     assert summary.result == "ok", summary.events
     assert [part.name for part in summary.maneuvers()] == ["hover", "circle"]
@@ -93,7 +95,7 @@ def test_a_vehicle_held_too_low_is_not_taken_over(autopilot):
 @BOTH
 def test_the_pilot_takes_it_back_at_any_time(autopilot):
     mock = in_the_air(autopilot)
-    mock.when(lambda: obeyed(mock), lambda: mock.at(mock.time + 2.0, mock.take_over))
+    mock.when(lambda: obeyed(mock), lambda: mock.at(mock.time + 1.5, mock.take_over))
     summary = testing.fly(handed_over(autopilot), mock)
     assert "the pilot or another station took over" in summary.result
     mode, count = mock.state()["mode"], len(mock.setpoints)

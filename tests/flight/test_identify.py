@@ -5,7 +5,6 @@ The judge is the mock's own physics, excited apart from any flight and fitted by
 
 import numpy as np
 import pytest
-from pymavlink import mavutil
 from scipy.optimize import least_squares
 
 from companion.guidance.reference import GRAVITY
@@ -14,6 +13,7 @@ from companion.vehicle.flight_log import read_flight_log
 from sitl_mock.config.airframe import AirframeConfig
 from sitl_mock.config.rate_loop import RateLoopConfig
 from sitl_mock.physics.multirotor import Multirotor
+from tests.flight import tlog
 from tests.flight.fly import fly, mock_vehicle
 
 SENSOR_DELAY = 0.005
@@ -146,9 +146,8 @@ def test_the_thrust_map_is_found_and_learning_the_hover_thrust_is_not_disturbed(
 
 
 def test_no_doublet_tilts_it_far(px4):
-    log = mavutil.mavlink_connection(str(px4[0].log / "flight.tlog"))
     tilts = []
-    while (message := log.recv_match(type="ATTITUDE_QUATERNION")) is not None:
+    for message in tlog.messages(px4[0], "ATTITUDE_QUATERNION"):
         cosine = 1.0 - 2.0 * (message.q2**2 + message.q3**2)
         tilts.append(np.degrees(np.arccos(min(cosine, 1.0))))
     assert 10.0 < max(tilts) < 20.0
@@ -226,10 +225,7 @@ def test_silence_in_a_doublet_ends_setpoints_at_once(tmp_path):
         summary = fly(mock, tmp_path / "log", flight={"maneuvers": ["identify"]})
         assert "no attitude from the vehicle" in summary.result
         assert not mock.state()["crashed"]
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    last = None
-    while (message := log.recv_match(type="SET_ATTITUDE_TARGET")) is not None:
-        last = message
+    *_, last = tlog.messages(summary, "SET_ATTITUDE_TARGET")
     assert abs(last.body_roll_rate) == pytest.approx(np.radians(30.0), rel=1e-6)
     struck = next(at for at, text in summary.events if text == "mode OFFBOARD") + 2.7
     assert last._timestamp <= struck + 0.02

@@ -62,10 +62,10 @@ def moments(speed):
     return (0.5 * speed, *(speed + (0.5 + later) * lap for later in LATER))
 
 
-def carried(autopilot, speed, held, after):
+def carried(autopilot, speed, held, after, *, full_rate):
     """One flight whose setpoints end `after` s of its circle; PX4 is set to hold afterwards."""
     settings = {HELD[autopilot]: held, **({"COM_OBL_RC_ACT": 5} if autopilot == "px4" else {})}
-    with mock_vehicle(autopilot=autopilot, full_rate=True, parameters=settings) as mock:
+    with mock_vehicle(autopilot=autopilot, full_rate=full_rate, parameters=settings) as mock:
         session = None
 
         def end():
@@ -97,7 +97,7 @@ def carried(autopilot, speed, held, after):
 def worst(autopilot, speed, held, *, all_of_them):
     """The largest in each direction over the moments."""
     chosen = moments(speed) if all_of_them else moments(speed)[1:2]
-    flights = [carried(autopilot, speed, held, after) for after in chosen]
+    flights = [carried(autopilot, speed, held, after, full_rate=all_of_them) for after in chosen]
     return Carried(*map(max, zip(*flights, strict=True)))
 
 

@@ -30,7 +30,7 @@ def test_after_a_failsafe_landing_the_next_flight_begins():
         assert "nothing is commanded" in first.events[-1][1]
         left = mock.until(lambda state: not state["armed"])
         assert (left["mode"], left["crashed"]) == ("OFFBOARD", False)
-        second = fly(mock)
+        second = fly(mock, hover={"duration_s": 0.5})
     assert second.result == "ok", second.events
     assert HOLD_ASKED in [text for _, text in second.events]
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from pymavlink import mavutil
 
 from companion.attitude import (
     LAW_NAMES,
@@ -21,7 +20,7 @@ from companion.attitude import (
 from companion.config.files import load
 from companion.control import inner_loop
 from companion.mavlink import loop
-from tests.flight import sockets
+from tests.flight import sockets, tlog
 from tests.flight.fly import fly, mock_vehicle
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -78,9 +77,8 @@ def test_its_steps_through_level_are_straight_with_the_rate_loops_lag(flown):
 
 def test_every_setpoint_is_within_the_limits(flown):
     _, summary = flown
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
     asked = []
-    while (message := log.recv_match(type="SET_ATTITUDE_TARGET")) is not None:
+    for message in tlog.messages(summary, "SET_ATTITUDE_TARGET"):
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
         asked.append((math.degrees(math.hypot(*rates[:2])), abs(math.degrees(rates[2]))))
     assert len(asked) == summary.counts.setpoints

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
-from pymavlink import mavutil
 
+from tests.flight import tlog
 from tests.flight.fly import fly, mock_vehicle
 from tests.flight.others import When
 from tests.flight.position_relay import PositionRelay
+
+CIRCLE = {"flight": {"maneuvers": ["circle"]}, "circle": {"radius_m": 1.5}}
 
 
 def flown(folder, way, delay_ms=0, *, from_the_start=False, **changes):
@@ -41,7 +43,7 @@ def test_a_standing_position_is_silence():
     [100, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (2000, 8000))],
 )
 def test_late_copies_of_positions_change_nothing(delay_ms):
-    way = {"from_the_start": True, "flight": {"maneuvers": ["circle"]}}
+    way = {"from_the_start": True, **CIRCLE}
     plain, _ = flown(None, "at once", **way)
     copied, _ = flown(None, "twice", delay_ms, **way)
     assert copied.result == "ok", copied.events
@@ -52,11 +54,10 @@ def test_late_copies_of_positions_change_nothing(delay_ms):
 
 
 def test_positions_a_little_late_are_carried_on_to_now(tmp_path):
-    summary, _ = flown(tmp_path, "late", 200, flight={"maneuvers": ["circle"]})
+    summary, _ = flown(tmp_path, "late", 200, **CIRCLE)
     assert summary.result == "ok", summary.events
     time, north, east = summary.trace.tracking.rows()[:, :3].T
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    told = iter(lambda: log.recv_match(type=["LOCAL_POSITION_NED"]), None)
+    told = tlog.messages(summary, "LOCAL_POSITION_NED")
     stamps, x, y = np.array([(m.time_boot_ms / 1e3, m.x, m.y) for m in told]).T
     off = np.hypot(np.interp(time, stamps, x) - north, np.interp(time, stamps, y) - east)
     assert off.max() < 0.1  # the circle's speed is 1 m/s and more

@@ -48,11 +48,21 @@ def good(tmp_path_factory):
     return flown(tmp_path_factory.mktemp("good"))
 
 
-def own_texts(summary):
-    """(time, text) of our STATUSTEXTs, as pymavlink reads them, with their pieces joined."""
+def logged(summary):
+    """All messages of the log, as pymavlink reads them."""
     log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
+    return list(iter(log.recv_match, None))
+
+
+@pytest.fixture(scope="module")
+def log_of_good(good):
+    return logged(good[0])
+
+
+def own_texts(messages):
+    """(time, text) of our STATUSTEXTs among the messages, with their pieces joined."""
     texts, times = [], []
-    while (message := log.recv_match()) is not None:
+    for message in messages:
         times.append(message._timestamp)
         if message.get_type() != "STATUSTEXT" or message.get_srcComponent() != LOG:
             continue
@@ -64,9 +74,9 @@ def own_texts(summary):
     return texts
 
 
-def test_every_event_and_phase_is_in_the_log_at_its_time(good):
+def test_every_event_and_phase_is_in_the_log_at_its_time(good, log_of_good):
     summary, _ = good
-    texts = own_texts(summary)
+    texts = own_texts(log_of_good)
     began = texts[0][0]
     phases = [text for _, text in texts if text.startswith("phase: ")]
     assert phases == [f"phase: {each['name']}" for each in summary.as_dict()["phases"]]
@@ -78,14 +88,8 @@ def test_every_event_and_phase_is_in_the_log_at_its_time(good):
     assert any(len(text) > 100 for _, text in events)  # in several pieces
 
 
-def test_the_vehicle_receives_no_text_of_ours(good):
-    summary, _ = good
-    log = mavutil.mavlink_connection(str(summary.log / "flight.tlog"))
-    sent = {
-        message.get_type()
-        for message in iter(log.recv_match, None)
-        if message.get_srcComponent() == 191
-    }
+def test_the_vehicle_receives_no_text_of_ours(log_of_good):
+    sent = {message.get_type() for message in log_of_good if message.get_srcComponent() == 191}
     assert "SET_ATTITUDE_TARGET" in sent
     assert "STATUSTEXT" not in sent
 
@@ -153,7 +157,7 @@ def test_a_wrong_hover_thrust_is_advised_once_and_not_among_the_events_shown(tmp
     (sentence,) = summary.facts.advice
     assert sentence not in observer.events
     assert [text for _, text in summary.events].count(sentence) == 1
-    assert any(text == sentence for _, text in own_texts(summary))
+    assert any(text == sentence for _, text in own_texts(logged(summary)))
     value = float(summary.facts.settings["thrust.hover_thrust"])
     assert value == pytest.approx(0.49, abs=0.02)
     assert f"set it to {value:.2f}" in sentence
@@ -179,7 +183,7 @@ def test_a_fault_in_the_report_of_the_state_is_an_event_and_does_not_end_the_fli
         raise ZeroDivisionError("the report")
 
     monkeypatch.setattr("companion.flight.status.StatusReporter.record", broken)
-    summary = fly(QUICK_FLIGHT, QuickVehicle())
+    summary = fly(merged(QUICK_FLIGHT, {"hover": {"duration_s": 0.5}}), QuickVehicle())
     assert summary.result == "ok"
     faults = [text for _, text in summary.events if "the report" in text]
     assert faults == ["internal error: ZeroDivisionError('the report')"]
@@ -205,7 +209,8 @@ def test_height_and_speed_are_unknown_when_no_position_comes():
     vehicle, observer = QuickVehicle(), Watching()
     silent = {"kind": "stop_telemetry", "messages": ["LOCAL_POSITION_NED"]}
     vehicle.when(lambda: vehicle.state()["mode"] == "LAND", lambda: vehicle.inject(silent))
-    summary = fly(QUICK_FLIGHT, vehicle, None, observer)
+    short = merged(QUICK_FLIGHT, {"hover": {"duration_s": 0.5}})
+    summary = fly(short, vehicle, None, observer)
     last = observer.states[-1]
     assert last.height is None
     assert last.speed is None
@@ -216,9 +221,9 @@ def test_height_and_speed_are_unknown_when_no_position_comes():
 def test_a_nearly_full_disk_is_told_before_take_off(tmp_path, monkeypatch):
     def told(free):
         monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free))
-        config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 0.5}})
-        summary = fly(config, QuickVehicle(), tmp_path / str(free))
-        assert summary.result == "ok"
+        vehicle = QuickVehicle()
+        vehicle.when(lambda: vehicle.state()["armed"], vehicle.take_over)
+        summary = fly(QUICK_FLIGHT, vehicle, tmp_path / str(free))
         arming = next(at for at, text in summary.events if text == "armed")
         return [text for at, text in summary.events if "MB left" in text and at < arming]
 

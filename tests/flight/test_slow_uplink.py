@@ -29,8 +29,9 @@ class Extent:
         self.lowest = min(self.lowest, -state["position"][2])
 
 
-def flown(autopilot, kind, **fault):
+def flown(autopilot, kind, hover_s=12.0, **fault):
     """A hover in wind whose uplink has the fault from its first second on."""
+    hover = {"hover": {"duration_s": hover_s}}
     with mock_vehicle(autopilot=autopilot, wind=WIND) as mock:
         extent = Extent(mock)
 
@@ -38,7 +39,7 @@ def flown(autopilot, kind, **fault):
             extent.begin()
             mock.inject({"kind": kind, "direction": "from_companion", **fault})
 
-        summary = fly(mock, None, When("maneuvers", begin, after=1.0), **HOVER)
+        summary = fly(mock, None, When("maneuvers", begin, after=1.0), **HOVER | hover)
         return summary, mock.state(), extent
 
 
@@ -55,7 +56,7 @@ def test_setpoints_that_become_late_end_control_before_the_vehicle_swings_far(
 
 
 def test_a_hiccup_of_the_uplink_is_flown_on():
-    summary, _, _ = flown("px4", "delay", delay_ms=300.0, duration_s=0.4)
+    summary, _, _ = flown("px4", "delay", 5.0, delay_ms=300.0, duration_s=0.4)
     assert summary.result == "ok", summary.events
 
 

@@ -12,6 +12,8 @@ import pytest
 from tests.flight.fly import fly, mock_vehicle, run, session_for
 from tests.flight.others import When
 
+SHORT = {"hover": {"duration_s": 0.5}}
+
 
 def stalled(autopilot, seconds, phase="maneuvers"):
     """A hover in which the program stands still; what is on the wire then, it reads first."""
@@ -20,7 +22,8 @@ def stalled(autopilot, seconds, phase="maneuvers"):
         def stall():
             asyncio.get_running_loop().clock.now += seconds
 
-        summary = fly(mock, None, When(phase, stall, after=1.0), hover={"duration_s": 9.0})
+        hover = {"duration_s": 9.0 if phase == "maneuvers" else 0.5}
+        summary = fly(mock, None, When(phase, stall, after=1.0), hover=hover)
         return summary, mock.state()
 
 
@@ -95,7 +98,7 @@ def test_a_pilot_who_takes_over_in_a_stall_of_the_hand_back_is_not_overruled(
             takeover = {"kind": "pilot_takeover", "mode": "POSCTL", "at_s": mock.time + 0.8}
             mock.inject(takeover)
 
-        summary = stalled_at(mock, "hand back", 1.5, after, then=take_over_soon)
+        summary = stalled_at(mock, "hand back", 1.5, after, then=take_over_soon, **SHORT)
         mock.run(1.0)  # a command may be on its way
         truth = mock.state()
     assert truth["mode"] == piloted, summary.events
@@ -115,7 +118,7 @@ def test_an_empty_battery_is_landed_though_the_program_stalls_as_it_asks_for_the
 def test_a_vehicle_that_drifted_in_a_stall_of_the_hand_back_is_not_flown_back():
     """It drifts half a metre, and is held where it is then."""
     with mock_vehicle(autopilot="ardupilot", delay_s=0.015) as mock:
-        summary = stalled_at(mock, "hand back", 5.0, 0.0, then=mock.setpoints.clear)
+        summary = stalled_at(mock, "hand back", 5.0, 0.0, then=mock.setpoints.clear, **SHORT)
     assert summary.result == "ok", summary.events
     resumed = [each for each in mock.setpoints if each.time > mock.setpoints[0].time + 1.0]
     assert len(resumed) > 3

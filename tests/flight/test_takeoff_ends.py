@@ -51,7 +51,7 @@ def test_a_vehicle_that_does_not_leave_the_ground_is_told_so_and_stops_its_motor
 def test_motors_that_spool_up_slowly_are_waited_for():
     """They were stopped just before the vehicle lifted off."""
     with mock_vehicle(parameters={"COM_SPOOLUP_TIME": 11.0, "COM_DISARM_PRFLT": 20.0}) as mock:
-        summary = fly(mock, flight={"takeoff_timeout_s": 60.0})
+        summary = fly(mock, flight={"takeoff_timeout_s": 60.0}, hover={"duration_s": 0.5})
     assert summary.result == "ok", summary.events
 
 

@@ -19,7 +19,7 @@ HEAVY = {"thrust_slope_m_s2": 12.95, "thrust_offset_m_s2": 0.22}
 
 STEPS = {
     "flight": {"maneuvers": ["steps"], "takeoff_height_m": 4.0},
-    "steps": {"coefficient": 0.69, "duration_s": 1.0, "settle_s": 2.0},
+    "steps": {"coefficient": 0.69, "duration_s": 1.0, "settle_s": 1.2},
     "limits": {"max_tilt_deg": 45},
 }
 """Acceleration steps at 44° of tilt."""
@@ -117,7 +117,7 @@ def test_a_vehicle_that_only_just_hovers_is_not_flown():
 
 def test_setpoints_that_are_lost_for_a_moment_make_no_vehicle_too_heavy():
     """It holds the last rates and thrust and falls, so more thrust is sent than it gives."""
-    steps = {"coefficient": 0.5, "duration_s": 0.4, "settle_s": 3.0}
+    steps = {"coefficient": 0.5, "duration_s": 0.4, "settle_s": 2.0}
     with mock_vehicle() as mock:
         mock.inject(
             {

@@ -38,11 +38,11 @@ def test_a_clock_that_jumps_in_flight_is_handed_back(autopilot, shift_ms, words)
     assert (truth["mode"], truth["crashed"]) == (HELD[autopilot], False)
 
 
-def wrapping(autopilot, seconds):
+def wrapping(autopilot, seconds, **changes):
     """A flight whose time since boot wraps so long after its begin."""
     with mock_vehicle(autopilot=autopilot, in_lockstep=True) as mock:
         ClockRelay(mock).shift_ms = WRAP_MS - round(1000 * seconds)
-        return fly(mock), mock.state()
+        return fly(mock, **changes), mock.state()
 
 
 WRAPPED = "the vehicle's time since boot wrapped around after 49.7 days"
@@ -56,7 +56,7 @@ def test_time_that_wraps_in_flight_is_named_and_handed_back(autopilot, seconds):
 
 
 def test_time_that_wraps_before_control_is_named_and_flown_on():
-    summary, _ = wrapping("px4", 3.0)
+    summary, _ = wrapping("px4", 3.0, hover={"duration_s": 0.5})
     assert summary.result == "ok", summary.events
     assert WRAPPED in [text for _, text in summary.events]
 

@@ -49,7 +49,7 @@ class ArduRig(Rig):
         """Send NAV_TAKEOFF."""
         return self.command(ardupilotmega.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height)
 
-    def lift(self, height: float = 5.0) -> None:
+    def lift(self, height: float = 3.0) -> None:
         """Arm in GUIDED, climb, and hold there."""
         assert self.switch(GUIDED) == ACCEPTED
         assert self.arm() == ACCEPTED
@@ -57,7 +57,7 @@ class ArduRig(Rig):
         self.run_until(lambda: self.height > height - 0.15, 20.0)
         self.run(0.6)
 
-    def fly(self, height: float = 5.0, **setpoint: Any) -> None:
+    def fly(self, height: float = 3.0, **setpoint: Any) -> None:
         """Take off and hand over to a stream of rates that goes on by itself."""
         self.lift(height)
         setpoint.setdefault("thrust", HOVER)

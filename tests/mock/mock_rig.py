@@ -21,7 +21,7 @@ else:
 HOVER = 0.4903
 IGNORE_ATTITUDE = 128
 CUSTOM = 1
-QUICK = {"MPC_TKO_RAMP_T": 0.3, "COM_SPOOLUP_TIME": 0.1, "MPC_TKO_SPEED": 3.0}
+QUICK = {"MPC_TKO_RAMP_T": 0.3, "COM_SPOOLUP_TIME": 0.1, "MPC_TKO_SPEED": 5.0}
 ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 
 
@@ -168,14 +168,14 @@ class Rig:
             )
         )
 
-    def take_off(self, height: float = 5.0) -> None:
+    def take_off(self, height: float = 3.0) -> None:
         """Arm, climb and arrive in LOITER."""
         self.simulation.parameters.set("MIS_TAKEOFF_ALT", height)
         assert self.mode(4, 2) == ACCEPTED
         assert self.arm() == ACCEPTED
         self.run_until(lambda: self.state.mode.name == "LOITER", 20.0)
 
-    def fly_offboard(self, height: float = 5.0, **setpoint: Any) -> None:
+    def fly_offboard(self, height: float = 3.0, **setpoint: Any) -> None:
         """Take off and hand over to a stream of setpoints that goes on by itself."""
         self.take_off(height)
         self.each_tick = lambda: self.rates(**setpoint)

@@ -14,6 +14,8 @@ TEXTS = ("study", "bench", "cli", "demo.py", "report", "testing", "tuning/flight
 
 def names_in(source):
     """Identifiers and strings of a module that name an autopilot; docstrings may."""
+    if not NAMED.search(source):
+        return  # to parse every module takes seconds
     tree = ast.parse(source)
     prose = {
         id(node.value)
