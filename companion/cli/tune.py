@@ -43,7 +43,8 @@ def tune(options: argparse.Namespace) -> int:
     log = source / TLOG_FILE
     disturbances = Disturbances()
     if source.is_dir() and log.exists():
-        disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
+        drag = drag_prior(config).drag.linear
+        disturbances = measured_disturbances(log, drag, disturbances, console.print)
     proposal = propose(config, disturbances)
     flights = {} if options.no_flights else _fly_trials(proposal, console)
     vehicle_source: Path | dict[str, Any]
