@@ -1,7 +1,6 @@
 """`companion campaign FILE`: checks, estimates and runs the campaign, and tells how to continue."""
 
 import argparse
-import shlex
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -176,7 +175,7 @@ class _Run:
             documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
             say(f"{documented_count} of {faulty_count} flights with a fault ended as documented.")
         say(f"The results are in {self._folder}. Write their report with")
-        say(f"  {program_command()} campaign report {shlex.quote(str(self._folder))}")
+        say(f"  {program_command('campaign', 'report', self._folder)}")
         return FAILED if errors else DONE
 
     def _report_stop(self, why: str) -> int:
@@ -187,9 +186,9 @@ class _Run:
         description = folder.read_description(self._folder)
         units = unit_ranges(description.cases, description.unit)
         finished_cases = sum(len(units[number]) for number in store.finished_units(self._folder))
-        command = f"{program_command()} campaign {shlex.quote(str(self._folder))}"
-        if self._options.scheduler:
-            command += f" --scheduler {self._options.scheduler}"
+        scheduler = self._options.scheduler
+        options = ["--scheduler", scheduler] if scheduler else []
+        command = program_command("campaign", self._folder, *options)
         self._console.print(
             f"{why}; the results of {finished_cases} of {description.cases} {self._noun} are kept. "
             f"Continue with\n  {command}"

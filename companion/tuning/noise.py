@@ -71,9 +71,7 @@ def measured_disturbances(
     )
 
 
-def _telemetry(
-    log: Path, on_damage: Callable[[str], object] | None
-) -> tuple[Floats, Floats]:
+def _telemetry(log: Path, on_damage: Callable[[str], object] | None) -> tuple[Floats, Floats]:
     """Motion (n, 5): time, position and velocity north and east; slopes (m, 3): time, north, east.
 
     The times are in s. A slope is the horizontal part of the thrust divided by its vertical part.
