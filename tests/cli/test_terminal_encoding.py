@@ -10,6 +10,7 @@ import sys
 
 import pytest
 
+from companion.config.files import shipped
 from companion.files.ascii_text import ascii_for
 from companion.mavlink.transport.free_port import free_port
 from tests.cli.test_demo import quick_demo
@@ -184,3 +185,21 @@ def test_figures_are_told_on_any_terminal(tmp_path, command):
     done = companion(tmp_path, ASCII, *command)
     assert_said(done, 0)
     assert done.stdout.isascii()
+
+
+def test_standard_error_that_is_full_changes_no_exit_code(tmp_path):
+    """`2>/dev/full` made a usage error a failure, and took the result of `tune --json`."""
+    vehicle = str(shipped("vehicle-px4.yaml"))
+    tune = ["tune", vehicle, "--no-flights", "--json", "--out", "tuned.yaml"]
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        done = subprocess.run(
+            [sys.executable, "-c", IN_ONE_PROCESS, *tune, ";", *tune],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            stderr=full,
+            check=False,
+        )
+    figures, codes = done.stdout.splitlines()
+    assert json.loads(figures)["file"] == "tuned.yaml"
+    assert json.loads(codes) == [0, 2]
+    assert done.returncode == 0
