@@ -98,8 +98,8 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
             )
         return _with_hover(load(base)), False
     identified = load(vehicle)
-    if base is None:
-        return _with_hover(identified), True
+    if base is None:  # a file with a mock vehicle cannot be included
+        return _with_hover(identified), identified.mock is None
     identified_keys = identified.model_dump(exclude_unset=True, include=set(_VEHICLE_SECTIONS))
     return _with_hover(changed(load(base), identified_keys, str(vehicle))), True
 

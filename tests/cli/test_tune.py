@@ -170,3 +170,14 @@ def test_damaged_records_of_the_flight_are_told(vehicle, capsys):
     code, _, error = run(capsys, folder, "--no-flights", "--json")
     assert code == 0
     assert f"{log.path}: damaged at 1 place, the first after " in error
+
+
+def test_a_configuration_with_a_mock_vehicle_gets_a_file_that_it_can_include(tmp_path, capsys):
+    """It wrote a file that included the configuration, and then refused its own file."""
+    out = tmp_path / "tuned.yaml"
+    code, told, error = run(capsys, shipped("mock-px4.yaml"), "--out", out, "--no-flights")
+    assert (code, error) == (0, "")
+    assert "Let your configuration include it" in told
+    own = tmp_path / "mine.yaml"
+    own.write_text("include: tuned.yaml\nmock: {autopilot: px4}\n")
+    assert load(own).vehicle == load(shipped("mock-px4.yaml")).vehicle
