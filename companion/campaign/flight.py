@@ -42,7 +42,8 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         error, `result` is the error.
     """
     row: dict[str, Value] = {"case": case.index, "seed": case.seed, **case.factors}
-    with tempfile.TemporaryDirectory(prefix="companion-case-", dir=_worker_folder()) as files_folder:
+    temporary_folder = tempfile.TemporaryDirectory(prefix="companion-case-", dir=_worker_folder())
+    with temporary_folder as files_folder:
         try:
             return row | CaseFlight(case, Path(files_folder)).fly(folder)
         except ConfigError as error:  # such as a trajectory that the limits do not allow
