@@ -35,6 +35,7 @@ from companion.campaign.loading import load
 from companion.campaign.report.results import Results
 from companion.campaign.unit import cases_per_unit, check_cases, unit_ranges
 from companion.child_process import usable_cores
+from companion.files.write_whole import reason_of
 from companion.files.yaml_file import ConfigError
 from companion.program_command import program_command
 
@@ -54,7 +55,6 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: the file is wrong, the campaign is too large, or the folder cannot be used.
         MissingExtraError: the extra `campaign` is not installed.
-        OSError: the results cannot be written.
     """
     require_packages()
     path: Path = options.file
@@ -108,6 +108,9 @@ class _Run:
             return self._report_stop("interrupted")
         except ClusterError as error:
             return self._report_stop(str(error))
+        except OSError as error:  # such as a full disk
+            place = f"{error.filename}: " if error.filename else ""
+            return self._report_stop(f"{place}{reason_of(error)}")
 
     def _check_all_cases(self) -> float | None:
         """Check every case; return the wall time that a case takes, s; None: not measured."""

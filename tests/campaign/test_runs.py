@@ -1,5 +1,6 @@
 """A run of a campaign on Dask: lost units, other versions, no worker yet, interruptions."""
 
+import errno
 import logging
 import os
 import re
@@ -381,3 +382,19 @@ def test_a_case_keeps_its_files_where_dask_removes_those_of_a_killed_worker(
     [worker_folder] = dask.run(lambda dask_worker: dask_worker.local_directory).values()
     assert row["folder"] == worker_folder
     assert flight.fly_case(case)["folder"] == tempfile.gettempdir()
+
+
+def test_a_full_disk_says_how_to_go_on(tmp_path, on_dask, monkeypatch, capsys):
+    """It said that there was no space left, and nothing about the flights that were kept."""
+
+    def write_unit(place, *_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(place / "x"))
+
+    monkeypatch.setattr(store, "write_unit", write_unit)
+    out = tmp_path / "out"
+    file = written(tmp_path, sweep=TILT)
+    assert main(["campaign", str(file), "--out", str(out), "--workers", "2"]) == 1
+    assert (
+        f"{out / 'x'}: No space left on device; the results of 0 of 3 flights are kept. Continue "
+        f"with\n  {program_command('campaign', out)}\n"
+    ) in capsys.readouterr().out
