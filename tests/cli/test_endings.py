@@ -414,3 +414,16 @@ def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
 def test_an_option_that_would_have_no_effect_is_refused(options, told, capsys):
     assert main(["fly", "--config", str(shipped("px4.yaml")), *options]) == 2
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("error", [ConfigError('bad "key"'), LinkError("none"), ENOSPC])
+def test_an_error_of_a_command_with_json_is_json(capsys, error):
+    """Standard output was empty, so a script that parses it failed with an error of its own."""
+
+    def command(_):
+        raise error
+
+    run(command, argparse.Namespace(debug=False, json=True))
+    told = capsys.readouterr()
+    result = json.loads(told.out)["result"]
+    assert told.err == f"companion: {result}\n"
