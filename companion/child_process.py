@@ -32,14 +32,15 @@ def end_with_parent(parent_pid: int) -> None:
 
 @contextmanager
 def interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT in this thread, and in threads and processes that start in the block.
+    """Block SIGINT and SIGHUP in this thread, and in threads and processes that start in the block.
 
-    Ctrl-C in a terminal reaches all processes. Only the command's main process acts on Ctrl-C, and
-    ends the workers.
+    Ctrl-C in a terminal, and a terminal that closes, signal all processes. Only the command's main
+    process acts on these signals, and ends the workers.
     """
-    resource_tracker.ensure_running()  # if it started in the block, it would unblock SIGINT
-    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
+        resource_tracker.ensure_running()  # it would unblock SIGINT
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)

@@ -30,18 +30,37 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
     if not in_main_thread or not isinstance(loop, OwnThreadLoop) or not callable(handler_before):
         yield
         return
-    call_handler_before: Callable[[int, FrameType | None], object] = handler_before
-
-    def on_signal(number: int, frame: FrameType | None) -> None:
-        loop.post(_require_reaction, loop, interrupt)
-        call_handler_before(number, frame)
-
-    signal.signal(signal.SIGINT, on_signal)
+    handler = _Handler(loop, interrupt, handler_before)
+    signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:
-        if signal.getsignal(signal.SIGINT) is on_signal:
-            signal.signal(signal.SIGINT, handler_before)
+        handler.ended = True
+        # Of two flights that overlap, the first to end may have left its handler below ours.
+        while isinstance(top := signal.getsignal(signal.SIGINT), _Handler) and top.ended:
+            signal.signal(signal.SIGINT, top.handler_before)
+
+
+class _Handler:
+    """Handler of SIGINT during one flight, above the handler before it.
+
+    Attributes:
+        ended: whether the flight has ended.
+    """
+
+    def __init__(
+        self,
+        loop: FlightLoop,
+        interrupt: Callable[[str], object],
+        handler_before: Callable[[int, FrameType | None], object],
+    ) -> None:
+        self._loop, self._interrupt = loop, interrupt
+        self.handler_before = handler_before
+        self.ended = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self._loop.post(_require_reaction, self._loop, self._interrupt)
+        self.handler_before(number, frame)
 
 
 def _require_reaction(loop: FlightLoop, interrupt: Callable[[str], object]) -> None:

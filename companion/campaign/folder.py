@@ -100,9 +100,9 @@ def read_description(folder: Path) -> Description:
     try:
         values = json.loads(read_text(path, _LARGEST_FILE_BYTES))
         description = Description(**{**values, "versions": as_versions(values["versions"])})
-        # `range` refuses everything but whole numbers.
+        # `range` refuses everything but whole numbers, and an empty one is false.
         if not (range(description.cases) and range(description.unit)):
-            raise ValueError("`cases` and `unit` must be above 0")
+            raise ValueError  # the message below names the file
     except FileRefusedError as error:
         raise ConfigError(f"{folder}: no campaign was begun here: {error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:

@@ -1,7 +1,6 @@
 """`companion campaign FILE`: checks, estimates and runs the campaign, and tells how to continue."""
 
 import argparse
-import shlex
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,6 +35,7 @@ from companion.campaign.loading import load
 from companion.campaign.report.results import Results
 from companion.campaign.unit import cases_per_unit, check_cases, unit_ranges
 from companion.child_process import usable_cores
+from companion.files.write_whole import reason_of
 from companion.files.yaml_file import ConfigError
 from companion.program_command import program_command
 
@@ -55,7 +55,6 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ConfigError: the file is wrong, the campaign is too large, or the folder cannot be used.
         MissingExtraError: the extra `campaign` is not installed.
-        OSError: the results cannot be written.
     """
     require_packages()
     path: Path = options.file
@@ -109,6 +108,9 @@ class _Run:
             return self._report_stop("interrupted")
         except ClusterError as error:
             return self._report_stop(str(error))
+        except OSError as error:  # such as a full disk
+            place = f"{error.filename}: " if error.filename else ""
+            return self._report_stop(f"{place}{reason_of(error)}")
 
     def _check_all_cases(self) -> float | None:
         """Check every case; return the wall time that a case takes, s; None: not measured."""
@@ -178,7 +180,7 @@ class _Run:
             documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
             say(f"{documented_count} of {faulty_count} flights with a fault ended as documented.")
         say(f"The results are in {self._folder}. Write their report with")
-        say(f"  {program_command()} campaign report {shlex.quote(str(self._folder))}")
+        say(f"  {program_command('campaign', 'report', self._folder)}")
         return FAILED if errors else DONE
 
     def _report_stop(self, why: str) -> int:
@@ -189,9 +191,9 @@ class _Run:
         description = folder.read_description(self._folder)
         units = unit_ranges(description.cases, description.unit)
         finished_cases = sum(len(units[number]) for number in store.finished_units(self._folder))
-        command = f"{program_command()} campaign {shlex.quote(str(self._folder))}"
-        if self._options.scheduler:
-            command += f" --scheduler {self._options.scheduler}"
+        scheduler = self._options.scheduler
+        options = ["--scheduler", scheduler] if scheduler else []
+        command = program_command("campaign", self._folder, *options)
         self._console.print(
             f"{why}; the results of {finished_cases} of {description.cases} {self._noun} are kept. "
             f"Continue with\n  {command}"

@@ -3,7 +3,6 @@
 import argparse
 import sys
 from pathlib import Path
-from shlex import quote
 
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.tool_options import STARTING_FILES
@@ -95,7 +94,7 @@ def init(options: argparse.Namespace) -> int:
         write_whole(out, own_text.replace(f"configs/{name}", str(out)))
     except OSError as error:
         raise ConfigError(f"--out: cannot write {out}: {error.strerror}") from error
-    print(f"Wrote {out}. Check it with: {program_command()} check-config {quote(str(out))}")
+    print(f"Wrote {out}. Check it with: {program_command('check-config', out)}")
     return EXIT_OK
 
 

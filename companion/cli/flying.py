@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import shlex
 import shutil
 from contextlib import suppress
 from pathlib import Path
@@ -24,7 +23,7 @@ from companion.flight.session import Session
 from companion.flight.start_checks import check_control, check_link, require_extras
 from companion.live.helper import Helper
 from companion.mavlink.errors import EndpointError, SigningError
-from companion.program_command import program_command
+from companion.program_command import no_report_text, program_command
 from companion.realtime import RealtimeError
 from companion.recording.closing_words import Invocation, closing_words
 from companion.recording.folder import flight_folder
@@ -144,7 +143,7 @@ def write_flight_page(folder: Path) -> str:
         reason = reason_of(error)
     except Exception as error:  # The flight is over.
         reason = str(error) or type(error).__name__
-    return f"No report: {reason}; `companion report {shlex.quote(str(folder))}` tries again"
+    return no_report_text(reason, folder)
 
 
 def fly_bundled(

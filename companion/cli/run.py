@@ -2,8 +2,10 @@
 
 import argparse
 import asyncio
+import json
 import traceback
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 
 from rich.console import Console
@@ -46,33 +48,42 @@ def command_of(options: argparse.Namespace) -> Command:
 def run(command: Command, options: argparse.Namespace) -> int:
     """Run a command; return the exit code.
 
+    With `--json`, a command that an error ends before it prints its figures prints the error's
+    text as `result`, so its output can be parsed.
+
     Raises:
         KeyboardInterrupt: Ctrl-C where no flight handles it.
     """
     code = EXIT_FAILURE
+    reason: str | None = None
     os_error: OSError | None = None
     try:
         code = command(options)
     except _USAGE_ERRORS as error:
-        _print_error(str(error))
-        code = EXIT_USAGE
+        reason, code = str(error), EXIT_USAGE
     except _FLIGHT_ERRORS as error:
-        _print_error(str(error))
+        reason = str(error)
     except BrokenPipeError:
         pass  # nobody reads our output any more, as after `| head`; a broken link is a LinkError
     except OSError as error:
         os_error = error
     except asyncio.CancelledError:
-        _print_error("interrupted before anything was sent")
+        reason = "interrupted before anything was sent"
     except Exception as error:
         if options.debug:
             traceback.print_exc()
-        _print_error(f"internal error: {error!r}; run again with --debug to see where it happened")
+        reason = f"internal error: {error!r}; run again with --debug to see where it happened"
     fault = flush_output()
     # An error without a file may be that of standard output, which is reported below.
     if os_error is not None and (fault is None or os_error.filename is not None):
         file = "" if os_error.filename is None else f"{os_error.filename}: "
-        _print_error(f"{file}{reason_of(os_error)}")
+        reason = f"{file}{reason_of(os_error)}"
+    if reason is not None:
+        _print_error(reason)
+        if getattr(options, "json", False):
+            with suppress(OSError):  # reported below
+                print(json.dumps({"result": reason}))
+            fault = fault or flush_output()
     if fault:
         _print_error(f"standard output cannot be written: {fault}")
         return code or EXIT_FAILURE

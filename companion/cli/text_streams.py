@@ -21,7 +21,8 @@ _ERROR_HANDLER = "companion.transliterated"
 def transliterate_output() -> None:
     """Make standard output and error accept any text.
 
-    Characters that the encoding lacks are transliterated. Text for a closed stream is discarded.
+    Characters that the encoding lacks are transliterated. Text for a closed stream is discarded,
+    and so is text that standard error does not take, because nobody could be told of it.
     """
     codecs.register_error(_ERROR_HANDLER, _transliterated)
     for name in ("stdout", "stderr"):
@@ -32,6 +33,8 @@ def transliterate_output() -> None:
             stream.reconfigure(errors=_ERROR_HANDLER)
     if sys.stdout is sys.__stdout__ and isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout = _Output(sys.stdout)
+    if sys.stderr is sys.__stderr__ and isinstance(sys.stderr, io.TextIOWrapper):
+        sys.stderr = _ErrorOutput(sys.stderr)
 
 
 class _Output(io.TextIOWrapper):
@@ -67,6 +70,21 @@ class _Output(io.TextIOWrapper):
         except OSError as error:
             self.failure = self.failure or error
             raise
+
+
+class _ErrorOutput(_Output):
+    """Standard error: a failed write raises nothing, so it ends no command and hides no result."""
+
+    def write(self, text: str) -> int:
+        """Write text, if possible."""
+        with suppress(OSError):
+            super().write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        """Flush, if possible."""
+        with suppress(OSError):
+            super().flush()
 
 
 def flush_output() -> str | None:

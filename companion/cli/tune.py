@@ -43,7 +43,8 @@ def tune(options: argparse.Namespace) -> int:
     log = source / TLOG_FILE
     disturbances = Disturbances()
     if source.is_dir() and log.exists():
-        disturbances = measured_disturbances(log, drag_prior(config).drag.linear, disturbances)
+        drag = drag_prior(config).drag.linear
+        disturbances = measured_disturbances(log, drag, disturbances, console.print)
     proposal = propose(config, disturbances)
     flights = {} if options.no_flights else _fly_trials(proposal, console)
     vehicle_source: Path | dict[str, Any]
@@ -97,8 +98,8 @@ def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Conf
             )
         return _with_hover(load(base)), False
     identified = load(vehicle)
-    if base is None:
-        return _with_hover(identified), True
+    if base is None:  # a file with a mock vehicle cannot be included
+        return _with_hover(identified), identified.mock is None
     identified_keys = identified.model_dump(exclude_unset=True, include=set(_VEHICLE_SECTIONS))
     return _with_hover(changed(load(base), identified_keys, str(vehicle))), True
 

@@ -87,4 +87,5 @@ class RecordingConfig(Section):
     directory: PathKey = Path("flights")
     """Folder in which each flight makes its own folder; relative to the working folder."""
     report: bool = True
-    """Write report.html into the flight's folder after the flight (extra `report`)."""
+    """Write report.html into the flight's folder at the end of `fly`, `demo` and `serve` (extra
+    `report`)."""

@@ -115,7 +115,7 @@ def outcome_as_dict(outcome: ChangeOutcome) -> dict[str, Any]:
 def _finding_as_dict(config: Config, finding: Finding) -> dict[str, Any]:
     return {
         "key": str(finding.key),
-        "verdict": finding.result.value,
+        "result": finding.result.value,
         "accepted": finding.key in config.flight.accept,
         "found": finding.found,
         "because": finding.because,

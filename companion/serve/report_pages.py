@@ -1,7 +1,6 @@
 """The report pages of served flights, each written by a separate process."""
 
 import os
-import shlex
 import subprocess
 import sys
 import threading
@@ -9,6 +8,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from companion.program_command import no_report_text
 from companion.realtime import use_normal_scheduler
 
 _PAGE_TIMEOUT = 120.0
@@ -38,8 +38,7 @@ class ReportPages:
             try:
                 return f"Report: {self._run_report(folder)}"
             except (OSError, RuntimeError) as error:
-                again = f"companion report {shlex.quote(str(folder))}"
-                return f"No report: {error}; `{again}` tries again"
+                return no_report_text(error, folder)
 
     def leave(self) -> None:
         """Write no further page, because the program ends."""

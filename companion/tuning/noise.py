@@ -1,5 +1,6 @@
 """Measures the disturbances of a recorded flight from its telemetry: estimator errors and gusts."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,7 +24,12 @@ _LEAST_HEIGHT = 1.0
 _AUTOPILOTS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
 
 
-def measured_disturbances(log: Path, drag: float, default: Disturbances) -> Disturbances:
+def measured_disturbances(
+    log: Path,
+    drag: float,
+    default: Disturbances,
+    on_damage: Callable[[str], object] | None = None,
+) -> Disturbances:
     """The disturbances in flight, measured in a `.tlog`.
 
     `velocity_density` is measured from the change of position that is not due to the velocity,
@@ -35,11 +41,12 @@ def measured_disturbances(log: Path, drag: float, default: Disturbances) -> Dist
         drag: linear drag of the vehicle, 1/s.
         default: disturbances that supply what a log does not show: gusts and the errors on a path.
             `default` is returned unchanged if the log has too little flight.
+        on_damage: called with a sentence if damaged records of the log were left out.
 
     Raises:
         LogError: the file cannot be read or is not a `.tlog`.
     """
-    motion, slopes = _telemetry(log)
+    motion, slopes = _telemetry(log, on_damage)
     if len(motion) < 2 or len(slopes) < 2:
         return default
     time, position, velocity = motion[:, 0], motion[:, 1:3], motion[:, 3:5]
@@ -64,7 +71,7 @@ def measured_disturbances(log: Path, drag: float, default: Disturbances) -> Dist
     )
 
 
-def _telemetry(log: Path) -> tuple[Floats, Floats]:
+def _telemetry(log: Path, on_damage: Callable[[str], object] | None) -> tuple[Floats, Floats]:
     """Motion (n, 5): time, position and velocity north and east; slopes (m, 3): time, north, east.
 
     The times are in s. A slope is the horizontal part of the thrust divided by its vertical part.
@@ -73,7 +80,8 @@ def _telemetry(log: Path) -> tuple[Floats, Floats]:
     motion: list[tuple[float, ...]] = []
     slopes: list[tuple[float, ...]] = []
     first_down = None
-    for frame, message in messages(log, {"HEARTBEAT", "LOCAL_POSITION_NED", "ATTITUDE_QUATERNION"}):
+    names = {"HEARTBEAT", "LOCAL_POSITION_NED", "ATTITUDE_QUATERNION"}
+    for frame, message in messages(log, names, on_damage):
         source, message_type = (frame.system, frame.component), message.get_type()
         if message_type == "HEARTBEAT":
             if vehicle is None and message.autopilot in _AUTOPILOTS:

@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import SWITCH_INTERVAL, OwnThreadLoop, SharedLoop, flight_loop
 from companion.api.state import _PendingCall
 from companion.safety.actions import FlightEnded
@@ -164,3 +165,20 @@ def test_news_do_not_queue_up_while_the_program_does_not_run():
         assert (len(queued), len(heard)) == (1, 1)
 
     asyncio.run(main())
+
+
+def test_two_flights_that_overlap_leave_ctrl_c_as_it_was():
+    """The first to end left its handler, so a later `asyncio.run` was not cancelled by Ctrl-C."""
+
+    async def main():
+        before, flights = signal.getsignal(signal.SIGINT), [OwnThreadLoop(), OwnThreadLoop()]
+        first, second = (on_ctrl_c(loop, pytest.fail) for loop in flights)
+        first.__enter__()
+        second.__enter__()
+        assert signal.getsignal(signal.SIGINT) is not before
+        for each, loop in zip((first, second), flights, strict=True):
+            each.__exit__(None, None, None)
+            loop.close(wait=True)
+        return signal.getsignal(signal.SIGINT) is before
+
+    assert asyncio.run(main())

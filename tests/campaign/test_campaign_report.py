@@ -19,6 +19,7 @@ from companion.campaign.report.page import _few_samples_warning, run
 from companion.campaign.report.results import Results
 from companion.campaign.report.statistics import levels, pareto_front, share_of
 from companion.files.yaml_file import ConfigError
+from companion.program_command import program_command
 
 CAMPAIGN = {
     "name": "planners",
@@ -85,7 +86,7 @@ def test_the_page_says_what_was_flown_how_it_went_and_summary_sentences(flown, c
     assert f"{len(crashed)} flights crashed" in body
     assert "Success is lowest with mock.wind.speed_m_s = " in body
     assert re.search(r"planner.name explains \d\d% ± \d+% of the variance", body)
-    assert f"companion campaign rerun {place} {crashed[0]}<" in body
+    assert f"{program_command('campaign', 'rerun', place, str(crashed[0]))}<" in body
     assert "http" not in body
     # What it flew with: what was set, limits that are the default, and nothing that was swept.
     flown_with = re.search(r"Configuration of every case.*?</table>", body, re.S)[0]

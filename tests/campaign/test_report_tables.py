@@ -15,6 +15,7 @@ from companion.campaign.report import page, plots, tables
 from companion.campaign.report.results import Results
 from companion.campaign.report.sensitivity import Influence, influences
 from companion.campaign.report.statistics import choice_groups
+from companion.program_command import program_command
 from tests.campaign.test_campaign_file import load
 
 SAMPLED = {"sampled": True}
@@ -37,8 +38,8 @@ def test_a_batch_has_no_command_that_flies_a_case_again():
     assert [row[1] for row in batch.rows] == [tables.EMPTY] * 2
     flights = tables.worst_cases(results(told))
     assert [row[:2] for row in flights.rows] == [
-        ("1", "companion campaign rerun 'a [b]' 1"),
-        ("0", "companion campaign rerun 'a [b]' 0"),
+        ("1", program_command("campaign", "rerun", "a [b]", "1")),
+        ("0", program_command("campaign", "rerun", "a [b]", "0")),
     ]
 
 
@@ -212,7 +213,7 @@ def test_missing_cases_are_told_with_the_command_that_goes_on():
     told = {"ok": [True]}
     assert page.missing_cases_note(results(told)) == []
     assert page.missing_cases_note(results(told, planned=3)) == [
-        "2 of 3 flights are missing. `companion campaign 'a [b]'` goes on with them."
+        f"2 of 3 flights are missing. `{program_command('campaign', 'a [b]')}` goes on with them."
     ]
 
 

@@ -1,15 +1,27 @@
 """A run of a campaign on Dask: lost units, other versions, no worker yet, interruptions."""
 
+import errno
 import logging
 import os
 import re
 import signal
+import tempfile
 import threading
 from contextlib import contextmanager
 
 import pytest
 
-from companion.campaign import cluster, engine, estimate, folder, outcomes, running, store, unit
+from companion.campaign import (
+    cluster,
+    engine,
+    estimate,
+    flight,
+    folder,
+    outcomes,
+    running,
+    store,
+    unit,
+)
 from companion.campaign.cluster import ClusterError
 from companion.campaign.engine import Progress
 from companion.campaign.versions import VersionError, _version, versions
@@ -354,3 +366,39 @@ def test_only_the_loggers_of_dask_are_silenced():
     cluster._silence_dask()
     assert not dasks.isEnabledFor(logging.CRITICAL)
     assert other.level == logging.INFO
+
+
+def test_a_case_keeps_its_files_where_dask_removes_those_of_a_killed_worker(
+    tmp_path, dask, monkeypatch
+):
+    """Each worker that was killed or interrupted in a flight left a folder in /tmp."""
+
+    class Flight:
+        def __init__(self, _, files_folder):
+            self._row = {"folder": str(files_folder.parent)}
+
+        def fly(self, _):
+            return self._row
+
+    monkeypatch.setattr(flight, "CaseFlight", Flight)
+    case = next(load(tmp_path, sweep=TILT).cases())
+    row = dask.submit(flight.fly_case, case, pure=False).result()
+    [worker_folder] = dask.run(lambda dask_worker: dask_worker.local_directory).values()
+    assert row["folder"] == worker_folder
+    assert flight.fly_case(case)["folder"] == tempfile.gettempdir()
+
+
+def test_a_full_disk_says_how_to_go_on(tmp_path, on_dask, monkeypatch, capsys):
+    """It said that there was no space left, and nothing about the flights that were kept."""
+
+    def write_unit(place, *_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(place / "x"))
+
+    monkeypatch.setattr(store, "write_unit", write_unit)
+    out = tmp_path / "out"
+    file = written(tmp_path, sweep=TILT)
+    assert main(["campaign", str(file), "--out", str(out), "--workers", "2"]) == 1
+    assert (
+        f"{out / 'x'}: No space left on device; the results of 0 of 3 flights are kept. Continue "
+        f"with\n  {program_command('campaign', out)}\n"
+    ) in capsys.readouterr().out

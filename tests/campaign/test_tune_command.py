@@ -99,6 +99,9 @@ def test_what_ends_a_search_early_is_told(tmp_path, quick, monkeypatch, capsys, 
     assert said in told.out + told.err
     again = f"  {program_command()} campaign tune {tmp_path / 'tuned.yaml'} --out '{out}'\n"
     assert (again in told.out) == (code == 1)
+    assert tune(tmp_path, out, "--trials", "9") == code
+    again = f" --out '{out}' --trials 9\n"
+    assert (again in capsys.readouterr().out) == (code == 1)
 
 
 def test_a_campaign_that_cannot_be_searched_is_refused(tmp_path, monkeypatch):

@@ -54,9 +54,9 @@ def doctor(capsys, *arguments):
 
 
 def found(out):
-    """The JSON object, and the verdicts by key of what is not safe."""
+    """The JSON object, and the results by key of what is not safe."""
     told = json.loads(out)
-    keys = {f["key"]: f["verdict"] for f in told["findings"] if f["verdict"] != "safe"}
+    keys = {f["key"]: f["result"] for f in told["findings"] if f["result"] != "safe"}
     return told, keys
 
 

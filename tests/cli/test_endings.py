@@ -31,6 +31,7 @@ from companion.files.yaml_file import ConfigError
 from companion.mavlink import loop
 from companion.mavlink.errors import LinkError
 from companion.mavlink.loop import run as run_loop
+from companion.program_command import program_command
 
 ENOSPC = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
@@ -186,8 +187,8 @@ def test_the_next_command_names_the_program_as_it_was_called(monkeypatch, progra
     ("error", "said"),
     [
         (MissingExtraError("needs plotly"), "No report: needs plotly"),
-        (ValueError("x"), "No report: x; `companion report 'a b'` tries again"),
-        (ValueError(), "No report: ValueError; `companion report 'a b'` tries again"),
+        (ValueError("x"), f"No report: x; `{program_command()} report 'a b'` tries again"),
+        (ValueError(), f"No report: ValueError; `{program_command()} report 'a b'` tries again"),
     ],
 )
 def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, error, said):
@@ -416,3 +417,16 @@ def test_an_option_of_fly_replaces_its_key(monkeypatch, options, told):
 def test_an_option_that_would_have_no_effect_is_refused(options, told, capsys):
     assert main(["fly", "--config", str(shipped("px4.yaml")), *options]) == 2
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("error", [ConfigError('bad "key"'), LinkError("none"), ENOSPC])
+def test_an_error_of_a_command_with_json_is_json(capsys, error):
+    """Standard output was empty, so a script that parses it failed with an error of its own."""
+
+    def command(_):
+        raise error
+
+    run(command, argparse.Namespace(debug=False, json=True))
+    told = capsys.readouterr()
+    result = json.loads(told.out)["result"]
+    assert told.err == f"companion: {result}\n"

@@ -13,6 +13,7 @@ from itertools import product
 import pytest
 
 from companion.cli.main import main
+from companion.config.files import shipped
 from companion.files.ascii_text import ascii_for
 from companion.mavlink.transport.free_port import free_port
 from tests.cli.test_demo import quick_demo
@@ -45,11 +46,14 @@ for command in " ".join(sys.argv[1:]).split(" ; "):
 """
 
 
-def in_one_process(folder, environment, *commands):
+def in_one_process(folder, environment, *commands, errors=subprocess.STDOUT):
     """Like `companion`, several commands one after another: their imports cost more than they.
 
+    Args:
+        errors: where standard error goes; by default into the output, as on a terminal.
+
     Returns:
-        the exit code and the output of each, standard output and error as a terminal shows them.
+        the exit code and the output of each command.
     """
     words = " ; ".join(map(" ".join, commands)).split()
     done = subprocess.run(
@@ -57,7 +61,7 @@ def in_one_process(folder, environment, *commands):
         cwd=folder,
         env={**os.environ, **environment},
         stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
+        stderr=errors,
         check=False,
     )
     assert done.returncode == 0, done.stdout
@@ -277,3 +281,13 @@ def test_figures_are_told_on_any_terminal(tmp_path, command):
     done = companion(tmp_path, ASCII, *command)
     assert_said(done, 0)
     assert done[1].isascii()
+
+
+def test_standard_error_that_is_full_changes_no_exit_code(tmp_path):
+    """`2>/dev/full` made a usage error a failure, and took the result of `tune --json`."""
+    vehicle = str(shipped("vehicle-px4.yaml"))
+    tune = ["tune", vehicle, "--no-flights", "--json", "--out", "tuned.yaml"]
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        (code, out), (again, _) = in_one_process(tmp_path, {}, tune, tune, errors=full)
+    assert json.loads(out)["file"] == "tuned.yaml"
+    assert (code, again) == (0, 2)

@@ -10,7 +10,7 @@ from companion.cli import tune as command
 from companion.cli.main import main
 from companion.config.files import load, shipped
 from companion.tuning.flights import TRIAL_FLIGHTS, TrialResult
-from tests.tuning.test_noise import Log, flown, white
+from tests.tuning.test_noise import Log, flown, still, white
 
 
 def run(capsys, *arguments):
@@ -156,3 +156,28 @@ def test_both_configurations_are_flown_on_each_course_and_told(vehicle, capsys, 
     assert first["before"]["reported"] == 0.2
     assert (first["after"]["result"], first["after"]["true"]) == ("the fence was left", None)
     assert f"flying the {names[0]} on the px4 mock vehicle…" in error
+
+
+def test_damaged_records_of_the_flight_are_told(vehicle, capsys):
+    folder = vehicle.parent
+    (folder / "config.yaml").write_text("guidance: {drag_per_s: 1.0}\n")
+    log = Log(folder / "flight.tlog")
+    log.heartbeat()
+    flown(log, still, still, seconds=9.0)
+    data = bytearray(log.closed().read_bytes())
+    data[9000] ^= 0xFF
+    log.path.write_bytes(data)
+    code, _, error = run(capsys, folder, "--no-flights", "--json")
+    assert code == 0
+    assert f"{log.path}: damaged at 1 place, the first after " in error
+
+
+def test_a_configuration_with_a_mock_vehicle_gets_a_file_that_it_can_include(tmp_path, capsys):
+    """It wrote a file that included the configuration, and then refused its own file."""
+    out = tmp_path / "tuned.yaml"
+    code, told, error = run(capsys, shipped("mock-px4.yaml"), "--out", out, "--no-flights")
+    assert (code, error) == (0, "")
+    assert "Let your configuration include it" in told
+    own = tmp_path / "mine.yaml"
+    own.write_text("include: tuned.yaml\nmock: {autopilot: px4}\n")
+    assert load(own).vehicle == load(shipped("mock-px4.yaml")).vehicle

@@ -1,5 +1,6 @@
 """The channels of `flight.mcap`, as our writer writes them, read by our reader and the official."""
 
+import os
 from datetime import UTC, datetime
 
 import numpy as np
@@ -362,3 +363,9 @@ def test_a_full_disk_ends_the_record_but_a_bad_entry_does_not(tmp_path):
     assert "no such row" in told[0]
     with pytest.raises(OSError, match="No space"):
         file._write([(1.0, encode(OSError(28, "No space left on device")), ())])
+
+
+def test_a_pipe_is_no_record_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / RECORD_FILE)
+    with pytest.raises(RecordError, match=r"flight\.mcap: not a regular file; is this the folder"):
+        read_flight(tmp_path)

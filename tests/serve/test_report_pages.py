@@ -2,6 +2,7 @@
 
 import subprocess
 
+from companion.program_command import program_command
 from companion.serve import report_pages
 from companion.serve.report_pages import ReportPages
 
@@ -16,7 +17,7 @@ def test_a_page_that_cannot_be_written_is_told_in_one_sentence(tmp_path, monkeyp
     left = pages.write(tmp_path)
     assert "is this the folder of a flight?" in failed
     assert "\n" not in failed
-    assert failed.endswith(f"`companion report {tmp_path}` tries again")
+    assert failed.endswith(f"`{program_command('report', tmp_path)}` tries again")
     assert left.startswith("No report: interrupted; ")
 
 

@@ -1,7 +1,6 @@
 """`companion campaign report`: the page about a campaign, and its results in one table."""
 
 import argparse
-import shlex
 from collections import Counter
 from collections.abc import Iterator
 from io import BytesIO
@@ -23,6 +22,7 @@ from companion.campaign.report.statistics import levels, share_of
 from companion.extras import require
 from companion.files.write_whole import write_whole
 from companion.files.yaml_file import ConfigError
+from companion.program_command import program_command
 from companion.report import PAGE
 from companion.report.html_page import rendered_page, require_extra
 
@@ -134,8 +134,8 @@ def missing_cases_note(results: Results) -> list[str]:
     if not unflown:
         return []
     return [
-        f"{unflown} of {results.planned_count} {results.noun} are missing. `companion campaign "
-        f"{shlex.quote(str(results.folder))}` goes on with them."
+        f"{unflown} of {results.planned_count} {results.noun} are missing. "
+        f"`{program_command('campaign', results.folder)}` goes on with them."
     ]
 
 

@@ -1,7 +1,6 @@
 """The tables of a campaign's page."""
 
 import json
-import shlex
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
@@ -15,6 +14,7 @@ from companion.campaign.report.statistics import levels, median, share_of, worst
 from companion.config.reference import keys
 from companion.config.units import unit_of
 from companion.flight.flown_config import flattened
+from companion.program_command import program_command
 from companion.report.plots import even_indices
 from companion.report.tables import Table
 from companion.testing.settings import complete_mock
@@ -47,7 +47,7 @@ def worst_cases(results: Results) -> Table:
 def _rerun_command(results: Results, case: int) -> str:
     if results.kind == "batch":
         return EMPTY
-    return f"companion campaign rerun {shlex.quote(str(results.folder))} {case}"
+    return program_command("campaign", "rerun", results.folder, str(case))
 
 
 def configuration(campaign: Campaign) -> Table:

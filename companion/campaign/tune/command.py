@@ -1,7 +1,6 @@
 """`companion campaign tune`: searches, checks the result on unseen cases, and writes the result."""
 
 import argparse
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -79,8 +78,11 @@ def run(options: argparse.Namespace) -> int:
                 return _check_and_write(campaign, tune, search_folder, fly, results, console)
         except (KeyboardInterrupt, ClusterError, StorageError) as error:
             why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-            command = f"{program_command()} campaign tune {shlex.quote(str(options.file))}"
-            command += f" --out {shlex.quote(str(search_folder))}"
+            command = program_command(
+                *("campaign", "tune", options.file, "--out", search_folder),
+                *(("--trials", str(options.trials)) if options.trials else ()),
+                *(("--scheduler", options.scheduler) if options.scheduler else ()),
+            )
             console.print(f"{why}; the candidates so far are kept. Continue with\n  {command}")
             return FAILED
 

@@ -1,5 +1,6 @@
 """Reads a `.mcap` with the library `mcap`, also one that was cut off anywhere."""
 
+import errno
 import struct
 from collections import defaultdict
 from dataclasses import dataclass, field
@@ -52,11 +53,13 @@ def read_mcap(path: Path) -> McapContent:
     """Read all messages up to the end or to the first damage.
 
     Raises:
-        OSError: the file cannot be opened.
+        OSError: the file cannot be opened, or is a pipe, from which reading may never end.
     """
     content = McapContent()
     topics: dict[int, str] = {}
     schemas: dict[int, bytes] = {}
+    if path.is_fifo():
+        raise OSError(errno.EINVAL, "not a regular file")
     with path.open("rb") as file:
         reader = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_BYTES)
         try:
