@@ -47,7 +47,7 @@ def test_unknown_planner_names_the_known_ones():
         ({"recovery_angle": 1.5}, "recovery_angle"),
         ({"recovery_angle": 0.0}, "recovery_angle"),
         ({"recovery_angle": math.nan}, "recovery_angle"),
-        ({"limits": Limits(math.radians(80))}, "recovery angle"),
+        ({"limits": Limits(math.radians(80))}, "recovery_angle"),
     ],
 )
 def test_senseless_options_are_refused(name, options, words):

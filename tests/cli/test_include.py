@@ -179,4 +179,4 @@ def test_check_config_tells_it_as_usage(files, capsys):
 def test_the_schema_knows_include():
     include = json.loads(json_schema())["properties"]["include"]
     assert {kind["type"] for kind in include["anyOf"]} == {"string", "array"}
-    assert "override theirs" in include["description"]
+    assert "override keys of included files" in include["description"]

@@ -42,6 +42,14 @@ def failed(flown):
     assert flown.result != "ok"
 
 
+def left_alone(flown):
+    """After what the script did last, no mode and no landing is commanded; the flight failed."""
+    since = flown.autopilot.acted[-1]
+    late = [sent for sent in commands(flown, kinds.LAND, kinds.SET_MODE) if sent.t >= since]
+    assert not late, f"{late[0]}: {flown.events}"
+    failed(flown)
+
+
 def says(pattern):
     """Result or events say so."""
 

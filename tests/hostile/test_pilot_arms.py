@@ -2,7 +2,14 @@
 
 from tests.hostile import actions
 from tests.hostile.actions import arms, parameter, switches, together
-from tests.hostile.endings import never_armed, never_took_off, never_took_over, ok, on_the_ground
+from tests.hostile.endings import (
+    left_alone,
+    never_armed,
+    never_took_off,
+    never_took_over,
+    ok,
+    on_the_ground,
+)
 from tests.hostile.personality import ARDUPILOT, BOTH, PX4
 from tests.hostile.scenario import Scenario, flights, in_turn
 
@@ -44,7 +51,9 @@ def on_ground(kind):
 def before_takeover(kind):
     for fault, action in FAULTS.items():
         script = (*PILOT, ("TAKEOFF", 0.3, action))
-        demands = (never_took_over, on_the_ground)
+        # PX4's failsafe holds before it returns, so its hold is not ours to end.
+        by_failsafe = kind is PX4 and action is actions.CRITICAL
+        demands = (never_took_over, left_alone if by_failsafe else on_the_ground)
         yield row(f"{fault} before the take-over", script, demands, kind)
 
 

@@ -21,6 +21,15 @@ def lost_in_climb(vehicle: Vehicle) -> dict:
         return _outcome(vehicle, flight, silence)
 
 
+def lost_before_control(vehicle: Vehicle) -> dict:
+    """Lost as soon as PX4 holds at the end of the climb, before the program takes control."""
+    with _transmitter(vehicle) as silence:
+        flight, station = vehicle.fly(), vehicle.station
+        station.until(lambda: station.armed and station.mode == "TAKEOFF", 120.0, "take-off")
+        station.until(lambda: station.mode == "LOITER", 60.0, "the end of the climb")
+        return _outcome(vehicle, flight, silence)
+
+
 def lost_in_control(vehicle: Vehicle) -> dict:
     """The same just after the program took control."""
     with _transmitter(vehicle) as silence:

@@ -213,6 +213,7 @@ ROWS = {
     "lost_in_takeoff": lost_in_takeoff,
     "own_fence": own_fence,
     "transmitter_in_climb": lost_transmitter.lost_in_climb,
+    "transmitter_before_control": lost_transmitter.lost_before_control,
     "transmitter_in_control": lost_transmitter.lost_in_control,
     "battery": battery,
     "pilot": pilot,

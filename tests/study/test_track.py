@@ -225,7 +225,7 @@ def test_json_goes_with_this_study_alone(tmp_path, capsys):
     assert main(["study", "kmax", "--json", "--out", str(tmp_path)]) == 2
     said = capsys.readouterr()
     assert "--json needs study track" in said.err
-    assert not said.out
+    assert "--json needs study track" in json.loads(said.out)["result"]
     assert not list(tmp_path.iterdir())
 
 
