@@ -163,7 +163,7 @@ class ProgramPlan:
 
 
 def unless_disarmed(phases: Sequence[Phase]) -> Callable[[FlightContext], Sequence[Phase]]:
-    """Return the phases for `ProgramPlan.request`; none if the vehicle is disarmed."""
+    """A function for `ProgramPlan.request`: returns `phases`, or none for a disarmed vehicle."""
     return lambda context: () if context.link.state.armed is False else phases
 
 

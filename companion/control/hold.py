@@ -53,7 +53,7 @@ class Hold:
         self._flown_source.hold(brake(now, motion, heading, acceleration, self._assumed_braking))
 
     def move_upwind(self, now: float, wind: NorthEast) -> None:
-        """Move the hold upwind by the drift to expect from the autopilot; see `brake_upwind`.
+        """Move the hold upwind by the `drift` to expect when the autopilot takes over.
 
         Nothing changes if no hold has begun, or if the hold moves upwind already.
         """

@@ -110,7 +110,7 @@ class SampleRecorder:
         self._recorder.add(sample.received, self._rows.sample, entry)
 
     def action(self, name: str) -> None:
-        """Record a call by which a phase of the flight controls the loop."""
+        """Record that a phase of the flight called the method `name` of the control loop."""
         if self._recorder is not None:
             self._recorder.action(self._clock(), name)
 

@@ -136,7 +136,7 @@ def _number_advice(key: str, text: str) -> str:
 
 
 def _unit_hint(detail: Any, key: str) -> str:
-    """A hint if the value is in range once converted from the unit often mistaken for the key's."""
+    """A hint if the value is in range when it is taken as radians for degrees, or the like."""
     bound = detail.get("ctx", {})
     value = detail["input"]
     if not isinstance(value, int | float) or not 0.0 < abs(value) < _LARGEST_HINTED:

@@ -116,7 +116,7 @@ class FlightFiles:
             self._note(text)
 
     def recorder(self, observer: Observer) -> EventRecorder:
-        """Wrap `observer`: record phases and events, as STATUSTEXT too, and pass them to it."""
+        """An observer that records phases and events (as STATUSTEXT, too) before `observer`."""
         clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
 
         def write(words: str) -> None:

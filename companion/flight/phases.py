@@ -171,8 +171,8 @@ def control_phase(name: str, waits_for: str, work: Work, duration: float = inf) 
     monitors the vehicle lands.
 
     Args:
-        name: shown to the user.
-        waits_for: shown to the user.
+        name: name of the phase, shown to the user.
+        waits_for: what the phase waits for, such as "the autopilot to obey our rates".
         work: the coroutine of the phase.
         duration: expected duration, s.
     """

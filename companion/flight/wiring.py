@@ -49,7 +49,7 @@ async def connected(
 
 @contextmanager
 def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
-    """Connect the link's callbacks, and changes of values, to the flight while the block runs."""
+    """Connect the flight to the link's callbacks and to changed values while the block runs."""
     flight, context, link = assembled.flight, assembled.context, assembled.context.link
     loop, guidance_loop = context.loop, context.guidance_loop
     time = asyncio.get_running_loop().time

@@ -51,7 +51,7 @@ def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
 
 
 def _step_response(flight: FlightData) -> Plot:
-    """The first doublet's component along its direction, with ideal and nearest linear model."""
+    """Plot of the response along the first doublet, with the ideal and the nearest linear model."""
     if not flight.step_runs:
         return Plot("", "", [])
     run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)

@@ -144,8 +144,9 @@ class UdpTransport:
     def _take_unconnected(self, data: bytes, received_ns: int, address: Any) -> bool:
         """Take a datagram of an unconnected socket; return whether its sender becomes the peer.
 
-        The sender becomes the peer if the datagram contains a valid claim (`PeerRule`), or if only
-        an answer to a TIMESYNC request can prove its time stamps (`Receiver.may_prove_date`).
+        The sender becomes the peer if `PeerRule` accepts a frame of the datagram. It also becomes
+        the peer if only its answer to a TIMESYNC request can show that its signing time stamps
+        are right (`Receiver.may_prove_date`).
         """
         sender = host_and_port(address)
         if not self._named_peers.admits(address):
