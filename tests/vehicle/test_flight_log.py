@@ -291,6 +291,7 @@ def test_frames_of_other_dialects_are_no_damage(tmp_path):
         (b"\xa3\x95\x80\x80\x59FMT", "this is a DataFlash log; give the .tlog"),
         (b"PK", "not a .tlog; expected MAVLink frames, each after 8 bytes"),
     ],
+    ids=["ULog", "DataFlash", "zip"],
 )
 def test_other_files_are_refused(tmp_path, begin, words):
     path = tmp_path / "given"
