@@ -8,6 +8,7 @@ from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
 from companion.campaign.keys import replace_unchecked
 from companion.campaign.swept import Value
+from companion.campaign.worker import running_worker
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver
@@ -42,8 +43,10 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         error, `result` is the error.
     """
     row: dict[str, Value] = {"case": case.index, "seed": case.seed, **case.factors}
-    temporary_folder = tempfile.TemporaryDirectory(prefix="companion-case-", dir=_worker_folder())
-    with temporary_folder as files_folder:
+    # Dask removes the folder of a worker even if the worker is killed.
+    worker = running_worker()
+    parent = None if worker is None else worker.local_directory
+    with tempfile.TemporaryDirectory(prefix="companion-case-", dir=parent) as files_folder:
         try:
             return row | CaseFlight(case, Path(files_folder)).fly(folder)
         except ConfigError as error:  # such as a trajectory that the limits do not allow
@@ -51,19 +54,6 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         except Exception as error:
             reason = f"{INTERNAL_ERROR}{type(error).__name__}: {error}"
         return row | outcomes.error_outcomes(reason.replace(f"{files_folder}/", ""))
-
-
-def _worker_folder() -> str | None:
-    """Dask's folder of this worker, which Dask removes even if the worker is killed.
-
-    None: no worker runs this code.
-    """
-    try:
-        from distributed import get_worker  # noqa: PLC0415  an extra
-
-        return str(get_worker().local_directory)
-    except (ImportError, ValueError):
-        return None
 
 
 class CaseFlight:

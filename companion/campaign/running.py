@@ -35,7 +35,7 @@ from companion.campaign.loading import load
 from companion.campaign.report.results import Results
 from companion.campaign.unit import cases_per_unit, check_cases, unit_ranges
 from companion.child_process import usable_cores
-from companion.files.write_whole import reason_of
+from companion.files.write_whole import file_and_reason
 from companion.files.yaml_file import ConfigError
 from companion.program_command import program_command
 
@@ -109,8 +109,7 @@ class _Run:
         except ClusterError as error:
             return self._report_stop(str(error))
         except OSError as error:  # such as a full disk
-            place = f"{error.filename}: " if error.filename else ""
-            return self._report_stop(f"{place}{reason_of(error)}")
+            return self._report_stop(file_and_reason(error))
 
     def _check_all_cases(self) -> float | None:
         """Check every case; return the wall time that a case takes, s; None: not measured."""

@@ -10,6 +10,7 @@ from companion.campaign.design import PlannedCase
 from companion.campaign.flight import fly_case
 from companion.campaign.swept import Value
 from companion.campaign.versions import Versions, require_equal, versions
+from companion.campaign.worker import running_worker
 
 Row = dict[str, Value]
 LONGEST_UNIT_S = 2.5
@@ -88,12 +89,8 @@ def check_cases(kind: str, cases: Sequence[Case]) -> None:
 
 def _worker_address() -> str:
     """The address of the Dask worker that runs this code, or "this process" without one."""
-    from distributed import get_worker  # noqa: PLC0415  an extra
-
-    try:
-        return str(get_worker().address)
-    except ValueError:
-        return "this process"
+    worker = running_worker()
+    return "this process" if worker is None else str(worker.address)
 
 
 def cases_per_unit(cases: int, seconds_per_case: float, workers: int) -> int:

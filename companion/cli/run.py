@@ -14,7 +14,7 @@ from companion.cli.exit_codes import EXIT_FAILURE, EXIT_USAGE
 from companion.cli.text_streams import flush_output
 from companion.demo import VehicleStoppedError
 from companion.extras import MissingExtraError
-from companion.files.write_whole import reason_of
+from companion.files.write_whole import file_and_reason
 from companion.files.yaml_file import ConfigError
 from companion.mavlink.errors import EndpointError, LinkError, LogError, SigningError
 from companion.realtime import RealtimeError
@@ -76,8 +76,7 @@ def run(command: Command, options: argparse.Namespace) -> int:
     fault = flush_output()
     # An error without a file may be that of standard output, which is reported below.
     if os_error is not None and (fault is None or os_error.filename is not None):
-        file = "" if os_error.filename is None else f"{os_error.filename}: "
-        reason = f"{file}{reason_of(os_error)}"
+        reason = file_and_reason(os_error)
     if reason is not None:
         _print_error(reason)
         if getattr(options, "json", False):

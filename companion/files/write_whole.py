@@ -20,6 +20,11 @@ def reason_of(error: OSError) -> str:
     return error.strerror or str(error)
 
 
+def file_and_reason(error: OSError) -> str:
+    """The file of the error, if it is known, and `reason_of` the error."""
+    return f"{'' if error.filename is None else f'{error.filename}: '}{reason_of(error)}"
+
+
 class ReservedSpace:
     """Disk space reserved for a file that is written later, when the disk may be full.
 

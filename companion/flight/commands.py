@@ -195,10 +195,7 @@ async def leave_offboard(
     if context.armed() or not roles_of(context.link) & cannot_arm_in:
         return
     mode = context.link.state.mode
-    context.note(
-        f"the vehicle is disarmed in {mode}, in which it cannot be armed again: asking the "
-        "autopilot to hold"
-    )
+    context.note(disarmed_text(mode))
     context.detail = f"the autopilot to leave {mode}"
 
     def require_ours() -> None:
@@ -209,11 +206,23 @@ async def leave_offboard(
     try:
         await ask_to_hold(context, require_ours)
     except (CommandRefused, CommandTimeout) as error:
-        raise FlightEnded(
-            f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "
-            f"command another mode ({error})",
-            Exit.LEAVE,
-        ) from error
+        raise FlightEnded(left_disarmed_text(mode, error), Exit.LEAVE) from error
+
+
+def disarmed_text(mode: str | None) -> str:
+    """A sentence for the user: why the autopilot is asked to leave `mode`."""
+    return (
+        f"the vehicle is disarmed in {mode}, in which it cannot be armed again: asking the "
+        "autopilot to hold"
+    )
+
+
+def left_disarmed_text(mode: str | None, error: Exception) -> str:
+    """A sentence for the user: the autopilot did not leave `mode`, because of `error`."""
+    return (
+        f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "
+        f"command another mode ({error})"
+    )
 
 
 async def _takes_effect(context: FlightContext, done: IsDone) -> bool:

@@ -3,7 +3,7 @@
 import asyncio
 import gc
 
-from companion.flight.commands import in_role
+from companion.flight.commands import disarmed_text, in_role, left_disarmed_text
 from companion.mavlink.errors import LinkError
 from companion.serve.kept_fence import KeptFence
 from companion.serve.ownership import Ownership, Program
@@ -110,14 +110,8 @@ class ServedFlights:
     async def _ask_to_hold(self) -> None:
         link, tell = self._vehicle.link, self._vehicle.component.tell
         mode = link.state.mode
-        tell(
-            f"the vehicle is disarmed in {mode}, in which it cannot be armed again: asking the "
-            "autopilot to hold"
-        )
+        tell(disarmed_text(mode))
         try:
             await link.command(*link.autopilot.hold())
         except LinkError as error:
-            tell(
-                f"the vehicle is left disarmed in {mode}, in which it cannot be armed again; "
-                f"command another mode ({error})"
-            )
+            tell(left_disarmed_text(mode, error))
