@@ -12,7 +12,7 @@ MESSAGE_START = "an error outside this program: "
 """Beginning of the message of each `UserCodeError`."""
 
 _OUR_PACKAGE = __name__.partition(".")[0]
-_LONGEST_TEXT = 300
+_MAX_TEXT_LENGTH = 300
 """Largest number of characters of the user code's error that are shown."""
 
 
@@ -38,10 +38,14 @@ def naming_user_code(
         UserCodeError: the code raised anything else, also SystemExit or CancelledError, which would
             end the event loop or the guidance of the flight.
     """
-    unchanged: tuple[type[BaseException], ...] = (KeyboardInterrupt, UserCodeError, *passed_errors)
+    unchanged_errors: tuple[type[BaseException], ...] = (
+        KeyboardInterrupt,
+        UserCodeError,
+        *passed_errors,
+    )
     try:
         yield
-    except unchanged:
+    except unchanged_errors:
         raise
     except BaseException as error:
         code = _innermost_trajectory(code)
@@ -53,7 +57,7 @@ def naming_user_code(
         text = " ".join(f"{type(error).__name__}: {error}".removesuffix(": ").split())
         raise UserCodeError(
             f"an error outside this program: the {role} {source.__qualname__} of the module "
-            f"{source.__module__} raised {text[:_LONGEST_TEXT]}{_error_place(package, error)}"
+            f"{source.__module__} raised {text[:_MAX_TEXT_LENGTH]}{_error_place(package, error)}"
         ) from error
 
 

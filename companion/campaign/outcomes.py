@@ -145,7 +145,13 @@ def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
     sha256 = hashlib.sha256()
     for setpoint in setpoints:
         sha256.update(
-            struct.pack("<dq4d", setpoint.time, setpoint.answers, *setpoint.rates, setpoint.thrust)
+            struct.pack(
+                "<dq4d",
+                setpoint.time,
+                setpoint.sample_time_boot_ms,
+                *setpoint.rates,
+                setpoint.thrust,
+            )
         )
     motion = (*state["position"], *state["velocity"], *state["q"], *state["rates"])
     sha256.update(struct.pack(f"<{len(motion)}d", *motion))

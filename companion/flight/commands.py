@@ -83,7 +83,7 @@ async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
     if fence_text is None:
         return ended
     context.release()
-    mode, since = state.mode, state.mode_received - _TEXT_TIME
+    mode, since = state.mode, state.mode_received_at - _TEXT_TIME
     await asyncio.sleep(_TEXT_TIME)
     if not any(fence_text in each.text for each in state.texts if each.time >= since):
         return ended
@@ -152,7 +152,7 @@ async def change_mode(
         state = context.link.state
         if done():
             return True
-        if state.mode_received > accepted_at + _MODE_REPORT_TIMEOUT:
+        if state.mode_received_at > accepted_at + _MODE_REPORT_TIMEOUT:
             if in_role(context.link, Role.OFFBOARD):
                 raise CommandUnfinished(
                     f"{command_name(command.command)}: the autopilot accepted it, but still obeys "

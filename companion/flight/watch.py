@@ -155,7 +155,7 @@ class Watch:
 
         # While the autopilot flies by itself, as in a take-off, a short silence changes nothing.
         shortest_limit = 0.0 if in_control else INITIAL_HEARTBEAT_LIMIT
-        if age(state.mode_received) > max(self._context.heartbeat_limit, shortest_limit):
+        if age(state.mode_received_at) > max(self._context.heartbeat_limit, shortest_limit):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )

@@ -7,7 +7,7 @@ from companion.attitude import PLANNER_NAMES
 from companion.config import Config
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import INEFFECTIVE, SAFE, UNSAFE, Finding, Key
-from companion.vehicle.clock_estimates import MOST_DRIFT
+from companion.vehicle.clock_estimates import MAX_DRIFT
 
 _UNSAFE_NOT_NEWER_SHARE = 0.2
 """More than this share of samples stamped no later than the previous sample is unsafe."""
@@ -104,11 +104,11 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
 
     A pause of the samples at either end of the window makes the measured rate uncertain.
     """
-    lag_per_s = 1.0 - rate - MOST_DRIFT
+    lag_per_s = 1.0 - rate - MAX_DRIFT
     stale_after = config.deadman.telemetry_stale / lag_per_s if lag_per_s > 0.0 else inf
     uncertainty = evidence.samples.longest_pause / max(evidence.counting_time, 1e-3)
     too_slow = lag_per_s > uncertainty
-    differs = abs(rate - 1.0) > MOST_DRIFT
+    differs = abs(rate - 1.0) > MAX_DRIFT
     because = "time limits, such as those of `deadman`, are longer or shorter than configured"
     if too_slow:
         because = (

@@ -23,7 +23,7 @@ from companion.guidance.offboard_loss import (
 from companion.guidance.reference import Vector
 from companion.preflight.evidence import Evidence
 from companion.preflight.finding import Finding, Key
-from companion.vehicle.parameter_checks import LONGEST_RATE_HOLD, shortest_rate_hold
+from companion.vehicle.parameter_checks import MAX_RATE_HOLD_TIME, min_rate_hold_time
 from companion.vehicle.parameter_rules import CheckResult
 
 _POINT_PERIOD = 0.05
@@ -56,7 +56,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """How far the vehicle is carried if our setpoints stop at the worst moment of the flight."""
     failsafe, maneuvers = evidence.autopilot.offboard_loss_failsafe, evidence.maneuvers
     hold_time = evidence.survey.values.get(failsafe.parameter)
-    if maneuvers is None or hold_time is None or not 0.0 <= hold_time <= LONGEST_RATE_HOLD:
+    if maneuvers is None or hold_time is None or not 0.0 <= hold_time <= MAX_RATE_HOLD_TIME:
         return  # an unknown or longer time is unsafe, whatever is flown
     drag = evidence.known_drag.least
     worst = worst_reach(config, maneuvers, hold_time, drag, brakes=failsafe.brakes)
@@ -69,7 +69,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     if worst.breach is None:
         yield Finding(Key.OFFBOARD_LOSS, CheckResult.SAFE, reach_text, source=source)
         return
-    shortest = shortest_rate_hold(config.deadman.silence_limit)
+    shortest = min_rate_hold_time(config.deadman.silence_limit)
     shorter_hold = f"set {failsafe.parameter} to {shortest:g}, " if hold_time > shortest else ""
     yield Finding(
         Key.OFFBOARD_LOSS,

@@ -12,7 +12,7 @@ from companion.vehicle.parameter_rules import (
     CompanionSettings,
     ParameterFinding,
     ParameterRule,
-    judge,
+    apply_rules,
 )
 
 
@@ -55,7 +55,7 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
                 + evidence.autopilot.name,
             )
     yield from _missing_parameters(evidence)
-    for result in judge(rules, survey.values, companion_settings(config)):
+    for result in apply_rules(rules, survey.values, companion_settings(config)):
         yield _finding(result, survey.present_names[result.rule.name])
 
 

@@ -34,7 +34,7 @@ Parts of the above
     VirtualEventLoop    the event loop whose time is the vehicle's
     open_wire           opens a link inside `run`: `Link(settings, opener=open_wire)`
     environment         what a flight inside `run` gets from the computer
-    UnseenError         a task or callback failed, and the error was not handled
+    UnhandledError      a task or callback failed, and the error was not handled
 
 In pytest the fixture `mock_vehicle` makes vehicles.
 """
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from companion.testing.client_programs import serving as serving
     from companion.testing.conformance import check_guidance as check_guidance
     from companion.testing.conformance import check_planner as check_planner
-    from companion.testing.flying import UnseenError as UnseenError
+    from companion.testing.flying import UnhandledError as UnhandledError
     from companion.testing.flying import connect as connect
     from companion.testing.flying import environment as environment
     from companion.testing.flying import fly as fly
@@ -64,7 +64,14 @@ if TYPE_CHECKING:
 _NAMES = {
     "companion.testing.client_programs": ("Program", "serving"),
     "companion.testing.conformance": ("check_guidance", "check_planner"),
-    "companion.testing.flying": ("UnseenError", "connect", "environment", "fly", "run", "session"),
+    "companion.testing.flying": (
+        "UnhandledError",
+        "connect",
+        "environment",
+        "fly",
+        "run",
+        "session",
+    ),
     "companion.testing.setpoints": ("ReceivedSetpoint",),
     "companion.testing.vehicle": ("MockVehicle",),
     "companion.testing.virtual_loop": ("VirtualEventLoop",),

@@ -24,7 +24,7 @@ from companion.testing.wire import open_wire, wire_to
 T = TypeVar("T")
 
 
-class UnseenError(RuntimeError):
+class UnhandledError(RuntimeError):
     """A task or callback of the program failed, and the program did not handle the error."""
 
 
@@ -36,10 +36,10 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
 
     Raises:
         KeyboardInterrupt: Ctrl-C came, even if the flight then ended and returned.
-        UnseenError: a task or callback failed, and the error was not handled.
+        UnhandledError: a task or callback failed, and the error was not handled.
         ValueError: `main` is no coroutine.
     """
-    unseen: list[dict[str, Any]] = []
+    unhandled: list[dict[str, Any]] = []
 
     def make_loop() -> VirtualEventLoop:
         clock = VirtualClock(vehicle.time)
@@ -49,14 +49,14 @@ def run(vehicle: MockVehicle, main: Coroutine[Any, Any, T]) -> T:
         raise ValueError(f"a coroutine was expected, as in run(vehicle, main()), not {main!r}")
     # Garbage collection costs 7 % of a flight's time.
     with no_garbage_collection(), asyncio.Runner(loop_factory=make_loop) as runner:
-        runner.get_loop().set_exception_handler(lambda _, context: unseen.append(context))
-        result = runner.run(_cancelled_by_ctrl_c(main))
-    if unseen:
-        raise UnseenError(unseen[0]["message"]) from unseen[0].get("exception")
+        runner.get_loop().set_exception_handler(lambda _, context: unhandled.append(context))
+        result = runner.run(_result_unless_interrupted(main))
+    if unhandled:
+        raise UnhandledError(unhandled[0]["message"]) from unhandled[0].get("exception")
     return result
 
 
-async def _cancelled_by_ctrl_c(main: Coroutine[Any, Any, T]) -> T:
+async def _result_unless_interrupted(main: Coroutine[Any, Any, T]) -> T:
     """Return the result of `main`; raise CancelledError if Ctrl-C came meanwhile.
 
     After Ctrl-C a flight ends and returns normally. Without CancelledError, a campaign or a test
@@ -95,7 +95,7 @@ def session(
     flown_config = config_in_memory(config, vehicle)
     return Session(
         flown_config,
-        _made_folder(folder),
+        _make_folder(folder),
         observer or SilentObserver(),
         ask_landing or decline_landing,
         environment=environment,
@@ -125,7 +125,7 @@ def fly(
         ConfigError: the configuration is wrong, or a maneuver cannot be flown.
         LinkError: the link cannot do what the configuration demands.
         OSError: the folder cannot be written.
-        UnseenError: a task or callback failed, and the error was not handled.
+        UnhandledError: a task or callback failed, and the error was not handled.
     """
     return run(vehicle, session(config, vehicle, folder, observer, ask_landing).fly())
 
@@ -156,12 +156,12 @@ async def connect(
         )
     flown_config = config_in_memory(config, vehicle)
     async with connect_configured(
-        flown_config, _made_folder(folder), observer, environment
+        flown_config, _make_folder(folder), observer, environment
     ) as connected:
         yield connected
 
 
-def _made_folder(folder: Path | str | None) -> Path | None:
+def _make_folder(folder: Path | str | None) -> Path | None:
     """The folder of a flight, made if it does not exist."""
     if folder is None:
         return None

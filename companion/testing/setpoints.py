@@ -8,13 +8,13 @@ class ReceivedSetpoint(NamedTuple):
 
     Attributes:
         time: vehicle time when the setpoint was handled, s.
-        answers: `time_boot_ms`: time stamp of the sample to which the setpoint responds, ms.
+        sample_time_boot_ms: time stamp of the sample to which the setpoint responds, ms.
         rates: body rates about x, y, z (FRD), rad/s.
         thrust: normalised thrust, 0..1.
     """
 
     time: float
-    answers: int
+    sample_time_boot_ms: int
     rates: tuple[float, float, float]
     thrust: float
 

@@ -35,28 +35,30 @@ def mock_with(section: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[st
     Raises:
         ConfigError: an unknown key or a bad value; the message names the key.
     """
-    by_depth: dict[int, dict[str, Any]] = {}
+    changes_by_depth: dict[int, dict[str, Any]] = {}
     for key, value in changes.items():
-        by_depth.setdefault(key.count("."), {})[key] = value
-    data = dict(section) | by_depth.pop(0, {})
-    complete = complete_mock(data)
-    for depth in sorted(by_depth):
-        for key, value in by_depth[depth].items():
-            _put(complete, key.split("."), value)
-        complete = complete_mock(complete)
-    return complete
+        changes_by_depth.setdefault(key.count("."), {})[key] = value
+    changed_section = dict(section) | changes_by_depth.pop(0, {})
+    complete_section = complete_mock(changed_section)
+    for depth in sorted(changes_by_depth):
+        for key, value in changes_by_depth[depth].items():
+            _set_nested(complete_section, key.split("."), value)
+        complete_section = complete_mock(complete_section)
+    return complete_section
 
 
-def _put(section: dict[str, Any], path: list[str], value: Any) -> None:
+def _set_nested(section: dict[str, Any], path: list[str], value: Any) -> None:
     """Set a value in a nested section.
 
     Raises:
         ConfigError: a name on the path has a value that is not a section.
     """
     for depth, name in enumerate(path[:-1]):
-        inner = section.get(name)
-        if name in section and not isinstance(inner, dict):
-            where = ".".join(["mock", *path[: depth + 1]])
-            raise ConfigError(f"{where} is {inner!r:.40}, so there is no mock.{'.'.join(path)}")
+        subsection = section.get(name)
+        if name in section and not isinstance(subsection, dict):
+            section_key = ".".join(["mock", *path[: depth + 1]])
+            raise ConfigError(
+                f"{section_key} is {subsection!r:.40}, so there is no mock.{'.'.join(path)}"
+            )
         section = section.setdefault(name, {})
     section[path[-1]] = value

@@ -20,7 +20,7 @@ DatagramRelay = Callable[[bytes], Iterable[bytes]]
 
 _GROUND_STATION = 255, 190
 """MAVLink ids of a ground station."""
-_COMMAND_PARAMETERS = 7
+_COMMAND_PARAMETER_COUNT = 7
 
 
 def _plant_class(compiled: bool) -> type[Plant]:
@@ -129,8 +129,8 @@ class MockVehicle:
 
     def command(self, number: int, *parameters: float) -> None:
         """Let a ground station send a COMMAND_LONG (MAV_CMD, its parameters)."""
-        padded = (*parameters, *[0.0] * (_COMMAND_PARAMETERS - len(parameters)))
-        self.transmit(common.MAVLink_command_long_message(1, 1, number, 0, *padded))
+        padded_parameters = (*parameters, *[0.0] * (_COMMAND_PARAMETER_COUNT - len(parameters)))
+        self.transmit(common.MAVLink_command_long_message(1, 1, number, 0, *padded_parameters))
 
     def transmit(self, message: Any, sender: tuple[int, int] = _GROUND_STATION) -> None:
         """Let a station, with the system and component ids `sender`, send a pymavlink message."""
@@ -201,8 +201,8 @@ class MockVehicle:
         for each in (datagram,) if relay is None else relay(datagram):
             self._arrived_datagrams.append((each, decode(each)))
         if not self.in_lockstep:
-            arrived, self._arrived_datagrams = self._arrived_datagrams, []
-            self._exchange.deliver(arrived, self._simulation.companion)
+            arrived_datagrams, self._arrived_datagrams = self._arrived_datagrams, []
+            self._exchange.deliver(arrived_datagrams, self._simulation.companion)
 
     def take_sent(self) -> list[bytes]:
         """Take the datagrams that the vehicle has sent since the last call."""
@@ -222,8 +222,8 @@ class MockVehicle:
     def step(self) -> list[bytes]:
         """Simulate one step; return the datagrams that the vehicle sends in it."""
         self._has_begun = True
-        arrived, self._arrived_datagrams = self._arrived_datagrams, []
-        beacon = self._exchange.step(arrived)
+        arrived_datagrams, self._arrived_datagrams = self._arrived_datagrams, []
+        beacon = self._exchange.step(arrived_datagrams)
         datagrams = self._exchange.outgoing(self._simulation.companion, beacon)
         for callback in tuple(self.after_step):
             callback()

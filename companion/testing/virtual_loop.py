@@ -20,7 +20,7 @@ class VirtualClock:
 
     def __init__(self, now: float) -> None:
         self.now = now
-        self._last_beacon: float | None = None
+        self._last_beacon_time: float | None = None
 
     def read(self) -> float:
         """The loop's time, s."""
@@ -28,9 +28,9 @@ class VirtualClock:
 
     def advance(self, vehicle_time: float) -> bool:
         """Set the clock to the time of a lockstep beacon, s; False if the beacon is not newer."""
-        if self._last_beacon is not None and vehicle_time <= self._last_beacon:
+        if self._last_beacon_time is not None and vehicle_time <= self._last_beacon_time:
             return False
-        self._last_beacon = self.now = vehicle_time
+        self._last_beacon_time = self.now = vehicle_time
         return True
 
 

@@ -16,7 +16,7 @@ from companion.testing.vehicle import MockVehicle
 from companion.testing.virtual_loop import VirtualClock, VirtualEventLoop
 from sitl_mock.exchange import burst_time
 
-_NAME = "the mock vehicle"
+_SENDER_NAME = "the mock vehicle"
 
 
 class MemoryTransport:
@@ -24,31 +24,35 @@ class MemoryTransport:
 
     Args:
         receiver: takes arriving datagrams.
-        take: takes sent datagrams.
+        on_send: takes sent datagrams.
     """
 
     reconnects = False
 
-    def __init__(self, receiver: Receiver, take: Callable[[bytes], None]) -> None:
+    def __init__(self, receiver: Receiver, on_send: Callable[[bytes], None]) -> None:
         self.is_open = True
-        self._receiver, self._take = receiver, take
+        self._receiver, self._on_send = receiver, on_send
         self._loop = asyncio.get_running_loop()
-        self._connected = self._heard_in_period = False
+        self._connected = self._received_in_period = False
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
     def deliver(self, datagram: bytes, received_ns: int) -> None:
         """Let a datagram of the vehicle arrive at the event-loop time `received_ns`, ns."""
         receiver = self._receiver
         if self._connected:
-            self._heard_in_period = receiver.receive(datagram, received_ns) or self._heard_in_period
-        elif receiver.claim(datagram, received_ns, _NAME) or receiver.may_prove_date(_NAME):
-            self._connected = self._heard_in_period = True
+            self._received_in_period = (
+                receiver.receive(datagram, received_ns) or self._received_in_period
+            )
+        elif receiver.claim(datagram, received_ns, _SENDER_NAME) or receiver.may_prove_date(
+            _SENDER_NAME
+        ):
+            self._connected = self._received_in_period = True
 
     def send(self, frame: bytes) -> bool:
         """Send one datagram now; return false without a peer."""
         if not self._connected:
             return False
-        self._take(frame)
+        self._on_send(frame)
         return True
 
     def close(self) -> None:
@@ -58,8 +62,8 @@ class MemoryTransport:
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
-        silent, self._heard_in_period = not self._heard_in_period, False
-        if silent or self._receiver.may_replace_peer():
+        peer_silent, self._received_in_period = not self._received_in_period, False
+        if peer_silent or self._receiver.may_replace_peer():
             self._connected = False
 
 
@@ -78,10 +82,10 @@ class Wire:
         """
         if self._transport is not None and self._transport.is_open:
             raise EndpointError("the mock vehicle has one companion link, which is open already")
-        self._transport = MemoryTransport(receiver, self._take)
+        self._transport = MemoryTransport(receiver, self._send_to_vehicle)
         return self._transport
 
-    def _take(self, frame: bytes) -> None:
+    def _send_to_vehicle(self, frame: bytes) -> None:
         """Pass a frame of the program to the vehicle."""
         self._vehicle.receive(frame)
 
@@ -108,7 +112,7 @@ class LockstepWire(Wire):
         self._clock.now = max(self._clock.now, self._vehicle.time)
 
 
-class FreeWire(Wire):
+class FreeRunningWire(Wire):
     """A wire without lockstep: both sides run on the clock; `MockVehicle.delay_s` applies."""
 
     def __init__(self, vehicle: MockVehicle, clock: VirtualClock) -> None:
@@ -119,53 +123,53 @@ class FreeWire(Wire):
         # they arrive in the order of sending.
         self._in_transit: deque[tuple[float, bool, bytes]] = deque()
         # Time by which vehicle time is behind the clock, s.
-        self._behind_clock = clock.now - vehicle.time
-        vehicle.set_clock(lambda: round((clock.now - self._behind_clock) * 1e9))
+        self._vehicle_clock_lag = clock.now - vehicle.time
+        vehicle.set_clock(lambda: round((clock.now - self._vehicle_clock_lag) * 1e9))
 
     def advance(self, until: float) -> None:
         """Advance until a datagram reaches the program, but at most to the time `until`, s."""
         clock, in_transit = self._clock, self._in_transit
-        step_at = self._next_step_at()
+        next_step_time = self._next_step_time()
         while True:
-            arrival = in_transit[0][0] if in_transit else step_at
-            clock.now = max(clock.now, min(until, arrival, step_at))
-            received = clock.now >= arrival and self.deliver_due()
-            if clock.now >= step_at:
-                self._send(self._vehicle.begin())
-                self._send(self._vehicle.step())
-                self._behind_clock += self._vehicle.take_clock_slip()
-                step_at = self._next_step_at()
-                received = self.deliver_due() or received
-            if received or clock.now >= until:
+            arrival_time = in_transit[0][0] if in_transit else next_step_time
+            clock.now = max(clock.now, min(until, arrival_time, next_step_time))
+            program_received = clock.now >= arrival_time and self.deliver_due()
+            if clock.now >= next_step_time:
+                self._send_to_program(self._vehicle.begin())
+                self._send_to_program(self._vehicle.step())
+                self._vehicle_clock_lag += self._vehicle.take_clock_slip()
+                next_step_time = self._next_step_time()
+                program_received = self.deliver_due() or program_received
+            if program_received or clock.now >= until:
                 return
 
-    def _next_step_at(self) -> float:
-        return burst_time(self._vehicle.next_step_at, self._burst) + self._behind_clock
+    def _next_step_time(self) -> float:
+        return burst_time(self._vehicle.next_step_at, self._burst) + self._vehicle_clock_lag
 
     def deliver_due(self) -> bool:
         """Deliver due datagrams, in order; return whether the program received one."""
-        in_transit, now, received = self._in_transit, self._clock.now, False
+        in_transit, now, program_received = self._in_transit, self._clock.now, False
         while in_transit and in_transit[0][0] <= now:
             _, to_program, datagram = in_transit.popleft()
             if to_program:
-                received = True
+                program_received = True
                 self._deliver(datagram, now)
             else:
                 self._vehicle.receive(datagram)
-                self._send(self._vehicle.take_sent())
-        return received
+                self._send_to_program(self._vehicle.take_sent())
+        return program_received
 
-    def _take(self, frame: bytes) -> None:
+    def _send_to_vehicle(self, frame: bytes) -> None:
         self._in_transit.append((self._clock.now + self._delay, False, frame))
 
-    def _send(self, datagrams: list[bytes]) -> None:
-        arrival = self._clock.now + self._delay
-        self._in_transit.extend((arrival, True, datagram) for datagram in datagrams)
+    def _send_to_program(self, datagrams: list[bytes]) -> None:
+        arrival_time = self._clock.now + self._delay
+        self._in_transit.extend((arrival_time, True, datagram) for datagram in datagrams)
 
 
-def wire_to(vehicle: MockVehicle, clock: VirtualClock) -> LockstepWire | FreeWire:
+def wire_to(vehicle: MockVehicle, clock: VirtualClock) -> LockstepWire | FreeRunningWire:
     """The wire of a vehicle, with or without lockstep."""
-    return (LockstepWire if vehicle.in_lockstep else FreeWire)(vehicle, clock)
+    return (LockstepWire if vehicle.in_lockstep else FreeRunningWire)(vehicle, clock)
 
 
 async def open_wire(_endpoint: Any, receiver: Receiver, _lost: Any) -> MemoryTransport:

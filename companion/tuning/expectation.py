@@ -14,11 +14,11 @@ from companion.tuning.margins import Margins, frequencies, margins, smaller_marg
 
 Floats = NDArray[np.float64]
 
-_SETTLED_SHARE = 0.05
+_SETTLED_FRACTION = 0.05
 """Share of its peak below which the response to a gust has settled."""
 _RESPONSE_DURATION = 10.0
 """Duration of the computed response to a gust, s."""
-_RESPONSE_PERIOD = 0.01
+_RESPONSE_TIME_STEP = 0.01
 """Time between computed points of the response to a gust, s."""
 
 
@@ -89,7 +89,7 @@ class Expectation:
         return smaller_margins(self.margins_at_rate, self.margins_at_acceleration)
 
 
-def stability(config: Config, error: ModelMismatch = EXACT) -> Margins:
+def stability(config: Config, mismatch: ModelMismatch = EXACT) -> Margins:
     """Stability margins of a configuration.
 
     The loop is opened at the commanded body rate and at the commanded acceleration; of each margin
@@ -97,12 +97,12 @@ def stability(config: Config, error: ModelMismatch = EXACT) -> Margins:
 
     Args:
         config: the configuration.
-        error: difference between the real rate loop and the configured one.
+        mismatch: difference between the real rate loop and the configured one.
 
     Raises:
         ConfigError: see `control_loop`.
     """
-    return loop_margins(control_loop(config, frequencies(), error))
+    return loop_margins(control_loop(config, frequencies(), mismatch))
 
 
 def loop_margins(loop: Loop) -> Margins:
@@ -121,21 +121,22 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
         period: time between two position messages, s.
     """
     omega = loop.s.imag
-    by_acceleration = loop.responses_to_acceleration()
-    by_velocity = loop.responses_to_error(loop.velocity_feedback)
-    by_position = loop.responses_to_error(loop.position_feedback)
-    gust_time, error_time = disturbances.gust_correlation_time, disturbances.path_correlation_time
-    gusts = ((by_acceleration, _slow_density(omega, disturbances.gust * loop.drag, gust_time)),)
+    acceleration_responses = loop.responses_to_acceleration()
+    velocity_responses = loop.responses_to_error(loop.velocity_feedback)
+    position_responses = loop.responses_to_error(loop.position_feedback)
+    gust_time, path_time = disturbances.gust_correlation_time, disturbances.path_correlation_time
+    gust_density = _slow_density(omega, disturbances.gust * loop.drag, gust_time)
+    gusts = ((acceleration_responses, gust_density),)
     path = (
-        (by_velocity, _slow_density(omega, disturbances.velocity_error, error_time)),
-        (by_acceleration, _slow_density(omega, disturbances.acceleration_error, error_time)),
+        (velocity_responses, _slow_density(omega, disturbances.velocity_error, path_time)),
+        (acceleration_responses, _slow_density(omega, disturbances.acceleration_error, path_time)),
     )
     velocity_density = disturbances.velocity_density**2
     velocity_density += 2.0 * period * disturbances.velocity_noise**2
     noise = (
-        (by_velocity, velocity_density),
-        (by_acceleration, disturbances.acceleration_density**2),
-        (by_position, 2.0 * period * disturbances.position_noise**2),
+        (velocity_responses, velocity_density),
+        (acceleration_responses, disturbances.acceleration_density**2),
+        (position_responses, 2.0 * period * disturbances.position_noise**2),
     )
     causes = (gusts, path, noise)
     # Both axes are disturbed independently, therefore the factor 2.
@@ -151,15 +152,15 @@ def expected_errors(loop: Loop, disturbances: Disturbances, period: float) -> Er
     return Errors(gust_error, path_error, noise_error, sqrt(rate_variance))
 
 
-def _slow_density(omega: Floats, deviation: float, time: float) -> Floats:
+def _slow_density(omega: Floats, sigma: float, correlation_time: float) -> Floats:
     """(n,), one-sided power spectral density, per Hz, of noise after a first-order low-pass filter.
 
     Args:
         omega: (n,), frequencies, rad/s.
-        deviation: standard deviation of the noise.
-        time: correlation time of the noise, s.
+        sigma: standard deviation of the noise.
+        correlation_time: correlation time of the noise, s.
     """
-    density: Floats = 4.0 * deviation**2 * time / (1.0 + (omega * time) ** 2)
+    density: Floats = 4.0 * sigma**2 * correlation_time / (1.0 + (omega * correlation_time) ** 2)
     return density
 
 
@@ -171,13 +172,13 @@ def expectation(config: Config, disturbances: Disturbances) -> Expectation:
     """
     s = frequencies()
     loop = control_loop(config, s)
-    peak, settling = _gust_response(config)
+    peak_error, settling_time = _gust_response(config)
     return Expectation(
         margins(s, loop.gain_at_rate),
         margins(s, loop.gain_at_acceleration),
         expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz),
-        peak,
-        settling,
+        peak_error,
+        settling_time,
     )
 
 
@@ -198,9 +199,9 @@ def _gust_response(config: Config) -> tuple[float, float]:
     omega = np.arange(0.0, 60.0, 0.05)
     s = np.asarray(real_part + 1j * omega, dtype=np.complex128)
     position, _ = control_loop(config, s).responses_to_acceleration()
-    time = np.arange(0.0, _RESPONSE_DURATION, _RESPONSE_PERIOD)
+    time = np.arange(0.0, _RESPONSE_DURATION, _RESPONSE_TIME_STEP)
     integral = np.trapezoid(np.exp(1j * np.outer(time, omega)) * position, omega).real
     response = np.abs(np.exp(real_part * time) * integral / pi)
-    peak = float(response.max())
-    unsettled = np.flatnonzero(response > _SETTLED_SHARE * peak)
-    return peak, float(time[unsettled[-1]]) + _RESPONSE_PERIOD
+    peak_error = float(response.max())
+    unsettled = np.flatnonzero(response > _SETTLED_FRACTION * peak_error)
+    return peak_error, float(time[unsettled[-1]]) + _RESPONSE_TIME_STEP

@@ -52,26 +52,28 @@ def guidance_feedback(
         drag: assumed linear drag of the vehicle, 1/s.
         position_period: time between two position messages, s.
     """
-    by_acceleration, by_position, by_velocity = _observer_responses(s, observer, position_period)
-    age = 0.5 * position_period
-    delay = np.exp(-s * age)[:, None]
-    horizon = age + (guidance.tilt.dead_time + 0.5 * guidance.period)
+    to_acceleration, to_position, to_velocity = _observer_responses(s, observer, position_period)
+    position_age = 0.5 * position_period
+    delay = np.exp(-s * position_age)[:, None]
+    horizon = position_age + (guidance.tilt.dead_time + 0.5 * guidance.period)
     # The known acceleration is g·c − drag·v; between two positions its newest value is used.
     inputs = (
-        (GRAVITY * by_acceleration, GRAVITY),
-        (by_velocity - drag * by_acceleration, -drag),
-        (by_position, 0.0),
+        (GRAVITY * to_acceleration, GRAVITY),
+        (to_velocity - drag * to_acceleration, -drag),
+        (to_position, 0.0),
     )
     responses = []
-    for observer_response, known in inputs:
+    for observer_response, known_acceleration in inputs:
         position, velocity, disturbance = (delay * observer_response).T
-        present_velocity = velocity + age * (disturbance + known)
-        predicted_velocity = velocity + horizon * (disturbance + known)
+        total_acceleration = disturbance + known_acceleration
+        present_velocity = velocity + position_age * total_acceleration
+        predicted_velocity = velocity + horizon * total_acceleration
         predicted_position = (
-            position + horizon * velocity + 0.5 * horizon * horizon * (disturbance + known)
+            position + horizon * velocity + 0.5 * horizon * horizon * total_acceleration
         )
-        by_tilt = max(known, 0.0)  # drag acts on the observed velocity, not on the measured one
-        acceleration = by_tilt - drag * present_velocity + disturbance
+        # Drag acts on the observed velocity, not on the measured one.
+        tilt_acceleration = max(known_acceleration, 0.0)
+        acceleration = tilt_acceleration - drag * present_velocity + disturbance
         gains = guidance.gains
         command = (
             gains.position * predicted_position
@@ -107,6 +109,10 @@ def _observer_responses(
     i_minus_kc = np.eye(3) - k @ c
     z = np.exp(s * period)
     resolvent = np.linalg.inv(z[:, None, None] * np.eye(3) - i_minus_kc @ a) * z[:, None, None]
-    by_acceleration = (resolvent @ (i_minus_kc @ b)) * hold_element(s, period)[:, None]
-    by_measurement = resolvent @ k
-    return by_acceleration, by_measurement[:, :, 0], by_measurement[:, :, 1]
+    to_acceleration = (resolvent @ (i_minus_kc @ b)) * hold_element(s, period)[:, None]
+    to_measurements = resolvent @ k
+    return (
+        to_acceleration,
+        to_measurements[:, :, 0],
+        to_measurements[:, :, 1],
+    )

@@ -16,13 +16,13 @@ from companion.tuning.expectation import Floats
 
 GUSTS: Mapping[str, float] = {"speed_m_s": 3.0, "gust_m_s": 1.0}
 """Wind of the trial flights in gusts: mean and standard deviation, m/s."""
-_STRONG_GUST = 2.0
+_STRONG_GUST_SIGMAS = 2.0
 """Strength of a strong gust, in standard deviations of the gusts."""
-_LARGEST_RESERVE = 0.8
+_MAX_RESERVE_FRACTION = 0.8
 """Largest reserve for feedback and wind, as a share of the acceleration at the tilt limit."""
 _MAX_THRUST = 0.95
 _FENCE_SIZE = 50.0  # m
-_LEAST_SPEED = 0.05
+_MIN_MOVING_SPEED = 0.05
 """Speed above which the reference counts as moving, m/s."""
 _DATAGRAM_DELAY_S = 0.0005
 """Delay of each datagram between program and mock vehicle, s."""
@@ -108,9 +108,9 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
     Raises:
         ConfigError: the configuration cannot be flown on the mock vehicle.
     """
-    mock = load(shipped(f"mock-{autopilot}.yaml"))
-    parameters = (mock.mock or {}).get("parameters", {})
-    trial = replace(trial, wind=_tolerable_wind(config, trial, mock))
+    mock_config = load(shipped(f"mock-{autopilot}.yaml"))
+    parameters = (mock_config.mock or {}).get("parameters", {})
+    trial = replace(trial, wind=_tolerable_wind(config, trial, mock_config))
     vehicle = MockVehicle(
         autopilot,
         lockstep=False,
@@ -120,14 +120,14 @@ def fly_trial(config: Config, trial: TrialFlight, autopilot: str, seed: int = 3)
         wind=dict(trial.wind),
         parameters={**parameters, **_QUICK_TAKEOFF_AND_LANDING[autopilot]},
     )
-    flown_config = _flight_config(config, trial, mock)
+    flown_config = _flight_config(config, trial, mock_config)
     truth = TruthRecorder(vehicle)
     summary = fly(flown_config, vehicle)
     if summary.result != "ok":
         return TrialResult(summary.result)
     tracking = summary.trace.tracking.rows()
-    course = tracking[in_maneuvers(tracking[:, 0], summary.trace.maneuvers)]
-    result = _tracking_figures(course, truth.rows(), vehicle, flown_config)
+    maneuver_tracking = tracking[in_maneuvers(tracking[:, 0], summary.trace.maneuvers)]
+    result = _tracking_figures(maneuver_tracking, truth.rows(), vehicle, flown_config)
     return replace(result, wind=trial.wind.get("speed_m_s", 0.0))
 
 
@@ -144,7 +144,7 @@ def _tracking_figures(
     """
     time, reference = tracking[:, 0], tracking[:, 1:3]
     speed = np.hypot(*np.gradient(reference, time, axis=0).T)
-    moving_indices = np.flatnonzero(speed > _LEAST_SPEED)
+    moving_indices = np.flatnonzero(speed > _MIN_MOVING_SPEED)
     moving_rows = slice(moving_indices[0], moving_indices[-1] + 1)
     true_position = true_positions(truth, time)[:, :2]
     tilt_rates = [
@@ -168,16 +168,16 @@ def _rms(offsets: Floats) -> float:
     return float(np.sqrt(np.mean(np.sum(offsets**2, axis=1))))
 
 
-def _flight_config(config: Config, trial: TrialFlight, mock: Config) -> Config:
+def _flight_config(config: Config, trial: TrialFlight, mock_config: Config) -> Config:
     """The configuration for a flight of the mock vehicle."""
     return changed(
         config,
         {
             "link": {"signing_key_file": None},
-            "thrust": mock.thrust.model_dump(),
+            "thrust": mock_config.thrust.model_dump(),
             "guidance": {
-                "drag_per_s": mock.guidance.drag_per_s,
-                "quadratic_drag_per_m": mock.guidance.quadratic_drag_per_m,
+                "drag_per_s": mock_config.guidance.drag_per_s,
+                "quadratic_drag_per_m": mock_config.guidance.quadratic_drag_per_m,
             },
             "limits": {
                 "max_thrust": _MAX_THRUST,
@@ -190,7 +190,7 @@ def _flight_config(config: Config, trial: TrialFlight, mock: Config) -> Config:
                 "maneuvers": ("trajectory",),
                 "trajectory": shipped(f"trajectories/{trial.trajectory}"),
                 "slow_down": True,
-                "slow_down_reserve_m_s2": _acceleration_reserve(config, trial, mock),
+                "slow_down_reserve_m_s2": _acceleration_reserve(config, trial, mock_config),
                 "takeoff_height_m": 5.0,
             },
         },
@@ -198,23 +198,26 @@ def _flight_config(config: Config, trial: TrialFlight, mock: Config) -> Config:
     )
 
 
-def _tolerable_wind(config: Config, trial: TrialFlight, mock: Config) -> Mapping[str, float]:
+def _tolerable_wind(config: Config, trial: TrialFlight, mock_config: Config) -> Mapping[str, float]:
     """The wind of the trial, weakened if its drag would need too much of the tilt limit."""
-    largest_deceleration = _LARGEST_RESERVE * config.limits.max_horizontal_acceleration
-    factor = min(1.0, largest_deceleration / max(_wind_deceleration(trial, mock), 1e-9))
-    return {key: factor * value for key, value in trial.wind.items()}
+    largest_deceleration = _MAX_RESERVE_FRACTION * config.limits.max_horizontal_acceleration
+    wind_factor = min(1.0, largest_deceleration / max(_wind_deceleration(trial, mock_config), 1e-9))
+    return {key: wind_factor * value for key, value in trial.wind.items()}
 
 
-def _wind_deceleration(trial: TrialFlight, mock: Config) -> float:
+def _wind_deceleration(trial: TrialFlight, mock_config: Config) -> float:
     """Deceleration of a vehicle at rest by the drag in a strong gust, m/s²."""
-    wind_peak = trial.wind.get("speed_m_s", 0.0) + _STRONG_GUST * trial.wind.get("gust_m_s", 0.0)
-    deceleration, _, _ = (mock.guidance.drag or NO_DRAG).deceleration((wind_peak, 0.0, 0.0))
+    peak_wind = trial.wind.get("speed_m_s", 0.0) + _STRONG_GUST_SIGMAS * trial.wind.get(
+        "gust_m_s", 0.0
+    )
+    deceleration, _, _ = (mock_config.guidance.drag or NO_DRAG).deceleration((peak_wind, 0.0, 0.0))
     return deceleration
 
 
-def _acceleration_reserve(config: Config, trial: TrialFlight, mock: Config) -> float:
+def _acceleration_reserve(config: Config, trial: TrialFlight, mock_config: Config) -> float:
     """Horizontal acceleration that the trajectory must leave for feedback and wind drag, m/s²."""
-    largest_reserve = _LARGEST_RESERVE * config.limits.max_horizontal_acceleration
+    largest_reserve = _MAX_RESERVE_FRACTION * config.limits.max_horizontal_acceleration
     return min(
-        config.flight.slow_down_reserve_m_s2 + _wind_deceleration(trial, mock), largest_reserve
+        config.flight.slow_down_reserve_m_s2 + _wind_deceleration(trial, mock_config),
+        largest_reserve,
     )

@@ -23,9 +23,9 @@ from companion.files.yaml_file import ConfigError
 from companion.guidance import GRAVITY
 from companion.tuning.feedback import Complex, guidance_feedback, hold_element
 
-POSITION_LATENESS = 0.010
+UNSTAMPED_POSITION_DELAY = 0.010
 """Delay of the autopilot's position that is not contained in its time stamp, s."""
-_USUAL_LAG, _USUAL_DEAD_TIME = 0.07, 0.05
+_DEFAULT_LAG, _DEFAULT_DEAD_TIME = 0.07, 0.05
 """Lag and dead time of the rate loop of a heavy vehicle, s; used if they are not identified."""
 
 
@@ -85,14 +85,14 @@ class Loop:
         tilt = self._closed_loop_tilt(feedback)
         return GRAVITY * tilt / (self.s * (self.s + self.drag)), tilt / self.rate_response
 
-    def _closed_loop_tilt(self, subtracted: Complex) -> Complex:
-        """Closed-loop response of the coefficient if `subtracted` reduces guidance's command."""
-        return -self.command_response * subtracted / (1.0 + self.gain_at_rate)
+    def _closed_loop_tilt(self, feedback: Complex) -> Complex:
+        """Closed-loop response of the coefficient if `feedback` reduces guidance's command."""
+        return -self.command_response * feedback / (1.0 + self.gain_at_rate)
 
 
-def control_loop(config: Config, s: Complex, error: ModelMismatch = EXACT) -> Loop:
+def control_loop(config: Config, s: Complex, mismatch: ModelMismatch = EXACT) -> Loop:
     """The frequency responses of a configuration's control loop; see `control_loops`."""
-    return control_loops(config, s)(error)
+    return control_loops(config, s)(mismatch)
 
 
 def control_loops(config: Config, s: Complex) -> Callable[[ModelMismatch], Loop]:
@@ -113,22 +113,22 @@ def control_loops(config: Config, s: Complex) -> Callable[[ModelMismatch], Loop]
             "analysed; set planner.name: auto and guidance.kind: linear"
         )
     guidance, drag = linear_settings(config), drag_prior(config).drag.linear
-    target_gain, rate_feedback = _planner_response(config, s)
+    target_response, rate_feedback = _planner_response(config, s)
     axis = _slower_axis(config)
     hold = hold_element(s, 1.0 / config.link.attitude_rate_hz)
-    target_hold = hold_element(s, guidance.period)
+    guidance_hold = hold_element(s, guidance.period)
     feedback = guidance_feedback(
         s, guidance, observer_settings(config), drag, 1.0 / config.link.position_rate_hz
     )
-    position_delay = np.exp(-s * POSITION_LATENESS)
+    position_delay = np.exp(-s * UNSTAMPED_POSITION_DELAY)
     velocity, position = feedback.velocity * position_delay, feedback.position * position_delay
-    measured_tilt = feedback.tilt + GRAVITY / (s + drag) * (velocity + position / s)
+    total_tilt_feedback = feedback.tilt + GRAVITY / (s + drag) * (velocity + position / s)
 
-    def with_error(error: ModelMismatch) -> Loop:
-        rate_response = _rate_response(axis, s, error)
-        command_response = rate_response * target_gain * target_hold
+    def loop_with(mismatch: ModelMismatch) -> Loop:
+        rate_response = _rate_response(axis, s, mismatch)
+        command_response = rate_response * target_response * guidance_hold
         attitude_path = rate_response * hold * rate_feedback
-        guidance_path = command_response * measured_tilt
+        guidance_path = command_response * total_tilt_feedback
         return Loop(
             s=s,
             gain_at_rate=attitude_path + guidance_path,
@@ -140,22 +140,22 @@ def control_loops(config: Config, s: Complex) -> Callable[[ModelMismatch], Loop]
             drag=drag,
         )
 
-    return with_error
+    return loop_with
 
 
-def _rate_response(axis: AxisResponse, s: Complex, error: ModelMismatch) -> Complex:
+def _rate_response(axis: AxisResponse, s: Complex, mismatch: ModelMismatch) -> Complex:
     """Response (n,) of the coefficient to the commanded body rate, s."""
-    factor = error.time_factor
-    dead_time = np.exp(-s * (factor * axis.dead_time + error.delay))
-    lag = 1.0 + factor * s * (axis.lag + factor * s * axis.sigma)
-    response: Complex = error.gain * dead_time / lag / s
+    time_factor = mismatch.time_factor
+    dead_time = np.exp(-s * (time_factor * axis.dead_time + mismatch.delay))
+    lag = 1.0 + time_factor * s * (axis.lag + time_factor * s * axis.sigma)
+    response: Complex = mismatch.gain * dead_time / lag / s
     return response
 
 
 def _slower_axis(config: Config) -> AxisResponse:
     """Configured response of the slower of roll and pitch; if unknown, that of a heavy vehicle."""
     if not config.vehicle.response_known:
-        return AxisResponse(_USUAL_LAG, _USUAL_DEAD_TIME)
+        return AxisResponse(_DEFAULT_LAG, _DEFAULT_DEAD_TIME)
     lag, dead_time = tilt_lag_and_dead_time(config)
     return AxisResponse(lag, dead_time, damping=tilt_damping(config))
 

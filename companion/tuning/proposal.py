@@ -27,7 +27,7 @@ class Proposal:
     """Expected behaviour of `untuned`."""
     after: Expectation
     """Expected behaviour of `tuned`."""
-    margins_with_errors: tuple[tuple[ModelMismatch, Margins], ...]
+    margins_with_mismatches: tuple[tuple[ModelMismatch, Margins], ...]
     """Errors of lag and dead time, and the margins of `tuned` with each of these errors."""
     disturbances: Disturbances
     """Disturbances of the vehicle."""
@@ -42,16 +42,16 @@ class Proposal:
         A known drag is proposed too, because the analysis assumes the feedforward of this drag.
         """
         design, drag = self.design, self.tuned.guidance.drag
-        known_drag = {}
+        drag_keys = {}
         if drag is not None:
-            known_drag = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
+            drag_keys = {"drag_per_s": drag.linear, "quadratic_drag_per_m": drag.quadratic}
         return {
             "planner": {"gain_per_s": design.gain},
             "guidance": {
                 "position_weight_per_s4": design.position_weight,
                 "velocity_weight_per_s2": design.velocity_weight,
                 "disturbance_bandwidth_rad_s": design.bandwidth,
-                **known_drag,
+                **drag_keys,
             },
         }
 
@@ -95,7 +95,9 @@ def propose(
             f"no values keep {aims.gain_db:g} dB and {aims.phase_deg:g}° of margin with this "
             "vehicle; check vehicle.lag_ms and vehicle.dead_time_ms"
         )
-    margins_with_errors = tuple(
-        (error, stability(tuned, error)) for error in tolerated_mismatches(tuned, aims)
+    margins_with_mismatches = tuple(
+        (mismatch, stability(tuned, mismatch)) for mismatch in tolerated_mismatches(tuned, aims)
     )
-    return Proposal(untuned, tuned, design, before, after, margins_with_errors, disturbances, aims)
+    return Proposal(
+        untuned, tuned, design, before, after, margins_with_mismatches, disturbances, aims
+    )

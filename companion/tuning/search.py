@@ -65,17 +65,17 @@ class Design(NamedTuple):
         return Design(*(float(f"{value:.3g}") for value in self))
 
 
-_LARGEST_DESIGN = Design(20.0, 10000.0, 10000.0, 14.0)
+_UPPER_BOUNDS = Design(20.0, 10000.0, 10000.0, 14.0)
 """Upper bounds of the search."""
-_SMALLEST_DESIGN = Design(1.0, 0.01, 0.01, 0.3)
+_LOWER_BOUNDS = Design(1.0, 0.01, 0.01, 0.3)
 """Lower bounds of the search."""
-_LARGEST_BANDWIDTH_SLEWING = 8.0
+_MAX_BANDWIDTH_WITH_SLEW_LIMIT = 8.0
 """Largest bandwidth for a rate loop with a slew limit (ArduPilot), rad/s.
 
 Position and velocity of ArduPilot's estimator do not quite agree, and the analysis neglects this.
 On the mock vehicle, 14 rad/s gave errors an eighth larger in still air and a fifth larger in gusts.
 """
-_SLEWING_SHARE = 0.5
+_SLEWING_MARGIN_FRACTION = 0.5
 """Share of the `mismatch` margins that must remain while the rate loop is at its slew limit.
 
 Without any margin left, a figure-eight in gusts could oscillate by more than 1 m on the mock
@@ -85,15 +85,15 @@ vehicle.
 
 def largest_gain(config: Config) -> float:
     """Largest planner gain of the search, 1/s: `inner_loop.sensible_gain`, but at most 20."""
-    return min(_LARGEST_DESIGN.gain, sensible_gain(config))
+    return min(_UPPER_BOUNDS.gain, sensible_gain(config))
 
 
-def largest_design(config: Config) -> Design:
+def upper_bounds(config: Config) -> Design:
     """Upper bounds of the search for this vehicle."""
-    design = _LARGEST_DESIGN._replace(gain=largest_gain(config))
+    design = _UPPER_BOUNDS._replace(gain=largest_gain(config))
     if config.vehicle.axes["roll"].acceleration_limit is None:
         return design
-    return design._replace(bandwidth=_LARGEST_BANDWIDTH_SLEWING)
+    return design._replace(bandwidth=_MAX_BANDWIDTH_WITH_SLEW_LIMIT)
 
 
 def search(config: Config, disturbances: Disturbances, aims: Aims) -> Design:
@@ -117,14 +117,14 @@ def _best_near(
     config: Config, start: Design, disturbances: Disturbances, aims: Aims
 ) -> tuple[float, Design]:
     """The best design that the search finds from `start`, with its cost."""
-    largest = largest_design(config)
-    best, step = Design(*map(min, start, largest)), _FIRST_STEP
+    upper = upper_bounds(config)
+    best, step = Design(*map(min, start, upper)), _FIRST_STEP
     cost = _cost(config, best, disturbances, aims)
     while step >= _LAST_STEP:
-        for design in _neighbour_designs(best, step, largest):
-            other_cost = _cost(config, design, disturbances, aims, cost)
-            if other_cost < cost:
-                best, cost = design, other_cost
+        for design in _neighbour_designs(best, step, upper):
+            neighbour_cost = _cost(config, design, disturbances, aims, cost)
+            if neighbour_cost < cost:
+                best, cost = design, neighbour_cost
                 break
         else:
             step *= 0.5
@@ -138,27 +138,27 @@ def _starting_designs(config: Config) -> Iterator[Design]:
     (`hold_settings.hold_weights`). The velocity weights are lower and the observers quicker than
     the defaults.
     """
-    for gain_share, position, velocity, bandwidth in (
+    for gain_fraction, position, velocity, bandwidth in (
         (1.0, 1.0, 0.5, 2.0),
         (1.0, 0.9, 0.1, 2.7),
         (0.8, 1.4, 0.12, 3.5),
     ):
-        gain = gain_share * largest_gain(config)
+        gain = gain_fraction * largest_gain(config)
         delay = attitude_delay(with_gain(config, gain))
         yield Design(gain, position / delay**4, velocity / delay**2, bandwidth / delay)
 
 
-def _neighbour_designs(design: Design, step: float, largest: Design) -> Iterator[Design]:
+def _neighbour_designs(design: Design, step: float, upper: Design) -> Iterator[Design]:
     """Designs that differ by one step in one or two values, clamped to the bounds."""
     up, down = exp(step), exp(-step)
-    scales = [
+    scale_factors = [
         *((1.0,) * k + (ratio,) + (1.0,) * (3 - k) for k in range(4) for ratio in (up, down)),
         (1.0, up, 1.0, down), (1.0, down, 1.0, up), (up, down, 1.0, 1.0), (down, up, 1.0, 1.0),
         (up, 1.0, 1.0, down), (down, 1.0, 1.0, up),
     ]  # fmt: skip
-    for scale in scales:
-        neighbour = Design(*(value * factor for value, factor in zip(design, scale, strict=True)))
-        yield Design(*map(max, _SMALLEST_DESIGN, map(min, largest, neighbour)))
+    for factors in scale_factors:
+        neighbour = Design(*(value * factor for value, factor in zip(design, factors, strict=True)))
+        yield Design(*map(max, _LOWER_BOUNDS, map(min, upper, neighbour)))
 
 
 def _cost(
@@ -170,8 +170,8 @@ def _cost(
     """
     candidate = design.apply_to(config)
     s = frequencies()
-    loop_with = control_loops(candidate, s)
-    loop = loop_with(EXACT)
+    loop_for = control_loops(candidate, s)
+    loop = loop_for(EXACT)
     expected_error = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
     shortfall = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
     shortfall += max(
@@ -179,21 +179,21 @@ def _cost(
         3.0 * expected_error.commanded_rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0,
     )
     cost = log(expected_error.position) + _COST_OF_MISSED_AIM * shortfall
-    for error in tolerated_mismatches(candidate, aims):
+    for mismatch in tolerated_mismatches(candidate, aims):
         if cost >= stop_at:
             break
-        loop = loop_with(error)
-        share = _SLEWING_SHARE if error.delay else 1.0
-        required_margins = share * aims.mismatch_gain_db, share * aims.mismatch_phase_deg
+        loop = loop_for(mismatch)
+        factor = _SLEWING_MARGIN_FRACTION if mismatch.delay else 1.0
+        required_margins = factor * aims.mismatch_gain_db, factor * aims.mismatch_phase_deg
         cost += _COST_OF_MISSED_AIM * _shortfall(margins(s, loop.gain_at_rate), *required_margins)
     return cost
 
 
 def tolerated_mismatches(config: Config, aims: Aims) -> list[ModelMismatch]:
     """Model errors that must leave a margin: wrong lag and dead time; delay by the slew limit."""
-    errors = [ModelMismatch(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
+    mismatches = [ModelMismatch(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
     delay = slewing_delay(config)
-    return [*errors, ModelMismatch(delay=delay)] if delay > 0.0 else errors
+    return [*mismatches, ModelMismatch(delay=delay)] if delay > 0.0 else mismatches
 
 
 def _shortfall(actual: Margins, gain_db: float, phase_deg: float) -> float:

@@ -50,7 +50,7 @@ def proposal_text(
 def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
     """Text for the user: expected behaviour without and with the proposal, rates, and flights."""
     before, after, aims = proposal.before, proposal.after, proposal.aims
-    limit = degrees(proposal.tuned.limits.max_tilt_rate)
+    max_tilt_rate_deg_s = degrees(proposal.tuned.limits.max_tilt_rate)
     warning = worse_flights_warning(flights)
     lines = [] if warning is None else [warning]
     lines += [
@@ -62,13 +62,13 @@ def summary_lines(proposal: Proposal, flights: Flights) -> list[str]:
         "errors of the vehicle model:",
     ]
     lines += [
-        f"margin {_error_text(error)}: {reached.sentence()}"
-        for error, reached in proposal.margins_with_errors
+        f"margin {_mismatch_text(mismatch)}: {margins.sentence()}"
+        for mismatch, margins in proposal.margins_with_mismatches
     ]
-    used_rate = 3.0 * degrees(after.errors.commanded_rate)
+    used_deg_s = 3.0 * degrees(after.errors.commanded_rate)
     lines.append(
-        f"cost: these disturbances command up to {used_rate:.0f}°/s (3 standard deviations) of the "
-        f"{limit:.0f}°/s that limits.max_tilt_rate_deg_s allows; before: "
+        f"cost: these disturbances command up to {used_deg_s:.0f}°/s (3 standard deviations) of "
+        f"the {max_tilt_rate_deg_s:.0f}°/s that limits.max_tilt_rate_deg_s allows; before: "
         f"{3.0 * degrees(before.errors.commanded_rate):.0f}°/s"
     )
     if flights:
@@ -95,12 +95,12 @@ def worse_flights_warning(flights: Flights) -> str | None:
             (worse_flights if before.ok else failed_as_before).append(f"{name} {after.result}")
         elif after.true > max(_WORSE_FACTOR * before.true, before.true + _WORSE_DISTANCE):
             worse_flights.append(f"{name} {before.true:.3f} -> {after.true:.3f} m")
-    faults = [f"flew worse: {'; '.join(worse_flights)}"] if worse_flights else []
+    problems = [f"flew worse: {'; '.join(worse_flights)}"] if worse_flights else []
     if failed_as_before:
-        faults.append(f"failed, as it did without the proposal: {'; '.join(failed_as_before)}")
-    if not faults:
+        problems.append(f"failed, as it did without the proposal: {'; '.join(failed_as_before)}")
+    if not problems:
         return None
-    return f"DO NOT USE THE PROPOSAL: with it the mock vehicle {', and '.join(faults)}"
+    return f"DO NOT USE THE PROPOSAL: with it the mock vehicle {', and '.join(problems)}"
 
 
 def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
@@ -118,11 +118,13 @@ def _comparison_lines(before: Expectation, after: Expectation) -> list[str]:
     ]
 
 
-def _error_text(error: ModelMismatch) -> str:
-    if error.delay:
-        return f"with {1e3 * error.delay:.0f} ms of added delay, as at the rate loop's slew limit"
-    percent = round(100.0 * abs(error.time_factor - 1.0))
-    change = "larger" if error.time_factor > 1.0 else "smaller"
+def _mismatch_text(mismatch: ModelMismatch) -> str:
+    if mismatch.delay:
+        return (
+            f"with {1e3 * mismatch.delay:.0f} ms of added delay, as at the rate loop's slew limit"
+        )
+    percent = round(100.0 * abs(mismatch.time_factor - 1.0))
+    change = "larger" if mismatch.time_factor > 1.0 else "smaller"
     return f"with lag and dead time {percent} % {change}"
 
 
@@ -141,22 +143,22 @@ def _flight_line(name: str, before: TrialResult, after: TrialResult) -> str:
 def _reasons(proposal: Proposal) -> dict[str, str]:
     """Reason for the proposed value, by key."""
     untuned, tuned, design = proposal.untuned, proposal.tuned, proposal.design
-    limit, weights = largest_gain(tuned), hold_weights(untuned)
-    is_capped = design.gain > 0.97 * limit
-    slewing_s = slewing_delay(tuned)
+    max_gain, weights = largest_gain(tuned), hold_weights(untuned)
+    is_capped = design.gain > 0.97 * max_gain
+    slewing_delay_s = slewing_delay(tuned)
     if is_capped:
         formula = f"{LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)"
-        gain_reason = f"the largest sensible gain, {formula} = {limit:.2f}"
-        if limit < sensible_gain(tuned):
-            gain_reason = f"the largest gain that is searched, {limit:g}"
-    elif slewing_s:
+        gain_reason = f"the largest sensible gain, {formula} = {max_gain:.2f}"
+        if max_gain < sensible_gain(tuned):
+            gain_reason = f"the largest gain that is searched, {max_gain:g}"
+    elif slewing_delay_s:
         gain_reason = (
-            f"below {limit:.1f}, the largest sensible gain, because the rate loop needs "
-            f"{2e3 * slewing_s:.0f} ms to reach limits.max_tilt_rate_deg_s; tune again after "
+            f"below {max_gain:.1f}, the largest sensible gain, because the rate loop needs "
+            f"{2e3 * slewing_delay_s:.0f} ms to reach limits.max_tilt_rate_deg_s; tune again after "
             "a change of that limit"
         )
     else:
-        gain_reason = f"below {limit:.2f}, the largest sensible gain, to keep the margins"
+        gain_reason = f"below {max_gain:.2f}, the largest sensible gain, to keep the margins"
     drag = "as configured, or learned in an earlier flight of this vehicle"
     return {
         "drag_per_s": drag,

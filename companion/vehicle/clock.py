@@ -1,8 +1,9 @@
 """The vehicle's clock, compared with the event loop's: ages of samples, and jumps of the clock.
 
 The offset is vehicle time minus event-loop time. The stamp of an attitude sample minus its arrival
-is the offset minus the sample's delay. So the largest difference comes from the sample with the
-smallest delay, the "quickest" sample. TIMESYNC measures the delay of the quickest sample.
+is the offset minus the sample's delay. So the largest difference (`max_offset`) comes from the
+sample with the smallest delay, the "quickest" sample. TIMESYNC measures the delay of the quickest
+sample.
 """
 
 from collections.abc import Callable
@@ -57,10 +58,10 @@ class VehicleClock:
         self.last_change = ""
         self.on_event: Callable[[str], None] = lambda _: None
         self._lockstep = lockstep
-        self._began = inf
-        self._shift = 0.0
-        self._quickest = self._newest_time = -inf
-        self._received = self._lateness = 0.0
+        self._start_time = inf
+        self._jump_correction = 0.0
+        self._max_offset = self._newest_time = -inf
+        self._last_arrival = self._lateness = 0.0
         self._misfits = MisfitRun()
         self._reported_unknown = self._reported_outlier = False
 
@@ -72,11 +73,11 @@ class VehicleClock:
     @property
     def offset(self) -> float | None:
         """Vehicle time minus event-loop time, s; None before the first sample."""
-        return None if self._began == inf else self._quickest + self.delay.seconds
+        return None if self._start_time == inf else self._max_offset + self.delay.seconds
 
     def vehicle_time(self, time_boot_ms: int) -> float:
         """Convert the stamp of any message, ms, to vehicle time as in `SampleTiming`, s."""
-        return time_boot_ms / 1000.0 + self._shift
+        return time_boot_ms / 1000.0 + self._jump_correction
 
     def age(self, vehicle_time: float, now: float) -> float | None:
         """Age at the event-loop time `now` of a message stamped with `vehicle_time`; all in s.
@@ -88,7 +89,7 @@ class VehicleClock:
 
     def is_ahead(self, vehicle_time: float, now: float) -> bool:
         """Whether a stamp (s) is further ahead of the clock at time `now` than drift explains."""
-        offset, spread = self.offset, self.rate.spread(max(0.0, now - self._received))
+        offset, spread = self.offset, self.rate.spread(max(0.0, now - self._last_arrival))
         return offset is not None and vehicle_time - now > offset + SMALLEST_JUMP + spread
 
     def take(self, time_boot_ms: int, received: float) -> SampleTiming:
@@ -98,24 +99,24 @@ class VehicleClock:
             time_boot_ms: time stamp of the sample, ms.
             received: event-loop time of its arrival, s.
         """
-        time = time_boot_ms / 1000.0 + self._shift
-        ahead = time - received
-        quickest = self._quickest + self.rate.lowest_rate * (received - self._received)
-        fits = time > self._newest_time and ahead <= quickest + SMALLEST_JUMP
+        time = time_boot_ms / 1000.0 + self._jump_correction
+        offset = time - received
+        max_offset = self._max_offset + self.rate.lowest_rate * (received - self._last_arrival)
+        fits = time > self._newest_time and offset <= max_offset + SMALLEST_JUMP
         if not fits or self._misfits.stamps:
-            misfit = self._adapt_to(Stamp(time, ahead, received), time_boot_ms, quickest)
+            misfit = self._fit_stamp(Stamp(time, offset, received), time_boot_ms, max_offset)
             if misfit is not None:
                 return SampleTiming(time, nan, misfit)
-            time = time_boot_ms / 1000.0 + self._shift
-            ahead, quickest = time - received, self._quickest
-        late = quickest - ahead
-        if late < 0.0:
-            quickest, late = ahead, 0.0
-        self._quickest, self._received = quickest, received
-        self._newest_time, self._lateness = time, late
+            time = time_boot_ms / 1000.0 + self._jump_correction
+            offset, max_offset = time - received, self._max_offset
+        lateness = max_offset - offset
+        if lateness < 0.0:
+            max_offset, lateness = offset, 0.0
+        self._max_offset, self._last_arrival = max_offset, received
+        self._newest_time, self._lateness = time, lateness
         if received >= self.rate.note_due:
-            self.rate.note(received, quickest)
-        return SampleTiming(time, late + self.delay.seconds)
+            self.rate.note(received, max_offset)
+        return SampleTiming(time, lateness + self.delay.seconds)
 
     def take_timesync(self, sent: float, received: float, vehicle_ns: int) -> None:
         """Take a TIMESYNC exchange.
@@ -128,25 +129,26 @@ class VehicleClock:
             received: event-loop time of the answer, s.
             vehicle_ns: the vehicle's time in the answer, ns.
         """
-        if self._lockstep or self._began == inf:
+        if self._lockstep or self._start_time == inf:
             return
-        time = vehicle_ns % WRAP_PERIOD_NS * 1e-9 + self._shift  # wraps as the samples' stamps do
+        boot_time = vehicle_ns % WRAP_PERIOD_NS * 1e-9  # wraps as the samples' stamps do
+        time = boot_time + self._jump_correction
         middle_time, half_round_trip = 0.5 * (sent + received), 0.5 * (received - sent)
-        quickest = self._quickest + self.rate.rate * (middle_time - self._received)
-        attitude_fits = received - self._received < 1.0 and self._lateness < SMALLEST_JUMP
-        error = half_round_trip + self.rate.spread(max(0.0, received - self._received))
-        delay = time - middle_time - quickest
-        setback = self.delay.take_exchange(received, error, delay)
-        if setback is None:
+        max_offset = self._max_offset + self.rate.rate * (middle_time - self._last_arrival)
+        attitude_fits = received - self._last_arrival < 1.0 and self._lateness < SMALLEST_JUMP
+        error = half_round_trip + self.rate.spread(max(0.0, received - self._last_arrival))
+        delay = time - middle_time - max_offset
+        clock_setback = self.delay.take_exchange(received, error, delay)
+        if clock_setback is None:
             if -delay < SMALLEST_JUMP:
-                self._quickest -= max(0.0, -delay - error - _TIMESYNC_LAG)
+                self._max_offset -= max(0.0, -delay - error - _TIMESYNC_LAG)
             return
         if attitude_fits:  # the samples are as before: only TIMESYNC's clock has changed
             self.delay.forget(DelayUnknown.OTHER_CLOCK)
         else:
             # The answer may be a little older than the newest sample.
             was_set_back = time < self._newest_time - _MIN_CLOCK_SETBACK
-            self._accept_jump(-setback, round(vehicle_ns * 1e-6), set_back=was_set_back)
+            self._accept_jump(-clock_setback, round(vehicle_ns * 1e-6), set_back=was_set_back)
 
     def update(self, now: float) -> None:
         """Drop expired TIMESYNC exchanges; report when ages become unknown or known again.
@@ -155,7 +157,7 @@ class VehicleClock:
             now: event-loop time, s.
         """
         self.delay.expire(now)
-        if now - self._began < _TIMESYNC_WAIT or self.age_known is not self._reported_unknown:
+        if now - self._start_time < _TIMESYNC_WAIT or self.age_known is not self._reported_unknown:
             return
         self._reported_unknown = not self.age_known
         if self._reported_unknown:
@@ -166,69 +168,69 @@ class VehicleClock:
         else:
             self.on_event("the age of telemetry is known by TIMESYNC")
 
-    def _adapt_to(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
-        """Adapt the clock (expected offset `quickest`, s) to a stamp; return the misfit or None."""
-        if self._began == inf:
-            self._began = self._received = stamp.received
-            self._quickest = 0.0 if self._lockstep else stamp.apparent_offset
-        elif self._drift_explains(stamp, quickest):
-            self._quickest = quickest
-            self._end_misfits(time_boot_ms, quickest - stamp.apparent_offset)
-        elif self._link_got_quicker(stamp, quickest):
-            self._quickest = quickest
-            self.delay.shorten(stamp.apparent_offset - quickest, stamp.received)
+    def _fit_stamp(self, stamp: Stamp, time_boot_ms: int, max_offset: float) -> Misfit | None:
+        """Adapt the clock (with `max_offset`, s) to a stamp; return the misfit or None."""
+        if self._start_time == inf:
+            self._start_time = self._last_arrival = stamp.received
+            self._max_offset = 0.0 if self._lockstep else stamp.apparent_offset
+        elif self._drift_explains(stamp, max_offset):
+            self._max_offset = max_offset
+            self._end_misfits(time_boot_ms, max_offset - stamp.apparent_offset)
+        elif self._link_got_quicker(stamp, max_offset):
+            self._max_offset = max_offset
+            self.delay.shorten(stamp.apparent_offset - max_offset, stamp.received)
             self._drop_misfits()
         else:
-            return self._take_misfit(stamp, time_boot_ms, quickest)
+            return self._take_misfit(stamp, time_boot_ms, max_offset)
         return None
 
-    def _drift_explains(self, stamp: Stamp, quickest: float) -> bool:
+    def _drift_explains(self, stamp: Stamp, max_offset: float) -> bool:
         """Whether `stamp` is newer, and ahead of the clock by no more than the largest drift."""
-        limit = quickest + SMALLEST_JUMP + self.rate.spread(stamp.received - self._received)
+        limit = max_offset + SMALLEST_JUMP + self.rate.spread(stamp.received - self._last_arrival)
         return stamp.time > self._newest_time and stamp.apparent_offset <= limit
 
-    def _link_got_quicker(self, stamp: Stamp, quickest: float) -> bool:
+    def _link_got_quicker(self, stamp: Stamp, max_offset: float) -> bool:
         """Whether `stamp` seems ahead only because the link has become quicker.
 
         A quicker link puts `stamp` ahead by at most the delay measured on the slower link.
         Exchanges after the last sample that fitted the clock do not count, because the clock may
         have jumped before these exchanges.
         """
-        largest_delay = self.delay.largest_possible(before=self._received - SAME_CLOCK_SPREAD)
-        return stamp.time > self._newest_time and stamp.apparent_offset - quickest <= largest_delay
+        max_delay = self.delay.largest_possible(before=self._last_arrival - SAME_CLOCK_SPREAD)
+        return stamp.time > self._newest_time and stamp.apparent_offset - max_offset <= max_delay
 
-    def _take_misfit(self, stamp: Stamp, time_boot_ms: int, quickest: float) -> Misfit | None:
+    def _take_misfit(self, stamp: Stamp, time_boot_ms: int, max_offset: float) -> Misfit | None:
         """Add a sample that does not fit; if the misfits show a jump, adopt it and return None."""
         if not self._misfits.agrees_with(stamp):
             self._drop_misfits()
         self._misfits.stamps.append(stamp)
-        if not self._misfits.show_jump(quickest):
+        if not self._misfits.show_jump(max_offset):
             return Misfit.AHEAD if stamp.time > self._newest_time else Misfit.NOT_NEWER
-        jump = self._misfits.largest_offset() - quickest
+        jump = self._misfits.largest_offset() - max_offset
         self._misfits.stamps.clear()
-        self._quickest, self._newest_time = quickest, -inf
+        self._max_offset, self._newest_time = max_offset, -inf
         self._accept_jump(jump, time_boot_ms, set_back=jump < 0.0)
         return None
 
-    def _end_misfits(self, time_boot_ms: int, late: float) -> None:
-        """End the misfits with a sample that fits the clock and came `late` seconds late.
+    def _end_misfits(self, time_boot_ms: int, lateness: float) -> None:
+        """End the misfits with a sample that fits the clock and came `lateness` seconds late.
 
         If all misfits repeated the newest stamp that fitted the clock, the clock stood still.
         """
         if not self._misfits.stamps:
             return
         clock_stopped = self._misfits.clock_stopped(self._newest_time)
-        lasted = self._misfits.stamps[-1].received - self._received
+        duration = self._misfits.stamps[-1].received - self._last_arrival
         self._drop_misfits()
-        if clock_stopped and min(lasted, late) >= SMALLEST_JUMP:
-            self._accept_jump(-late, time_boot_ms, set_back=False)
+        if clock_stopped and min(duration, lateness) >= SMALLEST_JUMP:
+            self._accept_jump(-lateness, time_boot_ms, set_back=False)
 
     def _drop_misfits(self) -> None:
         """Drop the misfits; report, only once, a sample that was stamped ahead of the clock."""
-        ahead = any(stamp.time > self._newest_time for stamp in self._misfits.stamps)
-        if ahead and not self._reported_outlier:
+        any_ahead = any(stamp.time > self._newest_time for stamp in self._misfits.stamps)
+        if any_ahead and not self._reported_outlier:
             self._reported_outlier = True
-            lead = self._misfits.largest_offset() - self._quickest
+            lead = self._misfits.largest_offset() - self._max_offset
             self.on_event(
                 f"a sample stamped {lead:.1f} s ahead of the vehicle's clock was dropped; such "
                 "samples are counted"
@@ -237,10 +239,10 @@ class VehicleClock:
 
     def _accept_jump(self, jump: float, time_boot_ms: int, *, set_back: bool) -> None:
         """Accept that the vehicle's clock jumped by `jump` s; vehicle times stay continuous."""
-        before = self._received + self._quickest - self._shift
-        self._shift -= jump
-        self.delay.forget_after(self._received - self.delay.seconds - SAME_CLOCK_SPREAD)
-        if self._received - self._began < _SETTLING_TIME and jump > -RESTART_SETBACK:
+        before = self._last_arrival + self._max_offset - self._jump_correction
+        self._jump_correction -= jump
+        self.delay.forget_after(self._last_arrival - self.delay.seconds - SAME_CLOCK_SPREAD)
+        if self._last_arrival - self._start_time < _SETTLING_TIME and jump > -RESTART_SETBACK:
             return
         self.change_count += 1
         self.restart_count += set_back and not has_wrapped(jump, before) and jump < -RESTART_SETBACK

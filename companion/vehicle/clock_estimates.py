@@ -9,17 +9,17 @@ from enum import Enum
 from math import inf
 from typing import NamedTuple
 
-MOST_DRIFT = 0.02
+MAX_DRIFT = 0.02
 """Largest assumed difference in rate between the two clocks, s per s. Crystals differ by less than
 0.0002; a simulator that ran slower than real time differed by 0.006."""
 _RATE_UNCERTAINTY = 0.005
 """Uncertainty of a measured rate, s per s."""
-_LATE_SAMPLES_RISE = 0.005
+_MAX_OFFSET_RISE = 0.005
 """Rise of the offset beyond what drift explains, s, which shows that earlier samples were late. The
 measurement of the rate then restarts. Otherwise a backlog of 68 ms at the start (measured on PX4)
 would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
 """
-_NOTE_PERIOD = 1.0
+_SAMPLING_PERIOD = 1.0
 """Time between two offsets that are noted to measure the rate, s."""
 _MIN_WINDOW, _MAX_WINDOW = 5, 20
 """Shortest and longest time over which a rate is measured, s."""
@@ -47,7 +47,7 @@ class ClockRate:
     def __init__(self, *, same_clock: bool) -> None:
         self.rate = 0.0
         self.note_due = inf if same_clock else -inf
-        self._rate_error = 0.0 if same_clock else MOST_DRIFT
+        self._rate_error = 0.0 if same_clock else MAX_DRIFT
         self.lowest_rate = -self._rate_error
         self._noted_offsets: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
 
@@ -66,18 +66,18 @@ class ClockRate:
         """
         if self._noted_offsets:
             noted_at, noted_offset = self._noted_offsets[-1]
-            if offset - noted_offset > MOST_DRIFT * (now - noted_at) + _LATE_SAMPLES_RISE:
+            if offset - noted_offset > MAX_DRIFT * (now - noted_at) + _MAX_OFFSET_RISE:
                 self._noted_offsets.clear()  # the noted offsets are of late samples
-                self.rate, self._rate_error = 0.0, MOST_DRIFT
-                self.lowest_rate = -MOST_DRIFT
-        self.note_due = now + _NOTE_PERIOD
+                self.rate, self._rate_error = 0.0, MAX_DRIFT
+                self.lowest_rate = -MAX_DRIFT
+        self.note_due = now + _SAMPLING_PERIOD
         self._noted_offsets.append((now, offset))
         noted_at, noted_offset = self._noted_offsets[0]
-        if now - noted_at < _MIN_WINDOW * _NOTE_PERIOD:
+        if now - noted_at < _MIN_WINDOW * _SAMPLING_PERIOD:
             return
         self._rate_error = _RATE_UNCERTAINTY
         slope = (offset - noted_offset) / (now - noted_at)
-        self.rate = max(-MOST_DRIFT, min(MOST_DRIFT, slope))
+        self.rate = max(-MAX_DRIFT, min(MAX_DRIFT, slope))
         self.lowest_rate = self.rate - self._rate_error
 
 
@@ -100,13 +100,13 @@ class _Exchange(NamedTuple):
 
     def error(self, now: float) -> float:
         """Largest possible error of `delay` at the event-loop time `now`, s."""
-        return self.initial_error + MOST_DRIFT * (now - self.answered_at)
+        return self.initial_error + MAX_DRIFT * (now - self.answered_at)
 
 
 class TelemetryDelay:
     """The delay of the quickest sample, from the TIMESYNC exchange with the smallest error bound.
 
-    The error bound of an exchange grows with its age, by `MOST_DRIFT` per second: a growing
+    The error bound of an exchange grows with its age, by `MAX_DRIFT` per second: a growing
     queue that delays all samples looks like a slower clock of the vehicle.
 
     Attributes:
@@ -120,7 +120,7 @@ class TelemetryDelay:
         self.seconds = 0.0
         self.why_unknown = DelayUnknown.UNANSWERED
         self._exchanges: deque[_Exchange] = deque(maxlen=round(EXCHANGE_LIFETIME) + 10)
-        self._implausible: _Exchange | None = None
+        self._last_implausible: _Exchange | None = None
 
     def take_exchange(self, now: float, error: float, delay: float) -> float | None:
         """Take an exchange, and store it if its delay is plausible.
@@ -141,17 +141,17 @@ class TelemetryDelay:
         """
         exchange = _Exchange(now, error, delay)
         if -(error + _MAX_TIMESYNC_LAG) <= delay <= _MAX_DELAY:
-            self._implausible = None
+            self._last_implausible = None
             self.why_unknown = DelayUnknown.UNANSWERED
             self._exchanges.append(exchange)
             self.expire(now)
             return None
-        before, self._implausible = self._implausible, exchange
-        if before is None:
+        previous, self._last_implausible = self._last_implausible, exchange
+        if previous is None:
             return None
-        if abs(before.delay - delay) > before.initial_error + error + _MAX_TIMESYNC_LAG:
+        if abs(previous.delay - delay) > previous.initial_error + error + _MAX_TIMESYNC_LAG:
             return None
-        self._implausible = None
+        self._last_implausible = None
         if self._exchanges and delay < 0.0:
             return self.seconds - delay
         self.forget(DelayUnknown.OTHER_CLOCK)
@@ -162,11 +162,11 @@ class TelemetryDelay:
 
         The result is 0 if there was no exchange up to `before`.
         """
-        earlier = [each for each in self._exchanges if each.answered_at <= before]
-        if not earlier:
+        earlier_exchanges = [each for each in self._exchanges if each.answered_at <= before]
+        if not earlier_exchanges:
             return 0.0
-        best = min(earlier, key=lambda each: each.error(before))
-        return best.delay + best.error(before)
+        best_exchange = min(earlier_exchanges, key=lambda each: each.error(before))
+        return best_exchange.delay + best_exchange.error(before)
 
     def shorten(self, decrease: float, now: float) -> None:
         """Shorten all delays, because a sample came that was quicker than the quickest so far.
@@ -187,10 +187,10 @@ class TelemetryDelay:
             self._exchanges.pop()
         self.expire(since)
 
-    def forget(self, why: DelayUnknown) -> None:
-        """Forget all exchanges: the delay is not known any more, because of `why`."""
+    def forget(self, reason: DelayUnknown) -> None:
+        """Forget all exchanges: the delay is not known any more, because of `reason`."""
         self._exchanges.clear()
-        self.known, self.why_unknown = False, why
+        self.known, self.why_unknown = False, reason
         self.seconds = 0.0
 
     def expire(self, now: float) -> None:
@@ -202,5 +202,5 @@ class TelemetryDelay:
             self.forget(self.why_unknown)
             return
         self.known = True
-        best = min(exchanges, key=lambda each: each.error(now))
-        self.seconds = max(0.0, best.delay)
+        best_exchange = min(exchanges, key=lambda each: each.error(now))
+        self.seconds = max(0.0, best_exchange.delay)

@@ -9,7 +9,7 @@ SAME_CLOCK_SPREAD = 0.1
 """Two misfits whose offsets differ by less than this, s, may come from the same jump."""
 _MIN_JUMP_SAMPLES = 3
 """Number of misfits in a row that shows a jump of the clock; fewer are outliers."""
-_MIN_JUMP_SPAN = 0.04
+_MIN_JUMP_DURATION = 0.04
 """Time that the misfits in a row must span to show a jump of the clock, s."""
 RESTART_SETBACK = 2.0
 """The autopilot restarted if its clock went back by more than this, s; otherwise it jumped."""
@@ -70,23 +70,23 @@ class MisfitRun:
             and abs(stamp.apparent_offset - last.apparent_offset) < SAME_CLOCK_SPREAD
         )
 
-    def show_jump(self, quickest: float) -> bool:
-        """Whether the misfits show a jump of the clock away from `quickest`, the old offset, s."""
+    def show_jump(self, old_offset: float) -> bool:
+        """Whether the misfits show a jump of the clock away from `old_offset`, s."""
         first, last = self.stamps[0], self.stamps[-1]
         return (
             len(self.stamps) >= _MIN_JUMP_SAMPLES
             and last.time > first.time
-            and last.received - first.received >= _MIN_JUMP_SPAN
-            and abs(self.largest_offset() - quickest) >= SMALLEST_JUMP
+            and last.received - first.received >= _MIN_JUMP_DURATION
+            and abs(self.largest_offset() - old_offset) >= SMALLEST_JUMP
         )
 
     def largest_offset(self) -> float:
         """The largest offset of the misfits (vehicle time minus event-loop time), s."""
         return max(stamp.apparent_offset for stamp in self.stamps)
 
-    def clock_stopped(self, newest: float) -> bool:
-        """Whether all misfits repeat `newest`, the stamp of the last sample that fitted, s."""
-        return self.stamps[0].time == self.stamps[-1].time == newest
+    def clock_stopped(self, newest_time: float) -> bool:
+        """Whether all misfits repeat `newest_time`, the stamp of the last sample that fitted, s."""
+        return self.stamps[0].time == self.stamps[-1].time == newest_time
 
 
 def has_wrapped(jump: float, before: float) -> bool:
@@ -103,13 +103,13 @@ def has_wrapped(jump: float, before: float) -> bool:
     )
 
 
-def describe_change(jump: float, before: float, now: float, *, set_back: bool) -> str:
+def describe_change(jump: float, before: float, after: float, *, set_back: bool) -> str:
     """A change of the vehicle's clock in words.
 
     Args:
         jump: how far the clock moved, s.
         before: time since boot before the change, s.
-        now: time since boot after the change, s.
+        after: time since boot after the change, s.
         set_back: for a negative `jump`: whether the clock was set back; False: it stood still.
     """
     if has_wrapped(jump, before):
@@ -120,7 +120,7 @@ def describe_change(jump: float, before: float, now: float, *, set_back: bool) -
         return f"the vehicle's clock stood still for {-jump:.2f} s"
     if jump < -RESTART_SETBACK:
         return (
-            f"the vehicle's time since boot went back from {before:.1f} s to {now:.1f} s: the "
-            "autopilot restarted"
+            f"the vehicle's time since boot went back from {before:.1f} s to {after:.1f} s: "
+            "the autopilot restarted"
         )
     return f"the vehicle's clock went back by {-jump:.2f} s"

@@ -34,7 +34,7 @@ class Connection:
     _on_dropped: Callable[[str], None]
     """Called with the reason when the connection drops."""
     _opener: OpenTransport
-    _reopening: asyncio.Task[None] | None = field(default=None, init=False)
+    _reopen_task: asyncio.Task[None] | None = field(default=None, init=False)
     _early_loss_reason: str | None = field(default=None, init=False)
 
     async def open(self) -> None:
@@ -54,9 +54,9 @@ class Connection:
 
     async def close(self) -> None:
         """Close the transport and stop reconnecting."""
-        if self._reopening is not None:
-            self._reopening.cancel()
-            await asyncio.gather(self._reopening, return_exceptions=True)
+        if self._reopen_task is not None:
+            self._reopen_task.cancel()
+            await asyncio.gather(self._reopen_task, return_exceptions=True)
         self._drop_transport()
 
     def _drop_transport(self) -> None:
@@ -72,21 +72,21 @@ class Connection:
             return
         if transport.reconnects:
             self._drop_transport()
-            self._reopening = asyncio.get_running_loop().create_task(self._reopen())
+            self._reopen_task = asyncio.get_running_loop().create_task(self._reopen())
         else:  # a TCP server goes on listening
             self._inbox.start_connection(streaming=True)
             self._stats.reconnects += 1
         self._on_dropped(reason)
 
     async def _reopen(self) -> None:
-        pause = _BACKOFF_FIRST_S
+        pause_s = _BACKOFF_FIRST_S
         while self._outbox.transport is None:
-            await asyncio.sleep(pause)
+            await asyncio.sleep(pause_s)
             try:
                 await self.open()
             except Exception as error:  # after any failure the next try may succeed
                 _LOG.info("reconnecting failed, the next try follows: %s", error)
-                pause = min(2.0 * pause, _BACKOFF_MAX_S)
+                pause_s = min(2.0 * pause_s, _BACKOFF_MAX_S)
         self._stats.reconnects += 1
         _LOG.info("link is back")
 
@@ -94,9 +94,9 @@ class Connection:
 def no_heartbeat_message(settings: LinkSettings, stats: LinkStats, timeout_s: float) -> str:
     """The error message if no heartbeat of the autopilot came within `timeout_s`."""
     opening = f"no heartbeat from system {settings.target_system} within {timeout_s:g} s"
-    refused = _refusal_message(opening, stats)
-    if refused is not None:
-        return refused
+    refusal_message = _refusal_message(opening, stats)
+    if refusal_message is not None:
+        return refusal_message
     if stats.bad_crc:
         return (
             f"{opening}, but {stats.bad_crc} damaged frames; is the baud rate right? "
@@ -113,8 +113,8 @@ def no_heartbeat_message(settings: LinkSettings, stats: LinkStats, timeout_s: fl
 def no_beacon_message(settings: LinkSettings, stats: LinkStats) -> str:
     """The error message if no lockstep beacon came within `first_beacon_timeout_s`."""
     opening = f"no lockstep beacon within {settings.first_beacon_timeout_s:g} s"
-    why = f"{opening} on {settings.endpoint}; is the vehicle running, and in lockstep?"
-    return _refusal_message(opening, stats) or why
+    timeout_message = f"{opening} on {settings.endpoint}; is the vehicle running, and in lockstep?"
+    return _refusal_message(opening, stats) or timeout_message
 
 
 def _refusal_message(opening: str, stats: LinkStats) -> str | None:

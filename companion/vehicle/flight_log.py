@@ -14,9 +14,9 @@ from companion.vehicle.registry import AUTOPILOT_NAMES, AUTOPILOTS_BY_NUMBER
 
 Row = tuple[float, ...]
 
-_RELEVANT_BITS = IGNORE_ATTITUDE | 0b1100111
+_COMPARED_MASK_BITS = IGNORE_ATTITUDE | 0b1100111
 """Bits of a setpoint's type mask that are compared: quaternion, rates, throttle, body thrust."""
-_RECENT_SAMPLES = 500
+_RECENT_SAMPLE_COUNT = 500
 """Number of newest samples whose time stamp a setpoint may carry."""
 _MAX_CLOCK_DIFFERENCE = 1.0
 """Stamps of accelerometer and attitude that differ by more than this, s, come from two clocks."""
@@ -94,35 +94,35 @@ class _Reader:
     """Body rates from ATTITUDE."""
     specific_thrust: list[Row] = field(default_factory=list)
     """The accelerometer's −z axis; see `FlightLog.specific_thrust`."""
-    _was_obeying: bool = False
+    _obeyed_at_last_heartbeat: bool = False
     _unconfirmed_setpoints: list[Row] = field(default_factory=list)
-    _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT_SAMPLES))
+    _stamps_ms: deque[int] = field(default_factory=lambda: deque(maxlen=_RECENT_SAMPLE_COUNT))
 
     def take(self, source: tuple[int, int], message: Message) -> None:
         """Take one message from `source` (system, component)."""
         message_type = message.get_type()
         if message_type == "SET_ATTITUDE_TARGET":
-            self._setpoint(message)
+            self._take_setpoint(message)
         elif message_type == "HEARTBEAT":
-            self._heartbeat(source, message)
+            self._take_heartbeat(source, message)
         elif source == self.vehicle:
-            self._telemetry(message_type, message)
+            self._take_telemetry(message_type, message)
 
-    def _heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
+    def _take_heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
         if self.vehicle is None and heartbeat.autopilot in AUTOPILOTS_BY_NUMBER:
             self.vehicle, self.autopilot = source, AUTOPILOTS_BY_NUMBER[heartbeat.autopilot]
         if source != self.vehicle or self.autopilot is None:
             return
         mode = self.autopilot.mode_name(heartbeat.base_mode, heartbeat.custom_mode)
         armed = bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
-        obeying = armed and Role.OFFBOARD in self.autopilot.roles(mode)
-        if obeying and self._was_obeying:
+        obeys_setpoints = armed and Role.OFFBOARD in self.autopilot.roles(mode)
+        if obeys_setpoints and self._obeyed_at_last_heartbeat:
             self.obeyed_setpoints.extend(self._unconfirmed_setpoints)
         self._unconfirmed_setpoints.clear()
-        self._was_obeying = obeying
+        self._obeyed_at_last_heartbeat = obeys_setpoints
 
-    def _setpoint(self, setpoint: Message) -> None:
-        if not self._stamps_ms or setpoint.type_mask & _RELEVANT_BITS != IGNORE_ATTITUDE:
+    def _take_setpoint(self, setpoint: Message) -> None:
+        if not self._stamps_ms or setpoint.type_mask & _COMPARED_MASK_BITS != IGNORE_ATTITUDE:
             return
         stamp_is_known = setpoint.time_boot_ms in self._stamps_ms
         stamp = setpoint.time_boot_ms if stamp_is_known else self._stamps_ms[-1]
@@ -136,12 +136,12 @@ class _Reader:
             )
         )
 
-    def _telemetry(self, message_type: str, message: Message) -> None:
+    def _take_telemetry(self, message_type: str, message: Message) -> None:
         if message_type == "HIGHRES_IMU":
-            self._accelerometer(1e-6 * message.time_usec, -message.zacc)
+            self._take_accelerometer(1e-6 * message.time_usec, -message.zacc)
         elif message_type == "SCALED_IMU":
             milli_g = -message.zacc
-            self._accelerometer(1e-3 * message.time_boot_ms, 1e-3 * GRAVITY * milli_g)
+            self._take_accelerometer(1e-3 * message.time_boot_ms, 1e-3 * GRAVITY * milli_g)
         else:
             is_quaternion = message_type == "ATTITUDE_QUATERNION"
             rows = self.rates_with_quaternion if is_quaternion else self.rates_with_euler
@@ -149,6 +149,6 @@ class _Reader:
             rows.append((time, message.rollspeed, message.pitchspeed, message.yawspeed))
             self._stamps_ms.append(message.time_boot_ms)
 
-    def _accelerometer(self, time: float, specific_thrust: float) -> None:
+    def _take_accelerometer(self, time: float, specific_thrust: float) -> None:
         if self._stamps_ms and abs(time - 1e-3 * self._stamps_ms[-1]) < _MAX_CLOCK_DIFFERENCE:
             self.specific_thrust.append((time, specific_thrust))

@@ -64,7 +64,7 @@ class Inbox:
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
         # The sender that becomes the peer with the next accepted frame; see `may_prove_date`.
-        self._candidate: str | None = None
+        self._peer_candidate: str | None = None
         self._peer_rule = PeerRule(
             stats,
             self._filter.notify_once,
@@ -91,9 +91,9 @@ class Inbox:
                     self._call_on_frame(frame)
                 elif self._is_admitted(frame):
                     accepted = True
-                    if self._candidate is not None:
-                        self._peer_rule.set_peer(self._candidate)
-                        self._candidate = None
+                    if self._peer_candidate is not None:
+                        self._peer_rule.set_peer(self._peer_candidate)
+                        self._peer_candidate = None
                     self._accept(frame, received_ns)
                 elif not self._filter.is_vehicle(frame):
                     self._call_on_frame(frame)
@@ -108,15 +108,17 @@ class Inbox:
         If none of the frames entitles `sender` to become the peer (see `PeerRule`), no frame is
         accepted. Never raises.
         """
-        known = (frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA)
-        admitted = [frame for frame in known if self._is_admitted(frame)]
-        if not any(map(self._peer_rule.makes_sender_peer, admitted)):
-            self._stats.unclaimed += len(admitted)
+        known_frames = (
+            frame for frame in self._scanner.feed(data) if frame.message_id in CRC_EXTRA
+        )
+        admitted_frames = [frame for frame in known_frames if self._is_admitted(frame)]
+        if not any(map(self._peer_rule.makes_sender_peer, admitted_frames)):
+            self._stats.unclaimed += len(admitted_frames)
             return False
-        self._candidate = None
+        self._peer_candidate = None
         self._peer_rule.set_peer(sender)
         try:
-            for frame in admitted:
+            for frame in admitted_frames:
                 self._accept(frame, received_ns)
         except Exception as error:  # from the tap
             self._dispatcher.report(error)
@@ -129,7 +131,7 @@ class Inbox:
         """
         if not self._filter.needs_timesync_answer:
             return False
-        self._candidate = sender
+        self._peer_candidate = sender
         return True
 
     def may_replace_peer(self) -> bool:
@@ -154,9 +156,9 @@ class Inbox:
     def _accept(self, frame: Frame, received_ns: int) -> None:
         if frame.message_id == HEARTBEAT and self._peer_rule.makes_sender_peer(frame):
             self._peer_rule.renew()
-        self._pass_on(frame, received_ns)
+        self._distribute(frame, received_ns)
 
-    def _pass_on(self, frame: Frame, received_ns: int) -> None:
+    def _distribute(self, frame: Frame, received_ns: int) -> None:
         """Pass a frame to the tap, the control loop, the counter and the dispatcher.
 
         The control loop comes early because all work before it adds latency.
@@ -183,10 +185,12 @@ class Inbox:
             self._stats.refuse_non_finite("ATTITUDE_QUATERNION", now)
             return
         time_boot_ms, q, rates = decoded
-        time, age, misfit = self._clock.take(time_boot_ms, now)
-        known = self._clock.age_known
+        vehicle_time, age, misfit = self._clock.take(time_boot_ms, now)
+        age_known = self._clock.age_known
         self._call_on_attitude(
-            AttitudeSample(time_boot_ms, time, now, received_ns, q, rates, age, misfit, known)
+            AttitudeSample(
+                time_boot_ms, vehicle_time, now, received_ns, q, rates, age, misfit, age_known
+            )
         )
 
     def _call_on_attitude(self, sample: AttitudeSample) -> None:

@@ -1,6 +1,6 @@
 """The effective rate of setpoints or samples, from the intervals between them."""
 
-_MAX_UNEVENNESS = 2.0
+_MAX_INTERVAL_RATIO = 2.0
 """Largest ratio of Σg²/Σg to the mean interval at which the effective rate is the mean rate.
 
 g are the intervals. The ratio is 1 for equal intervals. Above the limit, the effective rate is
@@ -32,14 +32,14 @@ class IntervalSums:
         """A copy of the present sums."""
         return IntervalSums(self.intervals, self.seconds, self.squares)
 
-    def rate_since(self, before: "IntervalSums") -> float | None:
-        """Effective rate since `before`, Hz; None if there was no interval since then.
+    def rate_since(self, earlier: "IntervalSums") -> float | None:
+        """Effective rate since `earlier`, Hz; None if there was no interval since then.
 
         The rate is the number of intervals per second, but at most 2·Σg/Σg² of the intervals g.
         Long intervals dominate Σg², so pauses between bursts lower the rate.
         """
-        intervals = self.intervals - before.intervals
-        seconds, squares = self.seconds - before.seconds, self.squares - before.squares
+        intervals = self.intervals - earlier.intervals
+        seconds, squares = self.seconds - earlier.seconds, self.squares - earlier.squares
         if seconds <= 0.0 or squares <= 0.0:
             return None
-        return min(intervals / seconds, _MAX_UNEVENNESS * seconds / squares)
+        return min(intervals / seconds, _MAX_INTERVAL_RATIO * seconds / squares)

@@ -72,9 +72,9 @@ class Link(VehicleClient, LinkCallbacks):
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
         )
-        self._stamp_writer: StampWriter | None = None
+        self._signing_stamp_writer: StampWriter | None = None
         if settings.signing is not None and settings.signing.file is not None:
-            self._stamp_writer = StampWriter(settings.signing, settings.signing.file)
+            self._signing_stamp_writer = StampWriter(settings.signing, settings.signing.file)
 
     # --- lifetime
 
@@ -82,15 +82,15 @@ class Link(VehicleClient, LinkCallbacks):
         await self._connection.open()
         try:
             if self._lockstep is not None:
-                await self._first_beacon(self._lockstep)
+                await self._wait_for_first_beacon(self._lockstep)
         except BaseException:
             await self.__aexit__()
             raise
-        if self._stamp_writer is not None:
-            self._stamp_writer.start()
+        if self._signing_stamp_writer is not None:
+            self._signing_stamp_writer.start()
         self._inbox.report_stamp_remarks()
-        self._start(self._send_heartbeats())
-        self._start(self.timesync.run())
+        self._start_task(self._send_heartbeats())
+        self._start_task(self.timesync.run())
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -102,8 +102,8 @@ class Link(VehicleClient, LinkCallbacks):
         self._tasks.clear()
         self._registry.fail("this program closed the link")
         await self._connection.close()
-        if self._stamp_writer is not None:
-            self._stamp_writer.stop()
+        if self._signing_stamp_writer is not None:
+            self._signing_stamp_writer.stop()
         self._inbox.report_stamp_remarks()
 
     async def wait_connected(self, timeout_s: float) -> Heartbeat:
@@ -114,12 +114,12 @@ class Link(VehicleClient, LinkCallbacks):
             LinkLost: the connection dropped while waiting.
             UnsupportedAutopilot: this program cannot fly the autopilot.
         """
-        with AnswerQueue[None](self._registry) as heard:
-            unsubscribe = self._dispatcher.subscribe("HEARTBEAT", lambda _: heard.put(None))
+        with AnswerQueue[None](self._registry) as heartbeats:
+            unsubscribe = self._dispatcher.subscribe("HEARTBEAT", lambda _: heartbeats.put(None))
             try:
                 async with asyncio.timeout(timeout_s):
                     while self.state.heartbeat is None:
-                        await heard.next(timeout_s)
+                        await heartbeats.next(timeout_s)
             except TimeoutError:
                 raise LinkTimeout(
                     no_heartbeat_message(self.settings, self.stats, timeout_s)
@@ -178,8 +178,8 @@ class Link(VehicleClient, LinkCallbacks):
         self._registry.fail(reason)
         self.timesync.reset()
 
-    def _start(self, work: Coroutine[Any, Any, None]) -> None:
-        task = self._loop.create_task(work)
+    def _start_task(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        task = self._loop.create_task(coroutine)
         task.add_done_callback(self._report_failure)
         self._tasks.append(task)
 
@@ -195,7 +195,7 @@ class Link(VehicleClient, LinkCallbacks):
             self._outbox.send_heartbeat()
             await asyncio.sleep(1.0 / self.settings.heartbeat_rate_hz)
 
-    async def _first_beacon(self, lockstep: LockstepInbox) -> None:
+    async def _wait_for_first_beacon(self, lockstep: LockstepInbox) -> None:
         # Some vehicles wait for a first message before they send (udpout, TCP).
         self._outbox.send_heartbeat()
         try:

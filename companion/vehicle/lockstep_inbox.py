@@ -32,7 +32,7 @@ class LockstepInbox(Inbox):
             raise LinkError("lockstep needs the event loop of companion.mavlink.lockstep.run")
         self._lockstep_loop = self._loop
         self._held_frames: list[tuple[Frame, int]] = []
-        self._samples: list[AttitudeSample] = []
+        self._held_samples: list[AttitudeSample] = []
         self._closed = False
         self.open_step_time_ms: int | None = None
         self.first_beacon: asyncio.Future[None] = self._loop.create_future()
@@ -41,7 +41,7 @@ class LockstepInbox(Inbox):
         """Stop: the open step is not answered, and its samples are not delivered any more."""
         self._closed = True
 
-    def _pass_on(self, frame: Frame, received_ns: int) -> None:
+    def _distribute(self, frame: Frame, received_ns: int) -> None:
         beacon = decode_beacon(frame.payload) if frame.message_id == SYSTEM_TIME else None
         if beacon is None:
             self._held_frames.append((frame, received_ns))
@@ -58,24 +58,24 @@ class LockstepInbox(Inbox):
         self.open_step_time_ms = time_boot_ms
         if not self.first_beacon.done():
             self.first_beacon.set_result(None)
-        held, self._held_frames = self._held_frames, []
-        for frame, received_ns in held:
-            super()._pass_on(frame, received_ns)
+        held_frames, self._held_frames = self._held_frames, []
+        for frame, received_ns in held_frames:
+            super()._distribute(frame, received_ns)
         self._lockstep_loop.settle(self._deliver_samples)
 
     def _call_on_attitude(self, sample: AttitudeSample) -> None:
-        self._samples.append(sample)
+        self._held_samples.append(sample)
 
     def _deliver_samples(self) -> None:
         if self._closed:
             return
-        samples, self._samples = self._samples, []
+        samples, self._held_samples = self._held_samples, []
         for sample in samples:
             super()._call_on_attitude(sample)
         # Settle again, so that tasks started by the control loop send before the step closes.
         self._lockstep_loop.settle(self._close_step)
 
     def _close_step(self) -> None:
-        step, self.open_step_time_ms = self.open_step_time_ms, None
-        if step is not None and not self._closed:
-            self._outbox.close_step(step)
+        step_time_ms, self.open_step_time_ms = self.open_step_time_ms, None
+        if step_time_ms is not None and not self._closed:
+            self._outbox.close_step(step_time_ms)

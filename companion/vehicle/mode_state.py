@@ -52,7 +52,7 @@ class ModeState:
         return heartbeat.mode if current is None or self.heartbeat_is_newest else current.mode
 
     @property
-    def mode_received(self) -> float:
+    def mode_received_at(self) -> float:
         """Event-loop time at which a mode was last received, s; −inf if none was."""
         messages = (self.heartbeat, self.current_mode)
         return max((each.received for each in messages if each is not None), default=-inf)
@@ -101,10 +101,10 @@ class ModeState:
     def _on_current_mode(self, message: Message) -> None:
         if self.autopilot is None:
             return  # the meaning of the mode's number is not known yet
-        mode, intended = (
+        mode, intended_mode = (
             self.autopilot.mode_name(self._base_mode, number)
             # MAVLink: an intended mode of 0 is unknown; then the present mode counts as intended.
             for number in (message.custom_mode, message.intended_custom_mode or message.custom_mode)
         )
-        self.current_mode = CurrentMode(self._clock(), mode, intended)
+        self.current_mode = CurrentMode(self._clock(), mode, intended_mode)
         self.heartbeat_is_newest = False

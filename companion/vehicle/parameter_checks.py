@@ -7,7 +7,7 @@ from companion.vehicle.parameter_rules import Check, CheckResult, CompanionSetti
 
 UNSAFE, INEFFECTIVE = CheckResult.UNSAFE, CheckResult.INEFFECTIVE
 
-LONGEST_RATE_HOLD = 2.0
+MAX_RATE_HOLD_TIME = 2.0
 """Longest time for which the autopilot may hold the last rates, s. 0.4 rad/s held for 1 s became
 24° of tilt (measured on PX4); twice that tilt is not recoverable."""
 
@@ -18,11 +18,11 @@ _MAX_LIMIT_RATIO = 1.15
 """Acceleration limits that differ by less than this factor have the same effect."""
 
 
-def forbidden(result: CheckResult, bad: Mapping[float, str], set_to: float) -> Check:
-    """A check that forbids the values in `bad`, which gives the consequence of each."""
+def forbidden(result: CheckResult, consequences: Mapping[float, str], set_to: float) -> Check:
+    """A check that forbids the values in `consequences`, which gives the consequence of each."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
-        because = bad.get(value)
+        because = consequences.get(value)
         return None if because is None else Problem(result, because, set_to)
 
     return check
@@ -37,42 +37,49 @@ def first_problem(*checks: Check) -> Check:
     return check
 
 
-def safe_action(good: Iterable[float], bad: Mapping[float, str], set_to: float) -> Check:
-    """A check of what the autopilot does in an emergency: only the actions in `good` are safe.
+def safe_action(
+    safe_actions: Iterable[float], unsafe_actions: Mapping[float, str], set_to: float
+) -> Check:
+    """A check of what the autopilot does in an emergency: only `safe_actions` are safe.
 
     Args:
-        good: safe actions.
-        bad: unsafe actions, with the consequence of each. An action in neither is unsafe, too.
+        safe_actions: safe actions.
+        unsafe_actions: unsafe actions, with the consequence of each. An action in neither is
+            unsafe, too.
         set_to: a safe action to set.
     """
-    known = frozenset(good)
+    safe_values = frozenset(safe_actions)
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
-        if value in known:
+        if value in safe_values:
             return None
-        return Problem(UNSAFE, bad.get(value, "companion does not know this action"), set_to)
+        return Problem(
+            UNSAFE, unsafe_actions.get(value, "companion does not know this action"), set_to
+        )
 
     return check
 
 
-def _unless(is_good: Callable[[float], bool], problem: Problem) -> Check:
+def _problem_unless(is_good: Callable[[float], bool], problem: Problem) -> Check:
     """A check that finds the same problem in each value that is not good."""
     return lambda value, _values, _settings: None if is_good(value) else problem
 
 
-def required(result: CheckResult, good: float, because: str) -> Check:
-    """A check that requires the value `good`; `because`: consequence of any other value."""
-    return _unless(lambda value: value == good, Problem(result, because, good))
+def required(result: CheckResult, required_value: float, because: str) -> Check:
+    """A check that requires a value; `because`: consequence of any other value."""
+    return _problem_unless(
+        lambda value: value == required_value, Problem(result, because, required_value)
+    )
 
 
 def positive(result: CheckResult, because: str, set_to: float) -> Check:
     """A check that requires a value above zero, because zero or less turns a protection off."""
-    return _unless(lambda value: value > 0.0, Problem(result, because, set_to))
+    return _problem_unless(lambda value: value > 0.0, Problem(result, because, set_to))
 
 
 def at_most(result: CheckResult, limit: float, because: str, set_to: float) -> Check:
     """A check that requires a value of at most `limit`."""
-    return _unless(lambda value: value <= limit, Problem(result, because, set_to))
+    return _problem_unless(lambda value: value <= limit, Problem(result, because, set_to))
 
 
 def bit_set(result: CheckResult, bit: int, because: str) -> Check:
@@ -95,7 +102,7 @@ def bit_clear(result: CheckResult, bit: int, because: str) -> Check:
     return check
 
 
-def shortest_rate_hold(silence_limit: float) -> float:
+def min_rate_hold_time(silence_limit: float) -> float:
     """Shortest time for which the autopilot must hold the last rates, s.
 
     The result is longer than `silence_limit` (s), so that `companion` releases control first.
@@ -103,12 +110,12 @@ def shortest_rate_hold(silence_limit: float) -> float:
     return 1.5 * silence_limit
 
 
-def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
+def rate_hold(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     """Check the time for which the autopilot holds the last rates after setpoints stop.
 
-    The time must be longer than `silence_limit`, and at most `LONGEST_RATE_HOLD`.
+    The time must be longer than `silence_limit`, and at most `MAX_RATE_HOLD_TIME`.
     """
-    set_to = shortest_rate_hold(settings.silence_limit)
+    set_to = min_rate_hold_time(settings.silence_limit)
     if value <= settings.silence_limit:
         return Problem(
             UNSAFE,
@@ -117,7 +124,7 @@ def rates_held(value: float, _: Values, settings: CompanionSettings) -> Problem 
             "setpoints triggers it",
             set_to,
         )
-    if value > LONGEST_RATE_HOLD:
+    if value > MAX_RATE_HOLD_TIME:
         return Problem(
             UNSAFE,
             f"when setpoints stop, the last rates are held for {value:g} s: 0.4 rad/s become "
@@ -173,26 +180,28 @@ def system_id(value: float, _: Values, settings: CompanionSettings) -> Problem |
     )
 
 
-def acceleration_limit(unit: float, axis: str) -> Check:
+def acceleration_limit(unit_deg_s2: float, axis: str) -> Check:
     """A check that the configured angular acceleration limit of an axis equals the autopilot's.
 
     Args:
-        unit: the parameter's unit as a multiple of 1 °/s².
+        unit_deg_s2: the parameter's unit as a multiple of 1 °/s².
         axis: `roll`, `pitch` or `yaw`.
     """
     prefix = "" if axis == "roll" else f"{axis}_"
     key = f"vehicle.{prefix}acceleration_limit_deg_s2"
 
     def check(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
-        assumed, actual = settings.acceleration_limits[axis], unit * value
-        if assumed is None:
-            agrees, assumed_text = actual == 0.0, "null"
+        assumed_limit, actual_limit = settings.acceleration_limits[axis], unit_deg_s2 * value
+        if assumed_limit is None:
+            limits_agree, assumed_text = actual_limit == 0.0, "null"
         else:
-            agrees = 1.0 / _MAX_LIMIT_RATIO < actual / degrees(assumed) < _MAX_LIMIT_RATIO
-            assumed_text = f"{degrees(assumed):g}"
-        if agrees:
+            limits_agree = (
+                1.0 / _MAX_LIMIT_RATIO < actual_limit / degrees(assumed_limit) < _MAX_LIMIT_RATIO
+            )
+            assumed_text = f"{degrees(assumed_limit):g}"
+        if limits_agree:
             return None
-        actual_text = "null" if actual == 0.0 else f"{actual:g}"
+        actual_text = "null" if actual_limit == 0.0 else f"{actual_limit:g}"
         return Problem(
             INEFFECTIVE, f"the planner assumes {key} {assumed_text}; set this key to {actual_text}"
         )

@@ -1,7 +1,7 @@
 """Rules for the autopilot parameters that matter to a flight by body rates.
 
-Each autopilot lists its rules as data; `judge` applies them to the values that were read. Nothing
-here reads or writes a parameter.
+Each autopilot lists its rules as data; `apply_rules` applies them to the values that were read.
+Nothing here reads or writes a parameter.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -98,7 +98,7 @@ class ParameterRule:
         return self.names[0]
 
 
-_NO_NUMBER = Problem(
+_NOT_FINITE_PROBLEM = Problem(
     CheckResult.UNSAFE, "the value is not a number, and its effect on the autopilot is unknown"
 )
 
@@ -117,7 +117,7 @@ class ParameterFinding(NamedTuple):
     know a better one, or the configuration must change."""
 
 
-def judge(
+def apply_rules(
     rules: Iterable[ParameterRule], values: Values, settings: CompanionSettings
 ) -> list[ParameterFinding]:
     """Apply the rules in their order; a rule whose parameter is absent is left out.
@@ -125,12 +125,14 @@ def judge(
     A value that is NaN or infinite is unsafe, and other rules treat its parameter as absent.
     """
     findings = []
-    finite = {name: value for name, value in values.items() if isfinite(value)}
+    finite_values = {name: value for name, value in values.items() if isfinite(value)}
     for rule in rules:
         if rule.name not in values:
             continue
         value = values[rule.name]
-        problem = rule.check(value, finite, settings) if isfinite(value) else _NO_NUMBER
+        problem = (
+            rule.check(value, finite_values, settings) if isfinite(value) else _NOT_FINITE_PROBLEM
+        )
         if problem is None:
             findings.append(ParameterFinding(rule, value, CheckResult.SAFE))
         else:

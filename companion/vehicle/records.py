@@ -10,7 +10,7 @@ Vector = tuple[float, float, float]
 MAX_TELEMETRY_AGE = 5.0
 """Age from which telemetry counts as unknown, s; every message should come at 1 Hz or faster."""
 
-_MAX_CHARGE_AGE = 1.5
+_MAX_KEPT_CHARGE_AGE = 1.5
 """Age up to which a charge is kept although a newer message lacks it, s.
 
 The charge is in SYS_STATUS and BATTERY_STATUS, which come at 1 Hz or faster."""
@@ -121,11 +121,11 @@ class Battery(NamedTuple):
         """The newer record; if it lacks a charge, with the charge of this record.
 
         Some vehicles send the charge only in SYS_STATUS or only in BATTERY_STATUS. A charge is kept
-        for `_MAX_CHARGE_AGE`.
+        for `_MAX_KEPT_CHARGE_AGE`.
         """
         if newer.remaining is not None:
             return newer
-        if self.remaining is None or newer.received - self.received > _MAX_CHARGE_AGE:
+        if self.remaining is None or newer.received - self.received > _MAX_KEPT_CHARGE_AGE:
             return newer._replace(charge_received=self.charge_received)
         return self if newer.voltage_v is None else self._replace(voltage_v=newer.voltage_v)
 

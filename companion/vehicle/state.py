@@ -31,13 +31,13 @@ from companion.vehicle.records import (
 
 GROUND_HEIGHT = 1.5
 """Largest height above home that counts as on the ground, m, because the estimate drifts."""
-_UNKNOWN_U16 = 65535
-_PREARM_CHECK = 0x10000000
+_UNKNOWN_MV = 65535
+_PREARM_CHECK_BIT = 0x10000000
 _LANDED_UNDEFINED, LANDED_ON_GROUND, LANDED_TAKEOFF = 0, 1, 3
 
 
 @dataclass
-class _Values:
+class _NewestRecords:
     landed_state: LandedState | None = None
     position: LocalPosition | None = None
     battery: Battery | None = None
@@ -53,7 +53,7 @@ class _Values:
     reset_counter: int | None = None
 
 
-class VehicleState(ModeState, _Values):
+class VehicleState(ModeState, _NewestRecords):
     """The newest record of each kind of telemetry; each is `None` until its message has come.
 
     Mode and arming are in the base class `ModeState`.
@@ -80,9 +80,9 @@ class VehicleState(ModeState, _Values):
         clock: Callable[[], float],
         vehicle_clock: VehicleClock,
     ) -> None:
-        _Values.__init__(self)
+        _NewestRecords.__init__(self)
         ModeState.__init__(self, dispatcher, clock)
-        self._stats, self._assembler = stats, texts
+        self._stats, self._text_assembler = stats, texts
         self._vehicle_clock = vehicle_clock
         self.texts = texts.texts
         for name, callback in {
@@ -104,7 +104,7 @@ class VehicleState(ModeState, _Values):
     def forget(self) -> None:
         """Forget all but heartbeat, autopilot and texts; the rest may be of another vehicle."""
         self.current_mode, self.armings = None, 0
-        _Values.__init__(self)
+        _NewestRecords.__init__(self)
 
     @property
     def landed(self) -> bool:
@@ -125,8 +125,8 @@ class VehicleState(ModeState, _Values):
     def battery_silent(self) -> bool:
         """Whether the battery, or its charge, was reported before and is no longer reported."""
         battery, now = self.battery, self._clock()
-        times = () if battery is None else (battery.received, battery.charge_received)
-        return any(time is not None and is_outdated(time, now) for time in times)
+        arrivals = () if battery is None else (battery.received, battery.charge_received)
+        return any(time is not None and is_outdated(time, now) for time in arrivals)
 
     @property
     def height(self) -> float | None:
@@ -164,14 +164,14 @@ class VehicleState(ModeState, _Values):
         if not all(map(isfinite, values)):
             self._stats.refuse_non_finite("LOCAL_POSITION_NED", self._clock())
             return
-        clock, now, last = self._vehicle_clock, self._clock(), self.position
+        clock, now, newest = self._vehicle_clock, self._clock(), self.position
         stamp = clock.vehicle_time(message.time_boot_ms)
         if clock.is_ahead(stamp, now):
             self._stats.stamped_ahead += 1
         elif (
-            last is not None
-            and stamp <= last.vehicle_time
-            and not clock.is_ahead(last.vehicle_time, now)  # came before the clock was known
+            newest is not None
+            and stamp <= newest.vehicle_time
+            and not clock.is_ahead(newest.vehicle_time, now)  # came before the clock was known
         ):
             self._stats.outdated += 1
         else:
@@ -181,10 +181,10 @@ class VehicleState(ModeState, _Values):
     def _on_sys_status(self, message: Message) -> None:
         millivolts = message.voltage_battery
         self._take_battery(
-            None if millivolts == _UNKNOWN_U16 else millivolts / 1000.0, message.battery_remaining
+            None if millivolts == _UNKNOWN_MV else millivolts / 1000.0, message.battery_remaining
         )
-        passed = bool(message.onboard_control_sensors_health & _PREARM_CHECK)
-        self.prearm = Prearm(self._clock(), passed)
+        prearm_passed = bool(message.onboard_control_sensors_health & _PREARM_CHECK_BIT)
+        self.prearm = Prearm(self._clock(), prearm_passed)
 
     def _on_odometry(self, payload: bytes) -> None:
         self.reset_counter = decode_reset_counter(payload)
@@ -193,8 +193,8 @@ class VehicleState(ModeState, _Values):
         if message.id != 0:
             return
         # A battery without known cells reports its whole voltage in parts of 65534 mV.
-        cells = [cell for cell in message.voltages if cell != _UNKNOWN_U16]
-        cells += [cell for cell in message.voltages_ext if cell not in (0, _UNKNOWN_U16)]
+        cells = [cell for cell in message.voltages if cell != _UNKNOWN_MV]
+        cells += [cell for cell in message.voltages_ext if cell not in (0, _UNKNOWN_MV)]
         self._take_battery(sum(cells) / 1000.0 if cells else None, message.battery_remaining)
 
     def _take_battery(self, voltage_v: float | None, percent: int) -> None:
@@ -245,4 +245,4 @@ class VehicleState(ModeState, _Values):
         self.estimator = Estimator(self._clock(), message.flags)
 
     def _on_text(self, message: Message) -> None:
-        self._assembler.take(message, self._clock())
+        self._text_assembler.take(message, self._clock())

@@ -14,7 +14,9 @@ _DISABLED_INTERVAL = -1.0
 _TIMEOUT_S = 1.0
 _RETRIES = 3
 _MAX_HALVINGS = 3
-_ROUNDING = 1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not lose a whole step
+_ROUNDING_TOLERANCE = (
+    1e-6  # so that a rounding error, as in 1e6 / 333.333…, does not lose a whole step
+)
 
 
 class StreamRate(NamedTuple):
@@ -44,34 +46,36 @@ async def set_rates(
     and requested again, up to three times. Intervals are rounded down to a whole multiple of
     `interval_step_us`, us.
     """
-    numbers = {name: message_id(name) for name in rates}
-    answers = {
-        name: await _request(commands, numbers[name], rate, interval_step_us)
+    message_ids = {name: message_id(name) for name in rates}
+    granted_and_refusal = {
+        name: await _request_rate(commands, message_ids[name], rate, interval_step_us)
         for name, rate in rates.items()
     }
     achieved = await measure_rates(stats, rates, window_s)
     return {
-        name: StreamRate(rate, answers[name][0], achieved[name], answers[name][1])
+        name: StreamRate(
+            rate, granted_and_refusal[name][0], achieved[name], granted_and_refusal[name][1]
+        )
         for name, rate in rates.items()
     }
 
 
-async def _request(
-    commands: CommandClient, number: int, rate: float, interval_step_us: int
+async def _request_rate(
+    commands: CommandClient, message_number: int, rate: float, interval_step_us: int
 ) -> tuple[float, str]:
     """Request a message rate (Hz); return the granted rate, and the last refusal if it is 0."""
     refusal = ""
     for _ in range(_MAX_HALVINGS + 1):
         interval_us = _DISABLED_INTERVAL
         if rate > 0.0:
-            steps = max(1, floor(1e6 / rate / interval_step_us + _ROUNDING))
+            steps = max(1, floor(1e6 / rate / interval_step_us + _ROUNDING_TOLERANCE))
             interval_us = float(steps * interval_step_us)
         try:
-            params = (float(number), interval_us)
+            params = (float(message_number), interval_us)
             await commands.send(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, params, _TIMEOUT_S, _RETRIES)
-        except CommandRefused as refused:
-            refusal = refused.result_name
-            if refused.result != dialect.MAV_RESULT_DENIED or rate <= 0.0:
+        except CommandRefused as error:
+            refusal = error.result_name
+            if error.result != dialect.MAV_RESULT_DENIED or rate <= 0.0:
                 break
             rate /= 2.0
         else:
@@ -83,12 +87,12 @@ async def measure_rates(
     stats: LinkStats, names: Iterable[str], window_s: float
 ) -> dict[str, float]:
     """Rates in Hz at which messages arrive, by name; see `VehicleClient.measure_rates`."""
-    numbers = {name: message_id(name) for name in names}
-    before = dict(stats.by_message)
-    began = asyncio.get_running_loop().time()
+    message_ids = {name: message_id(name) for name in names}
+    counts_before = dict(stats.by_message)
+    start_time = asyncio.get_running_loop().time()
     await asyncio.sleep(window_s)
-    elapsed = asyncio.get_running_loop().time() - began
+    elapsed = asyncio.get_running_loop().time() - start_time
     return {
-        name: (stats.by_message.get(number, 0) - before.get(number, 0)) / elapsed
-        for name, number in numbers.items()
+        name: (stats.by_message.get(number, 0) - counts_before.get(number, 0)) / elapsed
+        for name, number in message_ids.items()
     }

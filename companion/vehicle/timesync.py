@@ -21,14 +21,14 @@ from companion.vehicle.clock_estimates import EXCHANGE_LIFETIME
 _QUICK_EXCHANGES, _QUICK_EXCHANGE_PERIOD_S = 10, 0.1
 _EXCHANGE_PERIOD_S = 1.0
 _NS_PER_S, _S_PER_NS = 1e9, 1e-9
-_PROBE_PERIOD = 0.1 * _NS_PER_S
-_UPLINK_WINDOW = 0.7 * _NS_PER_S
+_PROBE_PERIOD_NS = 0.1 * _NS_PER_S
+_UPLINK_WINDOW_NS = 0.7 * _NS_PER_S
 """Window of `Uplink.round_trip`, ns: it uses only probes answered in the last 0.7 s. A link that
 becomes slow is noticed after about this time: until then, earlier answers still count."""
 _MIN_PROBES = 6
-"""Smallest number of probes sent in `_UPLINK_WINDOW` to judge the link: with fewer, probing has
+"""Smallest number of probes sent in `_UPLINK_WINDOW_NS` to judge the link: with fewer, probing has
 just begun."""
-_KEPT_REQUESTS = 16
+_MAX_KEPT_REQUESTS = 16
 """Number of unanswered requests, and of round trips, that are kept for each kind of request."""
 
 
@@ -50,34 +50,41 @@ class _Requests:
     """
 
     def __init__(self) -> None:
-        self._unanswered: deque[int] = deque(maxlen=_KEPT_REQUESTS)
+        self._unanswered_ns: deque[int] = deque(maxlen=_MAX_KEPT_REQUESTS)
         # (arrival of the answer, round trip)
-        self._round_trips: deque[tuple[int, int]] = deque(maxlen=_KEPT_REQUESTS)
+        self._round_trips_ns: deque[tuple[int, int]] = deque(maxlen=_MAX_KEPT_REQUESTS)
 
-    def note_sent(self, stamp: int) -> None:
-        """Remember the request sent at `stamp`; its answer will contain this time."""
-        self._unanswered.append(stamp)
+    def note_sent(self, sent_ns: int) -> None:
+        """Remember the request sent at `sent_ns`; its answer will contain this time."""
+        self._unanswered_ns.append(sent_ns)
 
-    def take_answer(self, stamp: int, now: int) -> bool:
-        """Take the answer to the request sent at `stamp`; False if no such request is waiting."""
-        if stamp not in self._unanswered:
+    def take_answer(self, sent_ns: int, now_ns: int) -> bool:
+        """Take the answer to the request sent at `sent_ns`; False if no such request is waiting."""
+        if sent_ns not in self._unanswered_ns:
             return False
-        self._unanswered.remove(stamp)
-        self._round_trips.append((now, now - stamp))
+        self._unanswered_ns.remove(sent_ns)
+        self._round_trips_ns.append((now_ns, now_ns - sent_ns))
         return True
 
-    def unanswered_count(self, since: int) -> int:
-        """Number of unanswered requests sent after `since`."""
-        return sum(sent > since for sent in self._unanswered)
+    def unanswered_count(self, since_ns: int) -> int:
+        """Number of unanswered requests sent after `since_ns`."""
+        return sum(sent_ns > since_ns for sent_ns in self._unanswered_ns)
 
-    def sent_count(self, since: float) -> int:
-        """Number of requests sent at `since` or later."""
-        answered = sum(ended - trip >= since for ended, trip in self._round_trips)
-        return answered + sum(stamp >= since for stamp in self._unanswered)
+    def sent_count(self, since_ns: float) -> int:
+        """Number of requests sent at `since_ns` or later."""
+        answered_count = sum(
+            answered_ns - round_trip_ns >= since_ns
+            for answered_ns, round_trip_ns in self._round_trips_ns
+        )
+        return answered_count + sum(sent_ns >= since_ns for sent_ns in self._unanswered_ns)
 
-    def round_trips(self, since: float) -> list[float]:
-        """The round trips that ended at `since` or later, s."""
-        return [_S_PER_NS * trip for ended, trip in self._round_trips if ended >= since]
+    def round_trips(self, since_ns: float) -> list[float]:
+        """The round trips that ended at `since_ns` or later, s."""
+        return [
+            _S_PER_NS * round_trip_ns
+            for answered_ns, round_trip_ns in self._round_trips_ns
+            if answered_ns >= since_ns
+        ]
 
 
 class TimeSync:
@@ -102,8 +109,8 @@ class TimeSync:
     def reset(self) -> None:
         """Forget all requests and answers, after a reconnect: the vehicle may have restarted."""
         self._exchanges, self._probes = _Requests(), _Requests()
-        self._newest_answered: int | None = None
-        self._probe_due = 0.0
+        self._newest_answered_ns: int | None = None
+        self._probe_due_ns = 0.0
 
     async def run(self) -> None:
         """Begin exchanges until cancelled: quickly at first, then one each second."""
@@ -121,10 +128,10 @@ class TimeSync:
 
     def probe(self) -> None:
         """Send a probe, if one is due; at most ten are sent in a second."""
-        now = self._now_ns()
-        if now >= self._probe_due:
-            self._probe_due = now + _PROBE_PERIOD
-            self._send_request(self._probes, now)
+        now_ns = self._now_ns()
+        if now_ns >= self._probe_due_ns:
+            self._probe_due_ns = now_ns + _PROBE_PERIOD_NS
+            self._send_request(self._probes, now_ns)
 
     @property
     def round_trip_s(self) -> float | None:
@@ -134,8 +141,8 @@ class TimeSync:
     @property
     def jitter_s(self) -> float | None:
         """Range of the recent round trips of the exchanges, s; `None` if none was answered."""
-        trips = self._recent_round_trips()
-        return max(trips) - min(trips) if trips else None
+        round_trips = self._recent_round_trips()
+        return max(round_trips) - min(round_trips) if round_trips else None
 
     @property
     def uplink(self) -> Uplink:
@@ -144,31 +151,33 @@ class TimeSync:
         If the link becomes slow, `Uplink.round_trip` shows it within a second, `round_trip_s` only
         after 16 s.
         """
-        since = self._now_ns() - _UPLINK_WINDOW
-        enough_probes = self._probes.sent_count(since) >= _MIN_PROBES
-        newest_answered = self._newest_answered
+        since_ns = self._now_ns() - _UPLINK_WINDOW_NS
+        enough_probes = self._probes.sent_count(since_ns) >= _MIN_PROBES
+        newest_answered_ns = self._newest_answered_ns
         return Uplink(
-            min(self._probes.round_trips(since), default=None) if enough_probes else None,
-            None if newest_answered is None else self._probes.unanswered_count(newest_answered),
+            min(self._probes.round_trips(since_ns), default=None) if enough_probes else None,
+            None
+            if newest_answered_ns is None
+            else self._probes.unanswered_count(newest_answered_ns),
         )
 
-    def _send_request(self, requests: _Requests, stamp: int) -> None:
-        requests.note_sent(stamp)
-        self._outbox.send(dialect.MAVLink_timesync_message(tc1=0, ts1=stamp))
+    def _send_request(self, requests: _Requests, sent_ns: int) -> None:
+        requests.note_sent(sent_ns)
+        self._outbox.send(dialect.MAVLink_timesync_message(tc1=0, ts1=sent_ns))
 
     def _on_timesync(self, message: Message) -> None:
-        now, stamp = self._now_ns(), message.ts1
+        now_ns, sent_ns = self._now_ns(), message.ts1
         if message.tc1 == 0:
-            self._outbox.send(dialect.MAVLink_timesync_message(tc1=now, ts1=stamp))
+            self._outbox.send(dialect.MAVLink_timesync_message(tc1=now_ns, ts1=sent_ns))
             return
-        if self._exchanges.take_answer(stamp, now):
-            self._vehicle_clock.take_timesync(stamp * _S_PER_NS, now * _S_PER_NS, message.tc1)
-        elif not self._probes.take_answer(stamp, now):  # it answers another station
+        if self._exchanges.take_answer(sent_ns, now_ns):
+            self._vehicle_clock.take_timesync(sent_ns * _S_PER_NS, now_ns * _S_PER_NS, message.tc1)
+        elif not self._probes.take_answer(sent_ns, now_ns):  # it answers another station
             return
-        self._newest_answered = max(stamp, self._newest_answered or 0)
+        self._newest_answered_ns = max(sent_ns, self._newest_answered_ns or 0)
 
     def _recent_round_trips(self) -> list[float]:
-        return self._exchanges.round_trips(since=self._now_ns() - EXCHANGE_LIFETIME * _NS_PER_S)
+        return self._exchanges.round_trips(since_ns=self._now_ns() - EXCHANGE_LIFETIME * _NS_PER_S)
 
     def _now_ns(self) -> int:
         # Never 0: a zero in tc1 marks a request.

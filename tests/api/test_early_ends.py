@@ -106,7 +106,7 @@ def test_a_control_block_that_is_cancelled_twice_leaves_no_warning():
         del drifting
         gc.collect()
 
-    summary, _ = flown(program, QuickVehicle())  # raises UnseenError
+    summary, _ = flown(program, QuickVehicle())  # raises UnhandledError
     assert summary.result == "the program was cancelled"
 
 

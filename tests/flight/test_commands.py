@@ -46,7 +46,7 @@ class Vehicle:
         self.replacement_detector = SimpleNamespace(require=lambda: None)
 
     @property
-    def mode_received(self):
+    def mode_received_at(self):
         return asyncio.get_running_loop().time()
 
     def roles(self, mode):

@@ -46,7 +46,7 @@ class Vehicle:
         self.note = self.notes.append
         self.replacement_detector = SimpleNamespace(require=lambda: None)
 
-    mode_received = 0.0
+    mode_received_at = 0.0
 
     def armed(self):
         return self.is_armed

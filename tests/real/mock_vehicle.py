@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from companion.files.yaml_file import ConfigError
-from companion.testing import MockVehicle, UnseenError, fly
+from companion.testing import MockVehicle, UnhandledError, fly
 from tests.real.build import ROOT
 from tests.real.truth import NoTruthError, Truth, truth_from
 from tests.real.vehicle import merged
@@ -86,7 +86,7 @@ class MockInMemory:
         path.write_text(yaml.safe_dump(config, sort_keys=False))
         try:
             summary = fly(path, self._vehicle(), folder)
-        except (ConfigError, UnseenError) as error:
+        except (ConfigError, UnhandledError) as error:
             return self._flew(FlownInMemory({}, str(error)))
         return self._flew(FlownInMemory({**summary.as_dict(), "log": str(folder)}))
 

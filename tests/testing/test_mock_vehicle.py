@@ -19,7 +19,7 @@ from companion.serve.session import ServeSession
 from companion.testing import (
     MockVehicle,
     Program,
-    UnseenError,
+    UnhandledError,
     connect,
     environment,
     fly,
@@ -91,8 +91,8 @@ def test_without_lockstep_a_sample_is_answered_when_it_arrives_and_a_wire_takes_
         mock = vehicle(full_rate=True, lockstep=False, delay_s=delay)
         rate = {"attitude_rate_hz": attitude_rate_hz(mock)}
         assert fly(config(mock, link=rate), mock).result == "ok"
-        own = [each for each in mock.setpoints if each.answers]
-        later[delay] = {round(1e6 * (each.time - each.answers / 1e3)) for each in own}
+        own = [each for each in mock.setpoints if each.sample_time_boot_ms]
+        later[delay] = {round(1e6 * (each.time - each.sample_time_boot_ms / 1e3)) for each in own}
     # The autopilot takes a setpoint in the 4 ms between two of its steps.
     assert later[0.0] == {0}
     assert later[0.003] == {4000}
@@ -196,7 +196,7 @@ def test_an_error_that_nobody_takes_is_raised():
         asyncio.get_running_loop().call_soon(lambda: 1 / 0)
         await asyncio.sleep(0.1)
 
-    with pytest.raises(UnseenError) as raised:
+    with pytest.raises(UnhandledError) as raised:
         run(vehicle(), careless())
     assert isinstance(raised.value.__cause__, ZeroDivisionError)
 
@@ -349,7 +349,7 @@ def test_a_link_that_cannot_be_opened_is_told_once():
                     pass
             gc.collect()
 
-    run(mock, main())  # raises UnseenError if nobody took it
+    run(mock, main())  # raises UnhandledError if nobody took it
 
 
 def test_a_program_gets_a_folder_of_its_flight_that_there_was_not_before(tmp_path):

@@ -46,7 +46,7 @@ CONFIGS = {
 @pytest.fixture(autouse=True)
 def known_lateness(monkeypatch):
     """Positions of `tests.control.one_axis` are no later than their time stamp says."""
-    monkeypatch.setattr(loop_module, "POSITION_LATENESS", 0.0)
+    monkeypatch.setattr(loop_module, "UNSTAMPED_POSITION_DELAY", 0.0)
 
 
 def measured(config, omega):

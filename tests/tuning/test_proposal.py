@@ -13,7 +13,7 @@ from companion.tuning import ModelMismatch, propose, stability
 from companion.tuning.flights import TrialResult
 from companion.tuning.margins import Margins
 from companion.tuning.search import largest_gain
-from companion.tuning.writing import _error_text, proposal_text, summary_lines
+from companion.tuning.writing import _mismatch_text, proposal_text, summary_lines
 
 
 def vehicle(lag, dead_time, slew=None):
@@ -131,9 +131,9 @@ def test_the_reason_of_a_gain_names_what_limits_it():
 
 
 def test_each_error_of_the_model_has_its_words():
-    assert _error_text(ModelMismatch(delay=0.02)).startswith("with 20 ms of added delay, as at ")
-    assert _error_text(ModelMismatch(time_factor=1.3)) == "with lag and dead time 30 % larger"
-    assert _error_text(ModelMismatch(time_factor=0.7)) == "with lag and dead time 30 % smaller"
+    assert _mismatch_text(ModelMismatch(delay=0.02)).startswith("with 20 ms of added delay, as at ")
+    assert _mismatch_text(ModelMismatch(time_factor=1.3)) == "with lag and dead time 30 % larger"
+    assert _mismatch_text(ModelMismatch(time_factor=0.7)) == "with lag and dead time 30 % smaller"
 
 
 FLOWN = TrialResult("ok", true=0.134, reported=0.1, speed=5.0)

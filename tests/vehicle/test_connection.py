@@ -49,8 +49,8 @@ def test_a_connection_is_opened_again_whatever_the_first_tries_raise():
         await connection.open()
         dropped[0]("unplugged")
         assert outbox.transport is None
-        assert connection._reopening is not None
-        await asyncio.wait_for(connection._reopening, 5.0)
+        assert connection._reopen_task is not None
+        await asyncio.wait_for(connection._reopen_task, 5.0)
         assert outbox.transport is opened
         return stats.reconnects
 

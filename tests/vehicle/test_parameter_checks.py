@@ -72,8 +72,8 @@ def test_of_several_checks_the_first_that_finds_something_speaks():
     ],
 )
 def test_rates_are_held_neither_too_briefly_nor_too_long(value, words, set_to):
-    assert problem(checks.rates_held, 0.51) is problem(checks.rates_held, 2.0) is None
-    found = problem(checks.rates_held, value)
+    assert problem(checks.rate_hold, 0.51) is problem(checks.rate_hold, 2.0) is None
+    found = problem(checks.rate_hold, value)
     assert (found.result, found.set_to) == (UNSAFE, set_to)
     assert words in found.because
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from itertools import groupby, product
 from pathlib import Path
 
-from companion.vehicle.parameter_rules import CompanionSettings, judge
+from companion.vehicle.parameter_rules import CompanionSettings, apply_rules
 from companion.vehicle.registry import AUTOPILOTS
 from tests.vehicle.test_parameter_rules import PX4_SETUP
 
@@ -38,7 +38,7 @@ def findings() -> Iterator[str]:
     for autopilot, (name, settings) in product(AUTOPILOTS, (("plain", PLAIN), ("other", OTHER))):
         for rule in autopilot.parameters:
             yield f"{autopilot.name} {name}: {rule.name}, {rule.meaning} [{rule.source}]"
-            judged = [judge([rule], {rule.name: value}, settings)[0] for value in VALUES]
+            judged = [apply_rules([rule], {rule.name: value}, settings)[0] for value in VALUES]
             for told, alike in groupby(judged, lambda one: one[2:]):
                 values = " ".join(f"{one.value:g}" for one in alike)
                 yield f"  {values}: {told[0].value} {told[2]} {told[1]}".rstrip()

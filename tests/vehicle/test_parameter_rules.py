@@ -5,7 +5,7 @@ from math import degrees, inf, nan, radians
 import pytest
 
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
-from companion.vehicle.parameter_rules import CheckResult, CompanionSettings, judge
+from companion.vehicle.parameter_rules import CheckResult, CompanionSettings, apply_rules
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
 from companion.vehicle.registry import AUTOPILOTS
 
@@ -94,14 +94,14 @@ ARDUPILOT = (ARDUPILOT_PARAMETERS, GOOD_ARDUPILOT, ARDUPILOT_SETUP)
 def complaints(autopilot, changes=None, **setup):
     """What is found amiss after `changes` of a good vehicle's values, and of our setup."""
     rules, good, ours = autopilot
-    findings = judge(rules, good | (changes or {}), ours._replace(**setup))
+    findings = apply_rules(rules, good | (changes or {}), ours._replace(**setup))
     return [finding for finding in findings if finding.result is not CheckResult.SAFE]
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT], ids=["px4", "ardupilot"])
 def test_a_good_vehicle_is_found_good_by_every_rule(autopilot):
     rules, good, ours = autopilot
-    findings = judge(rules, good, ours)
+    findings = apply_rules(rules, good, ours)
     assert [finding.rule.name for finding in findings] == [rule.name for rule in rules]
     assert {finding.result for finding in findings} == {CheckResult.SAFE}
 
@@ -194,8 +194,8 @@ def test_no_loss_of_a_station_matters_where_another_is_watched():
 
 
 def test_what_the_autopilot_has_not_is_left_out():
-    assert judge(PX4_PARAMETERS, {}, PX4_SETUP) == []
-    (only,) = judge(PX4_PARAMETERS, {"COM_OF_LOSS_T": 1.0}, PX4_SETUP)
+    assert apply_rules(PX4_PARAMETERS, {}, PX4_SETUP) == []
+    (only,) = apply_rules(PX4_PARAMETERS, {"COM_OF_LOSS_T": 1.0}, PX4_SETUP)
     assert only.rule.name == "COM_OF_LOSS_T"
 
 
@@ -220,7 +220,7 @@ def test_motors_that_may_stop_at_a_tilt_that_was_not_told_are_not_safe(
     unread, termination, verdict
 ):
     values = {name: v for name, v in GOOD_PX4.items() if name not in unread}
-    findings = judge(PX4_PARAMETERS, values | {"CBRK_FLIGHTTERM": termination}, PX4_SETUP)
+    findings = apply_rules(PX4_PARAMETERS, values | {"CBRK_FLIGHTTERM": termination}, PX4_SETUP)
     (found,) = (finding for finding in findings if finding.rule.name == "CBRK_FLIGHTTERM")
     assert found.result is verdict
 
@@ -240,7 +240,7 @@ def test_motors_may_stop_only_15_degrees_beyond_the_largest_tilt(roll, pitch, ve
     tilt = degrees(PX4_SETUP.max_tilt)
     angles = [angle and tilt + angle for angle in (roll, pitch)]
     changes = {"CBRK_FLIGHTTERM": 0.0, "FD_FAIL_R": angles[0], "FD_FAIL_P": angles[1]}
-    findings = judge(PX4_PARAMETERS, GOOD_PX4 | changes, PX4_SETUP)
+    findings = apply_rules(PX4_PARAMETERS, GOOD_PX4 | changes, PX4_SETUP)
     (found,) = (finding for finding in findings if finding.rule.name == "CBRK_FLIGHTTERM")
     assert found.result is verdict
 

@@ -115,12 +115,12 @@ def test_the_mode_is_what_came_last_of_heartbeat_and_current_mode(bench):
     bench.take(px4_heartbeat(offboard, 129))
     bench.now += 0.1
     bench.take(development.MAVLink_current_mode_message(0, hold, hold))
-    assert (bench.state.mode, bench.state.mode_received) == ("AUTO.LOITER", 10.1)
+    assert (bench.state.mode, bench.state.mode_received_at) == ("AUTO.LOITER", 10.1)
     assert (bench.state.armed, bench.state.heartbeat.received) == (True, 10.0)
     assert not bench.state.heartbeat_is_newest
     bench.now += 0.1
     bench.take(px4_heartbeat(offboard, 129))
-    assert (bench.state.mode, bench.state.mode_received) == ("OFFBOARD", 10.2)
+    assert (bench.state.mode, bench.state.mode_received_at) == ("OFFBOARD", 10.2)
     assert bench.state.heartbeat_is_newest
 
 

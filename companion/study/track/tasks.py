@@ -33,8 +33,12 @@ class TrajectoryAtSpeed(NamedTuple):
         """Content of the trajectory file."""
         if self.shape == CIRCLE:
             return {"circle": {"radius_m": RADIUS_M, "speed_m_s": self.speed, "laps": self.laps}}
-        eight = {"half_width_m": HALF_WIDTH_M, "peak_speed_m_s": self.speed, "laps": self.laps}
-        return {"figure_eight": eight}
+        figure_eight = {
+            "half_width_m": HALF_WIDTH_M,
+            "peak_speed_m_s": self.speed,
+            "laps": self.laps,
+        }
+        return {"figure_eight": figure_eight}
 
 
 class Task(NamedTuple):
@@ -53,8 +57,9 @@ class Task(NamedTuple):
 
     def __str__(self) -> str:
         wind = f" in {self.wind:g} m/s of wind" if self.wind else ""
-        how = "" if self.guidance == LINEAR else f", {self.guidance}"
-        return f"{self.trajectory}, {self.planner}{how}{'' if self.lead else ', not led'}{wind}"
+        guidance = "" if self.guidance == LINEAR else f", {self.guidance}"
+        lead = "" if self.lead else ", not led"
+        return f"{self.trajectory}, {self.planner}{guidance}{lead}{wind}"
 
 
 CIRCLE_AT_5, EIGHT_AT_5 = TrajectoryAtSpeed(CIRCLE, 5.0, 2.0), TrajectoryAtSpeed(EIGHT, 5.0, 2.0)
@@ -79,20 +84,20 @@ def tasks() -> tuple[Task, ...]:
     Linear guidance flies every planner in still air, two planners in wind, and one planner without
     lead in still air and in wind. Predictive guidance flies one planner in still air.
     """
-    calm = [
+    calm_tasks = [
         Task(trajectory, planner, guidance)
         for trajectory in TRAJECTORIES
         for guidance in GUIDANCES
         for planner in planners(guidance)
     ]
-    windy = [
+    windy_tasks = [
         Task(trajectory, planner, LINEAR, WINDY)
         for trajectory in TRAJECTORIES
         for planner in _PLANNERS_IN_WIND
     ]
-    without_lead = [
+    tasks_without_lead = [
         Task(trajectory, MODEL_FOLLOWING, LINEAR, wind, lead=False)
         for trajectory in TRAJECTORIES
         for wind in (CALM, WINDY)
     ]
-    return (*calm, *windy, *without_lead)
+    return (*calm_tasks, *windy_tasks, *tasks_without_lead)

@@ -21,20 +21,20 @@ from companion.vehicle.autopilot import (
 _ARMED_FLAG = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _GUIDED_FLAG = dialect.MAV_MODE_FLAG_GUIDED_ENABLED
 _CUSTOM_MODE_ENABLED = 1.0
-_ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x10  # attitude, both velocities, absolute position
-_NO_POSITION = 0x80  # constant position mode: the estimator has no position measurement
-_PREFIX = "COPTER_MODE_"
+_REQUIRED_FLAGS = 0x1 | 0x2 | 0x4 | 0x10  # attitude, both velocities, absolute position
+_NO_POSITION_FLAG = 0x80  # constant position mode: the estimator has no position measurement
+_MODE_NAME_PREFIX = "COPTER_MODE_"
 
 _MODES: dict[str, int] = {
-    entry.name.removeprefix(_PREFIX): number
+    entry.name.removeprefix(_MODE_NAME_PREFIX): number
     for number, entry in dialect.enums["COPTER_MODE"].items()
     if number != dialect.COPTER_MODE_ENUM_END
 }
-_NAMES = {number: name for name, number in _MODES.items()}
-_BY_RATES = "GUIDED by rates"
-_ROLES = {
+_MODE_NAMES = {number: name for name, number in _MODES.items()}
+_GUIDED_BY_RATES = "GUIDED by rates"
+_ROLES_BY_MODE = {
     "GUIDED": frozenset({Role.TAKEOFF, Role.READY}),
-    _BY_RATES: frozenset({Role.OFFBOARD}),
+    _GUIDED_BY_RATES: frozenset({Role.OFFBOARD}),
     "BRAKE": frozenset({Role.HOLD}),
     "LAND": frozenset({Role.LAND}),
 }
@@ -85,13 +85,13 @@ class ArduPilot:
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
         """Name of the mode in a heartbeat; GUIDED that obeys body rates has a name of its own."""
-        name = _NAMES.get(custom_mode, f"mode {custom_mode}")
-        by_rates = name == "GUIDED" and base_mode & _ARMED_FLAG and not base_mode & _GUIDED_FLAG
-        return _BY_RATES if by_rates else name
+        name = _MODE_NAMES.get(custom_mode, f"mode {custom_mode}")
+        obeys_rates = name == "GUIDED" and base_mode & _ARMED_FLAG and not base_mode & _GUIDED_FLAG
+        return _GUIDED_BY_RATES if obeys_rates else name
 
     def roles(self, mode: str) -> frozenset[Role]:
         """What a mode is used for in a flight; empty if only the pilot or a failsafe uses it."""
-        return _ROLES.get(mode, frozenset())
+        return _ROLES_BY_MODE.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:
         """DO_SET_MODE with the mode's number. Raises `KeyError` for an unknown name."""
@@ -105,7 +105,7 @@ class ArduPilot:
         flags = readiness.estimator_flags
         if flags is None:
             return "the estimator's status (EKF_STATUS_REPORT)"
-        if flags & _ESTIMATOR_NEEDED != _ESTIMATOR_NEEDED or flags & _NO_POSITION:
+        if flags & _REQUIRED_FLAGS != _REQUIRED_FLAGS or flags & _NO_POSITION_FLAG:
             return f"the estimator (EKF_STATUS_REPORT flags 0x{flags:x})"
         if not readiness.has_position:
             return "a local position (LOCAL_POSITION_NED)"

@@ -15,7 +15,7 @@ from companion.vehicle.parameter_checks import (
     forbidden,
     hover_thrust,
     positive,
-    rates_held,
+    rate_hold,
     required,
     system_id,
     thrust_curve,
@@ -69,8 +69,8 @@ def _ground_station(value: float, values: Values, settings: CompanionSettings) -
 def _loop_rate(value: float, _: Values, settings: CompanionSettings) -> Problem | None:
     if value >= settings.attitude_rate_hz:
         return None
-    wanted = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
-    return Problem(INEFFECTIVE, f"the main loop is slower, so {wanted} is refused; lower the key")
+    setting = f"link.attitude_rate_hz {settings.attitude_rate_hz:g}"
+    return Problem(INEFFECTIVE, f"the main loop is slower, so {setting} is refused; lower the key")
 
 
 def _fence(value: float, values: Values, _: CompanionSettings) -> Problem | None:
@@ -127,7 +127,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         vital=True,
     ),
     ParameterRule(
-        ("GUID_TIMEOUT",), "for how long the last rates are held", rates_held, _MEASURED, vital=True
+        ("GUID_TIMEOUT",), "for how long the last rates are held", rate_hold, _MEASURED, vital=True
     ),
     ParameterRule(
         ("ATC_RATE_FF_ENAB",),

@@ -19,7 +19,7 @@ from companion.vehicle.autopilot import (
 )
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
 
-_ESTIMATOR_NEEDED = 0x1 | 0x2 | 0x4 | 0x8  # attitude, both velocities, horizontal position
+_REQUIRED_FLAGS = 0x1 | 0x2 | 0x4 | 0x8  # attitude, both velocities, horizontal position
 _CUSTOM_MODE_ENABLED = 1.0
 _AUTO_MAIN_MODE = 4
 
@@ -44,18 +44,18 @@ _MODES = {
     "OFFBOARD": _custom_mode(6),
     "STABILIZED": _custom_mode(7),
 }
-_DESCEND = "AUTO.DESCEND"
+_DESCEND_MODE = "AUTO.DESCEND"
 """Mode in which PX4's failsafe lands without a position; it cannot be commanded. PX4 changes from
 AUTO.LAND to this mode 4.8 s after GPS is lost (measured)."""
-_NAMES = {number: name for name, number in _MODES.items()} | {
-    _custom_mode(_AUTO_MAIN_MODE, 20): _DESCEND
+_MODE_NAMES = {number: name for name, number in _MODES.items()} | {
+    _custom_mode(_AUTO_MAIN_MODE, 20): _DESCEND_MODE
 }
-_ROLES = {
+_ROLES_BY_MODE = {
     "AUTO.TAKEOFF": frozenset({Role.TAKEOFF, Role.READY}),
     "AUTO.LOITER": frozenset({Role.HOLD, Role.READY}),
     "OFFBOARD": frozenset({Role.OFFBOARD}),
     "AUTO.LAND": frozenset({Role.LAND}),
-    _DESCEND: frozenset({Role.LAND}),
+    _DESCEND_MODE: frozenset({Role.LAND}),
 }
 
 
@@ -102,11 +102,11 @@ class Px4:
 
     def mode_name(self, base_mode: int, custom_mode: int) -> str:
         """Name of the mode in a heartbeat; PX4's depends only on `custom_mode`."""
-        return _NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
+        return _MODE_NAMES.get(custom_mode, f"mode 0x{custom_mode:08x}")
 
     def roles(self, mode: str) -> frozenset[Role]:
         """What a mode is used for in a flight; empty if only the pilot or a failsafe uses it."""
-        return _ROLES.get(mode, frozenset())
+        return _ROLES_BY_MODE.get(mode, frozenset())
 
     def set_mode(self, name: str) -> Command:
         """DO_SET_MODE with PX4's main and sub mode. Raises `KeyError` for an unknown name."""
@@ -120,7 +120,7 @@ class Px4:
             return "a local position (LOCAL_POSITION_NED)"
         if readiness.estimator_flags is None:
             return "the estimator's status (ESTIMATOR_STATUS)"
-        if readiness.estimator_flags & _ESTIMATOR_NEEDED != _ESTIMATOR_NEEDED:
+        if readiness.estimator_flags & _REQUIRED_FLAGS != _REQUIRED_FLAGS:
             return f"the estimator (ESTIMATOR_STATUS flags 0x{readiness.estimator_flags:x})"
         if not readiness.has_home:
             return "the home position (HOME_POSITION)"

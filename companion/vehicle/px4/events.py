@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 from companion.mavlink.texts import TextAssembler
 
-_EVENT_LAYOUT = struct.Struct("<IIHBBB40s")
+_EVENT_PAYLOAD = struct.Struct("<IIHBBB40s")
 """Fields: id, time, sequence, destination (two bytes), log levels, arguments."""
 _AUTOPILOT_COMPONENT = 1 << 24
 _FNV_OFFSET, _FNV_PRIME = 0x811C9DC5, 0x01000193
-_WARNING_SEVERITY, _PROGRAMS_ONLY_SEVERITY = 4, 8
+_WARNING_SEVERITY, _INTERNAL_SEVERITY = 4, 8
 
 _ARMING_REASONS = {
     1: "stick gesture",
@@ -62,11 +62,11 @@ class _Template(NamedTuple):
     """The text with ``{}`` for each value."""
     layout: str = ""
     """`struct` format of the values in the event's arguments."""
-    meanings: tuple[dict[int, str] | None, ...] = ()
+    value_texts_by_number: tuple[dict[int, str] | None, ...] = ()
     """For each value: the text for each number, or None to show the number itself."""
 
 
-_EVENTS = {
+_TEMPLATES_BY_NAME = {
     "commander_armed_by": _Template("Armed by {}", "<B", (_ARMING_REASONS,)),
     "commander_disarmed_by": _Template("Disarmed by {}", "<B", (_ARMING_REASONS,)),
     "commander_arm_denied_resolve_failures": _Template(
@@ -119,7 +119,7 @@ _EVENTS = {
     "commander_onboard_ctrl_regained": _Template("Onboard controller regained"),
 }
 
-_CHECK_TEXTS = {
+_CHECK_TEXTS_BY_NAME = {
     "check_modes_attitude": "No valid attitude estimate",
     "check_modes_angular_velocity": "Angular velocity not valid",
     "check_modes_local_pos": "Navigation error: No valid position estimate",
@@ -151,10 +151,10 @@ def event_id(name: str) -> int:
 
 # The names of 17980399 and 30203637 are not known. Their texts come from the STATUSTEXTs that PX4
 # sent together with them.
-_TEMPLATES_BY_ID = {event_id(name): template for name, template in _EVENTS.items()} | {
+_TEMPLATES_BY_ID = {event_id(name): template for name, template in _TEMPLATES_BY_NAME.items()} | {
     17980399: _Template("Logging to {}-{:02}-{:02}/{:02}_{:02}_{:02}.ulg", "<H5B", (None,) * 6),
 }
-_CHECKS_BY_ID = {event_id(name): text for name, text in _CHECK_TEXTS.items()} | {
+_CHECK_TEXTS_BY_ID = {event_id(name): text for name, text in _CHECK_TEXTS_BY_NAME.items()} | {
     30203637: "No heading reference",
 }
 _SETPOINT_CHECK_IDS = {event_id(name) for name in _SETPOINT_CHECKS}
@@ -175,46 +175,46 @@ class EventReader:
 
     def __init__(self, texts: TextAssembler, clock: Callable[[], float]) -> None:
         self._texts, self._clock = texts, clock
-        self._failing: set[int] = set()
-        self._failed_before: set[int] = set()
+        self._failing_checks: set[int] = set()
+        self._failing_in_last_report: set[int] = set()
         self._in_report = False
         self._last_sequence: int | None = None
-        self._unknown: set[int] = set()
+        self._reported_unknown_ids: set[int] = set()
 
     def take(self, payload: bytes) -> None:
         """Take the payload of one EVENT."""
-        number, _, sequence, _, _, levels, arguments = _EVENT_LAYOUT.unpack(
-            payload[: _EVENT_LAYOUT.size].ljust(_EVENT_LAYOUT.size, b"\0")
+        number, _, sequence, _, _, log_levels, arguments = _EVENT_PAYLOAD.unpack(
+            payload[: _EVENT_PAYLOAD.size].ljust(_EVENT_PAYLOAD.size, b"\0")
         )
         if sequence == self._last_sequence:
             return  # a repetition
         self._last_sequence = sequence
-        severity = levels & 0x0F
+        severity = log_levels & 0x0F
         if number == _REPORT_BEGINS:
-            self._failing, self._in_report = set(), True
+            self._failing_checks, self._in_report = set(), True
         elif number == _REPORT_ENDS:
-            self._failed_before, self._in_report = self._failing, False
+            self._failing_in_last_report, self._in_report = self._failing_checks, False
         elif self._in_report:
-            self._failing.add(number)
-            known = self._failed_before | _SETPOINT_CHECK_IDS
-            if number not in known and severity <= _WARNING_SEVERITY:
-                self._add_text(severity, number, _CHECKS_BY_ID.get(number))
-        elif severity < _PROGRAMS_ONLY_SEVERITY:
+            self._failing_checks.add(number)
+            unreported_checks = self._failing_in_last_report | _SETPOINT_CHECK_IDS
+            if number not in unreported_checks and severity <= _WARNING_SEVERITY:
+                self._add_text(severity, number, _CHECK_TEXTS_BY_ID.get(number))
+        elif severity < _INTERNAL_SEVERITY:
             template = _TEMPLATES_BY_ID.get(number)
-            self._add_text(severity, number, template and _filled_in(template, arguments))
+            self._add_text(severity, number, template and _fill_in(template, arguments))
 
     def _add_text(self, severity: int, number: int, text: str | None) -> None:
         if text is not None:
             self._texts.take_event(severity, text, self._clock())
-        elif number not in self._unknown:
-            self._unknown.add(number)
+        elif number not in self._reported_unknown_ids:
+            self._reported_unknown_ids.add(number)
             self._texts.take_event(severity, f"unknown PX4 event {number}", self._clock())
 
 
-def _filled_in(template: _Template, arguments: bytes) -> str:
+def _fill_in(template: _Template, arguments: bytes) -> str:
     values = struct.unpack_from(template.layout, arguments)
-    named = (
+    value_texts = (
         value if meaning is None else meaning.get(value, str(value))
-        for value, meaning in zip(values, template.meanings, strict=True)
+        for value, meaning in zip(values, template.value_texts_by_number, strict=True)
     )
-    return template.text.format(*named)
+    return template.text.format(*value_texts)

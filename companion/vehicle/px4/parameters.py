@@ -14,7 +14,7 @@ from companion.vehicle.parameter_checks import (
     forbidden,
     hover_thrust,
     positive,
-    rates_held,
+    rate_hold,
     required,
     safe_action,
     system_id,
@@ -32,15 +32,15 @@ _REFERENCE = "PX4 parameter reference"
 _MEASURED = "measured on PX4 main, 2026"
 _STOPS_MOTORS = "the motors stop in the air"
 _LINK_LOSS_ACTIONS = (0.0, 1.0, 2.0, 3.0)
-_ACTIONS = "(0 nothing, 1 hold, 2 return, 3 land)"
+_ACTIONS_TEXT = "(0 nothing, 1 hold, 2 return, 3 land)"
 _LOST_PILOT_IGNORED = "in OFFBOARD nothing is done about a lost transmitter"
-_STICKS_DO_NOTHING = "moving the sticks does not end offboard; only the mode switch does"
+_STICKS_IGNORED = "moving the sticks does not end offboard; only the mode switch does"
 
 PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("COM_OF_LOSS_T",),
         "for how long the last rates are held",
-        rates_held,
+        rate_hold,
         _MEASURED,
         vital=True,
     ),
@@ -62,7 +62,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("COM_RC_OVERRIDE",),
         "whether the pilot can take over by moving the sticks (before 1.18)",
-        bit_set(INEFFECTIVE, 2, _STICKS_DO_NOTHING),
+        bit_set(INEFFECTIVE, 2, _STICKS_IGNORED),
         _REFERENCE,
     ),
     ParameterRule(
@@ -74,7 +74,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
         ("MAN_OVERRIDE_SPD",),
         "how quickly the sticks must be moved to take over (1.18 on)",
-        positive(INEFFECTIVE, _STICKS_DO_NOTHING, 1.0),
+        positive(INEFFECTIVE, _STICKS_IGNORED, 1.0),
         _REFERENCE,
     ),
     ParameterRule(
@@ -94,7 +94,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ),
     ParameterRule(
         ("NAV_DLL_ACT",),
-        f"what PX4 does without a ground station's heartbeat, even with setpoints {_ACTIONS}",
+        f"what PX4 does without a ground station's heartbeat, even with setpoints {_ACTIONS_TEXT}",
         safe_action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         f"{_REFERENCE}; {_MEASURED}",
         universal=True,
