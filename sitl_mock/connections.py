@@ -53,15 +53,15 @@ class Connections:
         Requests on the control channel are answered here.
         """
         by_descriptor = {fd: endpoint for endpoint in self._links for fd in endpoint.descriptors}
-        control = [] if self._control is None else [self._control.fileno()]
-        readable, _, _ = select.select([*by_descriptor, *control], (), (), timeout_s)
+        control_descriptors = [] if self._control is None else [self._control.fileno()]
+        readable, _, _ = select.select([*by_descriptor, *control_descriptors], (), (), timeout_s)
         if self._control is not None and self._control.fileno() in readable:
             self._answer_requests(self._control)
         return [by_descriptor[fd] for fd in readable if fd in by_descriptor]
 
-    def deliver(self, arrived: list[ReceivedDatagram], endpoint: Endpoint) -> None:
+    def deliver(self, datagrams: list[ReceivedDatagram], endpoint: Endpoint) -> None:
         """Pass the datagrams that arrived on an endpoint to the autopilot."""
-        self._exchange.deliver(arrived, self._links[endpoint])
+        self._exchange.deliver(datagrams, self._links[endpoint])
 
     def send_beacon(self, beacon: bytes) -> None:
         """Send the companion a lockstep beacon without the queued frames."""
@@ -71,7 +71,7 @@ class Connections:
         """Send the queued frames of every link; the beacon, if any, only to the companion."""
         for endpoint, link in self._links.items():
             own_beacon = beacon if endpoint is self.companion else None
-            endpoint.send(self._exchange.outgoing(link, own_beacon))
+            endpoint.send(self._exchange.take_outgoing(link, own_beacon))
 
     def _answer_requests(self, control: socket.socket) -> None:
         with contextlib.suppress(OSError):  # no further request waits, or its sender is gone

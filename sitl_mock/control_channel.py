@@ -80,29 +80,30 @@ def add_fault(simulation: Simulation, fault: Mapping[str, Any]) -> None:
     try:
         valid_fault = fault_adapter.validate_python(dict(fault))
     except ValidationError as error:
-        detail = error.errors()[0]
-        key_path = ".".join(str(part) for part in detail["loc"])
-        problem = describe_wrong_kind(detail, Fault) or f" {key_path}{describe_wrong_value(error)}"
+        error_detail = error.errors()[0]
+        key_path = ".".join(str(part) for part in error_detail["loc"])
+        wrong_value = f" {key_path}{describe_wrong_value(error)}"
+        problem = describe_wrong_kind(error_detail, Fault) or wrong_value
         raise ConfigError(f"fault{problem}") from error
     simulation.faults.add(valid_fault, simulation.time_us)
 
 
 def _answer(simulation: Simulation, request: bytes) -> Mapping[str, Any]:
     try:
-        requested = json.loads(request)
+        decoded = json.loads(request)
     except (ValueError, RecursionError):
         return {"error": f"not JSON; {_USAGE}"}
-    match requested:
-        case {"fault": dict(fault)} if len(requested) == 1:
+    match decoded:
+        case {"fault": dict(fault)} if len(decoded) == 1:
             try:
                 add_fault(simulation, fault)
             except ConfigError as error:
                 return {"error": str(error)}
             return {"ok": True}
-        case {"clear": True} if len(requested) == 1:
+        case {"clear": True} if len(decoded) == 1:
             simulation.clear_faults()
             return {"ok": True}
-        case {"state": True} if len(requested) == 1:
+        case {"state": True} if len(decoded) == 1:
             return truth(simulation)
     return {"error": _USAGE}
 
@@ -130,6 +131,6 @@ def truth(simulation: Simulation) -> Truth:
         "touchdown_speed": None if isnan(touchdown_speed) else touchdown_speed,
         "battery": simulation.vehicle.battery.remaining,
         "setpoints": stream.setpoint_count,
-        "last_setpoint": None if stream.last_us is None else stream.last_us / 1e6,
+        "last_setpoint": None if stream.last_setpoint_us is None else stream.last_setpoint_us / 1e6,
         "signing": None if signing is None else signing.counts(),
     }

@@ -1,7 +1,7 @@
 """The datagrams that one vehicle receives and sends, with the faults of its companion link.
 
 `Exchange` has no sockets and no clock. `Server` joins it to sockets, `companion.testing` to a
-program in the same process. In each slot both call `step` and send `outgoing` of each link. In
+program in the same process. In each slot both call `step` and send `take_outgoing` of each link. In
 lockstep they pass the datagrams that arrived since the last slot to `step`; in real time they
 `deliver` each one as it arrives.
 """
@@ -47,35 +47,35 @@ class Exchange:
         self._companion_link = simulation.companion
         self._pipe_in = DatagramPipe("from_companion", 2 * settings.seed)
         self._pipe_out = DatagramPipe("to_companion", 2 * settings.seed + 1)
-        self._lockstep = settings.lockstep.enabled
-        self._bundle = settings.lockstep.enabled and settings.lockstep.bundle
+        self._in_lockstep = settings.lockstep.enabled
+        self._bundles_frames = settings.lockstep.enabled and settings.lockstep.bundle
 
-    def step(self, arrived: list[ReceivedDatagram]) -> bytes | None:
+    def step(self, datagrams: list[ReceivedDatagram]) -> bytes | None:
         """Handle the datagrams that arrived on the companion link, and simulate one slot.
 
         Returns:
             the lockstep beacon of the new slot, unsigned; None without lockstep.
         """
-        self.deliver(arrived, self._companion_link)
+        self.deliver(datagrams, self._companion_link)
         self._simulation.tick()
-        return self._simulation.beacon() if self._lockstep else None
+        return self._simulation.beacon() if self._in_lockstep else None
 
-    def deliver(self, arrived: list[ReceivedDatagram], link: Link) -> None:
+    def deliver(self, datagrams: list[ReceivedDatagram], link: Link) -> None:
         """Pass datagrams of a link to the autopilot; the companion's go through the link faults."""
         simulation = self._simulation
         faults = simulation.faults.link_faults
         if link is self._companion_link and not self._pipe_in.is_transparent(faults):
-            datagrams = [datagram for datagram, _ in arrived]
-            passed_datagrams = self._pipe_in.push(datagrams, faults, simulation.time_us)
-            arrived = [(datagram, decode(datagram)) for datagram in passed_datagrams]
-        hook = self.on_message if link is self._companion_link else None
-        for _, messages in arrived:
+            arrived_bytes = [datagram for datagram, _ in datagrams]
+            passed_bytes = self._pipe_in.push(arrived_bytes, faults, simulation.time_us)
+            datagrams = [(datagram, decode(datagram)) for datagram in passed_bytes]
+        on_message = self.on_message if link is self._companion_link else None
+        for _, messages in datagrams:
             for message in messages:
-                if hook is not None:
-                    hook(message)
+                if on_message is not None:
+                    on_message(message)
                 simulation.handle(message, link)
 
-    def outgoing(self, link: Link, beacon: bytes | None = None) -> list[bytes]:
+    def take_outgoing(self, link: Link, beacon: bytes | None = None) -> list[bytes]:
         """Return the datagrams that a link has queued; the beacon, if any, comes last.
 
         The faults of the companion link apply to all but the beacon.
@@ -86,7 +86,7 @@ class Exchange:
             frames = self._pipe_out.push(frames, faults, self._simulation.time_us)
         if beacon is not None:
             frames.append(link.sign(beacon))
-        return joined_datagrams(frames) if self._bundle else frames
+        return joined_datagrams(frames) if self._bundles_frames else frames
 
     def answers_beacon(self, messages: list[Message]) -> bool:
         """Whether one of these messages answers the latest lockstep beacon."""

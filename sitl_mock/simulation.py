@@ -137,12 +137,12 @@ class Simulation:
         state.estimate = vehicle.estimate()
         self._update_state()
         self._behaviour.parameter_protocol.step()
-        self._send_due(self._slot_count * self._slot_us)
+        self._send_due_messages(self._slot_count * self._slot_us)
 
     def boot(self) -> None:
         """Queue the telemetry of time 0."""
         self._update_state()
-        self._send_due(0)
+        self._send_due_messages(0)
 
     def beacon(self) -> bytes:
         """Return the lockstep beacon of the present time, unsigned; faults do not affect it."""
@@ -151,7 +151,7 @@ class Simulation:
 
     def _update_state(self) -> None:
         state, vehicle, behaviour = self.state, self.vehicle, self._behaviour
-        behaviour.land_detector.step(contact=vehicle.on_ground)
+        behaviour.land_detector.step(ground_contact=vehicle.on_ground)
         if behaviour.commander.obeys_setpoints and self.effects.offboard_since_us is None:
             self.effects.offboard_since_us = state.time_us
         begun_faults, ended_faults = self.faults.update(
@@ -167,10 +167,10 @@ class Simulation:
             )
             behaviour.commander.step(crashed=vehicle.crashed)
 
-    def _send_due(self, slot_us: int) -> None:
+    def _send_due_messages(self, slot_us: int) -> None:
         builders, is_stopped = self._behaviour.builders, self.effects.is_stopped
         for link in self.links:
-            for message_id in link.streams.due(slot_us, self.state.status_at_us):
+            for message_id in link.streams.due(slot_us, self.state.status_published_us):
                 builder = builders.get(message_id)
                 if builder is None or is_stopped(message_id):
                     continue

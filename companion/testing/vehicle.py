@@ -206,7 +206,7 @@ class MockVehicle:
 
     def take_sent(self) -> list[bytes]:
         """Take the datagrams that the vehicle has sent since the last call."""
-        return self._relayed(self._exchange.outgoing(self._simulation.companion))
+        return self._relayed(self._exchange.take_outgoing(self._simulation.companion))
 
     def begin(self) -> list[bytes]:
         """Boot, unless done before; return the first datagrams (in lockstep the first beacon)."""
@@ -224,7 +224,7 @@ class MockVehicle:
         self._has_begun = True
         arrived_datagrams, self._arrived_datagrams = self._arrived_datagrams, []
         beacon = self._exchange.step(arrived_datagrams)
-        datagrams = self._exchange.outgoing(self._simulation.companion, beacon)
+        datagrams = self._exchange.take_outgoing(self._simulation.companion, beacon)
         for callback in tuple(self.after_step):
             callback()
         return self._relayed(datagrams)

@@ -44,7 +44,7 @@ class ArduPilot:
     """The `Autopilot` ArduPilot (ArduCopter)."""
 
     boot_mode = Mode.STABILIZE
-    any_component = True
+    accepts_any_component = True
     system_id_parameter = "MAV_SYSID"
     unsigned_links: Collection[str] = ("companion",)
     parameters = ARDUPILOT_PARAMETERS
@@ -63,11 +63,11 @@ class ArduPilot:
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the stream schedule of a link; it begins with HEARTBEAT and TIMESYNC only."""
-        booting_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
+        boot_duration_s = settings.prearm_delay_s * INITIALISED_S / RECORDED_READY_S
         return ArduPilotStreams(
             _BOOT_RATES,
             loop_us=self.slot_period_us(settings),
-            booting_until_us=booting_s * 1e6,
+            booting_until_us=boot_duration_s * 1e6,
         )
 
     def mode_of(self, custom_mode: int) -> Mode | None:
@@ -83,9 +83,9 @@ class ArduPilot:
         control = ArduPilotModeControl(state, parameters, guided, parts.vehicle.throttle)
         notifier = Notifier(
             announce,
-            send_home=lambda: _send_once(commands, _HOME_MESSAGES, links),
+            send_home=lambda: _send_messages(commands, _HOME_MESSAGES, links),
             send_parameter=lambda name: protocol.send_changed(
-                name, [link for link in links if link.client_heard]
+                name, [link for link in links if link.client_has_sent]
             ),
         )
         boot = Boot(state, notifier, ready_us=parts.ready_us, elevation=parts.origin.altitude_m)
@@ -120,7 +120,7 @@ class ArduPilot:
         return motion.builders() | system.builders()
 
 
-def _send_once(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:
+def _send_messages(commands: Commands, messages: Iterable[int], links: Iterable[Link]) -> None:
     for link in links:
         for message_id in messages:
             commands.send(message_id, link)

@@ -11,14 +11,14 @@ RECORDED_READY_S = 41.6
 scales all recorded times such that this time becomes ``mock.prearm_delay_s``."""
 INITIALISED_S = 2.4
 """Time after boot, s, from which the vehicle can be armed with ``force`` and change its mode."""
-ORIGIN_S = 20.0
+ORIGIN_SET_S = 20.0
 """Time after boot, s, from which the estimator has an origin."""
-HOME_S = 23.5
+HOME_SET_S = 23.5
 """Time after boot, s, from which home is set, so that modes without position can be armed."""
-RUNTIME_PERIOD_US = 30_000_000
+RUNTIME_SENT_PERIOD_US = 30_000_000
 """Period at which STAT_RUNTIME is sent, us."""
 
-_TEXTS = (
+_BOOT_TEXTS = (
     (0.16, "RCInput: decoding UDP (Pulses)"),
     (0.28, "Calibrating barometer"),
     (1.87, "Barometer 1 calibration complete"),
@@ -35,8 +35,8 @@ _TEXTS = (
     (5.85, "EKF3 IMU1 MAG0 initial yaw alignment complete"),
     (9.76, "GPS 1: probing for u-blox at 230400 baud"),
     (9.78, "GPS 1: detected u-blox"),
-    (ORIGIN_S, "EKF3 IMU0 origin set"),
-    (ORIGIN_S, "Field Elevation Set: {elevation:.0f}m"),
+    (ORIGIN_SET_S, "EKF3 IMU0 origin set"),
+    (ORIGIN_SET_S, "Field Elevation Set: {elevation:.0f}m"),
     (20.2, "EKF3 IMU1 origin set"),
     (RECORDED_READY_S, "EKF3 IMU0 is using GPS"),
     (RECORDED_READY_S, "EKF3 IMU1 is using GPS"),
@@ -75,10 +75,10 @@ class Boot:
         self._notifier = notifier
         self._time_scale = ready_us / (RECORDED_READY_S * 1e6)
         self._elevation = elevation
-        self._unsent_texts = list(_TEXTS)
+        self._unsent_texts = list(_BOOT_TEXTS)
         self._unsent_parameters = list(_SAVED_PARAMETERS)
         self._home_sent = False
-        self._next_runtime_us = RUNTIME_PERIOD_US
+        self._runtime_due_us = RUNTIME_SENT_PERIOD_US
 
     def reached(self, recorded_s: float) -> bool:
         """Whether the time ``recorded_s`` of the recorded boot, scaled to this boot, has passed."""
@@ -92,12 +92,12 @@ class Boot:
     @property
     def origin_set(self) -> bool:
         """Whether the estimator has an origin, so that the position of home is known."""
-        return self.reached(ORIGIN_S)
+        return self.reached(ORIGIN_SET_S)
 
     @property
     def home_set(self) -> bool:
         """Whether the pre-arm checks accept home as set."""
-        return self.reached(HOME_S)
+        return self.reached(HOME_SET_S)
 
     def step(self) -> None:
         """Send the texts and messages that are due."""
@@ -110,6 +110,6 @@ class Boot:
         if self.origin_set and not self._home_sent:
             self._home_sent = True
             notifier.send_home()
-        if self._state.time_us >= self._next_runtime_us:
-            self._next_runtime_us += RUNTIME_PERIOD_US
+        if self._state.time_us >= self._runtime_due_us:
+            self._runtime_due_us += RUNTIME_SENT_PERIOD_US
             notifier.send_parameter("STAT_RUNTIME")

@@ -45,7 +45,7 @@ class ArduPilotFailsafe:
     _vehicle: Vehicle
     """The simulated vehicle, which has the battery's voltage."""
     _announce: Announce
-    _act: Callable[[Mode], None]
+    _start_failsafe: Callable[[Mode], None]
     """Enters the mode of a failsafe, or disarms a vehicle that is on the ground."""
     _gcs_heartbeat_us: int | None = field(default=None, init=False)
     gcs_lost: bool = field(default=False, init=False)
@@ -86,7 +86,7 @@ class ArduPilotFailsafe:
             )
             mode = _GCS_ACTIONS.get(action_number)
             if mode is not None and not pilot_continues:
-                self._act(mode)
+                self._start_failsafe(mode)
 
     def _watch_battery(self) -> None:
         state, parameters = self._state, self._parameters
@@ -102,12 +102,13 @@ class ArduPilotFailsafe:
         state.battery_warning = warning
         is_critical = warning is BatteryWarning.CRITICAL
         used_mah = parameters["BATT_CAPACITY"] - remaining_mah
-        detail = f"{self._vehicle.battery.voltage_v:.2f}V used {used_mah:.0f} mAh"
-        self._announce(EventKind.BATTERY_CRITICAL if is_critical else EventKind.BATTERY_LOW, detail)
+        battery = f"{self._vehicle.battery.voltage_v:.2f}V used {used_mah:.0f} mAh"
+        kind = EventKind.BATTERY_CRITICAL if is_critical else EventKind.BATTERY_LOW
+        self._announce(kind, battery)
         action = parameters["BATT_FS_CRT_ACT" if is_critical else "BATT_FS_LOW_ACT"]
         mode = _BATTERY_ACTIONS.get(int(action))
         if state.armed and mode is not None:
-            self._act(mode)
+            self._start_failsafe(mode)
 
     def _voltage_below(self, parameter: str) -> bool:
         return self._vehicle.battery.voltage_v < self._parameters[parameter]
@@ -130,4 +131,4 @@ class ArduPilotFailsafe:
         self._position_lost = lost and (self._position_lost or loss_began)
         if loss_began and self._parameters["FS_EKF_ACTION"]:
             self._announce(EventKind.POSITION_LOST, "")
-            self._act(Mode.LAND)
+            self._start_failsafe(Mode.LAND)

@@ -18,11 +18,11 @@ STOPPING_S = 0.65
 """Ratio of stopping distance to speed when a hold begins, s (recorded on entering LAND)."""
 _CLIMB_RATE_INTEGRAL_GAIN = 1.0
 """Integral gain of the climb rate, 1/s^2; chosen for a steady hover, not measured."""
-_CLIMB_LIMIT = 10.0
+_MAX_CLIMB_RATE = 10.0
 """Largest climb rate and sink rate of the height controller, m/s. The limit is high, because the
 callers limit the climb rate that they request."""
 
-_LEAST_COS_TILT = 0.3
+_MIN_COS_TILT = 0.3
 """Lower bound of cos(tilt) (73 degrees), so that the acceleration by the tilt stays bounded."""
 
 
@@ -42,8 +42,8 @@ class ClimbProfile:
 
     def step(self, climb_rate: float, acceleration: float, dt: float) -> None:
         """Advance by ``dt`` s towards a climb rate, with at most ``acceleration``, m/s^2."""
-        largest_change = acceleration * dt
-        change = max(-largest_change, min(largest_change, climb_rate - self.rate))
+        max_change = acceleration * dt
+        change = max(-max_change, min(max_change, climb_rate - self.rate))
         self.acceleration = change / dt
         self.rate += change
         self.height += self.rate * dt
@@ -57,8 +57,8 @@ def approach_speed(distance: float, deceleration: float, max_speed: float) -> fl
 def lean_acceleration(q: Quaternion) -> tuple[float, float]:
     """Return the acceleration (NED, m/s^2) of a vehicle that holds its height at an attitude."""
     north, east, down = body_z(q)
-    lift = max(down, _LEAST_COS_TILT) / GRAVITY
-    return (-north / lift, -east / lift)
+    vertical_per_g = max(down, _MIN_COS_TILT) / GRAVITY
+    return (-north / vertical_per_g, -east / vertical_per_g)
 
 
 class PositionHold:
@@ -74,7 +74,7 @@ class PositionHold:
         self._parameters = parameters
         self._controller = PositionController(self._gains)
         self.climb_profile = ClimbProfile()
-        self.point = (0.0, 0.0)
+        self.position_ne = (0.0, 0.0)
         """North and east of the held point, m."""
         self.yaw = 0.0
         """Held heading, rad."""
@@ -84,7 +84,7 @@ class PositionHold:
         estimate = self._state.estimate
         x, y, z = estimate.position_ned
         vx, vy, vz = estimate.velocity_ned
-        self.point = (x + STOPPING_S * vx, y + STOPPING_S * vy)
+        self.position_ne = (x + STOPPING_S * vx, y + STOPPING_S * vy)
         self.yaw = yaw(estimate.q)
         self.climb_profile.begin(-z, -vz)
         # The integrals start at the lean against the wind: a real vehicle drifts by only 0.03 m.
@@ -93,7 +93,7 @@ class PositionHold:
     def shift(self, yaw_step: float, position_step: Vector) -> None:
         """Move the held heading (rad) and position (m, NED) by the jumps of an estimator reset."""
         dx, dy, dz = position_step
-        self.point = (self.point[0] + dx, self.point[1] + dy)
+        self.position_ne = (self.position_ne[0] + dx, self.position_ne[1] + dy)
         self.climb_profile.height -= dz
         self.yaw += yaw_step
 
@@ -104,15 +104,15 @@ class PositionHold:
         """
         parameters, profile = self._parameters, self.climb_profile
         profile.step(climb_rate, 0.01 * parameters["WPNAV_ACCEL_Z"], dt)
-        north, east = (nan, nan) if level else self.point
+        north, east = (nan, nan) if level else self.position_ne
         demand = PositionDemand(
             (north, east, -profile.height),
             (nan, nan, -profile.rate),
             (*((0.0, 0.0) if level else (nan, nan)), -profile.acceleration),
             self.yaw,
             0.01 * parameters["WPNAV_SPEED"],
-            _CLIMB_LIMIT,
-            _CLIMB_LIMIT,
+            _MAX_CLIMB_RATE,
+            _MAX_CLIMB_RATE,
         )
         return self.follow(demand, dt)
 

@@ -116,7 +116,7 @@ class ArduPilotModeControl:
         return_home.step()
         if return_home.leg is not Leg.CLIMB:
             home = self._state.home_ned
-            self._hold.point = (home[0], home[1])
+            self._hold.position_ne = (home[0], home[1])
         remaining_height = return_home.height - self._hold.climb_profile.height
         acceleration = 0.01 * parameters["WPNAV_ACCEL_Z"]
         max_speed = 0.01 * parameters["WPNAV_SPEED_UP"]
@@ -127,7 +127,7 @@ class ArduPilotModeControl:
     def _land(self, dt: float) -> ActuatorCommand:
         """Descend fast to LAND_ALT_LOW, then at LAND_SPEED; reduce the thrust on the ground."""
         state, parameters = self._state, self._parameters
-        if state.contact:
+        if state.ground_contact:
             self._output.thrust = max(0.0, self._output.thrust - TOUCHDOWN_THRUST_RATE * dt)
             return self._output.attitude_command(from_yaw(self._hold.yaw), self._output.thrust)
         land_speed = 0.01 * parameters["LAND_SPEED"]

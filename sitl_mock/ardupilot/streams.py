@@ -59,10 +59,10 @@ class ArduPilotStreams:
         """Return the interval of a message in us, -1 if it is not streamed."""
         return self._intervals_us.get(message_id, -1)
 
-    def due(self, slot_us: int, status_at_us: int = 0) -> list[int]:
+    def due(self, slot_us: int, status_published_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
 
-        ``status_at_us`` (for PX4) is ignored.
+        ``status_published_us`` (for PX4) is ignored.
         """
         due_ids = []
         booting = slot_us < self._booting_until_us

@@ -48,5 +48,5 @@ class ArduPilotAnnouncer:
             self._long_texts += 1
             text_id = self._long_texts
         for link in self._links:
-            if link.client_heard:
+            if link.client_has_sent:
                 link.send_text(text, severity, text_id)

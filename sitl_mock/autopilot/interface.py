@@ -72,7 +72,7 @@ class Autopilot(Protocol):
 
     boot_mode: Mode
     system_id_parameter: str
-    any_component: bool
+    accepts_any_component: bool
     """Whether the autopilot handles messages to any component of its system."""
     unsigned_links: Collection[str]
     """Links on which the autopilot accepts unsigned frames although signing is on."""

@@ -10,7 +10,7 @@ from sitl_mock.autopilot.state import NAN_VECTOR
 from sitl_mock.physics.quaternion import Quaternion, Vector, heading_to_ned, normalise
 from sitl_mock.physics.rigid_body import GRAVITY
 
-_LARGEST_TILT = radians(80.0)
+_MAX_TILT = radians(80.0)
 """Upper bound of the tilt limit, rad."""
 
 
@@ -157,7 +157,7 @@ def _attitude_and_thrust(
     """Return attitude and thrust that give an acceleration (NED, m/s^2) at a yaw, within limits."""
     north, east, down = acceleration
     lift = max(GRAVITY - down, 0.1 * GRAVITY)
-    horizontal_limit = lift * tan(min(gains.max_tilt, _LARGEST_TILT))
+    horizontal_limit = lift * tan(min(gains.max_tilt, _MAX_TILT))
     horizontal = hypot(north, east)
     if horizontal > horizontal_limit:
         north, east = north * horizontal_limit / horizontal, east * horizontal_limit / horizontal

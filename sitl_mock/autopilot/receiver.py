@@ -46,12 +46,12 @@ class Receiver:
         self._handlers: dict[str, Callable[[Message, Link], None]] = {
             "SET_ATTITUDE_TARGET": lambda message, _: commander.receive_setpoint(message),
             "SET_POSITION_TARGET_LOCAL_NED": lambda message, _: commander.receive_setpoint(message),
-            "HEARTBEAT": self._heartbeat,
-            "COMMAND_LONG": self._command_long,
-            "COMMAND_INT": self._command_int,
-            "SET_MODE": self._set_mode,
-            "TIMESYNC": self._timesync,
-            "PING": self._ping,
+            "HEARTBEAT": self._handle_heartbeat,
+            "COMMAND_LONG": self._handle_command_long,
+            "COMMAND_INT": self._handle_command_int,
+            "SET_MODE": self._handle_set_mode,
+            "TIMESYNC": self._answer_timesync,
+            "PING": self._answer_ping,
             "PARAM_REQUEST_LIST": behaviour.parameter_protocol.request_list,
             "PARAM_REQUEST_READ": behaviour.parameter_protocol.request_read,
             "PARAM_SET": behaviour.parameter_protocol.set,
@@ -67,7 +67,7 @@ class Receiver:
         """
         if not link.accepts(message):
             return
-        link.client_heard = True
+        link.client_has_sent = True
         handler = self._handlers.get(message.get_type())
         if handler is not None and self._is_for_us(message):
             handler(message, link)
@@ -76,34 +76,34 @@ class Receiver:
         system = getattr(message, "target_system", _BROADCAST)
         component = getattr(message, "target_component", _BROADCAST)
         return system in (_BROADCAST, self._system_id) and (
-            component in (_BROADCAST, _AUTOPILOT_COMPONENT) or self._autopilot.any_component
+            component in (_BROADCAST, _AUTOPILOT_COMPONENT) or self._autopilot.accepts_any_component
         )
 
-    def _heartbeat(self, message: Message, link: Link) -> None:
+    def _handle_heartbeat(self, message: Message, link: Link) -> None:
         if (
             message.get_srcSystem() == self._system_id
             and message.get_srcComponent() == _AUTOPILOT_COMPONENT
         ):
             return
-        link.gcs_heard = link.gcs_heard or message.type == dialect.MAV_TYPE_GCS
+        link.gcs_has_sent = link.gcs_has_sent or message.type == dialect.MAV_TYPE_GCS
         self._commander.receive_heartbeat(message)
 
-    def _command_long(self, message: Message, link: Link) -> None:
+    def _handle_command_long(self, message: Message, link: Link) -> None:
         parameters = tuple(getattr(message, f"param{number}") for number in range(1, 8))
         self._run(Command(message.command, parameters), message, link)
 
-    def _command_int(self, message: Message, link: Link) -> None:
+    def _handle_command_int(self, message: Message, link: Link) -> None:
         x, y = float(message.x), float(message.y)
         if message.frame in _GLOBAL_FRAMES:
             x, y = (nan if value == 2**31 - 1 else value / 1e7 for value in (x, y))
-        first_four = message.param1, message.param2, message.param3, message.param4
-        self._run(Command(message.command, (*first_four, x, y, message.z)), message, link)
+        parameters_1_to_4 = message.param1, message.param2, message.param3, message.param4
+        self._run(Command(message.command, (*parameters_1_to_4, x, y, message.z)), message, link)
 
-    def _set_mode(self, message: Message, link: Link) -> None:
+    def _handle_set_mode(self, message: Message, link: Link) -> None:
         custom_mode = message.custom_mode
         mode = self._autopilot.mode_of(custom_mode)
-        valid = mode and message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-        result = self._commander.request_mode(mode) if mode and valid else DENIED
+        mode_is_valid = mode and message.base_mode & dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+        result = self._commander.request_mode(mode) if mode and mode_is_valid else DENIED
         self._acknowledge(dialect.MAV_CMD_DO_SET_MODE, result, message, link)
 
     def _run(self, command: Command, message: Message, link: Link) -> None:
@@ -119,11 +119,11 @@ class Receiver:
             )
         )
 
-    def _timesync(self, message: Message, link: Link) -> None:
+    def _answer_timesync(self, message: Message, link: Link) -> None:
         if message.tc1 == 0:
             link.send(dialect.MAVLink_timesync_message(self.clock_ns(), message.ts1))
 
-    def _ping(self, message: Message, link: Link) -> None:
+    def _answer_ping(self, message: Message, link: Link) -> None:
         if message.target_system == _BROADCAST and message.target_component == _BROADCAST:
             link.send(
                 dialect.MAVLink_ping_message(

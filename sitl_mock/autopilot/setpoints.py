@@ -22,7 +22,7 @@ FORCE = 512
 YAW_IGNORED = 1024
 POSITION_YAW_RATE_IGNORED = 2048
 _BODY_FRAMES = (dialect.MAV_FRAME_BODY_NED, dialect.MAV_FRAME_BODY_FRD)
-LOSS_DETECTION_US = 60_000
+LOSS_DETECTION_DELAY_US = 60_000
 """Delay beyond COM_OF_LOSS_T after which the loss of setpoints is noticed, us (measured: 60 to 110
 ms)."""
 
@@ -99,33 +99,33 @@ class OffboardStream:
     Attributes:
         setpoint: the setpoint; None before the first.
         setpoint_count: number of setpoints accepted so far.
-        last_us: vehicle time at which the setpoint was received, us; None before the first.
-        fresh: whether a setpoint arrived since the last call of `take_fresh`.
+        last_setpoint_us: vehicle time at which it was received, us; None before the first.
+        is_fresh: whether a setpoint arrived since the last call of `take_fresh`.
     """
 
     def __init__(self) -> None:
         self.setpoint: Setpoint | None = None
         self.setpoint_count = 0
-        self.last_us: int | None = None
-        self.fresh = False
+        self.last_setpoint_us: int | None = None
+        self.is_fresh = False
 
     def accept(self, setpoint: Setpoint, now_us: int) -> None:
         """Accept a setpoint that was received at `now_us`; it replaces the one before."""
         self.setpoint = setpoint
         self.setpoint_count += 1
-        self.last_us = now_us
-        self.fresh = True
+        self.last_setpoint_us = now_us
+        self.is_fresh = True
 
     def take_fresh(self) -> bool:
         """Return whether a setpoint arrived since the last call."""
-        fresh, self.fresh = self.fresh, False
-        return fresh
+        is_fresh, self.is_fresh = self.is_fresh, False
+        return is_fresh
 
     def alive(self, now_us: int, loss_s: float) -> bool:
-        """Whether the latest setpoint is at most ``loss_s`` + `LOSS_DETECTION_US` old.
+        """Whether the latest setpoint is at most ``loss_s`` + `LOSS_DETECTION_DELAY_US` old.
 
         ``loss_s`` is COM_OF_LOSS_T.
         """
-        if self.last_us is None:
+        if self.last_setpoint_us is None:
             return False
-        return now_us - self.last_us <= round(loss_s * 1e6) + LOSS_DETECTION_US
+        return now_us - self.last_setpoint_us <= round(loss_s * 1e6) + LOSS_DETECTION_DELAY_US

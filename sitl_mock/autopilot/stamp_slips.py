@@ -16,16 +16,16 @@ class StampSlips:
         self._rate_hz = rate_hz
         self._random = Random(f"{seed}/stamps")
         self._slipped = False
-        self._next_us = self._next_slip_us(0.0)
+        self._next_slip_us = self._draw_next_slip_us(0.0)
 
     def lag_ms(self, now_us: int) -> int:
         """Return the time stamp's lag behind ``now_us`` (which must not decrease), 0 or 1 ms."""
-        if now_us >= self._next_us:
+        if now_us >= self._next_slip_us:
             self._slipped = not self._slipped
-            self._next_us = self._next_slip_us(now_us)
+            self._next_slip_us = self._draw_next_slip_us(now_us)
         return int(self._slipped)
 
-    def _next_slip_us(self, now_us: float) -> float:
+    def _draw_next_slip_us(self, now_us: float) -> float:
         if not self._rate_hz:
             return inf
         return now_us + 1e6 * self._random.expovariate(self._rate_hz)

@@ -80,12 +80,12 @@ class State:
     intended_mode: Mode = Mode.LOITER
     mode_after_disarming: Mode = Mode.LOITER
     """The mode that PX4 enters when it disarms."""
-    status_at_us: int = 0
+    status_published_us: int = 0
     """Vehicle time at which PX4 last published its status (mode and arming), us."""
     failsafe: bool = False
     prearm_problem: str | None = "system is booting"
     """Reason for which arming is refused, None if it is allowed."""
-    contact: bool = True
+    ground_contact: bool = True
     """Whether the vehicle touches the ground."""
     landed: bool = True
     """Whether the land detector reports landed."""

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from sitl_mock.config.section import ConfigError
 
-_TCP = re.compile(r"tcpin://([^:/\s]*):(\d{1,5})/?")
-_EXAMPLES = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
+_TCP_PATTERN = re.compile(r"tcpin://([^:/\s]*):(\d{1,5})/?")
+_ENDPOINT_EXAMPLES = "write udp, tcpin://127.0.0.1:5760 or serial:///tmp/vehicle"
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,10 @@ def parse_endpoint(text: str) -> TcpIn | SerialLine | None:
         path = text.removeprefix("serial://")
         if not path or path.startswith("/"):
             return SerialLine(Path(path) if path else None)
-    tcp = _TCP.fullmatch(text)
-    if tcp is not None and _is_host(tcp[1]) and 1 <= int(tcp[2]) <= 65535:
-        return TcpIn(tcp[1] or "127.0.0.1", int(tcp[2]))
-    raise ValueError(f"not an endpoint; {_EXAMPLES}")
+    tcp_match = _TCP_PATTERN.fullmatch(text)
+    if tcp_match is not None and _is_host(tcp_match[1]) and 1 <= int(tcp_match[2]) <= 65535:
+        return TcpIn(tcp_match[1] or "127.0.0.1", int(tcp_match[2]))
+    raise ValueError(f"not an endpoint; {_ENDPOINT_EXAMPLES}")
 
 
 def _is_host(text: str) -> bool:

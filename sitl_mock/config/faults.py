@@ -91,9 +91,9 @@ class NanField(TimedFault):
         field_types = dict(zip(message_class.fieldnames, message_class.fieldtypes, strict=True))
         float_fields = [name for name in field_types if field_types[name] in ("float", "double")]
         if self.field not in float_fields:
-            known = ", ".join(float_fields) or "none"
+            fields = ", ".join(float_fields) or "none"
             raise ValueError(
-                f"{self.message} has no float field {self.field!r}; its float fields: {known}"
+                f"{self.message} has no float field {self.field!r}; its float fields: {fields}"
             )
         return self
 

@@ -12,7 +12,7 @@ Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
-_MOST_NAMES_LISTED = 20
+_MAX_NAMES_LISTED = 20
 """Largest number of known names that a message lists."""
 _REQUIREMENTS = {
     "greater_than_equal": "must be at least {ge:.12g}",
@@ -62,16 +62,16 @@ class ConfigError(Exception):
     """The configuration cannot be used; the message is one sentence for the user."""
 
 
-def suggestion(word: str, known: Iterable[str]) -> str:
+def suggestion(word: str, known_names: Iterable[str]) -> str:
     """Return ``; did you mean ...?`` with the known name that is most like ``word``.
 
     If none is similar: ``; known are ...`` with all names; with more than 20 names, no text.
     """
-    names = list(known)
+    names = list(known_names)
     nearest = _nearest(word, names)
     if nearest:
         return f"; did you mean {nearest}?"
-    return f"; known are {', '.join(sorted(names))}" if len(names) <= _MOST_NAMES_LISTED else ""
+    return f"; known are {', '.join(sorted(names))}" if len(names) <= _MAX_NAMES_LISTED else ""
 
 
 def _nearest(word: str, names: list[str]) -> str | None:
@@ -86,12 +86,12 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
     path = [str(part) for part in detail["loc"]]
     full_key = ".".join(["mock", *path])
     if detail["type"] == "extra_forbidden":
-        owner = _model_at(model, path[:-1])
-        sibling_keys = owner.model_fields if owner else ()
+        section_model = _model_at(model, path[:-1])
+        sibling_keys = section_model.model_fields if section_model else ()
         other_paths = [other for other in _valid_paths(path[-1], model) if other != full_key]
         if other_paths and not any(key.startswith(f"{path[-1]}_") for key in sibling_keys):
             return f"{full_key} is in the wrong section; write {' or '.join(other_paths)}"
-        hint = suggestion(path[-1], sibling_keys) if owner else ""
+        hint = suggestion(path[-1], sibling_keys) if section_model else ""
         return f"unknown key {full_key}{hint}"
     if detail["type"] in ("float_parsing", "int_parsing"):
         return f"{full_key} must be a number: {_number_advice(str(detail['input']))}"
@@ -103,17 +103,17 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 def describe_wrong_value(error: ValidationError) -> str:
     """Return what is wrong with the first wrong value, to be put after the path of its key."""
     details = error.errors()
-    error_type, path, context = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
+    error_type, path, limits = details[0]["type"], details[0]["loc"], details[0].get("ctx", {})
     if error_type == "missing" and isinstance(details[0]["input"], list | tuple):
         count = len(details[0]["input"])
-        missing = [each for each in details if each["loc"][:-1] == path[:-1]]
-        return f" is missing: the list has {count} values and needs {count + len(missing)}"
+        missing_values = [each for each in details if each["loc"][:-1] == path[:-1]]
+        return f" is missing: the list has {count} values and needs {count + len(missing_values)}"
     if error_type == "missing":
         return " is missing"
     if error_type == "literal_error":
-        return f" must be {context['expected'].replace(chr(39), '')}"
+        return f" must be {limits['expected'].replace(chr(39), '')}"
     if error_type in _REQUIREMENTS:
-        return f" {_REQUIREMENTS[error_type].format(**context)}"
+        return f" {_REQUIREMENTS[error_type].format(**limits)}"
     message = details[0]["msg"].removeprefix("Value error, ")
     if message[1:2].islower():
         message = message[0].lower() + message[1:]
@@ -176,9 +176,9 @@ def _model_at(model: type[BaseModel], path: list[str]) -> type[BaseModel] | None
     """
     candidates = [model]
     for key in path:
-        tagged = [each for each in candidates if key in _kinds(each)]
-        if tagged:
-            candidates = tagged
+        models_of_kind = [each for each in candidates if key in _kinds(each)]
+        if models_of_kind:
+            candidates = models_of_kind
         elif len(candidates) == 1 and key in candidates[0].model_fields:
             candidates = list(_models_of(candidates[0].model_fields[key].annotation))
     return candidates[0] if len(candidates) == 1 else None

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 import yaml
 
-_MOST_BYTES = 250_000
-_MOST_NODES = 6000
-_DEEPEST_NESTING = 20
+_MAX_BYTES = 250_000
+_MAX_NODES = 6000
+_MAX_NESTING = 20
 """Largest number of nested levels."""
-_LONGEST_VALUE = 5000  # characters of a value
+_MAX_VALUE_LENGTH = 5000  # characters of a value
 
-_PLAIN_PATTERNS = {
+_SCALAR_PATTERNS = {
     "bool": r"true|True|TRUE|false|False|FALSE",
     "null": r"~|null|Null|NULL|",
     "int": r"[-+]?[0-9]{1,40}",
@@ -33,7 +33,7 @@ class _Loader(yaml.SafeLoader):
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
-        self._nodes = 0
+        self._node_count = 0
         self._depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
@@ -44,13 +44,13 @@ class _Loader(yaml.SafeLoader):
                 that is too long.
         """
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
-        self._nodes += 1
+        self._node_count += 1
         self._depth += 1
         if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) is not None:
             raise yaml.YAMLError("aliases and tags are not supported")
-        if self._nodes > _MOST_NODES or self._depth > _DEEPEST_NESTING:
+        if self._node_count > _MAX_NODES or self._depth > _MAX_NESTING:
             raise yaml.YAMLError("too many values, or nested too deeply")
-        if isinstance(event, yaml.ScalarEvent) and len(event.value) > _LONGEST_VALUE:
+        if isinstance(event, yaml.ScalarEvent) and len(event.value) > _MAX_VALUE_LENGTH:
             raise yaml.YAMLError("a value is too long")
         node = super().compose_node(parent, index)
         self._depth -= 1
@@ -61,7 +61,7 @@ class _Loader(yaml.SafeLoader):
         return int(self.construct_scalar(node))
 
 
-for _name, _pattern in _PLAIN_PATTERNS.items():
+for _name, _pattern in _SCALAR_PATTERNS.items():
     _Loader.add_implicit_resolver(
         f"tag:yaml.org,2002:{_name}", re.compile(f"(?:{_pattern})$"), None
     )
@@ -108,9 +108,9 @@ def load_yaml(path: Path) -> Document:
     with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise FileRefusedError("is not a regular file")
-        content = file.read(_MOST_BYTES + 1)
-    if len(content) > _MOST_BYTES:
-        raise FileRefusedError(f"is larger than {_MOST_BYTES // 1000} kB")
+        content = file.read(_MAX_BYTES + 1)
+    if len(content) > _MAX_BYTES:
+        raise FileRefusedError(f"is larger than {_MAX_BYTES // 1000} kB")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -126,11 +126,11 @@ def load_yaml(path: Path) -> Document:
 
 def explain_yaml(error: Exception) -> str:
     """Return why a file cannot be read as YAML, on one line."""
-    mark = getattr(error, "problem_mark", None)
-    if mark is not None and "'\\t'" in str(getattr(error, "problem", "")):
+    position = getattr(error, "problem_mark", None)
+    if position is not None and "'\\t'" in str(getattr(error, "problem", "")):
         return (
-            f"line {mark.line + 1}: a tab is used where YAML requires spaces; indent with two "
-            "spaces for each level"
+            f"line {position.line + 1}: a tab is used where YAML requires spaces; indent with "
+            "two spaces for each level"
         )
     problem = " ".join(str(error).split())
     return f"is not valid YAML: {problem:.300}"

@@ -43,14 +43,14 @@ class Endpoint(Protocol):
 
 def joined_datagrams(frames: list[bytes]) -> list[bytes]:
     """Return the frames joined in order into datagrams of at most `MAX_BUNDLE` bytes."""
-    joined: list[bytes] = []
+    datagrams: list[bytes] = []
     size = 0
     start = 0
     for index, frame in enumerate(frames):
         if size + len(frame) > MAX_BUNDLE:
-            joined.append(b"".join(frames[start:index]))
+            datagrams.append(b"".join(frames[start:index]))
             start, size = index, 0
         size += len(frame)
     if size:
-        joined.append(b"".join(frames[start:]))
-    return joined
+        datagrams.append(b"".join(frames[start:]))
+    return datagrams

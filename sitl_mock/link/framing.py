@@ -46,7 +46,9 @@ def decode(datagram: bytes) -> list[Message]:
         frame = datagram[start : start + length]
         known_class = dialect.mavlink_map.get(_message_id(frame)) if frame[0] == _MAGIC_V2 else None
         valid, message = (
-            _decode_other(frame) if known_class is None else _decode_known(frame, known_class)
+            _decode_by_pymavlink(frame)
+            if known_class is None
+            else _decode_known(frame, known_class)
         )
         start += length if valid else 1
         if message is not None:
@@ -72,7 +74,7 @@ def _decode_known(frame: bytes, message_class: Any) -> tuple[bool, Message | Non
     return True, message
 
 
-def _decode_other(frame: bytes) -> tuple[bool, Message | None]:
+def _decode_by_pymavlink(frame: bytes) -> tuple[bool, Message | None]:
     """Decode a frame of MAVLink 1, or of a message that the dialect lacks."""
     try:
         message = _decoder.decode(bytearray(frame))

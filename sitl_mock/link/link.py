@@ -26,10 +26,10 @@ class StreamSchedule(Protocol):
     def interval(self, message_id: int) -> int:
         """Return the interval of a message in us, -1 if it is not streamed."""
 
-    def due(self, slot_us: int, status_at_us: int = 0) -> list[int]:
+    def due(self, slot_us: int, status_published_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
 
-        ``status_at_us``: vehicle time at which PX4 last published its status, for CURRENT_MODE.
+        ``status_published_us``: vehicle time of PX4's last published status, for CURRENT_MODE.
         """
 
 
@@ -45,9 +45,9 @@ class Link:
     signing: Signing | None = None
     """Signs and verifies frames; None = no signing."""
     outbox: list[bytes] = field(default_factory=list, init=False)
-    gcs_heard: bool = field(default=False, init=False)
+    gcs_has_sent: bool = field(default=False, init=False)
     """Whether a heartbeat of a ground station arrived."""
-    client_heard: bool = field(default=False, init=False)
+    client_has_sent: bool = field(default=False, init=False)
     """Whether an accepted message of a client arrived."""
     tamper: Callable[[Message], None] | None = field(default=None, init=False)
     """Changes each message before it is packed (faults); None = no change."""

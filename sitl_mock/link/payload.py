@@ -37,26 +37,27 @@ def unpack(message_class: Any, payload: bytes) -> Message:
 def _wire_values(message_class: Any) -> Callable[[Message], Iterable[Any]]:
     """Return the function that lists the field values of a message class in wire order."""
     names = message_class.ordered_fieldnames
-    texts = _text_fields(message_class)
-    fields = attrgetter(*(f"_{name}_raw" if name in texts else name for name in names))
+    text_fields = _text_fields(message_class)
+    fields = attrgetter(*(f"_{name}_raw" if name in text_fields else name for name in names))
     if len(names) == 1:
         return lambda message: (fields(message),)
-    arrays = [
-        bool(length) and name not in texts
+    array_flags = [
+        bool(length) and name not in text_fields
         for name, length in zip(names, message_class.array_lengths, strict=True)
     ]
-    if not any(arrays):
+    if not any(array_flags):
         return fields
-    if sum(arrays) == 1:
-        array_index = arrays.index(True)
+    if sum(array_flags) == 1:
+        array_index = array_flags.index(True)
 
-        def flat(message: Message) -> Iterable[Any]:
+        def flattened_values(message: Message) -> Iterable[Any]:
             values = fields(message)
             return (*values[:array_index], *values[array_index], *values[array_index + 1 :])
 
-        return flat
+        return flattened_values
     return lambda message: chain.from_iterable(
-        value if array else (value,) for value, array in zip(fields(message), arrays, strict=True)
+        value if is_array else (value,)
+        for value, is_array in zip(fields(message), array_flags, strict=True)
     )
 
 
@@ -71,14 +72,14 @@ def _arguments(message_class: Any) -> Callable[[tuple[Any, ...]], Iterable[Any]]
         starts[order] if lengths[order] == 1 else slice(starts[order], starts[order + 1])
         for order in message_class.orders
     ]
-    texts = [message_class.fieldnames.index(name) for name in _text_fields(message_class)]
+    text_indices = [message_class.fieldnames.index(name) for name in _text_fields(message_class)]
 
     def arguments(values: tuple[Any, ...]) -> Iterable[Any]:
         selected_values = [
             list(values[selector]) if isinstance(selector, slice) else values[selector]
             for selector in value_selectors
         ]
-        for index in texts:
+        for index in text_indices:
             selected_values[index] = selected_values[index].rstrip(b"\0")
         return selected_values
 

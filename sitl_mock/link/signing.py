@@ -62,10 +62,10 @@ class Signing:
     its wall clock.
 
     Attributes:
-        accepted: number of frames with a valid signature and a newer time stamp than all earlier
-            ones of their stream (system, component, link id).
-        unsigned: number of frames without a signature, whether accepted or not.
-        refused: number of frames signed with another key, replayed, or (on a stream not heard
+        accepted_count: number of frames with a valid signature and a newer time stamp than all
+            earlier ones of their stream (system, component, link id).
+        unsigned_count: number of frames without a signature, whether accepted or not.
+        refused_count: number of frames signed with another key, replayed, or (on a stream not heard
             before) more than a minute older than the newest time stamp.
 
     Args:
@@ -83,7 +83,7 @@ class Signing:
         accept_unsigned: bool,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        self.accepted = self.unsigned = self.refused = 0
+        self.accepted_count = self.unsigned_count = self.refused_count = 0
         self._accept_unsigned = accept_unsigned
         self._clock = clock
         self._mav = dialect.MAVLink(None)
@@ -102,25 +102,25 @@ class Signing:
         """Whether a received message is accepted; also count it in the attributes."""
         frame = bytearray(message.get_msgbuf())
         if frame[0] != _MAGIC_V2 or not frame[_FLAGS_OFFSET] & SIGNED_FLAG:
-            self.unsigned += 1
+            self.unsigned_count += 1
             return self._accept_unsigned
         self._update_timestamp()
         old_timestamps = dict(self._mav.signing.stream_timestamps)
         if self._mav.check_signature(frame, message.get_srcSystem(), message.get_srcComponent()):
-            self.accepted += 1
+            self.accepted_count += 1
             return True
         # pymavlink stores the timestamp before it verifies the signature. We restore the old one,
         # else a forged future timestamp would lock out the true sender.
         self._mav.signing.stream_timestamps = old_timestamps
-        self.refused += 1
+        self.refused_count += 1
         return False
 
     def counts(self) -> dict[str, int]:
         """Return the numbers of ``accepted``, ``unsigned`` and ``refused`` frames."""
         return {
-            "accepted": self.accepted,
-            "unsigned": self.unsigned,
-            "refused": self.refused,
+            "accepted": self.accepted_count,
+            "unsigned": self.unsigned_count,
+            "refused": self.refused_count,
         }
 
     def _update_timestamp(self) -> None:

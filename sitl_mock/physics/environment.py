@@ -14,9 +14,9 @@ class Wind:
     def __init__(self, config: WindConfig, dt: float, seed: int) -> None:
         direction = radians(config.from_deg)
         self._mean = (-config.speed_m_s * cos(direction), -config.speed_m_s * sin(direction))
-        self._decay = exp(-dt / config.gust_time_s)
-        self._gust_noise = config.gust_m_s * sqrt(1.0 - self._decay**2)
-        self._vertical_gust_noise = config.vertical_gust_m_s * sqrt(1.0 - self._decay**2)
+        self._gust_decay = exp(-dt / config.gust_time_s)
+        self._gust_noise = config.gust_m_s * sqrt(1.0 - self._gust_decay**2)
+        self._vertical_gust_noise = config.vertical_gust_m_s * sqrt(1.0 - self._gust_decay**2)
         self._has_no_gusts = config.gust_m_s == 0.0 and config.vertical_gust_m_s == 0.0
         # A text seed gives the same numbers on every machine, independent of the other noises.
         self._random = Random(f"{seed}/wind")
@@ -37,7 +37,7 @@ class Wind:
         """Advance the gusts by `dt`."""
         if self._has_no_gusts:
             return
-        gauss, decay = self._random.gauss, self._decay
+        gauss, decay = self._random.gauss, self._gust_decay
         north, east, down = self._gust
         self._gust = (
             decay * north + self._gust_noise * gauss(0.0, 1.0),
@@ -55,7 +55,7 @@ class GroundConstants(NamedTuple):
 
     crash_cosine: float  # cosine of the tilt above which a touchdown is a crash
     crash_speed: float  # sink speed above which a touchdown is a crash, m/s
-    levelling: float  # factor on the tilt in one step on the ground
+    levelling_factor: float  # factor on the tilt in one step on the ground
 
 
 def ground_constants(airframe: AirframeConfig, dt: float) -> GroundConstants:
@@ -77,4 +77,4 @@ def survives_touchdown(constants: GroundConstants, q: Quaternion, sink_speed: fl
 def levelled_on_ground(constants: GroundConstants, q: Quaternion) -> Quaternion:
     """Return the attitude on the ground after one step of levelling; the heading is kept."""
     w, x, y, z = q
-    return normalise((w, x * constants.levelling, y * constants.levelling, z))
+    return normalise((w, x * constants.levelling_factor, y * constants.levelling_factor, z))

@@ -88,12 +88,12 @@ def multirotor_constants(
 ) -> MultirotorConstants:
     """Return the constants of an airframe with its rate controller."""
     dt = 1.0 / airframe.physics_rate_hz
-    per_throttle = airframe.mass_kg * airframe.thrust_slope_m_s2
+    thrust_per_throttle = airframe.mass_kg * airframe.thrust_slope_m_s2
     return MultirotorConstants(
         float(airframe.physics_rate_hz),
         airframe.mass_kg,
-        airframe.rotor_arm_m * per_throttle,
-        airframe.rotor_drag_ratio_m * per_throttle,
+        airframe.rotor_arm_m * thrust_per_throttle,
+        airframe.rotor_drag_ratio_m * thrust_per_throttle,
         body_of(airframe),
         rotor_constants(airframe, dt),
         rate_constants(rate_loop, dt),

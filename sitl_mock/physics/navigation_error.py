@@ -74,8 +74,8 @@ def extrapolated_errors(errors: Errors, elapsed: float) -> Errors:
     )
 
 
-def pending_correction_share(predictor_ms: float, state: FilterState, now: float) -> float:
-    """Return the share of the latest corrections that the output does not yet contain at ``now``.
+def pending_correction_fraction(predictor_ms: float, state: FilterState, now: float) -> float:
+    """Return the fraction of the latest corrections that the output does not yet contain at `now`.
 
     ``predictor_ms`` is the time constant with which the output follows a correction.
     """
@@ -124,28 +124,28 @@ def error_at(
 ) -> ErrorVectors:
     """Return the error of the estimate at time ``now`` (s); ``truth`` is the true motion (pure)."""
     elapsed = now - state.fused_at
-    pending_part = pending_correction_share(constants.predictor_ms, state, now)
-    yaw_pending_part = pending_correction_share(constants.heading_predictor_ms, state, now)
+    pending_fraction = pending_correction_fraction(constants.predictor_ms, state, now)
+    pending_yaw_fraction = pending_correction_fraction(constants.heading_predictor_ms, state, now)
     position, velocity, acceleration = propagated_horizontal_errors(
         constants, state, truth, elapsed
     )
     pending = state.horizontal.pending
-    position += constants.lead_time * complex(truth[0], truth[1]) - pending_part * pending[0]
-    velocity += constants.lead_time * complex(truth[13], truth[14]) - pending_part * pending[1]
+    position += constants.lead_time * complex(truth[0], truth[1]) - pending_fraction * pending[0]
+    velocity += constants.lead_time * complex(truth[13], truth[14]) - pending_fraction * pending[1]
     down, sink_rate, _ = propagated_vertical_errors(constants, state, truth, elapsed)
     pending = state.vertical.pending
-    down += constants.height_offset + state.down_error - pending_part * pending[0]
+    down += constants.height_offset + state.down_error - pending_fraction * pending[0]
     return ErrorVectors(
         (position.real, position.imag, down.real),
         (
             velocity.real,
             velocity.imag,
-            (sink_rate - pending_part * pending[1]).real + state.sink_error,
+            (sink_rate - pending_fraction * pending[1]).real + state.sink_error,
         ),
         # A wrong attitude rotates the thrust, which makes the acceleration wrong.
         (
             acceleration.imag / GRAVITY + constants.tilt_bias.real,
             -acceleration.real / GRAVITY + constants.tilt_bias.imag,
-            state.yaw - yaw_pending_part * state.pending_yaw,
+            state.yaw - pending_yaw_fraction * state.pending_yaw,
         ),
     )

@@ -16,7 +16,7 @@ from sitl_mock.physics.navigation_error import (
     ErrorState,
     FilterState,
     TruthRow,
-    pending_correction_share,
+    pending_correction_fraction,
     propagated_horizontal_errors,
     propagated_vertical_errors,
 )
@@ -29,7 +29,7 @@ _MIN_COURSE_SPEED = 0.5
 vehicle would seem to turn infinitely fast."""
 _COMPASS_TIME_S = 20.0
 """Time constant with which the heading follows the compass without acceleration, s."""
-_LARGEST_UNCERTAINTY = 0.1
+_MAX_UNCERTAINTY = 0.1
 """Uncertainty of the heading after a long time without acceleration, s^3/m^2. Fixes correct the
 heading at the rate uncertainty * acceleration^2, 1/s, and reduce the uncertainty, as in a Kalman
 filter."""
@@ -52,7 +52,7 @@ class NavigationFilter:
         self._config = config
         self._period = config.fix_period_ms * 1e-3
         self._gains = (config.position_gains, config.velocity_gains, config.acceleration_gains)
-        self._decay = exp(-self._period / config.noise_time_s)
+        self._noise_decay = exp(-self._period / config.noise_time_s)
         self._yaw_decay = exp(-self._period / config.yaw_time_s)
         self.constants = ErrorConstants(
             config.acceleration_lead_ms * 1e-3,
@@ -62,7 +62,7 @@ class NavigationFilter:
             config.predictor_ms,
             config.heading_predictor_ms,
         )
-        self._uncertainty = _LARGEST_UNCERTAINTY
+        self._uncertainty = _MAX_UNCERTAINTY
         self._random = Random(f"{seed}/navigation")
         self._height_random = Random(f"{seed}/height")
         self._slip_phase = Random(f"{seed}/slip").random()
@@ -99,21 +99,21 @@ class NavigationFilter:
         acceleration = complex(fused[13], fused[14])
         errors = propagated_horizontal_errors(constants, state, fused, elapsed)
         noise = self._next_noise(state.horizontal.noise, 1.0)
-        phase = (fused_at / config.fix_slip_time_s + self._slip_phase) % 1.0
-        slip = config.fix_slip_ms * (0.5 - phase)
-        position_late = (config.position_late_ms + slip) * 1e-3 + constants.lead_time
-        velocity_late = (config.velocity_late_ms + slip) * 1e-3 + constants.lead_time
-        fix_errors = noise[0] - position_late * velocity, noise[1] - velocity_late * acceleration
+        slip_phase = (fused_at / config.fix_slip_time_s + self._slip_phase) % 1.0
+        slip_ms = config.fix_slip_ms * (0.5 - slip_phase)
+        position_delay = (config.position_late_ms + slip_ms) * 1e-3 + constants.lead_time
+        velocity_delay = (config.velocity_late_ms + slip_ms) * 1e-3 + constants.lead_time
+        fix_errors = noise[0] - position_delay * velocity, noise[1] - velocity_delay * acceleration
         tilt_noise = GRAVITY * radians(config.tilt_noise_deg) * sqrt(elapsed)
         horizontal = self._corrected_state(errors, fix_errors, noise, tilt_noise)
-        share = config.vertical_share
-        noise = self._next_noise(state.vertical.noise, share)
+        ratio = config.vertical_share
+        noise = self._next_noise(state.vertical.noise, ratio)
         errors = propagated_vertical_errors(constants, state, fused, elapsed)
-        vertical = self._corrected_state(errors, noise, noise, share * tilt_noise)
+        vertical = self._corrected_state(errors, noise, noise, ratio * tilt_noise)
         noiseless_yaw = self._noiseless_yaw(velocity, acceleration, elapsed)
         yaw = self._next_yaw_noise() + noiseless_yaw
-        pending_yaw_part = pending_correction_share(constants.heading_predictor_ms, state, now)
-        pending_yaw = pending_yaw_part * state.pending_yaw + yaw - state.yaw
+        yaw_fraction = pending_correction_fraction(constants.heading_predictor_ms, state, now)
+        pending_yaw = yaw_fraction * state.pending_yaw + yaw - state.yaw
         height_noise = self._next_height_noise(elapsed)
         down_error, sink_error = self._next_slow_errors(abs(acceleration), height_noise, elapsed)
         corrected = FilterState(
@@ -136,20 +136,20 @@ class NavigationFilter:
         """Return the corrected state with pending corrections that keep the output as it was."""
         constants, state, now = self.constants, self.state, corrected.corrected_at
         since_last_fix, since_this_fix = now - state.fused_at, now - corrected.fused_at
-        pending_part = pending_correction_share(constants.predictor_ms, state, now)
+        pending_fraction = pending_correction_fraction(constants.predictor_ms, state, now)
         horizontal = _with_pending(
             state.horizontal,
             corrected.horizontal,
             propagated_horizontal_errors(constants, state, truth, since_last_fix),
             propagated_horizontal_errors(constants, corrected, truth, since_this_fix),
-            pending_part,
+            pending_fraction,
         )
         vertical = _with_pending(
             state.vertical,
             corrected.vertical,
             propagated_vertical_errors(constants, state, truth, since_last_fix),
             propagated_vertical_errors(constants, corrected, truth, since_this_fix),
-            pending_part,
+            pending_fraction,
         )
         return corrected._replace(horizontal=horizontal, vertical=vertical)
 
@@ -175,7 +175,7 @@ class NavigationFilter:
         numerator -= fix_correction_rate * turn_rate * config.turn_yaw_ms * 1e-3
         steady_error = numerator / total_rate
         uncertainty = self._uncertainty / (1.0 + fix_correction_rate * elapsed)
-        self._uncertainty = min(uncertainty + _UNCERTAINTY_GROWTH * elapsed, _LARGEST_UNCERTAINTY)
+        self._uncertainty = min(uncertainty + _UNCERTAINTY_GROWTH * elapsed, _MAX_UNCERTAINTY)
         return steady_error + (self.state.noiseless_yaw - steady_error) * exp(-total_rate * elapsed)
 
     def _next_slow_errors(
@@ -185,8 +185,8 @@ class NavigationFilter:
         config, down, sink = self._config, self.state.down_error, self.state.sink_error
         down_error = config.height_sag_s4_per_m * acceleration**2 + height_noise
         sink_error = config.sink_per_acceleration_ms * 1e-3 * acceleration
-        share = 1.0 - exp(-elapsed / _SLOW_ERROR_TIME_S)
-        return down + share * (down_error - down), sink + share * (sink_error - sink)
+        fraction = 1.0 - exp(-elapsed / _SLOW_ERROR_TIME_S)
+        return down + fraction * (down_error - down), sink + fraction * (sink_error - sink)
 
     def _next_height_noise(self, elapsed: float) -> float:
         """Return the slow noise of the height at the next fix, m."""
@@ -196,7 +196,7 @@ class NavigationFilter:
 
     def _next_noise(self, noise: tuple[complex, complex], ratio: float) -> tuple[complex, complex]:
         """Return the noise of the next fix: the configured noise times `ratio`."""
-        decay = self._decay
+        decay = self._noise_decay
         position, velocity = self._draw_noise(ratio * sqrt(1.0 - decay * decay))
         return decay * noise[0] + position, decay * noise[1] + velocity
 
@@ -233,7 +233,7 @@ class NavigationFilter:
 
 
 def _with_pending(
-    before: ErrorState, corrected: ErrorState, old: Errors, new: Errors, share: float
+    before: ErrorState, corrected: ErrorState, old: Errors, new: Errors, fraction: float
 ) -> ErrorState:
     """Return the corrected errors with pending corrections that keep the output continuous.
 
@@ -242,9 +242,9 @@ def _with_pending(
         corrected: the errors after the fix.
         old: `before`, propagated from its own fix to the present.
         new: `corrected`, propagated from its fix to the present.
-        share: share of the pending corrections of `before` that the output does not yet contain.
+        fraction: fraction of the pending corrections of `before` that the output still lacks.
     """
     position, velocity = before.pending
     return corrected._replace(
-        pending=(share * position + new[0] - old[0], share * velocity + new[1] - old[1])
+        pending=(fraction * position + new[0] - old[0], fraction * velocity + new[1] - old[1])
     )

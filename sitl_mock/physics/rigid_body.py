@@ -91,7 +91,7 @@ def derivative(motion: Motion, load: Load, body: Body) -> Motion:
     )
 
 
-def _after(motion: Motion, slope: Motion, dt: float) -> Motion:
+def _motion_after(motion: Motion, slope: Motion, dt: float) -> Motion:
     """Return the motion `dt` seconds later if its derivative were constant."""
     vn, ve, vd, w, x, y, z, p, q, r = motion
     a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = slope
@@ -118,9 +118,9 @@ def advance(motion: Motion, load: Load, body: Body, dt: float) -> tuple[Motion, 
         v dt + (k1 + k2 + k3) dt^2 / 6.
     """
     k1 = derivative(motion, load, body)
-    k2 = derivative(_after(motion, k1, 0.5 * dt), load, body)
-    k3 = derivative(_after(motion, k2, 0.5 * dt), load, body)
-    k4 = derivative(_after(motion, k3, dt), load, body)
+    k2 = derivative(_motion_after(motion, k1, 0.5 * dt), load, body)
+    k3 = derivative(_motion_after(motion, k2, 0.5 * dt), load, body)
+    k4 = derivative(_motion_after(motion, k3, dt), load, body)
     vn, ve, vd, w, x, y, z, p, q, r = motion
     a0, a1, a2, a3, a4, a5, a6, a7, a8, a9 = k1
     b0, b1, b2, b3, b4, b5, b6, b7, b8, b9 = k2

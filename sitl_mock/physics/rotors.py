@@ -82,9 +82,9 @@ class RotorConstants(NamedTuple):
 
 def rotor_constants(airframe: AirframeConfig, dt: float) -> RotorConstants:
     """Return the constants of an airframe's rotors for steps of `dt` seconds."""
-    per_rotor = airframe.mass_kg / 4.0
-    slope = airframe.thrust_slope_m_s2 * per_rotor
-    offset = airframe.thrust_offset_m_s2 * per_rotor
+    mass_per_rotor = airframe.mass_kg / 4.0
+    slope = airframe.thrust_slope_m_s2 * mass_per_rotor
+    offset = airframe.thrust_offset_m_s2 * mass_per_rotor
     return RotorConstants(
         slope,
         offset,

@@ -96,7 +96,7 @@ class Vehicle:
         self._slow_dt = self._slow_steps * dt
         self._wind = Wind(wind or WindConfig(), self._slow_dt, seed)
         self._battery = Battery(battery or BatteryConfig(), airframe)
-        body, stopped = at_rest(from_yaw(heading)), initial_actuation(self._multirotor, 0.0)
+        body, actuation = at_rest(from_yaw(heading)), initial_actuation(self._multirotor, 0.0)
         self.estimator = Estimator(
             sensors or SensorConfig(),
             truth_row(body, ZERO),
@@ -107,7 +107,7 @@ class Vehicle:
         )
         self.plant = plant(
             VehicleConstants(self._multirotor, ground_constants(airframe, dt)),
-            VehicleState(0, body, stopped, ZERO, True, False, nan),
+            VehicleState(0, body, actuation, ZERO, True, False, nan),
             self.estimator.history_length,
         )
 

@@ -11,7 +11,7 @@ from sitl_mock.px4.modes import PILOTED_MODES
 
 UNARMABLE_MODES = frozenset({Mode.RTL, Mode.LAND})
 """Modes in which PX4 cannot be armed. When PX4 disarms, it does not return to these modes."""
-PREFLIGHT_MARGIN_US = 1_000_000
+PREFLIGHT_DISARM_MARGIN_US = 1_000_000
 """Delay beyond COM_DISARM_PRFLT after which an armed vehicle that has not taken off disarms, us
 (measured: 11 s with COM_DISARM_PRFLT = 10 s)."""
 
@@ -97,5 +97,5 @@ class AutoDisarm:
             delay_s = parameters["COM_DISARM_LAND"]
             return EventKind.DISARMED_BY_LANDING if 0 < delay_s * 1e6 <= time_on_ground_us else None
         delay_s = parameters["COM_DISARM_PRFLT"]
-        is_overdue = time_on_ground_us >= delay_s * 1e6 + PREFLIGHT_MARGIN_US
+        is_overdue = time_on_ground_us >= delay_s * 1e6 + PREFLIGHT_DISARM_MARGIN_US
         return EventKind.DISARMED_ON_GROUND if delay_s > 0 and is_overdue else None

@@ -22,10 +22,10 @@ from sitl_mock.px4.health import HealthReport
 from sitl_mock.px4.mode_control import Px4ModeControl
 from sitl_mock.px4.modes import MODES_BY_COMMAND
 from sitl_mock.px4.parameters import PX4_PARAMETERS
-from sitl_mock.px4.streams import SLOT_US, Px4Streams
+from sitl_mock.px4.streams import SLOT_PERIOD_US, Px4Streams
 from sitl_mock.px4.system_telemetry import Px4SystemTelemetry
 
-POSITION_VALID_SHARE = 0.7
+POSITION_VALID_FRACTION = 0.7
 """Share of ``prearm_delay_s`` after which the position becomes valid (recorded: 3.2 s)."""
 LANDED_AFTER_US = 1_100_000
 """Time of ground contact with low thrust after which the vehicle has landed, us (measured)."""
@@ -81,7 +81,7 @@ class Px4:
     """The `Autopilot` PX4."""
 
     boot_mode = Mode.LOITER
-    any_component = False
+    accepts_any_component = False
     system_id_parameter = "MAV_SYS_ID"
     unsigned_links: Collection[str] = ()
     parameters = PX4_PARAMETERS
@@ -99,7 +99,7 @@ class Px4:
 
     def slot_period_us(self, settings: VehicleSettings) -> int:
         """Return the slot period at the configured inner loop rate, us."""
-        return SLOT_US[settings.inner_loop_hz]
+        return SLOT_PERIOD_US[settings.inner_loop_hz]
 
     def streams(self, link: str, settings: VehicleSettings) -> StreamSchedule:
         """Return the stream schedule of a link, with the rates recorded on this link."""
@@ -147,6 +147,6 @@ class Px4:
                 "MANUAL_CONTROL": commander.receive_manual_control,
                 "REQUEST_EVENT": events.answer_request,
             },
-            position_valid_from_us=POSITION_VALID_SHARE * parts.ready_us,
+            position_valid_from_us=POSITION_VALID_FRACTION * parts.ready_us,
             position_timeout_us=lambda: parameters["EKF2_NOAID_TOUT"],
         )

@@ -209,9 +209,9 @@ class Px4Commander:
         status = (state.armed, state.mode, state.intended_mode, state.failsafe)
         if (
             status != self._published_status
-            or state.time_us - state.status_at_us >= STATUS_PERIOD_US
+            or state.time_us - state.status_published_us >= STATUS_PERIOD_US
         ):
-            self._published_status, state.status_at_us = status, state.time_us
+            self._published_status, state.status_published_us = status, state.time_us
 
     def _can_run(self, mode: Mode) -> bool:
         if mode is Mode.OFFBOARD:

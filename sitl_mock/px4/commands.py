@@ -18,7 +18,7 @@ _PROTOCOL_VERSION_ID = 300
 _PROTOCOL_VERSION_CRC = 217
 _PROTOCOL_VERSION = bytes((200, 0, 100, 0, 200, 0)) + bytes(16)
 """Payload of PROTOCOL_VERSION: version 200, smallest 100, largest 200, no hashes."""
-_CHANGE_MODE = 1
+_CHANGE_MODE_FLAG = 1
 """Flag in param2 of DO_REPOSITION: change to LOITER if in another mode."""
 
 
@@ -76,7 +76,7 @@ class Px4Commands(Commands):
 
     def _reposition(self, command: Command, _: Link) -> int:
         flags = command.parameters[1]
-        mode_change_requested = isfinite(flags) and int(flags) & _CHANGE_MODE
+        mode_change_requested = isfinite(flags) and int(flags) & _CHANGE_MODE_FLAG
         if not mode_change_requested and self._state.mode is not Mode.LOITER:
             return TEMPORARILY_REJECTED
         return self._px4_commander.request_mode(Mode.LOITER, hold_position=self._position(command))

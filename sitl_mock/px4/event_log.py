@@ -23,9 +23,9 @@ _MAX_KEPT_EVENTS = 20
 """Number of events that can be requested again."""
 _SEQUENCE_PERIOD_US = 3_000_000
 """Period of CURRENT_EVENT_SEQUENCE."""
-_SEQUENCE_RESET = 1
+_SEQUENCE_RESET_FLAG = 1
 """Value of MAV_EVENT_CURRENT_SEQUENCE_FLAGS before the first event: the sequence restarts."""
-_UNAVAILABLE = 0
+_ERROR_UNAVAILABLE = 0
 """Value of MAV_EVENT_ERROR_REASON: the event is not available."""
 
 
@@ -68,7 +68,7 @@ class EventLog:
         is_first = not self._sent_events
         self._latest_sequence = (self._latest_sequence + 1) & 0xFFFF
         if is_first:
-            self._send_sequence(_SEQUENCE_RESET)
+            self._send_sequence(_SEQUENCE_RESET_FLAG)
         log_levels = (severity if internal_severity is None else internal_severity) << 4 | severity
         payload = EVENT.payload.pack(
             event_id,
@@ -86,7 +86,7 @@ class EventLog:
     def step(self) -> None:
         """Send the latest sequence number periodically, so that receivers notice lost events."""
         if self._state.time_us - self._sequence_sent_us >= _SEQUENCE_PERIOD_US:
-            self._send_sequence(0 if self._sent_events else _SEQUENCE_RESET)
+            self._send_sequence(0 if self._sent_events else _SEQUENCE_RESET_FLAG)
 
     def answer_request(self, request: Message, link: Link) -> None:
         """Answer a REQUEST_EVENT: resend each event, or refuse it with a reason.
@@ -99,8 +99,8 @@ class EventLog:
             self._refuse(first, request, link)
             first = last - _MAX_KEPT_EVENTS + 1
         payloads = {sent.sequence: sent.payload for sent in self._sent_events}
-        for number in range(first, first + min(count, _MAX_KEPT_EVENTS)):
-            sequence = number & 0xFFFF
+        for unwrapped_sequence in range(first, first + min(count, _MAX_KEPT_EVENTS)):
+            sequence = unwrapped_sequence & 0xFFFF
             if sequence in payloads:
                 _send(link, EVENT, payloads[sequence])
             else:
@@ -114,7 +114,11 @@ class EventLog:
             default=self._latest_sequence,
         )
         payload = RESPONSE_EVENT_ERROR.payload.pack(
-            sequence, oldest, request.get_srcSystem(), request.get_srcComponent(), _UNAVAILABLE
+            sequence,
+            oldest,
+            request.get_srcSystem(),
+            request.get_srcComponent(),
+            _ERROR_UNAVAILABLE,
         )
         _send(link, RESPONSE_EVENT_ERROR, payload)
 
@@ -152,6 +156,6 @@ class Announcer:
                 arguments or event.arguments,
             )
         for link in self._links:
-            if link.gcs_heard:
+            if link.gcs_has_sent:
                 link.send_text(event.text.format(detail), event.severity, self._text_id)
         self._text_id = (self._text_id + 1) & 0xFFFF

@@ -20,7 +20,7 @@ from sitl_mock.px4.modes import PILOTED_MODES, POSITION_MODES, custom_mode
 
 _NO_MANUAL_CONTROL = 4
 """Value of COM_RC_IN_MODE: no manual control."""
-_EXCEPT_AUTO, _EXCEPT_OFFBOARD = 2, 4
+_EXCEPT_AUTO_BIT, _EXCEPT_OFFBOARD_BIT = 2, 4
 """Bits of COM_RCL_EXCEPT and COM_DLL_EXCEPT that exempt automatic modes and OFFBOARD."""
 _GCS_MARGIN_US = 2_000_000
 """Delay beyond COM_DL_LOSS_T after which the ground station counts as lost, us (measured)."""
@@ -28,7 +28,7 @@ _ACTED_ALREADY = -1
 """Value that replaces the time of a loss once its failsafe has acted, so that it acts only once."""
 _COMPANION_MARGIN_US = 1_500_000
 """Delay beyond COM_OBC_LOSS_T after which the companion counts as lost, us (measured)."""
-_WARNINGS = {
+_BATTERY_EVENTS = {
     BatteryWarning.LOW: EventKind.BATTERY_LOW,
     BatteryWarning.CRITICAL: EventKind.BATTERY_CRITICAL,
     BatteryWarning.EMERGENCY: EventKind.BATTERY_EMERGENCY,
@@ -96,11 +96,11 @@ class Failsafe:
 
     def _is_exempt(self, parameter: str) -> bool:
         """Whether a parameter exempts the intended mode from a failsafe."""
-        bits = int(self._parameters[parameter])
+        exception_bits = int(self._parameters[parameter])
         mode = self._state.intended_mode
         if mode is Mode.OFFBOARD:
-            return bool(bits & _EXCEPT_OFFBOARD)
-        return mode in _AUTO_MODES and bool(bits & _EXCEPT_AUTO)
+            return bool(exception_bits & _EXCEPT_OFFBOARD_BIT)
+        return mode in _AUTO_MODES and bool(exception_bits & _EXCEPT_AUTO_BIT)
 
     def _watch_pilot(self, *, pilot_present: bool) -> None:
         """Detect the loss of sticks that were present, or that the mode needs."""
@@ -143,11 +143,11 @@ class Failsafe:
     def _warn_disarmed(self, *, offboard_alive: bool) -> None:
         """Warn, and do no more, if disarmed in OFFBOARD without setpoints (recorded)."""
         state = self._state
-        lost = not state.armed and state.mode is Mode.OFFBOARD and not offboard_alive
-        if lost and not self._disarmed_warning_sent:
+        offboard_lost = not state.armed and state.mode is Mode.OFFBOARD and not offboard_alive
+        if offboard_lost and not self._disarmed_warning_sent:
             mode = custom_mode(state.mode).to_bytes(4, "little")
             self._announce(EventKind.FAILSAFE_WARNING, "", mode)
-        self._disarmed_warning_sent = lost
+        self._disarmed_warning_sent = offboard_lost
 
     def _watch_gcs(self) -> None:
         state = self._state
@@ -193,9 +193,9 @@ class Failsafe:
         state.battery_warning = warning
         if not is_worse:
             return
-        self._announce(_WARNINGS[warning], "")
+        self._announce(_BATTERY_EVENTS[warning], "")
         action = int(parameters["COM_LOW_BAT_ACT"])
         if not state.armed or action not in (2, 3) or warning < BatteryWarning.CRITICAL:
             return
-        lands = action == 2 or warning is BatteryWarning.EMERGENCY
-        self._actions.act(Cause.BATTERY, LAND if lands else RETURN)
+        must_land = action == 2 or warning is BatteryWarning.EMERGENCY
+        self._actions.act(Cause.BATTERY, LAND if must_land else RETURN)

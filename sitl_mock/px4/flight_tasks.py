@@ -100,7 +100,7 @@ class FlightTasks:
         parameters, state = self._parameters, self._state
         speed = parameters["MPC_TKO_SPEED"]
         x, y, _ = self._hold_position
-        if not state.contact:
+        if not state.ground_contact:
             target = (x, y, self._takeoff_z)
             return PositionDemand(target, NAN_VECTOR, yaw=self.yaw, max_up_speed=speed)
         # On the ground the climb rate ramps up from the value at which the thrust is zero.

@@ -12,7 +12,7 @@ from sitl_mock.autopilot.state import State
 from sitl_mock.px4.event_log import EventLog
 from sitl_mock.px4.events import event_id
 
-_CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL = 2, 3, 4, 6, 8
+_CRITICAL, _ERROR, _WARNING, _INFO, _PROTOCOL_SEVERITY = 2, 3, 4, 6, 8
 """MAV_SEVERITY; 8 = for programs only."""
 
 _ALL_MODES = 0xFFFFFFFF
@@ -87,7 +87,7 @@ class HealthReport:
         if state.time_us - self._last_report_us < _PERIOD_US:
             return
         gcs_check = None if gcs_alive else _GCS_REQUIRED if gcs_required else _NO_GCS
-        candidates = (
+        possible_checks = (
             _HEADING if state.time_us < self._ready_us // 2 else None,
             None if offboard_alive else _OFFBOARD,
             _ATTITUDE if state.time_us < self._ready_us // 2 else None,
@@ -97,7 +97,7 @@ class HealthReport:
             None if pilot_present else _NO_PILOT,
             gcs_check,
         )
-        failing_checks = tuple(check for check in candidates if check is not None)
+        failing_checks = tuple(check for check in possible_checks if check is not None)
         gps_present = state.gps_ok and state.position_valid
         components_present = (
             _SENSORS_PRESENT
@@ -123,7 +123,7 @@ class HealthReport:
             0, _components(errors), _components(warnings), armable_modes, armable_modes
         )
         send = self._events.send
-        send(event_id("commander_arming_check_summary"), _PROTOCOL, arguments=summary)
+        send(event_id("commander_arming_check_summary"), _PROTOCOL_SEVERITY, arguments=summary)
         for check in failing_checks:
             send(
                 check.event_id,
@@ -131,7 +131,7 @@ class HealthReport:
                 arguments=_FAILURE_LAYOUT.pack(check.modes, check.health_component),
             )
         health = _HEALTH_LAYOUT.pack(0, components_present, 0, 0)
-        send(event_id("commander_health_summary"), _PROTOCOL, arguments=health)
+        send(event_id("commander_health_summary"), _PROTOCOL_SEVERITY, arguments=health)
 
 
 def _components(checks: Iterable[_Check]) -> int:

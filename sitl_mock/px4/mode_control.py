@@ -39,7 +39,7 @@ class Px4ModeControl:
         self._tasks = FlightTasks(state, parameters)
         self._position_controller = PositionController(lambda: position_gains(parameters))
         self._last_thrust = 0.0
-        self._unusable_since_us: int | None = None
+        self._attitude_unusable_since_us: int | None = None
         self._attitude_failed = False
 
     def enter(
@@ -79,7 +79,7 @@ class Px4ModeControl:
             hover_thrust = float(self._parameters["MPC_THR_HOVER"])
             command = self._attitude_command(from_yaw(self._tasks.yaw), 0.0, hover_thrust)
         else:
-            if state.mode is Mode.TAKEOFF and state.contact:
+            if state.mode is Mode.TAKEOFF and state.ground_contact:
                 self._position_controller.reset()
             command = self._follow(self._tasks.demand(), dt)
         self._last_thrust = command.thrust
@@ -90,7 +90,7 @@ class Px4ModeControl:
 
     def _follow(self, demand: PositionDemand, dt: float) -> ActuatorCommand:
         state = self._state
-        if self._tasks.landing and state.contact:
+        if self._tasks.landing and state.ground_contact:
             thrust = max(0.0, self._last_thrust - TOUCHDOWN_THRUST_RATE * dt)
             return self._attitude_command(from_yaw(self._tasks.yaw), 0.0, thrust)
         estimate = state.estimate
@@ -123,12 +123,12 @@ class Px4ModeControl:
     ) -> ActuatorCommand:
         now = self._state.time_us
         if is_usable_quaternion(target):
-            self._unusable_since_us = None
-        elif self._unusable_since_us is None:
-            self._unusable_since_us = now
-        elif now - self._unusable_since_us > ATTITUDE_FAILURE_DELAY_US:
+            self._attitude_unusable_since_us = None
+        elif self._attitude_unusable_since_us is None:
+            self._attitude_unusable_since_us = now
+        elif now - self._attitude_unusable_since_us > ATTITUDE_FAILURE_DELAY_US:
             self._attitude_failed = True
-        if self._attitude_failed or self._unusable_since_us is not None:
+        if self._attitude_failed or self._attitude_unusable_since_us is not None:
             return self._rate_command(NAN_VECTOR, thrust)
         self._state.attitude_target.q = target
         rates = attitude_rates(

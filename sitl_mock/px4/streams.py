@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from random import Random
 
-SLOT_US = {100: 10_000, 250: 4000, 800: 2500}
+SLOT_PERIOD_US = {100: 10_000, 250: 4000, 800: 2500}
 """Slot period in us of vehicle time by inner loop rate in Hz."""
 
 HEARTBEAT, LOCAL_POSITION_NED, CURRENT_MODE = 0, 32, 436
 
-MISS_PROBABILITY = 0.22
+SLOT_MISS_PROBABILITY = 0.22
 """Probability that a stream sent in one slot misses the next (250 Hz loop only; measured: 0.17 in
 one flight, 0.23 in another)."""
 
@@ -31,7 +31,7 @@ class _Stream:
     due_us: int
     sent_us: int | None = None
     """Vehicle time of the latest slot in which the message was sent, us."""
-    status_at_us: int = -1
+    status_published_us: int = -1
     """Vehicle time of the latest status published before the message was last sent, us."""
 
 
@@ -75,26 +75,28 @@ class Px4Streams:
         stream = self._streams.get(message_id)
         return -1 if stream is None else stream.interval_us
 
-    def due(self, slot_us: int, status_at_us: int = 0) -> list[int]:
+    def due(self, slot_us: int, status_published_us: int = 0) -> list[int]:
         """Return the ids of the messages due in the slot at ``slot_us``, and count them as sent.
 
         CURRENT_MODE is sent at most once per publication of the vehicle status, the latest of which
-        was at ``status_at_us`` (measured: 2 Hz of 20 Hz requested).
+        was at ``status_published_us`` (measured: 2 Hz of 20 Hz requested).
         """
         due_ids = []
         for stream in self._streams.values():
-            late_us = slot_us - stream.due_us
-            if late_us < 0:
+            lateness_us = slot_us - stream.due_us
+            if lateness_us < 0:
                 continue
             message_id = stream.message_id
-            nothing_new = message_id == CURRENT_MODE and stream.status_at_us == status_at_us
-            if nothing_new or self._misses_slot(stream, slot_us):
+            is_same_status = stream.status_published_us == status_published_us
+            if (message_id == CURRENT_MODE and is_same_status) or self._misses_slot(
+                stream, slot_us
+            ):
                 continue
             # Keep the phase while the stream is nearly on time, else restart it.
-            nearly_on_time = 2 * late_us < stream.interval_us
+            nearly_on_time = 2 * lateness_us < stream.interval_us
             stream.due_us = (stream.due_us if nearly_on_time else slot_us) + stream.interval_us
             stream.sent_us = slot_us
-            stream.status_at_us = status_at_us
+            stream.status_published_us = status_published_us
             due_ids.append(message_id)
         self._last_slot_us = slot_us
         return due_ids
@@ -106,4 +108,4 @@ class Px4Streams:
         if slot_us % VALUE_PERIOD_US.get(stream.message_id, 1):
             return True
         sent_in_last_slot = stream.sent_us is not None and stream.sent_us == self._last_slot_us
-        return sent_in_last_slot and self._random.random() < MISS_PROBABILITY
+        return sent_in_last_slot and self._random.random() < SLOT_MISS_PROBABILITY

@@ -113,13 +113,13 @@ class Px4SystemTelemetry(SystemTelemetry):
         """Return ESTIMATOR_STATUS with the recorded flags and typical ratios."""
         state = self._state
         if not state.position_valid:
-            ratios = (nan, nan, 0.004, 0.05, nan, nan, 14.0, 1.25)
+            test_ratios = (nan, nan, 0.004, 0.05, nan, nan, 14.0, 1.25)
             return dialect.MAVLink_estimator_status_message(
-                state.stamp_us, _ESTIMATOR_NO_POSITION, *ratios
+                state.stamp_us, _ESTIMATOR_NO_POSITION, *test_ratios
             )
         flags = _ESTIMATOR_ON_GROUND if state.landed else _ESTIMATOR_IN_AIR
-        ratios = (0.015, 0.008, 0.004, 0.08, 0.001, nan, 0.295, 0.275)
-        return dialect.MAVLink_estimator_status_message(state.stamp_us, flags, *ratios)
+        test_ratios = (0.015, 0.008, 0.004, 0.08, 0.001, nan, 0.295, 0.275)
+        return dialect.MAVLink_estimator_status_message(state.stamp_us, flags, *test_ratios)
 
     def ping(self) -> Message:
         """Return a PING request, with a new sequence number."""
