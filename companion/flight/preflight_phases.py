@@ -137,10 +137,10 @@ async def _arm(context: FlightContext) -> None:
     )
     await context.until(lambda: in_role(context.link, Role.READY))
     await context.preflight.require(Stage.GROUND)
-    armings = state.armings
+    arming_count = state.arming_count
 
     def armed() -> bool:
-        if state.armings > armings and not context.armed():
+        if state.arming_count > arming_count and not context.armed():
             raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
         return context.armed()
 

@@ -73,7 +73,9 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
     survey = evidence.survey
     lossy = survey.lossy or evidence.link.loss > TOLERABLE_LOSS
     rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]
-    unread_rules = [rule for rule in rules if rule.universal and _may_exist_unread(rule, survey)]
+    unread_rules = [
+        rule for rule in rules if rule.in_all_versions and _may_exist_unread(rule, survey)
+    ]
     missing_names = [rule.name for rule in unread_rules]
     if lossy:
         for rule in unread_rules:
@@ -102,9 +104,9 @@ def _may_exist_unread(rule: ParameterRule, survey: Survey) -> bool:
 def _finding(result: ParameterFinding, name: str) -> Finding:
     change, fix = None, ""
     if result.set_to is not None:
-        change = ParameterChange(name, result.value, result.set_to, result.rule.reboot)
+        change = ParameterChange(name, result.value, result.set_to, result.rule.needs_reboot)
         fix = f"set {name} to {result.set_to:g}"
-        if result.rule.reboot:
+        if result.rule.needs_reboot:
             fix += " and restart the autopilot"
     return Finding(
         result.rule.name,

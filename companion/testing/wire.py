@@ -43,7 +43,7 @@ class MemoryTransport:
             self._received_in_period = (
                 receiver.receive(datagram, received_ns) or self._received_in_period
             )
-        elif receiver.claim(datagram, received_ns, _SENDER_NAME) or receiver.may_prove_date(
+        elif receiver.claim(datagram, received_ns, _SENDER_NAME) or receiver.needs_timesync_with(
             _SENDER_NAME
         ):
             self._connected = self._received_in_period = True

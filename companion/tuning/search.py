@@ -26,15 +26,15 @@ class Aims:
     """Smallest gain margin, dB."""
     phase_deg: float = 31.0
     """Smallest phase margin, degrees."""
-    mismatch: float = 1.3
+    mismatch_factor: float = 1.3
     """Factor by which real lag and dead time may be larger or smaller than configured."""
     mismatch_gain_db: float = 3.0
-    """Smallest gain margin when lag and dead time differ by the factor `mismatch`, dB. While the
-    rate loop is at its slew limit, half of both `mismatch` margins is enough."""
+    """Smallest gain margin when lag and dead time differ by `mismatch_factor`, dB. While the rate
+    loop is at its slew limit, half of both `mismatch_` margins is enough."""
     mismatch_phase_deg: float = 15.0
-    """Smallest phase margin when lag and dead time differ by the factor `mismatch`, degrees."""
-    rate_share: float = 1.0
-    """Largest share of the rate limit that three standard deviations of the commanded roll-pitch
+    """Smallest phase margin when lag and dead time differ by `mismatch_factor`, degrees."""
+    rate_fraction: float = 1.0
+    """Largest fraction of the rate limit that three standard deviations of the commanded roll-pitch
     rate may be."""
 
 
@@ -174,10 +174,8 @@ def _cost(
     loop = loop_for(EXACT)
     expected_error = expected_errors(loop, disturbances, 1.0 / config.link.position_rate_hz)
     shortfall = _shortfall(loop_margins(loop), aims.gain_db, aims.phase_deg)
-    shortfall += max(
-        0.0,
-        3.0 * expected_error.commanded_rate / (aims.rate_share * config.limits.max_tilt_rate) - 1.0,
-    )
+    max_rate = aims.rate_fraction * config.limits.max_tilt_rate
+    shortfall += max(0.0, 3.0 * expected_error.commanded_rate / max_rate - 1.0)
     cost = log(expected_error.position) + _COST_OF_MISSED_AIM * shortfall
     for mismatch in tolerated_mismatches(candidate, aims):
         if cost >= stop_at:
@@ -191,7 +189,8 @@ def _cost(
 
 def tolerated_mismatches(config: Config, aims: Aims) -> list[ModelMismatch]:
     """Model errors that must leave a margin: wrong lag and dead time; delay by the slew limit."""
-    mismatches = [ModelMismatch(time_factor=each) for each in (aims.mismatch, 1.0 / aims.mismatch)]
+    factor = aims.mismatch_factor
+    mismatches = [ModelMismatch(time_factor=each) for each in (factor, 1.0 / factor)]
     delay = slewing_delay(config)
     return [*mismatches, ModelMismatch(delay=delay)] if delay > 0.0 else mismatches
 

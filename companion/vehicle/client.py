@@ -166,8 +166,8 @@ class VehicleClient:
             CommandTimeout: the autopilot did not answer a request.
             LinkLost: the connection dropped while waiting.
         """
-        step_us = self.autopilot.interval_step_us
-        return await set_rates(self._commands, self.stats, rates, window_s, step_us)
+        interval_step_us = self.autopilot.interval_step_us
+        return await set_rates(self._commands, self.stats, rates, window_s, interval_step_us)
 
     async def measure_rates(self, names: Iterable[str], window_s: float) -> dict[str, float]:
         """Rates in Hz at which messages arrive, counted over `window_s`.

@@ -114,8 +114,8 @@ class VehicleClock:
             max_offset, lateness = offset, 0.0
         self._max_offset, self._last_arrival = max_offset, received
         self._newest_time, self._lateness = time, lateness
-        if received >= self.rate.note_due:
-            self.rate.note(received, max_offset)
+        if received >= self.rate.next_offset_due:
+            self.rate.add_offset(received, max_offset)
         return SampleTiming(time, lateness + self.delay.seconds)
 
     def take_timesync(self, sent: float, received: float, vehicle_ns: int) -> None:

@@ -19,7 +19,7 @@ _MAX_OFFSET_RISE = 0.005
 measurement of the rate then restarts. Otherwise a backlog of 68 ms at the start (measured on PX4)
 would give a rate of 1.4 %, and samples would seem up to 79 ms old for 40 s.
 """
-_SAMPLING_PERIOD = 1.0
+_OFFSET_PERIOD = 1.0
 """Time between two offsets that are noted to measure the rate, s."""
 _MIN_WINDOW, _MAX_WINDOW = 5, 20
 """Shortest and longest time over which a rate is measured, s."""
@@ -41,21 +41,21 @@ class ClockRate:
     Attributes:
         rate: rate of the vehicle's clock minus that of the loop's clock, s per s.
         lowest_rate: the lowest rate that is possible now, s per s.
-        note_due: event-loop time at which the next offset should be noted, s.
+        next_offset_due: event-loop time at which the next offset should be noted, s.
     """
 
     def __init__(self, *, same_clock: bool) -> None:
         self.rate = 0.0
-        self.note_due = inf if same_clock else -inf
+        self.next_offset_due = inf if same_clock else -inf
         self._rate_error = 0.0 if same_clock else MAX_DRIFT
         self.lowest_rate = -self._rate_error
-        self._noted_offsets: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
+        self._offsets: deque[tuple[float, float]] = deque(maxlen=_MAX_WINDOW + 1)
 
     def spread(self, seconds: float) -> float:
         """Difference between the fastest and the slowest possible clock after `seconds`, s."""
         return 2.0 * self._rate_error * seconds
 
-    def note(self, now: float, offset: float) -> None:
+    def add_offset(self, now: float, offset: float) -> None:
         """Take the quickest sample's offset (vehicle time minus event-loop time) once a second.
 
         Two offsets far apart suffice for the rate, because each is from the quickest sample.
@@ -64,19 +64,19 @@ class ClockRate:
             now: event-loop time, s.
             offset: the offset, s.
         """
-        if self._noted_offsets:
-            noted_at, noted_offset = self._noted_offsets[-1]
-            if offset - noted_offset > MAX_DRIFT * (now - noted_at) + _MAX_OFFSET_RISE:
-                self._noted_offsets.clear()  # the noted offsets are of late samples
+        if self._offsets:
+            earlier_time, earlier_offset = self._offsets[-1]
+            if offset - earlier_offset > MAX_DRIFT * (now - earlier_time) + _MAX_OFFSET_RISE:
+                self._offsets.clear()  # the noted offsets are of late samples
                 self.rate, self._rate_error = 0.0, MAX_DRIFT
                 self.lowest_rate = -MAX_DRIFT
-        self.note_due = now + _SAMPLING_PERIOD
-        self._noted_offsets.append((now, offset))
-        noted_at, noted_offset = self._noted_offsets[0]
-        if now - noted_at < _MIN_WINDOW * _SAMPLING_PERIOD:
+        self.next_offset_due = now + _OFFSET_PERIOD
+        self._offsets.append((now, offset))
+        earlier_time, earlier_offset = self._offsets[0]
+        if now - earlier_time < _MIN_WINDOW * _OFFSET_PERIOD:
             return
         self._rate_error = _RATE_UNCERTAINTY
-        slope = (offset - noted_offset) / (now - noted_at)
+        slope = (offset - earlier_offset) / (now - earlier_time)
         self.rate = max(-MAX_DRIFT, min(MAX_DRIFT, slope))
         self.lowest_rate = self.rate - self._rate_error
 

@@ -63,7 +63,7 @@ class Inbox:
         self._loop = asyncio.get_running_loop()
         self._filter = FrameFilter(settings, stats, notice)
         self._counter = FrameCounter(stats)
-        # The sender that becomes the peer with the next accepted frame; see `may_prove_date`.
+        # The sender that becomes the peer with the next accepted frame; see `needs_timesync_with`.
         self._peer_candidate: str | None = None
         self._peer_rule = PeerRule(
             stats,
@@ -124,7 +124,7 @@ class Inbox:
             self._dispatcher.report(error)
         return True
 
-    def may_prove_date(self, sender: str) -> bool:
+    def needs_timesync_with(self, sender: str) -> bool:
         """Whether to send frames to `sender`, so that TIMESYNC can prove its signing time stamps.
 
         See `Receiver`.

@@ -25,7 +25,7 @@ class ModeState:
         current_mode: the newest CURRENT_MODE; `mode` is from HEARTBEAT or CURRENT_MODE, the newer.
         heartbeat_is_newest: whether HEARTBEAT is newer than CURRENT_MODE; `armed` is then as new as
             `mode`.
-        armings: number of times that a heartbeat showed a newly armed vehicle.
+        arming_count: number of times that a heartbeat showed a newly armed vehicle.
         autopilot: how to command the vehicle; known from the first heartbeat of an autopilot that
             this program flies.
         unsupported_error: the error to raise if this program cannot fly the autopilot.
@@ -36,7 +36,7 @@ class ModeState:
         self.heartbeat: Heartbeat | None = None
         self.current_mode: CurrentMode | None = None
         self.heartbeat_is_newest = True
-        self.armings = 0
+        self.arming_count = 0
         self.autopilot: Autopilot | None = None
         self.unsupported_error: UnsupportedAutopilot | None = None
         self._base_mode = 0
@@ -90,7 +90,7 @@ class ModeState:
         elif message.autopilot != self.autopilot.mav_autopilot or message.type not in MULTIROTORS:
             return  # another component: the kind of an autopilot does not change
         armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
-        self.armings += armed and not self.armed
+        self.arming_count += armed and not self.armed
         mode = str(message.custom_mode)
         if self.autopilot is not None:
             mode = self.autopilot.mode_name(message.base_mode, message.custom_mode)

@@ -84,12 +84,12 @@ class ParameterRule:
     vital: bool = False
     """Whether the flight is refused if the vehicle does not send the parameter, because the effect
     of a setpoint, or how long the autopilot holds a setpoint, is then unknown."""
-    universal: bool = False
+    in_all_versions: bool = False
     """Whether every supported version has the parameter, and some of its values are unsafe. A
     parameter that the link lost may then have an unsafe value."""
     alternative: str = ""
     """Name of the parameter that other versions have instead; that parameter has its own rule."""
-    reboot: bool = False
+    needs_reboot: bool = False
     """Whether a change takes effect only after the autopilot restarts."""
 
     @property

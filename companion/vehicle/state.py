@@ -103,7 +103,7 @@ class VehicleState(ModeState, _NewestRecords):
 
     def forget(self) -> None:
         """Forget all but heartbeat, autopilot and texts; the rest may be of another vehicle."""
-        self.current_mode, self.armings = None, 0
+        self.current_mode, self.arming_count = None, 0
         _NewestRecords.__init__(self)
 
     @property

@@ -54,7 +54,7 @@ class _Requests:
         # (arrival of the answer, round trip)
         self._round_trips_ns: deque[tuple[int, int]] = deque(maxlen=_MAX_KEPT_REQUESTS)
 
-    def note_sent(self, sent_ns: int) -> None:
+    def add_sent(self, sent_ns: int) -> None:
         """Remember the request sent at `sent_ns`; its answer will contain this time."""
         self._unanswered_ns.append(sent_ns)
 
@@ -162,7 +162,7 @@ class TimeSync:
         )
 
     def _send_request(self, requests: _Requests, sent_ns: int) -> None:
-        requests.note_sent(sent_ns)
+        requests.add_sent(sent_ns)
         self._outbox.send(dialect.MAVLink_timesync_message(tc1=0, ts1=sent_ns))
 
     def _on_timesync(self, message: Message) -> None:

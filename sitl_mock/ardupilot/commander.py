@@ -42,7 +42,7 @@ class ArduPilotCommander:
         notifier: Notifier,
         boot: Boot,
     ) -> None:
-        self.refusal: str | None = None
+        self.arming_refusal: str | None = None
         self.pilot_simulated = False
         self.failsafe = ArduPilotFailsafe(
             state, parameters, vehicle, notifier.announce, self._act_on_failsafe
@@ -201,7 +201,7 @@ class ArduPilotCommander:
             home_set=self._boot.home_set,
             crashed=self._crashed,
             gcs_failsafe=self.failsafe.gcs_lost,
-            refusal=self.refusal,
+            arming_refusal=self.arming_refusal,
         )
         return state.prearm_problem
 

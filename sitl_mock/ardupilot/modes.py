@@ -54,16 +54,16 @@ def arming_problem(
     home_set: bool,
     crashed: bool,
     gcs_failsafe: bool,
-    refusal: str | None,
+    arming_refusal: str | None,
 ) -> str | None:
     """Return why arming is refused now, in ArduCopter's words; None if it is allowed.
 
-    ``refusal`` is the reason of an active `RefuseArming` fault; ``initialised``: see `Boot`.
+    ``arming_refusal`` is the reason of an active `RefuseArming` fault; ``initialised``: see `Boot`.
     """
     mode: Mode = state.mode
     problems = (
         (not initialised, "System not initialised"),
-        (refusal is not None, refusal),
+        (arming_refusal is not None, arming_refusal),
         (crashed, "Vehicle has crashed"),
         (not home_set, "AHRS: waiting for home"),
         (mode in POSITION_MODES and not state.position_valid, "Need Position Estimate"),

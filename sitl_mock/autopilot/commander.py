@@ -19,7 +19,7 @@ FAILED = int(dialect.MAV_RESULT_FAILED)
 class Commander(Protocol):
     """Sets ``armed``, ``mode``, ``intended_mode`` and ``failsafe`` of the state."""
 
-    refusal: str | None
+    arming_refusal: str | None
     """Reason of an active `RefuseArming` fault, None without one."""
     pilot_simulated: bool
     """Whether a fault simulates a pilot at the sticks."""

@@ -177,7 +177,7 @@ class FaultEffects:
                 self._vehicle.estimator.shift(yaw=yaw_step, position_ned=fault.position_ned_m)
                 self._control.shift(yaw_step, fault.position_ned_m)
             case RefuseArming():
-                self._commander.refusal = fault.reason
+                self._commander.arming_refusal = fault.reason
             case LowBattery():
                 self._vehicle.set_battery_remaining(fault.remaining)
             case GpsLoss():
@@ -196,7 +196,7 @@ class FaultEffects:
             case PilotTakeover():
                 self._commander.pilot_simulated = False
             case RefuseArming():
-                self._commander.refusal = None
+                self._commander.arming_refusal = None
             case GpsLoss():
                 self._state.gps_ok = True
             case EstimatorReset() | LowBattery() | SlipClock():

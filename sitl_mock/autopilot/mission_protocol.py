@@ -94,10 +94,10 @@ class MissionProtocol:
 
     def _clear(self, message: Message, link: Link) -> None:
         clears_all = message.mission_type == dialect.MAV_MISSION_TYPE_ALL
-        cleared_types = _PLAN_TYPES if clears_all else self.plans.keys() & {message.mission_type}
-        for mission_type in cleared_types:
+        plan_types = _PLAN_TYPES if clears_all else self.plans.keys() & {message.mission_type}
+        for mission_type in plan_types:
             self.plans[mission_type] = []
-        result = _ACCEPTED if cleared_types else dialect.MAV_MISSION_UNSUPPORTED
+        result = _ACCEPTED if plan_types else dialect.MAV_MISSION_UNSUPPORTED
         _acknowledge(message, link, result)
 
 

@@ -23,11 +23,11 @@ from sitl_mock.physics.sensors import Estimate, SensorConstants, SensorState, es
 from sitl_mock.physics.vehicle import Vehicle
 from sitl_mock.physics.vehicle_step import (
     ActuatorCommand,
-    Outcome,
+    StepOutcome,
     VehicleConstants,
     VehicleState,
     advance,
-    outcome,
+    step_outcome,
     truth_row,
 )
 
@@ -41,7 +41,7 @@ def _all_callees(function: Any) -> set[FunctionType]:
     return callees.union(*(_all_callees(each) for each in callees))
 
 
-_COMPILED_FUNCTIONS: set[Any] = {advance, outcome, estimate, white_noise}
+_COMPILED_FUNCTIONS: set[Any] = {advance, step_outcome, estimate, white_noise}
 _COMPILED_FUNCTIONS |= _all_callees(advance) | _all_callees(estimate)
 for _function in _COMPILED_FUNCTIONS:
     register_jitable(_function)
@@ -100,10 +100,10 @@ def _load_and_store(numba_type: Any) -> tuple[Any, Any]:
     return intrinsic(load), intrinsic(store)
 
 
-_EXAMPLE = Vehicle(seed=0)  # its attributes have the types to compile for
-_EXAMPLE_SENSORS = _EXAMPLE.estimator.constants, _EXAMPLE.estimator.state
-_load_constants, _store_constants = _load_and_store(numba.typeof(_EXAMPLE.plant.constants))
-_load_state, _store_state = _load_and_store(numba.typeof(_EXAMPLE.plant.state))
+_EXAMPLE_VEHICLE = Vehicle(seed=0)  # its attributes have the types to compile for
+_EXAMPLE_SENSORS = _EXAMPLE_VEHICLE.estimator.constants, _EXAMPLE_VEHICLE.estimator.state
+_load_constants, _store_constants = _load_and_store(numba.typeof(_EXAMPLE_VEHICLE.plant.constants))
+_load_state, _store_state = _load_and_store(numba.typeof(_EXAMPLE_VEHICLE.plant.state))
 _load_sensors, _store_sensors = _load_and_store(numba.typeof(_EXAMPLE_SENSORS))
 
 
@@ -136,7 +136,7 @@ def _advance(
     wind: tuple[float, float, float],
     attitude_error: tuple[float, float, float],
     count: int,
-) -> Outcome:
+) -> StepOutcome:
     state = advance(
         _load_constants(constants_memory),
         DelayRings(before_shaping, before_rate_loop),
@@ -147,7 +147,7 @@ def _advance(
         count,
     )
     _store_state(state_memory, state)
-    return outcome(state)
+    return step_outcome(state)
 
 
 @_compiled
@@ -189,7 +189,7 @@ class CompiledPlant:
             self._state = _read_state(self._state_memory)
         return self._state
 
-    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
+    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> StepOutcome:
         """Advance by `count` steps under one command."""
         self._steps += count
         self._state = None

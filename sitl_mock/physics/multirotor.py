@@ -43,7 +43,7 @@ class Multirotor:
         self.constants = multirotor_constants(airframe, rate_loop)
         self.body = at_rest(q)
         self.actuation = initial_actuation(self.constants, self.throttle(specific_thrust))
-        self._rings = empty_rings(self.constants)
+        self._delay_rings = empty_rings(self.constants)
         self._steps = 0
 
     @property
@@ -72,7 +72,7 @@ class Multirotor:
         """
         load, self.actuation = drive(
             self.constants,
-            self._rings,
+            self._delay_rings,
             self.actuation,
             self.body,
             self._steps,

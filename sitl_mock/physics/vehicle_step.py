@@ -138,11 +138,11 @@ def _move_or_rest(
     return body, position, False, crashed, touchdown_speed
 
 
-Outcome = tuple[bool, bool, float]
+StepOutcome = tuple[bool, bool, float]
 """After the last step: on the ground, crashed, total thrust of the rotors (N)."""
 
 
-def outcome(state: VehicleState) -> Outcome:
+def step_outcome(state: VehicleState) -> StepOutcome:
     """Return whether the vehicle is on the ground, whether it crashed, and its total thrust (N)."""
     _, (first, second, third, fourth), _, _ = state.actuation
     return state.on_ground, state.crashed, first + second + third + fourth
@@ -166,7 +166,7 @@ class Plant(Protocol):
     def state(self) -> VehicleState:
         """State after the latest step."""
 
-    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
+    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> StepOutcome:
         """Advance by `count` steps under one command."""
 
     def truth_ago(self, steps: int) -> TruthRow:
@@ -190,15 +190,15 @@ class PythonPlant:
     ) -> None:
         self.state = state
         self.constants = constants
-        self._rings = empty_rings(constants.multirotor)
+        self._delay_rings = empty_rings(constants.multirotor)
         self._history = [truth_row(state.body, state.position)] * history_length
 
-    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> Outcome:
+    def advance(self, command: ActuatorCommand, conditions: Conditions, count: int) -> StepOutcome:
         """Advance by `count` steps under one command."""
         self.state = advance(
-            self.constants, self._rings, self._history, self.state, command, conditions, count
+            self.constants, self._delay_rings, self._history, self.state, command, conditions, count
         )
-        return outcome(self.state)
+        return step_outcome(self.state)
 
     def truth_ago(self, steps: int) -> TruthRow:
         """The true motion `steps` steps ago."""

@@ -37,16 +37,16 @@ class ArmingChecks:
         return self._stream.alive(self._state.time_us, self._parameters["COM_OF_LOSS_T"])
 
     def find_problem(
-        self, *, gcs_alive: bool, pilot_present: bool, refusal: str | None
+        self, *, gcs_alive: bool, pilot_present: bool, arming_refusal: str | None
     ) -> str | None:
         """Store in the state and return why arming is refused now; None if it is allowed.
 
-        ``refusal`` is the reason of an active `RefuseArming` fault.
+        ``arming_refusal`` is the reason of an active `RefuseArming` fault.
         """
         state = self._state
         problems = (
             (state.time_us < self._ready_us, "no heading reference"),
-            (refusal is not None, refusal),
+            (arming_refusal is not None, arming_refusal),
             (self.crashed, "vehicle has crashed"),
             (not state.position_valid, "no valid position estimate"),
             (state.battery_warning >= BatteryWarning.CRITICAL, "battery too low"),

@@ -36,7 +36,7 @@ class Px4Commander:
     _announce: Announcer
     _checks: ArmingChecks
     """Finds what forbids arming, and sends the health report."""
-    refusal: str | None = field(default=None, init=False)
+    arming_refusal: str | None = field(default=None, init=False)
     pilot_simulated: bool = field(default=False, init=False)
     _requested_takeoff_z: float | None = field(default=None, init=False)
     _published_status: tuple[bool, Mode, Mode, bool] | None = field(default=None, init=False)
@@ -172,7 +172,7 @@ class Px4Commander:
         return self._checks.find_problem(
             gcs_alive=self.failsafe.gcs_alive,
             pilot_present=self._pilot_present,
-            refusal=self.refusal,
+            arming_refusal=self.arming_refusal,
         )
 
     def _detect_stick_override(self) -> None:

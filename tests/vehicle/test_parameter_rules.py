@@ -247,7 +247,7 @@ def test_motors_may_stop_only_15_degrees_beyond_the_largest_tilt(roll, pitch, ve
 
 def test_every_rule_that_can_be_unsafe_is_missed_where_it_is_not_told():
     for rules, *_ in (PX4, ARDUPILOT):
-        marked = {rule.name for rule in rules if rule.vital or rule.universal}
+        marked = {rule.name for rule in rules if rule.vital or rule.in_all_versions}
         replaced = {rule.alternative for rule in rules if rule.alternative}
         unsafe = {
             next(iter(changes))

@@ -92,10 +92,10 @@ def px4_heartbeat(custom_mode, base_mode=157):
 
 
 def test_each_arming_is_counted(bench):
-    assert bench.state.armings == 0
+    assert bench.state.arming_count == 0
     for base_mode in (1, 129, 129, 1, 129):
         bench.take(px4_heartbeat(0x00060000, base_mode))
-    assert bench.state.armings == 2
+    assert bench.state.arming_count == 2
     assert bench.state.heartbeat == (10.0, "OFFBOARD", True, 4)
 
 
@@ -387,7 +387,7 @@ def test_of_another_vehicle_only_the_heartbeat_is_kept(bench):
     state = bench.state
     assert (state.mode, state.armed) == ("OFFBOARD", True)
     assert (state.position, state.battery, state.home, state.gps) == (None, None, None, None)
-    assert (state.position_count, state.armings, state.gps_was_good) == (0, 0, False)
+    assert (state.position_count, state.arming_count, state.gps_was_good) == (0, 0, False)
     assert state.readiness == (None, None, False, False)
 
 

@@ -29,7 +29,7 @@ class Receiver(Protocol):
         If the bytes contain no valid claim, none of their frames is accepted.
         """
 
-    def may_prove_date(self, sender: str) -> bool:
+    def needs_timesync_with(self, sender: str) -> bool:
         """Whether to send frames to `sender`, although its claim was refused.
 
         True if the frame was signed with the right key, but only an answer to a TIMESYNC request

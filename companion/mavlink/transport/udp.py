@@ -146,7 +146,7 @@ class UdpTransport:
 
         The sender becomes the peer if `PeerRule` accepts a frame of the datagram. It also becomes
         the peer if only its answer to a TIMESYNC request can show that its signing time stamps
-        are right (`Receiver.may_prove_date`).
+        are right (`Receiver.needs_timesync_with`).
         """
         sender = host_and_port(address)
         if not self._named_peers.admits(address):
@@ -156,7 +156,7 @@ class UdpTransport:
             accepted = self._receiver.receive(data, received_ns)  # the peer was only silent
         else:
             accepted = self._receiver.claim(data, received_ns, sender)
-        return accepted or self._receiver.may_prove_date(sender)
+        return accepted or self._receiver.needs_timesync_with(sender)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)

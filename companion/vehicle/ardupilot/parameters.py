@@ -164,7 +164,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "what ArduPilot does when the pilot's transmitter is lost",
         _transmitter_failsafe,
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("FS_OPTIONS",),
@@ -196,7 +196,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "which checks before arming are left out",
         required(UNSAFE, 0.0, "checks before arming are left out"),
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
         alternative="ARMING_CHECK",
     ),
     ParameterRule(
@@ -210,7 +210,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "after how long on the ground ArduPilot disarms itself",
         positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("SCHED_LOOP_RATE",), "how often ArduPilot's main loop runs, Hz", _loop_rate, _MEASURED
@@ -227,7 +227,7 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
             1.0,
         ),
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(("FENCE_ACTION",), "what ArduPilot does at its own geofence", _fence, _REFERENCE),
     ParameterRule(
@@ -238,13 +238,13 @@ ARDUPILOT_PARAMETERS: tuple[ParameterRule, ...] = (
         "what ArduPilot does about a low battery",
         forbidden(UNSAFE, {5.0: _STOPS_MOTORS}, 2.0),
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("BATT_FS_CRT_ACT",),
         "what ArduPilot does about a nearly empty battery",
         _battery_failsafe,
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
 )

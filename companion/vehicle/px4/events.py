@@ -158,8 +158,8 @@ _CHECK_TEXTS_BY_ID = {event_id(name): text for name, text in _CHECK_TEXTS_BY_NAM
     30203637: "No heading reference",
 }
 _SETPOINT_CHECK_IDS = {event_id(name) for name in _SETPOINT_CHECKS}
-_REPORT_BEGINS = event_id("commander_arming_check_summary")
-_REPORT_ENDS = event_id("commander_health_summary")
+_REPORT_BEGIN_ID = event_id("commander_arming_check_summary")
+_REPORT_END_ID = event_id("commander_health_summary")
 
 
 class EventReader:
@@ -174,7 +174,7 @@ class EventReader:
     """
 
     def __init__(self, texts: TextAssembler, clock: Callable[[], float]) -> None:
-        self._texts, self._clock = texts, clock
+        self._text_assembler, self._clock = texts, clock
         self._failing_checks: set[int] = set()
         self._failing_in_last_report: set[int] = set()
         self._in_report = False
@@ -183,32 +183,32 @@ class EventReader:
 
     def take(self, payload: bytes) -> None:
         """Take the payload of one EVENT."""
-        number, _, sequence, _, _, log_levels, arguments = _EVENT_PAYLOAD.unpack(
+        event_number, _, sequence, _, _, log_levels, arguments = _EVENT_PAYLOAD.unpack(
             payload[: _EVENT_PAYLOAD.size].ljust(_EVENT_PAYLOAD.size, b"\0")
         )
         if sequence == self._last_sequence:
             return  # a repetition
         self._last_sequence = sequence
         severity = log_levels & 0x0F
-        if number == _REPORT_BEGINS:
+        if event_number == _REPORT_BEGIN_ID:
             self._failing_checks, self._in_report = set(), True
-        elif number == _REPORT_ENDS:
+        elif event_number == _REPORT_END_ID:
             self._failing_in_last_report, self._in_report = self._failing_checks, False
         elif self._in_report:
-            self._failing_checks.add(number)
+            self._failing_checks.add(event_number)
             unreported_checks = self._failing_in_last_report | _SETPOINT_CHECK_IDS
-            if number not in unreported_checks and severity <= _WARNING_SEVERITY:
-                self._add_text(severity, number, _CHECK_TEXTS_BY_ID.get(number))
+            if event_number not in unreported_checks and severity <= _WARNING_SEVERITY:
+                self._add_text(severity, event_number, _CHECK_TEXTS_BY_ID.get(event_number))
         elif severity < _INTERNAL_SEVERITY:
-            template = _TEMPLATES_BY_ID.get(number)
-            self._add_text(severity, number, template and _fill_in(template, arguments))
+            template = _TEMPLATES_BY_ID.get(event_number)
+            self._add_text(severity, event_number, template and _fill_in(template, arguments))
 
     def _add_text(self, severity: int, number: int, text: str | None) -> None:
         if text is not None:
-            self._texts.take_event(severity, text, self._clock())
+            self._text_assembler.take_event(severity, text, self._clock())
         elif number not in self._reported_unknown_ids:
             self._reported_unknown_ids.add(number)
-            self._texts.take_event(severity, f"unknown PX4 event {number}", self._clock())
+            self._text_assembler.take_event(severity, f"unknown PX4 event {number}", self._clock())
 
 
 def _fill_in(template: _Template, arguments: bytes) -> str:

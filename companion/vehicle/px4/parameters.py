@@ -57,7 +57,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
             set_to=5.0,
         ),
         f"{_REFERENCE}; {_MEASURED}",
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("COM_RC_OVERRIDE",),
@@ -84,7 +84,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
             UNSAFE, {4.0: "stick input is disabled, so that no pilot can take over"}, set_to=0.0
         ),
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("MAV_FWDEXTSP",),
@@ -97,7 +97,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         f"what PX4 does without a ground station's heartbeat, even with setpoints {_ACTIONS_TEXT}",
         safe_action(_LINK_LOSS_ACTIONS, {5.0: _STOPS_MOTORS, 6.0: _STOPS_MOTORS}, set_to=2.0),
         f"{_REFERENCE}; {_MEASURED}",
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("NAV_RCL_ACT",),
@@ -110,7 +110,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
             forbidden(INEFFECTIVE, {0.0: _LOST_PILOT_IGNORED, 7.0: _LOST_PILOT_IGNORED}, 2.0),
         ),
         f"{_REFERENCE}; PX4's failsafe.cpp",
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("COM_RCL_EXCEPT",),
@@ -135,7 +135,7 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "after how long on the ground PX4 disarms itself",
         positive(UNSAFE, "a vehicle that was armed and does not take off stays armed", 10.0),
         f"{_REFERENCE}; {_MEASURED}",
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(("MAV_SYS_ID",), "the vehicle's system id", system_id, "MAVLink routing"),
     ParameterRule(
@@ -143,21 +143,21 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
         "whether PX4 obeys only signed frames",
         signing,
         _REFERENCE,
-        reboot=True,
+        needs_reboot=True,
     ),
     ParameterRule(
         ("IMU_INTEG_RATE",),
         "how often attitude is estimated, Hz",
         attitude_rate,
         _MEASURED,
-        reboot=True,
+        needs_reboot=True,
     ),
     ParameterRule(
         ("GF_ACTION",),
         "what PX4 does at its own geofence (0 nothing, 1 warn, 2 hold, 3 return, 5 land)",
         safe_action((0.0, 1.0, 2.0, 3.0, 5.0), {4.0: _STOPS_MOTORS}, set_to=2.0),
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("COM_LOW_BAT_ACT",),
@@ -171,22 +171,22 @@ PX4_PARAMETERS: tuple[ParameterRule, ...] = (
             ),
         ),
         _REFERENCE,
-        universal=True,
+        in_all_versions=True,
     ),
     ParameterRule(
         ("CBRK_SUPPLY_CHK",),
         "whether arming checks the power supply",
         forbidden(INEFFECTIVE, {894281.0: "the power supply is not checked before arming"}, 0.0),
         _REFERENCE,
-        reboot=True,
+        needs_reboot=True,
     ),
     ParameterRule(
         ("CBRK_FLIGHTTERM",),
         "whether the failure detector stops motors",
         termination_tilt,
         _REFERENCE,
-        universal=True,
-        reboot=True,
+        in_all_versions=True,
+        needs_reboot=True,
     ),
     ParameterRule(
         ("FD_FAIL_R",), "beyond which roll PX4 reports a failure", failure_tilt, _REFERENCE
