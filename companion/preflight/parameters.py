@@ -112,7 +112,7 @@ def _finding(result: ParameterFinding, name: str) -> Finding:
         result.rule.name,
         result.result,
         f"{name} is {result.value:g}",
-        result.because or result.rule.meaning,
+        result.consequence or result.rule.meaning,
         fix,
         result.rule.source,
         change,

@@ -19,11 +19,11 @@ _MAX_LIMIT_RATIO = 1.15
 
 
 def forbidden(result: CheckResult, consequences: Mapping[float, str], set_to: float) -> Check:
-    """A check that forbids the values in `consequences`, which gives the consequence of each."""
+    """A check that forbids some values; `consequences` gives the consequence of each."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
-        because = consequences.get(value)
-        return None if because is None else Problem(result, because, set_to)
+        consequence = consequences.get(value)
+        return None if consequence is None else Problem(result, consequence, set_to)
 
     return check
 
@@ -65,39 +65,39 @@ def _problem_unless(is_good: Callable[[float], bool], problem: Problem) -> Check
     return lambda value, _values, _settings: None if is_good(value) else problem
 
 
-def required(result: CheckResult, required_value: float, because: str) -> Check:
-    """A check that requires a value; `because`: consequence of any other value."""
+def required(result: CheckResult, required_value: float, consequence: str) -> Check:
+    """A check that requires a value; `consequence`: consequence of any other value."""
     return _problem_unless(
-        lambda value: value == required_value, Problem(result, because, required_value)
+        lambda value: value == required_value, Problem(result, consequence, required_value)
     )
 
 
-def positive(result: CheckResult, because: str, set_to: float) -> Check:
+def positive(result: CheckResult, consequence: str, set_to: float) -> Check:
     """A check that requires a value above zero, because zero or less turns a protection off."""
-    return _problem_unless(lambda value: value > 0.0, Problem(result, because, set_to))
+    return _problem_unless(lambda value: value > 0.0, Problem(result, consequence, set_to))
 
 
-def at_most(result: CheckResult, limit: float, because: str, set_to: float) -> Check:
+def at_most(result: CheckResult, limit: float, consequence: str, set_to: float) -> Check:
     """A check that requires a value of at most `limit`."""
-    return _problem_unless(lambda value: value <= limit, Problem(result, because, set_to))
+    return _problem_unless(lambda value: value <= limit, Problem(result, consequence, set_to))
 
 
-def bit_set(result: CheckResult, bit: int, because: str) -> Check:
+def bit_set(result: CheckResult, bit: int, consequence: str) -> Check:
     """A check that requires a bit of a mask to be set; `bit` is the bit's value."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         mask = int(value)
-        return None if mask & bit else Problem(result, because, float(mask | bit))
+        return None if mask & bit else Problem(result, consequence, float(mask | bit))
 
     return check
 
 
-def bit_clear(result: CheckResult, bit: int, because: str) -> Check:
+def bit_clear(result: CheckResult, bit: int, consequence: str) -> Check:
     """A check that requires a bit of a mask not to be set; `bit` is the bit's value."""
 
     def check(value: float, _: Values, __: CompanionSettings) -> Problem | None:
         mask = int(value)
-        return Problem(result, because, float(mask & ~bit)) if mask & bit else None
+        return Problem(result, consequence, float(mask & ~bit)) if mask & bit else None
 
     return check
 

@@ -58,11 +58,11 @@ class Problem(NamedTuple):
     """What is wrong with the value of a parameter."""
 
     result: CheckResult
-    because: str
+    consequence: str
     """Consequence of the value, one sentence."""
     set_to: float | None = None
     """Value to which the parameter should be set. `None`: only the user can know it, or the
-    configuration must change; `because` then says which key."""
+    configuration must change; `consequence` then says which key."""
 
 
 Check = Callable[[float, Values, CompanionSettings], Problem | None]
@@ -110,7 +110,7 @@ class ParameterFinding(NamedTuple):
     value: float
     """The autopilot's value."""
     result: CheckResult
-    because: str = ""
+    consequence: str = ""
     """Consequence of the value; empty if it is safe."""
     set_to: float | None = None
     """Value to which the parameter should be set; `None` if the value is safe, only the user can

@@ -222,9 +222,9 @@ class CompiledPlant:
         return estimated
 
     @staticmethod
-    def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
+    def make_noise(uniform_numbers: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
         """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
-        numbers: Any = np.array(uniform)
+        numbers: Any = np.array(uniform_numbers)
         _white_noise(numbers, deviations)
         return cast("Sequence[float]", numbers)
 

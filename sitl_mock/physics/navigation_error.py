@@ -30,7 +30,7 @@ class ErrorState(NamedTuple):
     """Either the horizontal or the vertical errors after a fix."""
 
     errors: Errors
-    pending: tuple[complex, complex]
+    pending_corrections: tuple[complex, complex]
     """Corrections of position (m) and velocity (m/s) that the output does not yet contain."""
     noise: tuple[complex, complex]
     """Noise of the latest fix: position, m, and velocity, m/s."""
@@ -129,11 +129,11 @@ def error_at(
     position, velocity, acceleration = propagated_horizontal_errors(
         constants, state, truth, elapsed
     )
-    pending = state.horizontal.pending
+    pending = state.horizontal.pending_corrections
     position += constants.lead_time * complex(truth[0], truth[1]) - pending_fraction * pending[0]
     velocity += constants.lead_time * complex(truth[13], truth[14]) - pending_fraction * pending[1]
     down, sink_rate, _ = propagated_vertical_errors(constants, state, truth, elapsed)
-    pending = state.vertical.pending
+    pending = state.vertical.pending_corrections
     down += constants.height_offset + state.down_error - pending_fraction * pending[0]
     return ErrorVectors(
         (position.real, position.imag, down.real),

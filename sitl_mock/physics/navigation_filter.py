@@ -244,7 +244,6 @@ def _with_pending(
         new: `corrected`, propagated from its fix to the present.
         fraction: fraction of the pending corrections of `before` that the output still lacks.
     """
-    position, velocity = before.pending
-    return corrected._replace(
-        pending=(fraction * position + new[0] - old[0], fraction * velocity + new[1] - old[1])
-    )
+    position, velocity = before.pending_corrections
+    pending = (fraction * position + new[0] - old[0], fraction * velocity + new[1] - old[1])
+    return corrected._replace(pending_corrections=pending)

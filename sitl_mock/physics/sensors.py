@@ -62,8 +62,8 @@ class SensorState(NamedTuple):
     """The part of the estimator's state that only fixes and resets change."""
 
     filter: FilterState
-    yaw: Quaternion  # rotation of the estimate by all resets
-    offset: Vector  # shift of the estimate by all resets, NED, m
+    reset_rotation: Quaternion  # rotation of the estimate by all resets
+    reset_offset: Vector  # shift of the estimate by all resets, NED, m
 
 
 def white_noise(numbers: list[float], deviations: tuple[float, ...]) -> None:
@@ -109,10 +109,10 @@ def estimate(
     fx, fy, fz = to_body(
         q, (attitude_row[13], attitude_row[14], attitude_row[15] - constants.gravity)
     )
-    attitude_estimate = multiply(state.yaw, rotated_slightly(error.attitude, q))
+    attitude_estimate = multiply(state.reset_rotation, rotated_slightly(error.attitude, q))
     rate_row = history[(steps - constants.rate_delay) % len(history)]
     yaw_rate = rate_row[9] + constants.yaw_rate_bias + noise[5]
-    position, velocity, offset = error.position, error.velocity, state.offset
+    position, velocity, offset = error.position, error.velocity, state.reset_offset
     new_estimate = Estimate(
         normalise(multiply(attitude_estimate, (1.0, noise[0], noise[1], noise[2]))),
         (rate_row[7] + noise[3], rate_row[8] + noise[4], yaw_rate),
@@ -193,16 +193,16 @@ class Estimator:
         self._random = Random(f"{seed}/sensors")
         self._make_noise = make_noise
         self._noise: Sequence[float] = ()
-        self._noise_used = 0
+        self._noise_used_count = 0
         self.attitude_error: Vector = (0.0, 0.0, 0.0)
         self.reset_counter = 0
 
     def shift(self, *, yaw: float = 0.0, position_ned: Vector = (0.0, 0.0, 0.0)) -> None:
         """Reset the estimator: the estimate jumps by `yaw` (rad) and `position_ned` (m)."""
-        n, e, d = self.state.offset
+        n, e, d = self.state.reset_offset
         self.state = self.state._replace(
-            yaw=multiply(from_yaw(yaw), self.state.yaw),
-            offset=(n + position_ned[0], e + position_ned[1], d + position_ned[2]),
+            reset_rotation=multiply(from_yaw(yaw), self.state.reset_rotation),
+            reset_offset=(n + position_ned[0], e + position_ned[1], d + position_ned[2]),
         )
         self.reset_counter += 1
 
@@ -220,11 +220,11 @@ class Estimator:
 
     def draw_noise(self) -> Sequence[float]:
         """Return new white noise for one estimate, 15 numbers."""
-        count, begin = len(self._deviations), self._noise_used
+        count, begin = len(self._deviations), self._noise_used_count
         if begin == len(self._noise):
             random = self._random.random
-            uniform = [random() for _ in range(count * _ESTIMATES_PER_DRAW)]
-            self._noise = self._make_noise(uniform, self._deviations)
+            uniform_numbers = [random() for _ in range(count * _ESTIMATES_PER_DRAW)]
+            self._noise = self._make_noise(uniform_numbers, self._deviations)
             begin = 0
-        self._noise_used = begin + count
+        self._noise_used_count = begin + count
         return self._noise[begin : begin + count]

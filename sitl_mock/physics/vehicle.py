@@ -168,7 +168,8 @@ class Vehicle:
         *_, shaping = self.plant.state.actuation
         if not shaping.active:
             return None
-        return shaping._replace(target=multiply(self.estimator.state.yaw, shaping.target))
+        rotation = self.estimator.state.reset_rotation
+        return shaping._replace(target=multiply(rotation, shaping.target))
 
     def step(self, command: ActuatorCommand, count: int = 1) -> None:
         """Advance by `count` physics steps under one command."""

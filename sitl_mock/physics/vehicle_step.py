@@ -178,7 +178,7 @@ class Plant(Protocol):
         """The present estimate of the autopilot: see `sensors.estimate`."""
 
     @staticmethod
-    def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
+    def make_noise(uniform_numbers: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
         """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
 
 
@@ -211,7 +211,7 @@ class PythonPlant:
         return estimate(constants, state, self._history, self.state.steps, time, noise)
 
     @staticmethod
-    def make_noise(uniform: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
+    def make_noise(uniform_numbers: list[float], deviations: tuple[float, ...]) -> Sequence[float]:
         """Turn uniform random numbers into normal ones: see `sensors.white_noise`."""
-        white_noise(uniform, deviations)
-        return uniform
+        white_noise(uniform_numbers, deviations)
+        return uniform_numbers

@@ -75,7 +75,7 @@ def test_rates_are_held_neither_too_briefly_nor_too_long(value, words, set_to):
     assert problem(checks.rate_hold, 0.51) is problem(checks.rate_hold, 2.0) is None
     found = problem(checks.rate_hold, value)
     assert (found.result, found.set_to) == (UNSAFE, set_to)
-    assert words in found.because
+    assert words in found.consequence
 
 
 @pytest.mark.parametrize(

@@ -166,7 +166,7 @@ def test_each_mistake_is_found_by_itself_and_mended_by_what_is_proposed(
     (found,) = complaints(autopilot, changes)
     assert found.rule.name in changes
     assert (found.result, found.set_to, found.value) == (verdict, set_to, changes[found.rule.name])
-    assert found.because
+    assert found.consequence
     if set_to is not None:
         assert not complaints(autopilot, changes | {found.rule.name: set_to})
 
@@ -205,7 +205,7 @@ def test_what_is_no_number_is_unsafe_whatever_the_rule(autopilot, value):
     for rule in autopilot[0]:
         (found,) = (f for f in complaints(autopilot, {rule.name: value}) if f.rule is rule)
         assert (found.result, found.set_to) == (UNSAFE, None)
-        assert found.because
+        assert found.consequence
 
 
 def test_what_is_no_number_tells_other_rules_nothing():
