@@ -33,7 +33,7 @@ class LinkListener:
     """Collects what comes over the link while its `with` block runs.
 
     Args:
-        link: link to listen on. The `with` block replaces the link's `on_foreign`.
+        link: link to listen on. The `with` block replaces the link's `on_foreign_frame`.
         clock: our clock, s.
 
     Attributes:
@@ -53,7 +53,10 @@ class LinkListener:
         self.reset_count = 0
 
     def __enter__(self) -> "LinkListener":
-        self._on_foreign_before, self._link.on_foreign = self._link.on_foreign, self._on_foreign
+        self._on_foreign_before, self._link.on_foreign_frame = (
+            self._link.on_foreign_frame,
+            self._on_foreign,
+        )
         self._unsubscribe = [
             self._link.subscribe("ATTITUDE_QUATERNION", self._on_attitude),
             self._link.subscribe("ATTITUDE_TARGET", self._on_target),
@@ -62,7 +65,7 @@ class LinkListener:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._link.on_foreign = self._on_foreign_before
+        self._link.on_foreign_frame = self._on_foreign_before
         for unsubscribe in self._unsubscribe:
             unsubscribe()
 

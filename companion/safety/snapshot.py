@@ -7,7 +7,7 @@ from companion.attitude import Quaternion
 from companion.control.loop_record import Unanswered
 from companion.guidance.fence import Place
 from companion.guidance.reference import NorthEast, Vector
-from companion.vehicle.records import Battery, Estimator, Gps
+from companion.vehicle.records import Battery, EstimatorStatus, Gps
 from companion.vehicle.timesync import Uplink
 
 UNHEARD_S = 0.3
@@ -23,7 +23,7 @@ class AutopilotStatus(NamedTuple):
     failsafe: bool = False
     battery: Battery | None = None
     gps: Gps | None = None
-    estimator: Estimator | None = None
+    estimator: EstimatorStatus | None = None
 
 
 class Motion(NamedTuple):

@@ -23,7 +23,7 @@ async def serving(
     config: Configuration,
     vehicle: MockVehicle,
     folder: Path | None = None,
-    note: Callable[[str], None] = lambda _: None,
+    on_event: Callable[[str], None] = lambda _: None,
 ) -> AsyncGenerator[ServeSession, None]:
     """Run `companion serve` between a mock vehicle and client programs, inside `testing.run`.
 
@@ -35,7 +35,7 @@ async def serving(
         vehicle: vehicle that was passed to `testing.run`.
         folder: gets one folder for each flight under a client's control; None: nothing is
             recorded.
-        note: called with events as sentences.
+        on_event: called with events as sentences.
 
     Raises:
         ConfigError: the configuration is wrong.
@@ -44,7 +44,7 @@ async def serving(
     """
     served_config = config_in_memory(config, vehicle)
     served_config = changed(served_config, {"serve": {"clients": ()}}, "the test")
-    session = ServeSession(served_config, note, None, environment, folder)
+    session = ServeSession(served_config, on_event, None, environment, folder)
     session_task = asyncio.ensure_future(session.run())
     try:
         while session.network is None:

@@ -29,7 +29,7 @@ class LinkCallbacks:
 
     on_attitude: Callable[[AttitudeSample], None] | None = None
     """Called with each attitude sample; in lockstep after the tasks of the step have run."""
-    on_foreign: Callable[[Frame], None] | None = None
+    on_foreign_frame: Callable[[Frame], None] | None = None
     """Called with each frame of another system or component than the vehicle's."""
     on_frame: Callable[[Frame], None] | None = None
     """Called with each frame of the peer, from any system and of any message, after the control
@@ -149,8 +149,8 @@ class Inbox:
     def _is_admitted(self, frame: Frame) -> bool:
         if self._filter.admits_source(frame):
             return self._filter.has_good_signature(frame)
-        if self._callbacks.on_foreign is not None:
-            self._dispatcher.guard(self._callbacks.on_foreign, frame)
+        if self._callbacks.on_foreign_frame is not None:
+            self._dispatcher.guard(self._callbacks.on_foreign_frame, frame)
         return False
 
     def _accept(self, frame: Frame, received_ns: int) -> None:

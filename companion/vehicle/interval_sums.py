@@ -12,25 +12,25 @@ class IntervalSums:
     """Sums over the intervals between consecutive setpoints or samples.
 
     Attributes:
-        intervals: number of intervals.
-        seconds: sum of the intervals, s.
-        squares: sum of the squared intervals, s².
+        count: number of intervals.
+        total: sum of the intervals, s.
+        sum_of_squares: sum of the squared intervals, s².
     """
 
-    __slots__ = ("intervals", "seconds", "squares")
+    __slots__ = ("count", "sum_of_squares", "total")
 
-    def __init__(self, intervals: int = 0, seconds: float = 0.0, squares: float = 0.0) -> None:
-        self.intervals, self.seconds, self.squares = intervals, seconds, squares
+    def __init__(self, count: int = 0, total: float = 0.0, sum_of_squares: float = 0.0) -> None:
+        self.count, self.total, self.sum_of_squares = count, total, sum_of_squares
 
     def add(self, interval: float) -> None:
         """Add the interval between two consecutive setpoints or samples, s."""
-        self.intervals += 1
-        self.seconds += interval
-        self.squares += interval * interval
+        self.count += 1
+        self.total += interval
+        self.sum_of_squares += interval * interval
 
     def copy(self) -> "IntervalSums":
         """A copy of the present sums."""
-        return IntervalSums(self.intervals, self.seconds, self.squares)
+        return IntervalSums(self.count, self.total, self.sum_of_squares)
 
     def rate_since(self, earlier: "IntervalSums") -> float | None:
         """Effective rate since `earlier`, Hz; None if there was no interval since then.
@@ -38,8 +38,9 @@ class IntervalSums:
         The rate is the number of intervals per second, but at most 2·Σg/Σg² of the intervals g.
         Long intervals dominate Σg², so pauses between bursts lower the rate.
         """
-        intervals = self.intervals - earlier.intervals
-        seconds, squares = self.seconds - earlier.seconds, self.squares - earlier.squares
-        if seconds <= 0.0 or squares <= 0.0:
+        count = self.count - earlier.count
+        total = self.total - earlier.total
+        sum_of_squares = self.sum_of_squares - earlier.sum_of_squares
+        if total <= 0.0 or sum_of_squares <= 0.0:
             return None
-        return min(intervals / seconds, _MAX_INTERVAL_RATIO * seconds / squares)
+        return min(count / total, _MAX_INTERVAL_RATIO * total / sum_of_squares)

@@ -67,7 +67,7 @@ class Link(VehicleClient, LinkCallbacks):
         self._inbox = (LockstepInbox if settings.lockstep else Inbox)(
             settings, stats, dispatcher, self, tap, notice, self.clock, outbox
         )
-        self._lockstep = self._inbox if isinstance(self._inbox, LockstepInbox) else None
+        self._lockstep_inbox = self._inbox if isinstance(self._inbox, LockstepInbox) else None
         self.timesync = TimeSync(outbox, dispatcher, self._loop.time, self.clock)
         self._connection = Connection(
             endpoint, self._inbox, outbox, self.stats, self._on_dropped, opener
@@ -81,8 +81,8 @@ class Link(VehicleClient, LinkCallbacks):
     async def __aenter__(self) -> "Link":
         await self._connection.open()
         try:
-            if self._lockstep is not None:
-                await self._wait_for_first_beacon(self._lockstep)
+            if self._lockstep_inbox is not None:
+                await self._wait_for_first_beacon(self._lockstep_inbox)
         except BaseException:
             await self.__aexit__()
             raise
@@ -94,8 +94,8 @@ class Link(VehicleClient, LinkCallbacks):
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        if self._lockstep is not None:
-            self._lockstep.close()
+        if self._lockstep_inbox is not None:
+            self._lockstep_inbox.close()
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -167,7 +167,10 @@ class Link(VehicleClient, LinkCallbacks):
         Raises:
             InvalidSetpoint: a value is out of range, or not finite; nothing was sent.
         """
-        if self._lockstep is not None and self._lockstep.open_step_time_ms == time_boot_ms:
+        if (
+            self._lockstep_inbox is not None
+            and self._lockstep_inbox.open_step_time_ms == time_boot_ms
+        ):
             self._outbox.latch(time_boot_ms, rates, thrust)
             return True
         return self._outbox.send_setpoint(time_boot_ms, rates, thrust)
@@ -195,11 +198,11 @@ class Link(VehicleClient, LinkCallbacks):
             self._outbox.send_heartbeat()
             await asyncio.sleep(1.0 / self.settings.heartbeat_rate_hz)
 
-    async def _wait_for_first_beacon(self, lockstep: LockstepInbox) -> None:
+    async def _wait_for_first_beacon(self, lockstep_inbox: LockstepInbox) -> None:
         # Some vehicles wait for a first message before they send (udpout, TCP).
         self._outbox.send_heartbeat()
         try:
             async with asyncio.timeout(self.settings.first_beacon_timeout_s):
-                await lockstep.first_beacon
+                await lockstep_inbox.first_beacon
         except TimeoutError:
             raise LinkTimeout(no_beacon_message(self.settings, self.stats)) from None

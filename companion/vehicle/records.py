@@ -168,7 +168,7 @@ def gps_fault(gps: Gps | None, now: float) -> str | None:
     return "GPS position lost" if gps.fix_type < GPS_FIX_3D else None
 
 
-class Prearm(NamedTuple):
+class PrearmStatus(NamedTuple):
     """SYS_STATUS: the autopilot's own pre-arm checks."""
 
     received: float
@@ -192,7 +192,7 @@ class Home(NamedTuple):
     """Down coordinate in the frame of LOCAL_POSITION_NED, m."""
 
 
-class Estimator(NamedTuple):
+class EstimatorStatus(NamedTuple):
     """ESTIMATOR_STATUS (PX4) or EKF_STATUS_REPORT (ArduPilot), whose flags mean the same."""
 
     received: float

@@ -18,13 +18,13 @@ from companion.vehicle.records import (
     AttitudeTarget,
     AttitudeTargetThrust,
     Battery,
-    Estimator,
+    EstimatorStatus,
     GlobalPosition,
     Gps,
     Home,
     LandedState,
     LocalPosition,
-    Prearm,
+    PrearmStatus,
     gps_fault,
     is_outdated,
 )
@@ -46,9 +46,9 @@ class _NewestRecords:
     global_position: GlobalPosition | None = None
     gps: Gps | None = None
     home: Home | None = None
-    estimator: Estimator | None = None
+    estimator: EstimatorStatus | None = None
     position_count: int = 0
-    prearm: Prearm | None = None
+    prearm: PrearmStatus | None = None
     gps_was_good: bool = False
     reset_counter: int | None = None
 
@@ -184,7 +184,7 @@ class VehicleState(ModeState, _NewestRecords):
             None if millivolts == _UNKNOWN_MV else millivolts / 1000.0, message.battery_remaining
         )
         prearm_passed = bool(message.onboard_control_sensors_health & _PREARM_CHECK_BIT)
-        self.prearm = Prearm(self._clock(), prearm_passed)
+        self.prearm = PrearmStatus(self._clock(), prearm_passed)
 
     def _on_odometry(self, payload: bytes) -> None:
         self.reset_counter = decode_reset_counter(payload)
@@ -242,7 +242,7 @@ class VehicleState(ModeState, _NewestRecords):
         )
 
     def _on_estimator(self, message: Message) -> None:
-        self.estimator = Estimator(self._clock(), message.flags)
+        self.estimator = EstimatorStatus(self._clock(), message.flags)
 
     def _on_text(self, message: Message) -> None:
         self._text_assembler.take(message, self._clock())

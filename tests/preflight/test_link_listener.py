@@ -93,7 +93,7 @@ def test_samples_that_cannot_be_answered(values):
         callbacks[name] = callback
         return lambda: None
 
-    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    link = SimpleNamespace(on_foreign_frame=None, subscribe=subscribe, clock=VehicleClock())
     with LinkListener(link, lambda: 0.0) as listener:
         callbacks["ATTITUDE_QUATERNION"](attitude(0, *values))
         callbacks["ATTITUDE_QUATERNION"](attitude(4))
@@ -108,7 +108,7 @@ def test_pauses_and_stamps_of_the_samples():
         callbacks[name] = callback
         return lambda: None
 
-    link = SimpleNamespace(on_foreign=None, subscribe=subscribe, clock=VehicleClock())
+    link = SimpleNamespace(on_foreign_frame=None, subscribe=subscribe, clock=VehicleClock())
     with LinkListener(link, lambda: next(times)) as listener:
         assert listener.samples.clock_rate is None
         for stamp in (0, 100, 100, 90, *(400 + 200 * n for n in range(1, 8))):

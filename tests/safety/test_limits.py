@@ -21,7 +21,7 @@ from companion.safety.monitor import Monitor
 from companion.safety.motion_judges import braking
 from companion.safety.snapshot import AutopilotStatus, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
-from companion.vehicle.records import Battery, Estimator
+from companion.vehicle.records import Battery, EstimatorStatus
 from companion.vehicle.timesync import Uplink
 
 NOW = 100.0
@@ -111,7 +111,7 @@ SAID = [
     ),
     (
         lambda: autopilot_judges.estimator_flags,
-        autopilot(estimator=Estimator(OLD, 0x33F)),
+        autopilot(estimator=EstimatorStatus(OLD, 0x33F)),
         "the estimator's state is not reported any more",
     ),
     (
@@ -199,7 +199,9 @@ def test_a_breach_is_told_in_these_words(make, snapshot, words):
 
 
 def test_lost_velocity_and_lost_position_are_told_together():
-    lost = at(autopilot=AutopilotStatus(estimator=Estimator(NOW, 0x33F & ~0x1A)), good_flags=0x33F)
+    lost = at(
+        autopilot=AutopilotStatus(estimator=EstimatorStatus(NOW, 0x33F & ~0x1A)), good_flags=0x33F
+    )
     assert autopilot_judges.estimator_flags(lost, False).endswith(
         "no valid velocity, position any more"
     )

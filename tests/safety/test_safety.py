@@ -13,7 +13,7 @@ from companion.safety.actions import StreamEffect
 from companion.safety.counter_window import CounterWindow
 from companion.safety.monitor import Alarm, Monitor
 from companion.safety.snapshot import AutopilotStatus, Control, Health, Motion, Resets, Snapshot
-from companion.vehicle.records import Battery, Estimator, Gps
+from companion.vehicle.records import Battery, EstimatorStatus, Gps
 from companion.vehicle.timesync import Uplink
 
 CONFIG = Config.model_validate({"limits": {"fence_radius_m": 60.0}})
@@ -30,7 +30,9 @@ def roll(angle_deg):
 FINE = Snapshot(
     NOW,
     AutopilotStatus(
-        battery=Battery(inf, 16.0, 0.9), gps=Gps(inf, 3, 12, 500.0), estimator=Estimator(inf, GOOD)
+        battery=Battery(inf, 16.0, 0.9),
+        gps=Gps(inf, 3, 12, 500.0),
+        estimator=EstimatorStatus(inf, GOOD),
     ),
     Motion(
         LEVEL, (0.1, 0.0, 0.0), (1.0, 2.0, -1.0), (1.0, 1.0, 0.0), 6.0, 0.2, 0.5, Place(47.0, 8.0)
@@ -111,9 +113,21 @@ BREACHES = [
     ("battery", autopilot(battery=Battery(NOW, 16.0, None, NOW - 6.0)), LAND, 0.2, "charge is not"),
     ("gps", autopilot(gps=Gps(NOW, 1, 3, 500.0)), LAND, 0.2, "GPS position lost"),
     ("gps", autopilot(gps=Gps(NOW - 6.0, 3, 12, 500.0)), LAND, 0.2, "GPS is not reported"),
-    ("estimator", autopilot(estimator=Estimator(NOW - 6.0, GOOD)), LAND, 0.5, "not reported"),
-    ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x1)), LAND, 0.5, "valid attitude"),
-    ("estimator", autopilot(estimator=Estimator(NOW, GOOD & ~0x18)), LAND, 0.5, "valid position"),
+    ("estimator", autopilot(estimator=EstimatorStatus(NOW - 6.0, GOOD)), LAND, 0.5, "not reported"),
+    (
+        "estimator",
+        autopilot(estimator=EstimatorStatus(NOW, GOOD & ~0x1)),
+        LAND,
+        0.5,
+        "valid attitude",
+    ),
+    (
+        "estimator",
+        autopilot(estimator=EstimatorStatus(NOW, GOOD & ~0x18)),
+        LAND,
+        0.5,
+        "valid position",
+    ),
     ("reset", FINE._replace(resets=Resets(1, 0.5, 0.3)), WARN, 0.1, "0.5 m and 17°"),
     ("resets", FINE._replace(resets=Resets(4)), LAND, 0.0, "reset 4 times"),
     ("resets", FINE._replace(resets=Resets(1, 1.1)), LAND, 0.0, "reset by 1.1 m"),

@@ -28,11 +28,11 @@ def test_the_rate_is_the_mean_one_unless_pauses_dominate(intervals, rate):
 def test_only_what_came_since_then_counts():
     rates = held(0.5, 0.25)
     before = rates.copy()
-    assert (before.intervals, before.seconds, before.squares) == (2, 0.75, 0.3125)
+    assert (before.count, before.total, before.sum_of_squares) == (2, 0.75, 0.3125)
     assert rates.rate_since(before) is None
     rates.add(0.02)
     assert rates.rate_since(before) == pytest.approx(50.0)
-    assert before.intervals == 2
+    assert before.count == 2
 
 
 def test_setpoints_without_any_time_between_them_have_no_rate():
