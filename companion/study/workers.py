@@ -36,22 +36,19 @@ class _StoppedError(Exception):
 
 
 def run_in_workers(
-    run_study: RunStudy,
-    part_counts: Mapping[str, int],
-    workers: int,
-    tick: Callable[[str, str], None],
+    run_study: RunStudy, parts: Mapping[str, int], workers: int, tick: Callable[[str, str], None]
 ) -> dict[str, Outcome]:
     """Run studies in worker processes. On Ctrl-C each study ends after its present part.
 
     Args:
         run_study: runs one study; a function at the top level of a module.
-        part_counts: number of parts, such as flights, by name of the study. Studies with more parts
+        parts: number of parts, such as flights, by name of the study. Studies with more parts
             begin first, because they take longer.
         workers: number of processes.
         tick: called in this process with study and part, soon after a part begins.
 
     Returns:
-        the outcomes by study, in the order of `part_counts`.
+        the outcomes by study, in the order of `parts`.
 
     Raises:
         OSError: a result cannot be written, or a worker was killed.
@@ -64,10 +61,10 @@ def run_in_workers(
         with interrupts_blocked():
             futures = {
                 name: pool.submit(_run_one, run_study, name)
-                for name in sorted(part_counts, key=lambda name: -part_counts[name])
+                for name in sorted(parts, key=lambda name: -parts[name])
             }
         _forward_ticks(list(futures.values()), channels.tick_queue, tick)
-        return {name: futures[name].result() for name in part_counts}
+        return {name: futures[name].result() for name in parts}
     except BrokenProcessPool as error:
         raise OSError(
             "a worker process was killed, perhaps for lack of memory; run again with --workers 1"
