@@ -91,8 +91,8 @@ def flattened(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
     return values
 
 
-def _make_absolute(data: dict[str, Any], place: tuple[str, ...]) -> None:
-    *sections, key = place
+def _make_absolute(data: dict[str, Any], key_path: tuple[str, ...]) -> None:
+    *sections, key = key_path
     section: Any = data
     for name in sections:
         section = section.get(name) if isinstance(section, dict) else None

@@ -16,7 +16,7 @@ class Observer(Protocol):
     def phase(self, name: str, waits_for: str) -> None:
         """A phase began; `waits_for` names the condition that ends it, as shown to the user."""
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Once a second: name of the phase, what it waits for, elapsed time and timeout (s)."""
 
     def status(self, status: FlightStatus) -> None:
@@ -32,7 +32,7 @@ class SilentObserver:
     def phase(self, name: str, waits_for: str) -> None:
         """Ignore the phase."""
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Ignore the progress."""
 
     def status(self, status: FlightStatus) -> None:
@@ -53,10 +53,10 @@ class SeveralObservers:
         for observer in self._observers:
             observer.phase(name, waits_for)
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Pass the progress on to each observer."""
         for observer in self._observers:
-            observer.waiting(name, detail, elapsed, timeout)
+            observer.waiting(name, waiting_for, elapsed, timeout)
 
     def status(self, status: FlightStatus) -> None:
         """Pass the state on to each observer."""
@@ -114,9 +114,9 @@ class EventRecorder:
             self.file.phase(name, waits_for)
         self._tell(lambda observer: observer.phase(name, waits_for))
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Pass the progress on to the observer."""
-        self._tell(lambda observer: observer.waiting(name, detail, elapsed, timeout))
+        self._tell(lambda observer: observer.waiting(name, waiting_for, elapsed, timeout))
 
     @property
     def wants_status(self) -> bool:

@@ -124,5 +124,5 @@ class Session:
         try:
             return await self._flight_task
         except asyncio.CancelledError:
-            flight.failed_in = flight.failed_in or flight.phase
+            flight.failed_phase = flight.failed_phase or flight.phase
             return LEFT_BY_USER

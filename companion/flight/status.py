@@ -32,7 +32,7 @@ class FlightStatus(NamedTuple):
     airborne_time: float | None
     """Time since the vehicle left the ground, s."""
     phase: str
-    detail: str
+    waiting_for: str
     """What the phase waits for."""
     elapsed: float
     """Time since the phase began, s."""
@@ -72,7 +72,7 @@ class StatusReporter:
     """Records the motion in all phases, and shows the state of the flight.
 
     Attributes:
-        takeoff: time when the vehicle left the ground, s on our clock; None before the take-off.
+        takeoff_time: when the vehicle left the ground, s on our clock; None before the take-off.
         battery_at_takeoff: remaining charge at the take-off, 0..1; None: unknown.
         real_time: whether latencies are meaningful; False in lockstep.
 
@@ -96,7 +96,7 @@ class StatusReporter:
         *,
         real_time: bool,
     ) -> None:
-        self.takeoff: float | None = None
+        self.takeoff_time: float | None = None
         self.battery_at_takeoff: float | None = None
         self._context, self._safety_ladder, self._trace = context, ladder, trace
         self.real_time = real_time
@@ -127,8 +127,8 @@ class StatusReporter:
         """Record the motion, and note the take-off."""
         now, context, state = self._clock(), self._context, self._context.link.state
         ground = context.ground
-        if self.takeoff is None and ground.takeoff_commanded and not ground.standing:
-            self.takeoff = now
+        if self.takeoff_time is None and ground.takeoff_commanded and not ground.standing:
+            self.takeoff_time = now
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
         self._status_rows.record(now)
         vehicle_time, tilt = context.loop.record.last_vehicle_time, context.tilt()
@@ -149,9 +149,9 @@ class StatusReporter:
         maneuver = context.guidance_loop.flown_source.part(now)
         return FlightStatus(
             time=now - self._began,
-            airborne_time=None if self.takeoff is None else now - self.takeoff,
+            airborne_time=None if self.takeoff_time is None else now - self.takeoff_time,
             phase=phase.name,
-            detail=context.detail,
+            waiting_for=context.waiting_for,
             elapsed=now - phase_began,
             timeout=phase.timeout,
             maneuver=None if maneuver is None else maneuver.name,
@@ -177,8 +177,8 @@ class StatusReporter:
         while len(counts) > 2 and now - counts[1][0] >= _RATE_WINDOW:
             counts.popleft()
         since, before = counts[0]
-        sent = record.setpoints - before
-        return sent / (now - since) if sent and now > since else None
+        sent_count = record.setpoints - before
+        return sent_count / (now - since) if sent_count and now > since else None
 
     def _position(self, now: float) -> LocalPosition | None:
         position = self._context.link.state.position

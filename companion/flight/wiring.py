@@ -52,14 +52,14 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
     """Connect the flight to the link's callbacks and to changed values while the block runs."""
     flight, context, link = assembled.flight, assembled.context, assembled.context.link
     loop, guidance_loop = context.loop, context.guidance_loop
-    time = asyncio.get_running_loop().time
+    clock = asyncio.get_running_loop().time
     dead_time_watch = assembled.dead_time_watch
 
     def on_attitude(sample: AttitudeSample) -> None:
         loop.on_sample(sample)
         guidance_loop.note_attitude(sample)
         if loop.offboard_active:
-            dead_time_watch.after_answer(sample.received)
+            dead_time_watch.after_setpoint(sample.received)
 
     state_logger = StateLogger(link.state, flight.note)
 
@@ -73,7 +73,7 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
 
     def on_attitude_target(message: Message) -> None:
         if loop.offboard_active:
-            context.snapshot_builder.echo.take(message, time())
+            context.snapshot_builder.echo.take(message, clock())
 
     link.on_attitude = on_attitude
     link.on_error = flight.fail
@@ -85,8 +85,8 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
         link.subscribe_parameters(context.preflight.on_parameter),
     )
     try:
-        retuning, record = Retuning(loop, guidance_loop), assembled.trace.recorder
-        with assembled.changes.applying(retuning, flight.note, record):
+        retuning, recorder = Retuning(loop, guidance_loop), assembled.trace.recorder
+        with assembled.changes.applying(retuning, flight.note, recorder):
             yield
     finally:
         link.on_attitude = link.on_error = None

@@ -78,7 +78,7 @@ class Helper:
     async def run_while_serving(self, work: Coroutine[Any, Any, T]) -> T:
         """Run `work`, and handle the requests of the process at the same time."""
         loop = asyncio.get_running_loop()
-        self.changes.on_change, self.changes.on_drag = self._tell_change, self._tell_drag
+        self.changes.on_change, self.changes.on_known_drag = self._tell_change, self._tell_drag
         loop.add_reader(self._channel.fileno(), self._on_readable)
         try:
             return await work
@@ -97,8 +97,8 @@ class Helper:
         """Send a phase to the process."""
         self._send("phase", name=name, waits_for=waits_for)
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Do nothing: `status` sends the same detail."""
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
+        """Do nothing: `status` sends the same text."""
 
     def status(self, status: FlightStatus) -> None:
         """Send the state of the flight to the process."""
@@ -107,7 +107,7 @@ class Helper:
             "status",
             time_s=round(status.time, 3),
             phase=status.phase,
-            detail=status.detail,
+            detail=status.waiting_for,
             maneuver=status.maneuver,
             maneuver_elapsed_s=round(status.maneuver_elapsed, 1),
             maneuver_duration_s=status.maneuver_duration,

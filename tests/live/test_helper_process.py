@@ -137,7 +137,7 @@ def test_requests_of_the_process_are_answered():
     helper = Helper(HelperTasks(None, Config(), None, None, False, None), Config())
     sent = []
     helper._send = lambda kind, **content: sent.append((kind, content))
-    helper.changes.on_change, helper.changes.on_drag = helper._tell_change, helper._tell_drag
+    helper.changes.on_change, helper.changes.on_known_drag = helper._tell_change, helper._tell_drag
     requests = (
         {"kind": "change", "id": 1, "values": CLIMB, "by": "a test"},
         {"kind": "undo", "id": 2, "by": "a test"},
