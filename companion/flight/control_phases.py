@@ -50,7 +50,7 @@ async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> N
 
     def progress() -> str:
         elapsed = clock() - began
-        maneuver, _ = sequence.part_at(elapsed)
+        maneuver, _ = sequence.maneuver_at(elapsed)
         return f"{maneuver.name}, {elapsed:.0f} of {sequence.duration:.0f} s flown"
 
     await _fly(context, ManeuverSource(sequence), progress)

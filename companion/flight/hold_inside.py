@@ -1,8 +1,8 @@
 """Holds the vehicle where the autopilot's landing will not drift out of the fence."""
 
 from companion.flight.context import FlightContext
-from companion.guidance.braking import drift
-from companion.guidance.fence import Fence, Place
+from companion.guidance.braking import handover_drift
+from companion.guidance.fence import Fence, GeoPosition
 from companion.guidance.reference import NorthEast, Vector, minus
 from companion.safety.table import fence_of
 
@@ -27,7 +27,7 @@ def brake_inside_fence(context: FlightContext) -> None:
 
 
 def only_upwind_is_inside(
-    fence: Fence, origin: Place | None, stop: Vector, wind: NorthEast
+    fence: Fence, origin: GeoPosition | None, stop: Vector, wind: NorthEast
 ) -> bool:
     """Whether the landing would drift out of the fence, but not if it began further upwind.
 
@@ -38,7 +38,7 @@ def only_upwind_is_inside(
         wind: acceleration that the wind gives a vehicle at rest, m/s², north and east.
     """
     walls = fence.walls
-    (north, east, down), (drift_north, drift_east) = stop, drift(wind)
+    (north, east, down), (drift_north, drift_east) = stop, handover_drift(wind)
     downwind = (north + drift_north, east + drift_east, down)
     upwind = (north - drift_north, east - drift_east, down)
     return (

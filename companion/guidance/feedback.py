@@ -99,7 +99,11 @@ class HeightGains:
 
 
 def acceleration_down(
-    gains: HeightGains, reference: Reference, motion: VehicleMotion, ahead: Reference, drag: Drag
+    gains: HeightGains,
+    reference: Reference,
+    motion: VehicleMotion,
+    future_reference: Reference,
+    drag: Drag,
 ) -> float:
     """Acceleration that thrust and gravity together shall give, m/s² downwards, from −g/2 to g/2.
 
@@ -107,15 +111,16 @@ def acceleration_down(
         gains: gains and limits of the height cascade.
         reference: the reference now.
         motion: the present motion.
-        ahead: the reference one rotor lag later; its acceleration and velocity are fed forward.
+        future_reference: the reference one rotor lag later; its acceleration and velocity are fed
+            forward.
         drag: drag of the vehicle, which thrust balances in climb and descent; with
             `VerticalMode.ACCELERATION` neither drag nor feedback is added.
     """
-    wanted = ahead.acceleration_ned[2]
+    wanted = future_reference.acceleration_ned[2]
     if reference.vertical is not VerticalMode.ACCELERATION:
         error = reference.position_ned[2] - motion.position_ned[2]
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)
         wanted += gains.climb * (speed - motion.velocity_ned[2])
-        wanted += drag.deceleration(ahead.velocity_ned)[2]
+        wanted += drag.deceleration(future_reference.velocity_ned)[2]
     return min(max(wanted, -_LARGEST_VERTICAL_ACCELERATION), _LARGEST_VERTICAL_ACCELERATION)

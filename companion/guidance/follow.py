@@ -21,7 +21,7 @@ def circle(radius: float, speed: float, laps: float) -> "HeldHeadingManeuver":
         laps: number of laps, including speeding up and slowing down. If it is not whole, the
             circle does not end where it began.
     """
-    return HeldHeadingManeuver(steady_circle(radius, speed, laps, longest=inf))
+    return HeldHeadingManeuver(steady_circle(radius, speed, laps, longest_duration=inf))
 
 
 @dataclass(frozen=True, slots=True)

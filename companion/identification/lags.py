@@ -92,13 +92,15 @@ def complex_lag_response(commands: Knots, lag: complex, at: Floats) -> Numbers:
     An underdamped second-order response is a weighted sum of two such responses with complex
     conjugate lags.
     """
-    steady = commands.value - commands.slope * lag
-    ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
-    jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
+    steady_output = commands.value - commands.slope * lag
+    steady_at_ends = steady_output[:-1] + commands.slope[:-1] * np.diff(commands.time)
+    jumps = np.concatenate(
+        ([commands.value[0] - steady_output[0]], steady_at_ends - steady_output[1:])
+    )
     transients = _transients_at_knots(commands.time / lag, jumps)
     pieces = np.searchsorted(commands.time, at, side="right") - 1
     elapsed = at - commands.time[pieces]
-    steady_response = steady[pieces] + commands.slope[pieces] * elapsed
+    steady_response = steady_output[pieces] + commands.slope[pieces] * elapsed
     response: Numbers = steady_response + transients[pieces] * np.exp(-elapsed / lag)
     return response
 
@@ -109,18 +111,18 @@ def _transients_at_knots(scaled_times: Numbers, jumps: Numbers) -> Numbers:
     `scaled_times` are the times of the knots divided by the lag. The sums are computed in parts so
     short that no exponential overflows.
     """
-    sums = np.empty_like(jumps)
+    transients = np.empty_like(jumps)
     real_times = np.real(scaled_times)
     start, previous_sum = 0, 0.0 * jumps[0]
     while start < jumps.size:
         end = int(np.searchsorted(real_times, real_times[start] + _LARGEST_EXPONENT, side="right"))
         growth = np.exp(scaled_times[start:end] - scaled_times[start])
-        sums[start:end] = (previous_sum + np.cumsum(jumps[start:end] * growth)) / growth
+        transients[start:end] = (previous_sum + np.cumsum(jumps[start:end] * growth)) / growth
         if end < jumps.size:
             elapsed = scaled_times[end] - scaled_times[end - 1]
-            previous_sum = sums[end - 1] * np.exp(-elapsed)
+            previous_sum = transients[end - 1] * np.exp(-elapsed)
         start = end
-    return sums
+    return transients
 
 
 def value_at(commands: Knots, at: Floats) -> Floats:

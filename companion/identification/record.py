@@ -53,15 +53,15 @@ def stretches(
     """
     t, u = _checked_series(time, commanded)
     sample_times, y = _checked_series(measured_time, measured)
-    found = []
+    found_stretches = []
     for rows in np.split(np.arange(t.size), np.flatnonzero(np.diff(t) > _LONGEST_HOLD) + 1):
         if rows.size == 0:
             continue
         first_time, last_time = t[rows[0]], t[rows[-1]]
         is_inside = (sample_times >= first_time + LONGEST_DEAD_TIME) & (sample_times <= last_time)
         if is_inside.any():
-            found.append(Stretch(t[rows], u[rows], sample_times[is_inside], y[is_inside]))
-    return found
+            found_stretches.append(Stretch(t[rows], u[rows], sample_times[is_inside], y[is_inside]))
+    return found_stretches
 
 
 def most_excited_windows(record: list[Stretch]) -> list[Stretch]:
@@ -74,14 +74,14 @@ def most_excited_windows(record: list[Stretch]) -> list[Stretch]:
         return record
     windows = [window for stretch in record for window in _windows(stretch)]
     windows.sort(key=lambda window: float(np.std(window.commanded)), reverse=True)
-    kept: list[Stretch] = []
-    rows = 0
+    chosen_windows: list[Stretch] = []
+    row_count = 0
     for window in windows:
-        rows += window.time.size + window.measured_time.size
-        if kept and rows > _MOST_ROWS:
+        row_count += window.time.size + window.measured_time.size
+        if chosen_windows and row_count > _MOST_ROWS:
             break
-        kept.append(window)
-    return sorted(kept, key=lambda window: float(window.time[0]))
+        chosen_windows.append(window)
+    return sorted(chosen_windows, key=lambda window: float(window.time[0]))
 
 
 def _windows(stretch: Stretch) -> list[Stretch]:
@@ -115,7 +115,7 @@ def _checked_series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]
         raise ValueError(
             f"times {t.shape} and values {v.shape} must be one-dimensional and equally long"
         )
-    finite = np.isfinite(t) & np.isfinite(v)
-    t, v = t[finite], v[finite]
+    is_finite = np.isfinite(t) & np.isfinite(v)
+    t, v = t[is_finite], v[is_finite]
     order = np.argsort(t, kind="stable")
     return t[order], v[order]

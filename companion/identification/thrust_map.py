@@ -80,9 +80,9 @@ def _excited_samples(record: list[Stretch]) -> list[Stretch]:
         change_times = stretch.time[np.abs(stretch.commanded - median) > least_change]
         latest_change = np.searchsorted(change_times, stretch.measured_time, side="right")
         elapsed = stretch.measured_time - np.concatenate(([-np.inf], change_times))[latest_change]
-        is_kept = elapsed < _LARGEST_DELAY
-        if is_kept.any():
-            measured = stretch.measured_time[is_kept], stretch.measured[is_kept]
+        is_excited = elapsed < _LARGEST_DELAY
+        if is_excited.any():
+            measured = stretch.measured_time[is_excited], stretch.measured[is_excited]
             excited_stretches.append(Stretch(stretch.time, stretch.commanded, *measured))
     return excited_stretches
 

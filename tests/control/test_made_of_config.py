@@ -231,8 +231,8 @@ def test_thrust_and_law():
         hover=0.45,
         correction_limit=0.3,
         correction_time=1.25,
-        lowest=0.15,
-        highest=0.85,
+        min_thrust=0.15,
+        max_thrust=0.85,
         curve_factor=0.2,
         battery_exponent=1.5,
         lag=0.03,
@@ -343,7 +343,7 @@ def test_predictive_control_gets_the_newest_attitude_and_the_estimated_wind():
     ],
 )
 def test_a_drag_that_is_far_off_is_told_with_the_keys_to_set(learned, certain, told):
-    made, _ = estimate(prior_drag=Drag(0.25, 0.0), drag=learned, top_speed=5.0, certain=certain)
+    made, _ = estimate(prior_drag=Drag(0.25, 0.0), drag=learned, top_speed=5.0, is_certain=certain)
     warning = made.mismatch_warning()
     assert (warning is None) is (told is None)
     if told is not None:

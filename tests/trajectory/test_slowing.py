@@ -148,7 +148,7 @@ def test_the_path_and_its_heading_are_the_same_and_the_derivatives_right(name):
 
 def test_two_corners_are_slowed_down_and_the_legs_are_not():
     found = slow_down(ANGULAR, ENVELOPE)
-    assert not found.even
+    assert not found.is_even
     even = evenly_slowed(ANGULAR, max(part.factor for part in found.parts))
     assert found.trajectory.duration < 0.9 * even.duration
     as_before = [
@@ -216,7 +216,7 @@ def test_what_can_be_flown_is_not_slowed():
 def test_what_is_too_long_is_slowed_evenly_and_says_so():
     laps = gerono_eight(3.0, Laps(5.0, 150.0))
     found = slow_down(laps, ENVELOPE)
-    assert found.even
+    assert found.is_even
     assert violations(found.trajectory, ENVELOPE) == ()
     note, _ = slow_down_notes(laps, found, 0.5)
     assert "it is too long to be slowed down in parts; its tightest limit is limits." in note
@@ -248,7 +248,7 @@ def test_a_slower_time_has_right_derivatives_and_is_found_again():
         assert here.second == pytest.approx((after.first - before.first) / (2 * h), abs=1e-6)
         assert here.third == pytest.approx((after.second - before.second) / (2 * h), abs=2e-4)
         assert 1 / 2.5 <= here.first <= 1.0
-        times, _ = law.stretched(np.array([here.phase]))
+        times, _ = law.stretched_times(np.array([here.phase]))
         assert times[0] == pytest.approx(time, abs=1e-12)
     assert law.at(-1.0).phase == 0.0
     assert law.at(law.duration + 1.0).phase == pytest.approx(6.0)

@@ -83,9 +83,9 @@ def require_finite(motion: Motion) -> None:
     _require_all_finite(*vectors, motion.heading_rate)
 
 
-def _require_all_finite(*columns: Floats) -> None:
-    for column in columns:
-        if not np.isfinite(column).all():
+def _require_all_finite(*arrays: Floats) -> None:
+    for array in arrays:
+        if not np.isfinite(array).all():
             raise FloatingPointError("not a finite number")
 
 

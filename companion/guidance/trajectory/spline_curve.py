@@ -55,7 +55,7 @@ class SplineCurve:
         spans = np.diff(knots)
         fractions = np.linspace(0.0, 1.0, 17)
         times = (knots[:-1, None] + spans[:, None] * fractions).ravel()
-        velocity = self.spline.along(times)[:, :, 1]
+        velocity = self.spline.sampled(times)[:, :, 1]
         speeds = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
         counts = np.ceil(np.maximum(spans * speeds * 1.05 / PATH_STEP, spans / self.longest_step))
         counts = np.maximum(counts, self.checks_per_piece)
@@ -142,7 +142,7 @@ def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineH
     """
     count = int(np.ceil((spline.end - spline.begin) / _HEADING_STEP)) + 1
     times = np.linspace(spline.begin, spline.end, count)
-    velocity = spline.along(times)[:, :2, 1]
+    velocity = spline.sampled(times)[:, :2, 1]
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     moving = speed > max(_SLOW_SHARE * speed.max(), _STANDING_SPEED)
     if not moving.any():

@@ -59,12 +59,12 @@ class Piece(NamedTuple):
 
     Attributes:
         begin, end: times, s.
-        steady: whether the rate of the phase is constant.
+        is_steady: whether the rate of the phase is constant.
     """
 
     begin: float
     end: float
-    steady: bool
+    is_steady: bool
 
 
 class TimeLaw(Protocol):
