@@ -66,16 +66,16 @@ def connection_url(endpoint: str) -> str:
     Raises:
         EndpointError: the endpoint cannot be parsed, or MAVSDK cannot do what it demands.
     """
-    where = parse_endpoint(endpoint)
-    if isinstance(where, UdpIn | TcpServer) and where.peers:
+    parsed_endpoint = parse_endpoint(endpoint)
+    if isinstance(parsed_endpoint, UdpIn | TcpServer) and parsed_endpoint.peers:
         raise EndpointError(
             f"endpoint {endpoint!r}: MAVSDK accepts every sender; remove ?peer=, or use "
             "link.backend: direct"
         )
-    scheme = _SCHEMES[type(where)]
-    if isinstance(where, SerialPort):
-        return f"{scheme}://{where.device}:{where.baud}"
-    return f"{scheme}://{where.host}:{where.port}"
+    scheme = _SCHEMES[type(parsed_endpoint)]
+    if isinstance(parsed_endpoint, SerialPort):
+        return f"{scheme}://{parsed_endpoint.device}:{parsed_endpoint.baud}"
+    return f"{scheme}://{parsed_endpoint.host}:{parsed_endpoint.port}"
 
 
 _MOST_WAITING_FRAMES = 1000

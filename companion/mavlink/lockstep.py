@@ -26,7 +26,7 @@ BEACON_TIMEOUT_S = 2.0
 time advances without beacons.
 """
 
-_SPIN_S = 0.0005
+_BUSY_WAIT_S = 0.0005
 """Wall time of polling for the next beacon before the process sleeps, s."""
 
 _TIMERS_IN_ORDER = 1_000_000
@@ -107,7 +107,7 @@ class SettlingSelector(HotSelector, ABC):
         self._on_settled, self._iterations = callback, 0
 
     @property
-    def settling(self) -> bool:
+    def is_settling(self) -> bool:
         """Whether a step is open: ready callbacks and due timers run, and no I/O happens."""
         return self._on_settled is not None
 
@@ -135,9 +135,9 @@ class _SteppingSelector(SettlingSelector):
         self._clock = clock
 
     def select(self, timeout: float | None = None) -> ReadyKeys:
-        was_settling = self.settling
+        was_settling = self.is_settling
         ready = super().select(timeout)
-        if was_settling and not self.settling:
+        if was_settling and not self.is_settling:
             self._clock.start_waiting()
         return ready
 
@@ -145,19 +145,19 @@ class _SteppingSelector(SettlingSelector):
         time_left = None if timeout == 0 else self._clock.time_left()
         if time_left is None:
             return HotSelector.select(self, timeout)
-        ready = self._spin()
-        if not ready and not self.settling:
+        ready = self._busy_wait()
+        if not ready and not self.is_settling:
             ready = HotSelector.select(self, time_left)
-        if not self.settling and self._clock.time_left() == 0.0:
+        if not self.is_settling and self._clock.time_left() == 0.0:
             self._clock.advance_alone()
         return ready
 
-    def _spin(self) -> ReadyKeys:
+    def _busy_wait(self) -> ReadyKeys:
         """Poll for the next beacon without sleeping: waking up would take longer."""
-        deadline = time.perf_counter() + _SPIN_S
+        deadline = time.perf_counter() + _BUSY_WAIT_S
         while time.perf_counter() < deadline:
             ready = HotSelector.select(self, 0)
-            if ready or self.settling:
+            if ready or self.is_settling:
                 return ready
             os.sched_yield()  # let other processes use this core
         return []

@@ -80,7 +80,7 @@ def test_messages_of_the_flight_reach_the_checks_and_the_listeners():
         flight.end.send({"kind": "config", "config": now, "can_undo": True})
         flight.end.send({"kind": "drag", "drag": [0.3, 0.0], "source": "learned-aa.json"})
         assert [(await heard.get())["kind"] for _ in range(2)] == ["config", "drag"]
-        assert connection.checks.current.planner.gain_per_s == 4.0
+        assert connection.checks.current_config.planner.gain_per_s == 4.0
         assert connection.checks._drag.drag.linear == 0.3
 
     used(use)

@@ -22,7 +22,7 @@ async def open_tcp_client(
         EndpointError: nobody listens there, the host is unknown, or no answer came within 5 s.
     """
     transport = TcpTransport(receiver, lost)
-    where = f"TCP {endpoint.host}:{endpoint.port}"
+    endpoint_text = f"TCP {endpoint.host}:{endpoint.port}"
     try:
         async with asyncio.timeout(OPEN_TIMEOUT_S):
             await asyncio.get_running_loop().create_connection(
@@ -30,16 +30,17 @@ async def open_tcp_client(
             )
     except TimeoutError as error:
         raise EndpointError(
-            f"{where}: no answer within {OPEN_TIMEOUT_S:g} s; check address and network"
+            f"{endpoint_text}: no answer within {OPEN_TIMEOUT_S:g} s; check address and network"
         ) from error
     except socket.gaierror as error:
         raise EndpointError(
-            f"{where}: host unknown ({error.strerror}); check the name or use its IP address"
+            f"{endpoint_text}: host unknown ({error.strerror}); check the name or use its IP "
+            "address"
         ) from error
     except OSError as error:
         raise EndpointError(
-            f"{where}: cannot connect ({error.strerror or error}); is the vehicle or router "
-            "running and listening there?"
+            f"{endpoint_text}: cannot connect ({error.strerror or error}); is the vehicle or "
+            "router running and listening there?"
         ) from error
     return transport
 
@@ -55,13 +56,13 @@ async def open_tcp_server(
     """
     named_peers = await resolve_peers(endpoint.peers, socket.SOCK_STREAM)
     transport = TcpTransport(receiver, lost, named_peers)
-    where = f"TCP {endpoint.host}:{endpoint.port}"
+    endpoint_text = f"TCP {endpoint.host}:{endpoint.port}"
     try:
         server = await asyncio.get_running_loop().create_server(
             lambda: _Connection(transport), endpoint.host, endpoint.port
         )
     except OSError as error:
-        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
+        raise EndpointError(f"{endpoint_text}: {why_not_opened(error)}") from error
     transport.listen(server)
     return transport
 
@@ -111,12 +112,12 @@ class TcpTransport:
         if self._connection is not None:
             if not self._may_be_replaced():
                 return False
-            connection_before = self._connection
+            old_connection = self._connection
             self.connection_dropped(
-                connection_before,
+                old_connection,
                 "this client sends no valid heartbeat, and another client replaced it",
             )
-            connection_before.abort()
+            old_connection.abort()
         sock = connection.get_extra_info("socket")
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection, self._connected_at = connection, self._loop.time()
