@@ -81,7 +81,7 @@ def connection_url(endpoint: str) -> str:
 _MOST_WAITING_FRAMES = 1000
 """Largest number of frames that wait for the event loop; if more wait, the oldest are dropped."""
 _SOURCE = slice(5, 7)  # system and component of a MAVLink 2 frame
-_OPEN_FAILURES = {
+_OPEN_ERROR_TEXTS = {
     "BIND_ERROR": "the port is in use by another program, or the address is not this computer's",
     "DESTINATION_IP_UNKNOWN": "the host is unknown; use its IP address",
     "CONNECTION_ERROR": "check that the device is there and that you may use it",
@@ -165,7 +165,7 @@ class MavsdkTransport:
 
 
 def _open_error(endpoint: str, message: str) -> str:
-    reasons = (reason for name, reason in _OPEN_FAILURES.items() if name in message)
+    reasons = (reason for name, reason in _OPEN_ERROR_TEXTS.items() if name in message)
     return f"{endpoint} cannot be opened by MAVSDK: {next(reasons, message)}"
 
 

@@ -170,7 +170,7 @@ def _reporter(
 ) -> StatusReporter:
     """Make the reporter of the flight's state; it shows the state only if the observer wants it."""
 
-    def phase() -> tuple[Phase, float]:
+    def current_phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began
 
     return StatusReporter(
@@ -178,7 +178,7 @@ def _reporter(
         ladder,
         trace,
         flight.began,
-        phase,
+        current_phase,
         recorder.status if recorder.wants_status else None,
         asyncio.get_running_loop().time,
         real_time=real_time,

@@ -129,12 +129,12 @@ def _early_end(
     time = next((event_time for event_time, text in flight.events if text == result), now - began)
     phase, name, maneuver_elapsed = flight.failed_phase.name, None, None
     if phase == "maneuvers":
-        for mark in assembled.trace.maneuvers:  # a hold may have ended it before the flight ended
-            if mark.name is not None:
-                name, maneuver_begin = mark.name, mark.time
+        for change in assembled.trace.maneuvers:  # a hold may have ended it before the flight ended
+            if change.name is not None:
+                name, maneuver_begin = change.name, change.time
                 maneuver_elapsed = time + began - maneuver_begin
-            elif name is not None and mark.time <= time + began:
-                maneuver_elapsed = mark.time - maneuver_begin
+            elif name is not None and change.time <= time + began:
+                maneuver_elapsed = change.time - maneuver_begin
     airborne_time = None if takeoff_time is None or takeoff_time > time else time - takeoff_time
     breach = assembled.ladder.breaches.get(result)
     return EarlyEnd(time, airborne_time, phase, name, maneuver_elapsed, breach)

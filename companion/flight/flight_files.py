@@ -139,11 +139,11 @@ class FlightFiles:
         self,
         assembled: AssembledFlight,
         result: str,
-        grants: tuple[realtime.SettingResult, ...],
+        setting_results: tuple[realtime.SettingResult, ...],
     ) -> Summary:
         """Make the summary of a finished flight before the log is closed; save the learned drag.
 
-        `result`: "ok", or the reason why the flight ended early. `grants`: which requested
+        `result`: "ok", or the reason why the flight ended early. `setting_results`: which requested
         real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
@@ -171,7 +171,7 @@ class FlightFiles:
             log=self.folder,
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
-            realtime={grant.name: grant.refusal or "granted" for grant in grants},
+            realtime={each.name: each.refusal or "granted" for each in setting_results},
             facts=facts_of(assembled, result, advice_texts, is_drag_saved=is_drag_saved),
         )
 

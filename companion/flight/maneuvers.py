@@ -36,7 +36,7 @@ def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
     """A copy of the sequence that has not begun: a `Follow` stores the pose where it began."""
     return ManeuverSequence(
         [
-            replace(maneuver, _with_turn=None, _pose=None)
+            replace(maneuver, _turned_trajectory=None, _pose=None)
             if isinstance(maneuver, Follow)
             else maneuver
             for maneuver in sequence.parts

@@ -132,7 +132,7 @@ async def _arm(context: FlightContext) -> None:
     await command_if_ours(
         context,
         autopilot.set_mode(autopilot.ready_mode),
-        lambda: _require_untouched(context),
+        lambda: _require_unchanged_by_others(context),
         lambda: in_role(context.link, Role.READY),
     )
     await context.until(lambda: in_role(context.link, Role.READY))
@@ -154,7 +154,7 @@ async def _arm(context: FlightContext) -> None:
     await context.until(armed, "the vehicle to be armed")
 
 
-def _require_untouched(context: FlightContext) -> None:
+def _require_unchanged_by_others(context: FlightContext) -> None:
     """Raise `FlightEnded` if somebody armed the vehicle or changed its mode since the checks."""
     state = context.link.state
     _refuse_unsafe(vehicle_checks.armed(state))
@@ -176,8 +176,8 @@ def _require_flyable_by_vehicle(context: FlightContext) -> None:
         if drag != drag_before_connecting(config):
             require_still_flyable(config, maneuvers, drag)
         if config.safety.fence_polygon_deg and global_position is not None:
-            place = GeoPosition(global_position.latitude_deg, global_position.longitude_deg)
-            require_inside(config, maneuvers.parts, place, drag)
+            position = GeoPosition(global_position.latitude_deg, global_position.longitude_deg)
+            require_inside(config, maneuvers.parts, position, drag)
     except ConfigError as error:
         raise FlightEnded(str(error)) from error
 
@@ -200,11 +200,11 @@ def _report_offboard_loss(context: FlightContext, values: Values) -> None:
     """Report the autopilot's reaction to the loss of our setpoints."""
     autopilot = context.link.autopilot
     failsafe = autopilot.offboard_loss_failsafe
-    seconds = values.get(failsafe.parameter)
-    how_long = "an unknown time" if seconds is None else f"{seconds:g} s"
+    hold_time = values.get(failsafe.parameter)
+    hold_time_text = "an unknown time" if hold_time is None else f"{hold_time:g} s"
     context.note(
         f"offboard loss: if our setpoints stop, {autopilot.name} holds the last rates for "
-        f"{how_long} ({failsafe.parameter}); then {failsafe.action}"
+        f"{hold_time_text} ({failsafe.parameter}); then {failsafe.action}"
     )
 
 

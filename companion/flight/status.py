@@ -90,7 +90,7 @@ class StatusReporter:
         ladder: SafetyLadder,
         trace: FlightTrace,
         began: float,
-        phase: Callable[[], tuple[Phase, float]],
+        current_phase: Callable[[], tuple[Phase, float]],
         show: Callable[[FlightStatus], None] | None,
         clock: Callable[[], float],
         *,
@@ -100,18 +100,23 @@ class StatusReporter:
         self.battery_at_takeoff: float | None = None
         self._context, self._safety_ladder, self._trace = context, ladder, trace
         self.real_time = real_time
-        self._began, self._phase, self._show, self._clock = began, phase, show, clock
+        self._began, self._current_phase, self._show, self._clock = (
+            began,
+            current_phase,
+            show,
+            clock,
+        )
         self._setpoint_counts: deque[tuple[float, int]] = deque()
         self._status_rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
         """Record and show the state until cancelled; steps that were missed are not repeated."""
-        due = self._clock()
+        next_time = self._clock()
         while True:
             self.record()
             self._show_status()
-            due = max(due + _STATUS_PERIOD, self._clock())
-            await asyncio.sleep(due - self._clock())
+            next_time = max(next_time + _STATUS_PERIOD, self._clock())
+            await asyncio.sleep(next_time - self._clock())
 
     def _show_status(self) -> None:
         """Show the state; once the observer has raised an exception, show no more states."""
@@ -145,7 +150,7 @@ class StatusReporter:
     def status(self) -> FlightStatus:
         """The present state."""
         now, context = self._clock(), self._context
-        (phase, phase_began), record = self._phase(), context.loop.record
+        (phase, phase_began), record = self._current_phase(), context.loop.record
         maneuver = context.guidance_loop.flown_source.part(now)
         return FlightStatus(
             time=now - self._began,
@@ -176,9 +181,9 @@ class StatusReporter:
         counts.append((now, record.setpoints))
         while len(counts) > 2 and now - counts[1][0] >= _RATE_WINDOW:
             counts.popleft()
-        since, before = counts[0]
-        sent_count = record.setpoints - before
-        return sent_count / (now - since) if sent_count and now > since else None
+        window_began, count_before = counts[0]
+        sent_count = record.setpoints - count_before
+        return sent_count / (now - window_began) if sent_count and now > window_began else None
 
     def _position(self, now: float) -> LocalPosition | None:
         position = self._context.link.state.position

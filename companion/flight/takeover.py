@@ -57,7 +57,7 @@ async def wait_for_handover(context: FlightContext) -> None:
     A vehicle that still takes off or climbs is not held yet. A vehicle that holds because of a
     failsafe, such as offboard loss, was not handed over.
     """
-    state, ready = context.link.state, context.link.autopilot.ready_mode
+    state, ready_mode = context.link.state, context.link.autopilot.ready_mode
     min_height = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
 
     def handed_over() -> bool:
@@ -71,9 +71,11 @@ async def wait_for_handover(context: FlightContext) -> None:
                 f"a height of {min_height:.1f} m (flight.takeoff_height_m), now {height}"
             )
             return False
-        if state.mode != ready or not in_role(context.link, Role.READY):
-            by_failsafe = " by the autopilot's failsafe" if state.mode == ready else ""
-            context.waiting_for = f"the pilot to switch to {ready}, now {state.mode}{by_failsafe}"
+        if state.mode != ready_mode or not in_role(context.link, Role.READY):
+            by_failsafe = " by the autopilot's failsafe" if state.mode == ready_mode else ""
+            context.waiting_for = (
+                f"the pilot to switch to {ready_mode}, now {state.mode}{by_failsafe}"
+            )
             return False
         context.waiting_for = "the vehicle to keep its height"
         return climb_has_ended(context)
@@ -148,9 +150,9 @@ async def offboard(context: FlightContext) -> None:
     await _require_learned_hover(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
-    jump = hypot(*context.loop.resets.position_shift)
-    if jump and context.takeoff_position is not None:  # the monitors count from here on
-        context.note(f"before the takeover the estimated position jumped by {jump:.1f} m")
+    position_jump = hypot(*context.loop.resets.position_shift)
+    if position_jump and context.takeoff_position is not None:  # the monitors count from here on
+        context.note(f"before the takeover the estimated position jumped by {position_jump:.1f} m")
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False
@@ -192,10 +194,13 @@ async def _require_learned_hover(context: FlightContext) -> None:
 
 
 def _is_held(context: FlightContext) -> bool:
-    sample, position = context.loop.resets.newest_attitude, context.fresh_position()
-    if sample is None or position is None:
+    attitude_sample, position = context.loop.resets.newest_attitude, context.fresh_position()
+    if attitude_sample is None or position is None:
         return False
-    tilt, speed = tilt_angle(sample.q[1], sample.q[2]), hypot(*position.velocity_ned[:2])
+    tilt, speed = (
+        tilt_angle(attitude_sample.q[1], attitude_sample.q[2]),
+        hypot(*position.velocity_ned[:2]),
+    )
     context.waiting_for = (
         f"the autopilot to hold the vehicle (tilt {degrees(tilt):.0f}°, speed {speed:.1f} m/s)"
     )

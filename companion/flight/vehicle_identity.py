@@ -38,10 +38,10 @@ class ReplacementDetector:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
         self._has_begun = self._arming_noted = False
-        self._peers = self._restarts = 0
+        self._peer_count = self._restart_count = 0
         self.uid: str | None = None
         self._other_uid: str | None = None
-        self._frames = 0
+        self._frame_count = 0
         self._updated_at = clock()
         self._silence = self._long_silence = 0.0
 
@@ -49,8 +49,11 @@ class ReplacementDetector:
         """Begin to watch: from now on, all frames must come from the same vehicle."""
         self._has_begun, self._arming_noted = True, False
         self.uid = self._other_uid = None
-        self._peers, self._restarts = self._link.stats.peers, self._link.clock.restart_count
-        self._frames, self._updated_at = self._link.stats.frames, self._clock()
+        self._peer_count, self._restart_count = (
+            self._link.stats.peers,
+            self._link.clock.restart_count,
+        )
+        self._frame_count, self._updated_at = self._link.stats.frames, self._clock()
         self._silence = self._long_silence = 0.0
 
     def note_arming(self) -> None:
@@ -64,12 +67,12 @@ class ReplacementDetector:
         """Measure the silence; the watch calls this 50 times a second."""
         now, frames = self._clock(), self._link.stats.frames
         interval, self._updated_at = now - self._updated_at, now
-        if frames == self._frames:
+        if frames == self._frame_count:
             self._silence += min(interval, _LONGEST_UPDATE_INTERVAL)
             return
         if self._silence > LONGEST_SILENCE and not self._arming_noted:
             self._long_silence = self._silence
-        self._frames, self._silence = frames, 0.0
+        self._frame_count, self._silence = frames, 0.0
 
     def note_identity(self, identity: Identity) -> None:
         """Take the identity from AUTOPILOT_VERSION; an unknown hardware id is ignored."""
@@ -82,8 +85,8 @@ class ReplacementDetector:
     def is_same_vehicle(self) -> bool:
         """Whether there is no sign of a replacement; the control loop asks at every sample."""
         return (
-            self._peers == self._link.stats.peers
-            and self._restarts == self._link.clock.restart_count
+            self._peer_count == self._link.stats.peers
+            and self._restart_count == self._link.clock.restart_count
             and self._other_uid is None
             and not self._long_silence
             and (self._silence <= LONGEST_SILENCE or self._arming_noted)
@@ -107,9 +110,9 @@ class ReplacementDetector:
 
         None: there is no sign, or the vehicle is still silent; a silence counts when it ends.
         """
-        if self._peers != self._link.stats.peers:
+        if self._peer_count != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"
-        if self._restarts != self._link.clock.restart_count:
+        if self._restart_count != self._link.clock.restart_count:
             return f"the autopilot may have restarted: {self._link.clock.last_change}"
         if self._other_uid is not None:
             return f"another vehicle answers: hardware id {self._other_uid}, not {self.uid}"

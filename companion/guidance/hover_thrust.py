@@ -160,7 +160,7 @@ class HoverThrust:
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
         """Take the battery voltage (V; None: unknown), received at `time`, s of event-loop time."""
-        self._battery.note(time, voltage)
+        self._battery.note_voltage(time, voltage)
 
     def on_ground(self) -> None:
         """Note that the vehicle is on the ground: pause learning, forget the take-off voltage."""

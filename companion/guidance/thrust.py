@@ -139,7 +139,7 @@ class BatterySag:
         self._first_voltage = None
         self._ratio = self.factor = 1.0
 
-    def note(self, time: float, voltage: float | None) -> None:
+    def note_voltage(self, time: float, voltage: float | None) -> None:
         """Take the voltage of the whole battery (V) at `time` (s); an unusable one is ignored."""
         if voltage is None or not isfinite(voltage) or voltage <= 0.0 or self._exponent == 0.0:
             return

@@ -32,8 +32,8 @@ class Model(Protocol):
     lower_bounds: Floats
     upper_bounds: Floats
 
-    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
-        """(m,), response at the times `at` (m,), s, from the steady state of the first command."""
+    def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
+        """(m,), response at `times` (m,), s, from the steady state of the first command."""
         ...
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
@@ -49,9 +49,9 @@ class FirstOrder:
 
     lower_bounds, upper_bounds = np.log([0.001]), np.log([1.0])
 
-    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
+    def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return first_order_response(commands, exp(log_params[0]), at)
+        return first_order_response(commands, exp(log_params[0]), times)
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
@@ -67,9 +67,9 @@ class SecondOrder:
 
     lower_bounds, upper_bounds = np.log([0.002, 0.2]), np.log([1.0, 4.0])
 
-    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
+    def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return second_order_response(commands, *frequency_damping(log_params), at)
+        return second_order_response(commands, *frequency_damping(log_params), times)
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""

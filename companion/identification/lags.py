@@ -78,15 +78,15 @@ def _start_values(commands: Knots, slew: float) -> Floats:
     return np.array(outputs)
 
 
-def first_order_response(commands: Knots, lag: float, at: Floats) -> Floats:
-    """(m,), response of a first-order lag of `lag` > 0 s to the commands, at the times `at`, s.
+def first_order_response(commands: Knots, lag: float, times: Floats) -> Floats:
+    """(m,), response of a first-order lag of `lag` > 0 s to the commands, at `times`, s.
 
     The response starts in the steady state of the first command. No time may be before it.
     """
-    return np.asarray(complex_lag_response(commands, lag, at), dtype=np.float64)
+    return np.asarray(complex_lag_response(commands, lag, times), dtype=np.float64)
 
 
-def complex_lag_response(commands: Knots, lag: complex, at: Floats) -> Numbers:
+def complex_lag_response(commands: Knots, lag: complex, times: Floats) -> Numbers:
     """Like `first_order_response`, for a complex lag, s.
 
     An underdamped second-order response is a weighted sum of two such responses with complex
@@ -98,8 +98,8 @@ def complex_lag_response(commands: Knots, lag: complex, at: Floats) -> Numbers:
         ([commands.value[0] - steady_output[0]], steady_at_ends - steady_output[1:])
     )
     transients = _transients_at_knots(commands.time / lag, jumps)
-    pieces = np.searchsorted(commands.time, at, side="right") - 1
-    elapsed = at - commands.time[pieces]
+    pieces = np.searchsorted(commands.time, times, side="right") - 1
+    elapsed = times - commands.time[pieces]
     steady_response = steady_output[pieces] + commands.slope[pieces] * elapsed
     response: Numbers = steady_response + transients[pieces] * np.exp(-elapsed / lag)
     return response
@@ -125,10 +125,10 @@ def _transients_at_knots(scaled_times: Numbers, jumps: Numbers) -> Numbers:
     return transients
 
 
-def value_at(commands: Knots, at: Floats) -> Floats:
-    """(m,), values of the commands at the times `at` (m,), s; none may be before the first knot."""
-    piece = np.searchsorted(commands.time, at, side="right") - 1
-    values: Floats = commands.value[piece] + commands.slope[piece] * (at - commands.time[piece])
+def value_at(commands: Knots, times: Floats) -> Floats:
+    """(m,), values of the commands at `times` (m,), s; none may be before the first knot."""
+    piece = np.searchsorted(commands.time, times, side="right") - 1
+    values: Floats = commands.value[piece] + commands.slope[piece] * (times - commands.time[piece])
     return values
 
 
@@ -136,24 +136,26 @@ _NEARLY_CRITICAL = 1e-6
 """Smallest |ζ² − 1| that is used; at 0 both lags would be equal, with a division by 0."""
 
 
-def second_order_response(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
+def second_order_response(
+    commands: Knots, frequency: float, damping: float, times: Floats
+) -> Floats:
     """(m,), response of a second-order lag, from the steady state of the first command.
 
     Args:
-        commands: the commands; no time in `at` may be before the first knot.
+        commands: the commands; no time in `times` may be before the first knot.
         frequency: natural frequency ω, rad/s.
         damping: damping ratio ζ.
-        at: (m,), times, s.
+        times: (m,), times, s.
     """
     first_lag, second_lag = _two_lags(frequency, damping)
     if first_lag.imag:
         response: Floats = (
-            np.imag(first_lag * complex_lag_response(commands, first_lag, at)) / first_lag.imag
+            np.imag(first_lag * complex_lag_response(commands, first_lag, times)) / first_lag.imag
         )
         return response
     slow_lag, quick_lag = first_lag.real, second_lag.real
-    slow_response = first_order_response(commands, slow_lag, at)
-    quick_response = first_order_response(commands, quick_lag, at)
+    slow_response = first_order_response(commands, slow_lag, times)
+    quick_response = first_order_response(commands, quick_lag, times)
     return (slow_lag * slow_response - quick_lag * quick_response) / (slow_lag - quick_lag)
 
 

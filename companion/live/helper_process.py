@@ -45,9 +45,9 @@ class FlightConnection:
         self._request_lock = asyncio.Lock()
         asyncio.get_running_loop().add_reader(channel.fileno(), self._on_readable)
 
-    def listen(self, take: Callable[[Message], None]) -> None:
-        """Call `take` with each further message of the flight."""
-        self._listeners.append(take)
+    def listen(self, listener: Callable[[Message], None]) -> None:
+        """Call `listener` with each further message of the flight."""
+        self._listeners.append(listener)
 
     async def change(self, values: Values, by: str) -> str:
         """Check new values and request them from the flight; return the change in words.
@@ -89,8 +89,10 @@ class FlightConnection:
         answer = self._pending_answers[number] = asyncio.get_running_loop().create_future()
         try:
             if self.flight_ended.is_set() or not self._channel.send({**message, "id": number}):
-                ended = self.flight_ended.is_set() or not self._channel.is_open
-                reason = "the flight has ended" if ended else "the flight is too busy to take it"
+                has_ended = self.flight_ended.is_set() or not self._channel.is_open
+                reason = (
+                    "the flight has ended" if has_ended else "the flight is too busy to take it"
+                )
                 raise ChangeRefusedError(f"{reason}; nothing has changed")
             async with asyncio.timeout(_ANSWER_TIMEOUT):
                 reply = await answer
@@ -115,9 +117,9 @@ class FlightConnection:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self.flight_ended.set()
             else:
-                self._take(message)
+                self._take_message(message)
 
-    def _take(self, message: Message) -> None:
+    def _take_message(self, message: Message) -> None:
         if message["kind"] == "config":
             self.checks.current_config = Config.model_validate(message["config"])
         elif message["kind"] == "drag":

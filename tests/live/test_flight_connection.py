@@ -201,7 +201,7 @@ def test_a_page_stays_while_it_is_open_and_some_seconds_more(monkeypatch):
     asyncio.run(until_unused(0, lambda: len(slept) < 5))
     assert len(slept) == 5 + 2
     slept.clear()
-    monkeypatch.setattr(after_flight, "_LONGEST_STAY", 20.0)
+    monkeypatch.setattr(after_flight, "_LONGEST_TIME_AFTER_FLIGHT", 20.0)
     asyncio.run(until_unused(0, lambda: True))
     assert len(slept) == 20
 

@@ -10,15 +10,15 @@ from companion.guidance.trajectory.sample import TrajectoryError
 _Spellings = tuple[tuple[str, ...], ...]
 
 
-def _of_axes(*patterns: str) -> _Spellings:
+def _axis_columns(*patterns: str) -> _Spellings:
     return tuple(tuple(pattern.format(axis) for axis in "xyz") for pattern in patterns)
 
 
 _SPELLINGS: dict[str, _Spellings] = {
     "time": (("t",), ("time",), ("timestamp",)),
-    "position": _of_axes("p_{}", "{}", "p{}", "pos_{}"),
-    "velocity": _of_axes("v_{}", "v{}", "vel_{}", "d{}"),
-    "acceleration": _of_axes("a_lin_{}", "a_{}", "a{}", "acc_{}", "dd{}"),
+    "position": _axis_columns("p_{}", "{}", "p{}", "pos_{}"),
+    "velocity": _axis_columns("v_{}", "v{}", "vel_{}", "d{}"),
+    "acceleration": _axis_columns("a_lin_{}", "a_{}", "a{}", "acc_{}", "dd{}"),
     "yaw": (("yaw",), ("psi",), ("heading",)),
     "quaternion": (("q_w", "q_x", "q_y", "q_z"), ("qw", "qx", "qy", "qz")),
 }
@@ -64,8 +64,8 @@ def rows_of(reader: Any, frames: list[str], name: str) -> Iterator[tuple[int, li
 
 def without_unit(column: str) -> str:
     """The name of a column without its unit."""
-    found = _UNIT.fullmatch(column)
-    return found[1] if found else column
+    match = _UNIT.fullmatch(column)
+    return match[1] if match else column
 
 
 def columns_of(

@@ -47,13 +47,13 @@ def add_page(connection: FlightConnection, page_data: PageData, guard: Guard) ->
     def page(client: Client, token: str = "") -> None:
         _add_drawings()
         Panel(connection, page_data, guard, unlocked=guard.is_token(token))
-        state = {
+        page_state = {
             "fence": page_data.fence(),
             "frames": page_data.states_since(0),
             "events": page_data.events_since(0),
         }
         sent_counts[client.id] = page_data.state_count, page_data.event_count
-        client.run_javascript(f"live.begin({json.dumps(state)})")
+        client.run_javascript(f"live.begin({json.dumps(page_state)})")
 
     async def push() -> None:
         for client in list(Client.instances.values()):
