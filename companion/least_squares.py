@@ -72,14 +72,14 @@ def minimise(
     for _ in range(_MOST_STEPS):
         curvature, descent = jacobian.T @ jacobian, -(jacobian.T @ residual)
         damped_curvature = curvature + damping * np.diag(np.diagonal(curvature) + 1e-12)
-        trial = np.clip(
+        trial_unknowns = np.clip(
             unknowns + np.linalg.solve(damped_curvature, descent), lower_bounds, upper_bounds
         )
-        trial_weights, trial_residual = projection(trial)
+        trial_weights, trial_residual = projection(trial_unknowns)
         reduction = float(residual @ residual - trial_residual @ trial_residual)
-        largest_change = float(np.abs(trial - unknowns).max())
+        largest_change = float(np.abs(trial_unknowns - unknowns).max())
         if reduction > 0.0:
-            unknowns, weights, residual = trial, trial_weights, trial_residual
+            unknowns, weights, residual = trial_unknowns, trial_weights, trial_residual
             jacobian = _jacobian(projection, unknowns)
             damping = max(0.2 * damping, 1e-9)
         else:

@@ -22,7 +22,7 @@ _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
 _REASON_TEXT_DELAY = 0.3
 """Largest time between a mode change and the STATUSTEXT that gives the reason, s."""
-_BY_FAILSAFE = "the autopilot's failsafe took over"
+_FAILSAFE_TEXT = "the autopilot's failsafe took over"
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 IsDone = Callable[[], bool]
@@ -63,7 +63,7 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     if released_by and not link.state.mode_by_failsafe:
         raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
     if link.state.mode_by_failsafe:
-        raise FlightEnded(f"{_BY_FAILSAFE}: mode {link.state.mode}", Exit.RELEASE)
+        raise FlightEnded(f"{_FAILSAFE_TEXT}: mode {link.state.mode}", Exit.RELEASE)
     raise ModeTakenOver(
         f"the pilot or another station took over: mode {link.state.mode}", Exit.RELEASE
     )
@@ -89,7 +89,7 @@ async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
     await asyncio.sleep(_REASON_TEXT_DELAY)
     if not any(fence_text in each.text for each in state.texts if each.time >= earliest_text_time):
         return ended
-    return FlightEnded(f"{_BY_FAILSAFE}: mode {mode}", ended.exit)
+    return FlightEnded(f"{_FAILSAFE_TEXT}: mode {mode}", ended.exit)
 
 
 async def command_if_ours(

@@ -16,7 +16,7 @@ from companion.identification.lags import (
     slew_limited,
     value_at,
 )
-from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
+from companion.identification.record import LONGEST_DEAD_TIME, Segment, segments
 from companion.least_squares import Floats
 
 _GRID_PERIOD = 0.004
@@ -72,11 +72,11 @@ def dead_time_by_correlation(
     if slew is not None and not slew > 0.0:
         raise ValueError(f"slew must be positive, not {slew}")
     taps = _band_pass(lag, damping)
-    record_stretches = stretches(time, commanded, measured_time, measured)
+    record_segments = segments(time, commanded, measured_time, measured)
     filtered_pairs = [
         filtered_pair
-        for stretch in record_stretches
-        if (filtered_pair := _filter(stretch, lag, slew, taps)) is not None
+        for segment in record_segments
+        if (filtered_pair := _filter(segment, lag, slew, taps)) is not None
     ]
     correlation = _correlation(filtered_pairs)
     delay = None if correlation is None else _peak_delay(correlation)
@@ -137,23 +137,23 @@ def _band_pass(lag: float, damping: float) -> Floats:
 
 
 def _filter(
-    stretch: Stretch, lag: float, slew: float | None, taps: Floats
+    segment: Segment, lag: float, slew: float | None, taps: Floats
 ) -> tuple[Floats, Floats] | None:
     """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), both sampled on the grid.
 
     Both arrays end at the same time. None: the measurements are shorter than the filter.
     """
-    first_time, last_time = stretch.measured_time[0], stretch.measured_time[-1]
+    first_time, last_time = segment.measured_time[0], segment.measured_time[-1]
     count = int((last_time - first_time) / _GRID_PERIOD)
     if count <= taps.size:
         return None
     times = last_time - _GRID_PERIOD * np.arange(count + _DELAY_COUNT)[::-1]
-    times = np.maximum(times, stretch.time[0])
-    knots = held_commands(stretch.time, stretch.commanded)
+    times = np.maximum(times, segment.time[0])
+    knots = held_commands(segment.time, segment.commanded)
     if slew is not None:
         knots = slew_limited(knots, slew)
     commands = first_order_response(knots, lag, times) if lag > 0.0 else value_at(knots, times)
-    response = np.interp(times[_DELAY_COUNT:], stretch.measured_time, stretch.measured)
+    response = np.interp(times[_DELAY_COUNT:], segment.measured_time, segment.measured)
     return np.convolve(commands, taps, "valid"), np.convolve(response, taps, "valid")
 
 

@@ -16,7 +16,7 @@ from companion.identification.lags import (
     slew_limited,
     value_at,
 )
-from companion.identification.record import LONGEST_DEAD_TIME, Stretch
+from companion.identification.record import LONGEST_DEAD_TIME, Segment
 from companion.identification.residual_analysis import FitQuality
 from companion.least_squares import Floats, Solution, minimise, project
 
@@ -126,7 +126,7 @@ _SAME_COMMAND_FRACTION = 0.005
 class DelayedModel:
     """The response of a model to the commands of a record, compared with every n-th sample.
 
-    y(t) = gain·x(t − dead time) + offset + free response of each stretch, where x is the model's
+    y(t) = gain·x(t − dead time) + offset + free response of each segment, where x is the model's
     exact response. Linear regression gives the offset, the initial states, and the gain if it is
     not given. The other unknowns are searched: the logarithms of the model's parameters, the dead
     time (s), and optionally the logarithm of the slew limit.
@@ -135,24 +135,24 @@ class DelayedModel:
         model: response without dead time, of first or second order.
         gain: the given gain; None: the gain is fitted.
         thinning: n; every n-th sample is used.
-        commands: commands of each stretch, before the slew limit.
-        times: times of the samples of each stretch, s.
-        measured: (m,), the samples of all stretches.
+        commands: commands of each segment, before the slew limit.
+        times: times of the samples of each segment, s.
+        measured: (m,), the samples of all segments.
         largest_change: largest change of a command.
     """
 
     def __init__(
-        self, record: list[Stretch], model: Model, gain: float | None, thinning: int = 1
+        self, record: list[Segment], model: Model, gain: float | None, thinning: int = 1
     ) -> None:
         self.model, self.gain, self.thinning = model, gain, thinning
         self._dead_time_index = model.lower_bounds.size
-        span = max(float(np.ptp(stretch.commanded)) for stretch in record)
+        span = max(float(np.ptp(segment.commanded)) for segment in record)
         self.commands = [
-            held_commands(stretch.time, stretch.commanded, _SAME_COMMAND_FRACTION * span)
-            for stretch in record
+            held_commands(segment.time, segment.commanded, _SAME_COMMAND_FRACTION * span)
+            for segment in record
         ]
-        self.times = [stretch.measured_time[::thinning] for stretch in record]
-        self.measured = np.concatenate([stretch.measured[::thinning] for stretch in record])
+        self.times = [segment.measured_time[::thinning] for segment in record]
+        self.measured = np.concatenate([segment.measured[::thinning] for segment in record])
         changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]
         self.largest_change = float(max(changes))
         self._slew_cache: tuple[float, list[Knots]] = (nan, [])
@@ -170,13 +170,13 @@ class DelayedModel:
     def response(self, unknowns: Floats) -> Floats:
         """(m,), response of the model to the delayed commands."""
         log_params = unknowns[: self._dead_time_index]
-        return self._per_stretch(
+        return self._per_segment(
             unknowns, lambda knots, at: self.model.response(log_params, knots, at)
         )
 
     def delayed_commands(self, unknowns: Floats, extra_delay: float = 0.0) -> Floats:
         """(m,), the commands after slew limit, dead time and `extra_delay`, s."""
-        return self._per_stretch(
+        return self._per_segment(
             unknowns, lambda knots, at: value_at(knots, np.maximum(at - extra_delay, knots.time[0]))
         )
 
@@ -212,9 +212,9 @@ class DelayedModel:
         return 1.0 - solution.rss / float(deviation @ deviation) if deviation.any() else 0.0
 
     def _offset_columns(self, unknowns: Floats) -> Floats:
-        """(m, 1 + number of initial states): ones, and free responses of each stretch.
+        """(m, 1 + number of initial states): ones, and free responses of each segment.
 
-        A free response begins at the first sample of its stretch. A free response from the first
+        A free response begins at the first sample of its segment. A free response from the first
         command on would be nearly 0 at the samples, and its weight would be unbounded.
         """
         log_params = unknowns[: self._dead_time_index]
@@ -235,15 +235,15 @@ class DelayedModel:
             row, column = row + row_count, column + column_count
         return columns
 
-    def _per_stretch(self, unknowns: Floats, compute: Callable[[Knots, Floats], Floats]) -> Floats:
-        """(m,), results of `compute` for the slew-limited, delayed commands of each stretch."""
+    def _per_segment(self, unknowns: Floats, compute: Callable[[Knots, Floats], Floats]) -> Floats:
+        """(m,), results of `compute` for the slew-limited, delayed commands of each segment."""
         slew, delay = self.slew(unknowns), self.dead_time(unknowns)
         commands = self.commands if slew is None else self._slew_limited(slew)
         pairs = zip(commands, self.times, strict=True)
         return np.concatenate([compute(knots, times - delay) for knots, times in pairs])
 
     def _slew_limited(self, slew: float) -> list[Knots]:
-        """The commands of each stretch after the slew limit; the latest result is cached."""
+        """The commands of each segment after the slew limit; the latest result is cached."""
         if slew != self._slew_cache[0]:
             self._slew_cache = slew, [slew_limited(knots, slew) for knots in self.commands]
         return self._slew_cache[1]

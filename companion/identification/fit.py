@@ -18,7 +18,7 @@ from companion.identification.delayed_model import (
     SecondOrderFit,
     frequency_damping,
 )
-from companion.identification.record import Stretch, most_excited_windows
+from companion.identification.record import Segment, most_excited_windows
 from companion.identification.residual_analysis import FitQuality, analyse_residual
 from companion.least_squares import Floats, Solution
 
@@ -76,7 +76,7 @@ class LagFit:
 
 
 def fit_lag(
-    record: list[Stretch], gain: float | None = None, *, search_slew_limit: bool = True
+    record: list[Segment], gain: float | None = None, *, search_slew_limit: bool = True
 ) -> LagFit | None:
     """The best first-order fit; None if no command changes, or there are fewer than 10 samples.
 
@@ -86,8 +86,8 @@ def fit_lag(
         search_slew_limit: whether to search for a slew limit.
     """
     record = most_excited_windows(record)
-    count = sum(stretch.measured.size for stretch in record)
-    if count < _FEWEST_SAMPLES or all(np.ptp(stretch.commanded) == 0.0 for stretch in record):
+    count = sum(segment.measured.size for segment in record)
+    if count < _FEWEST_SAMPLES or all(np.ptp(segment.commanded) == 0.0 for segment in record):
         return None
     fine_thinning, coarse_thinning = 1 + count // _MOST_SAMPLES, 1 + count // _COARSE_SAMPLES
     fine_model = DelayedModel(record, FirstOrder(), gain, fine_thinning)
@@ -145,7 +145,7 @@ def _slewed_start(best: Solution, coarse_model: DelayedModel) -> Floats:
 
 
 def _second_order_fit(
-    record: list[Stretch], first_order_model: DelayedModel, first_order: Solution, thinning: int
+    record: list[Segment], first_order_model: DelayedModel, first_order: Solution, thinning: int
 ) -> SecondOrderFit | None:
     """The best second-order fit, gain included; None: not clearly better than first order."""
     lag, dead_time, *slew = first_order.unknowns.tolist()

@@ -82,13 +82,13 @@ class _BeaconClock:
         """Start the timeout for the vehicle's next beacon."""
         self._waiting_since = time.monotonic()
 
-    def time_left(self) -> float | None:
+    def beacon_time_left(self) -> float | None:
         """Wall time left for the next beacon, s; `None` before the first beacon."""
         if self._vehicle_time is None:
             return None
         return max(0.0, self._waiting_since + BEACON_TIMEOUT_S - time.monotonic())
 
-    def advance_alone(self) -> None:
+    def advance_without_beacon(self) -> None:
         """Advance time although the vehicle sent no beacon in time."""
         self._offset += BEACON_TIMEOUT_S
         self.start_waiting()
@@ -142,14 +142,14 @@ class _SteppingSelector(SettlingSelector):
         return ready
 
     def wait(self, timeout: float | None) -> ReadyKeys:
-        time_left = None if timeout == 0 else self._clock.time_left()
-        if time_left is None:
+        beacon_time_left = None if timeout == 0 else self._clock.beacon_time_left()
+        if beacon_time_left is None:
             return HotSelector.select(self, timeout)
         ready = self._busy_wait()
         if not ready and not self.is_settling:
-            ready = HotSelector.select(self, time_left)
-        if not self.is_settling and self._clock.time_left() == 0.0:
-            self._clock.advance_alone()
+            ready = HotSelector.select(self, beacon_time_left)
+        if not self.is_settling and self._clock.beacon_time_left() == 0.0:
+            self._clock.advance_without_beacon()
         return ready
 
     def _busy_wait(self) -> ReadyKeys:

@@ -158,7 +158,7 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
     ]
     assert len(as_before) > 100
     for t in as_before:
-        assert found.trajectory.law.at(t).first > 0.97
+        assert found.trajectory.law.at(t).first_derivative > 0.97
     notes = slow_down_notes(ANGULAR, found, 0.5)
     assert notes[0].startswith("angular is slowed down to keep its limits: from ")
     assert ", because of limits.max_tilt_rate_deg_s at" in notes[0]  # without the reserve
@@ -244,10 +244,16 @@ def test_a_slower_time_has_right_derivatives_and_is_found_again():
     h = 1e-4
     for time in np.linspace(0.01, law.duration - 0.01, 97):
         before, here, after = (law.at(time + k * h) for k in (-1, 0, 1))
-        assert here.first == pytest.approx((after.phase - before.phase) / (2 * h), rel=1e-6)
-        assert here.second == pytest.approx((after.first - before.first) / (2 * h), abs=1e-6)
-        assert here.third == pytest.approx((after.second - before.second) / (2 * h), abs=2e-4)
-        assert 1 / 2.5 <= here.first <= 1.0
+        assert here.first_derivative == pytest.approx(
+            (after.phase - before.phase) / (2 * h), rel=1e-6
+        )
+        assert here.second_derivative == pytest.approx(
+            (after.first_derivative - before.first_derivative) / (2 * h), abs=1e-6
+        )
+        assert here.third_derivative == pytest.approx(
+            (after.second_derivative - before.second_derivative) / (2 * h), abs=2e-4
+        )
+        assert 1 / 2.5 <= here.first_derivative <= 1.0
         times, _ = law.stretched_times(np.array([here.phase]))
         assert times[0] == pytest.approx(time, abs=1e-12)
     assert law.at(-1.0).phase == 0.0

@@ -39,7 +39,7 @@ class Motion:
             np.stack(velocity, axis=1),
             np.stack(acceleration, axis=1),
             np.stack(jerk, axis=1),
-            self.heading_rate * progress.first,
+            self.heading_rate * progress.first_derivative,
         )
 
     def slowed(self, factor: "float | Floats") -> "Motion":

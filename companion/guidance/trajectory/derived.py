@@ -56,7 +56,7 @@ class Slowed:
         velocity, acceleration, jerk = derivatives(
             progress, sample.velocity, sample.acceleration, sample.jerk
         )
-        heading_rate = sample.heading_rate * progress.first
+        heading_rate = sample.heading_rate * progress.first_derivative
         return Sample(sample.position, velocity, acceleration, jerk, sample.heading, heading_rate)
 
 

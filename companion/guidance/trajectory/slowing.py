@@ -224,7 +224,7 @@ def _largest_of_four(values: Floats, padding: float) -> Floats:
 def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
     """The parts that a stretch factor slows down, each with the limit that requires it."""
     times, progress = law.stretched_times(motion.times)
-    factors = 1.0 / np.asarray(progress.first)
+    factors = 1.0 / np.asarray(progress.first_derivative)
     is_slow = np.concatenate(([False], factors > _NOTICEABLE_FACTOR, [False]))
     edges = np.flatnonzero(np.diff(is_slow.astype(int)))
     for begin, end in zip(edges[::2], edges[1::2], strict=True):

@@ -17,13 +17,14 @@ class Progress(NamedTuple):
 
     Attributes:
         phase: phase in the curve's unit (rad, m or s).
-        first, second, third: derivatives of the phase by time, in its unit per s, s², s³.
+        first_derivative, second_derivative, third_derivative: of the phase by time, in its unit
+            per s, s², s³.
     """
 
     phase: float
-    first: float = 0.0
-    second: float = 0.0
-    third: float = 0.0
+    first_derivative: float = 0.0
+    second_derivative: float = 0.0
+    third_derivative: float = 0.0
 
 
 Triple = tuple[Any, Any, Any]

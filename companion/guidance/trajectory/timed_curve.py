@@ -78,7 +78,7 @@ def require_duration(seconds: float, longest: float = LONGEST_DURATION) -> None:
 def _checked_pieces(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
     """The parts to check: the first and last lap of a long steady piece, else the whole piece."""
     if piece.is_steady and sampling.period is not None:
-        lap_duration = sampling.period / law.at(piece.begin).first
+        lap_duration = sampling.period / law.at(piece.begin).first_derivative
         if piece.end - piece.begin > 2.0 * lap_duration:
             yield Piece(piece.begin, piece.begin + lap_duration, True)
             yield Piece(piece.end - lap_duration, piece.end, True)
@@ -109,7 +109,7 @@ def _check_times_in(
     else:
         phases = np.linspace(begin, end, int(np.ceil((end - begin) / sampling.phase_step)) + 1)
     if piece.is_steady:
-        rate = law.at(piece.begin).first
+        rate = law.at(piece.begin).first_derivative
         ends = np.array([piece.begin, piece.end])
         return np.concatenate((ends, piece.begin + (phases - begin) / rate))
     row_count = int(np.clip(_ROWS_PER_PHASE * len(phases), *_TABLE_ROWS))
@@ -167,7 +167,7 @@ class TangentHeading:
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Heading of the tangent, and its derivative by the phase."""
-        (north, east, _), (north2, east2, _) = point.first, point.second
+        (north, east, _), (north2, east2, _) = point.first_derivative, point.second_derivative
         slope = (north * east2 - east * north2) / (north * north + east * east)
         middle = self.middle + self.winding * phase
         return middle + remainder(atan2(east, north) - middle, tau), slope
@@ -211,4 +211,6 @@ class TimedCurve:
         point = self.curve.at(progress.phase)
         velocity, acceleration, jerk = derivatives(progress, *point[1:])
         heading, slope = self.heading.at(progress.phase, point)
-        return Sample(point.position, velocity, acceleration, jerk, heading, slope * progress.first)
+        return Sample(
+            point.position, velocity, acceleration, jerk, heading, slope * progress.first_derivative
+        )

@@ -87,7 +87,7 @@ class TcpTransport:
         self._server: asyncio.Server | None = None
         self._connection: asyncio.Transport | None = None
         self._connected_at = 0.0
-        self._is_peer = False
+        self._has_peer = False
         self._closed = False
         self.local: tuple[str, int] | None = None
 
@@ -121,11 +121,11 @@ class TcpTransport:
         sock = connection.get_extra_info("socket")
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection, self._connected_at = connection, self._loop.time()
-        self._is_peer = False
+        self._has_peer = False
         return True
 
     def _may_be_replaced(self) -> bool:
-        if self._is_peer:
+        if self._has_peer:
             return self._receiver.may_replace_peer()
         return self._loop.time() - self._connected_at > CLAIM_DURATION_S
 
@@ -134,11 +134,11 @@ class TcpTransport:
         if connection is not self._connection:
             return  # from a connection that was replaced and is not closed yet
         received = time.perf_counter_ns()
-        if self._is_peer or self._server is None:
+        if self._has_peer or self._server is None:
             self._receiver.receive(data, received)
         else:
             sender = host_and_port(connection.get_extra_info("peername"))
-            self._is_peer = self._receiver.claim(data, received, sender)
+            self._has_peer = self._receiver.claim(data, received, sender)
 
     def connection_dropped(self, connection: asyncio.Transport | None, reason: str) -> None:
         """Note that a connection is closed, for `reason`."""
@@ -147,7 +147,7 @@ class TcpTransport:
         self._connection = None
         if self._closed:
             return
-        if self._server is not None and not self._is_peer:
+        if self._server is not None and not self._has_peer:
             self._receiver.start_connection(streaming=True)  # not the peer, so the link is not lost
             return
         self._lost(reason)

@@ -153,10 +153,10 @@ class UdpTransport:
             self._receiver.report_ignored(sender)
             return False
         if address == self._peer and not self._receiver.may_replace_peer():
-            is_accepted = self._receiver.receive(data, received_ns)  # the peer was only silent
+            accepted = self._receiver.receive(data, received_ns)  # the peer was only silent
         else:
-            is_accepted = self._receiver.claim(data, received_ns, sender)
-        return is_accepted or self._receiver.may_prove_date(sender)
+            accepted = self._receiver.claim(data, received_ns, sender)
+        return accepted or self._receiver.may_prove_date(sender)
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
