@@ -24,7 +24,7 @@ from companion.config import Config, trajectory_file
 from companion.config.file_kinds import FileKind, require_kind
 from companion.config.files import load as load_config
 from companion.files import yaml_file
-from companion.files.yaml_file import ConfigError, nearest_location, validated
+from companion.files.yaml_file import ConfigError, nearest_place, validated
 from companion.flight.flown_config import copy_trajectory
 from companion.testing.settings import complete_mock
 
@@ -83,7 +83,7 @@ class _CampaignReader:
 
     def _place_text(self, *where: str) -> str:
         """File, line and section of a key, for messages; `where` are the parts of its path."""
-        return f"{nearest_location(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
+        return f"{nearest_place(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
 
     def _base(self) -> Config:
         given_config = self._file.config

@@ -200,7 +200,7 @@ class MotionEstimate:
         speed = self.drag.top_speed
         learned = self.drag.drag.per_velocity(speed)
         assumed = self.drag.prior_drag.per_velocity(speed)
-        if not self.drag.is_certain or abs(learned - assumed) <= _DRAG_MISMATCH:
+        if not self.drag.certain or abs(learned - assumed) <= _DRAG_MISMATCH:
             return None
         return speed, learned, assumed
 

@@ -137,7 +137,7 @@ class PredictiveControl:
 
     def _wait_until_ready(self) -> None:
         until = monotonic() + _LONGEST_SOLVER_START
-        while self._solver.is_alive and not self._solver.is_ready and monotonic() < until:
+        while self._solver.alive and not self._solver.ready and monotonic() < until:
             sleep(0.01)
 
     def _report(self, trouble: Trouble, words: str) -> None:

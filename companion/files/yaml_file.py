@@ -207,7 +207,7 @@ def _config_error(
     details = essential_details(error.errors(include_url=False))
     faults, previous_place = [], SourceLocation("")
     for detail in details[:_MOST_FAULTS_SHOWN]:
-        place = nearest_location(detail["loc"], places, name)
+        place = nearest_place(detail["loc"], places, name)
         where = f"{place}: "
         if place == previous_place:
             where = ""
@@ -221,7 +221,7 @@ def _config_error(
     )
 
 
-def nearest_location(
+def nearest_place(
     key_path: KeyPath, places: Mapping[KeyPath, SourceLocation], name: str
 ) -> SourceLocation:
     """File and line of a key, or of the innermost section or list around the key with known line.

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from companion.guidance.fence import Breach, Fence, GeoPosition
+from companion.guidance.fence import Breach, Fence, Place
 from companion.guidance.reference import Vector
 from companion.guidance.trajectory.demand import Motion, columns
 from companion.guidance.trajectory.feasibility import Violation
@@ -33,7 +33,7 @@ class FenceCheck:
     """The fence that the monitors watch in flight."""
     height: float
     """Height above home where control begins, m."""
-    origin: GeoPosition | None = None
+    origin: Place | None = None
     """Geographic position where control begins, or None; then a fence in latitude and longitude is
     not checked."""
 

@@ -2,7 +2,7 @@
 
 from companion.flight.context import FlightContext
 from companion.guidance.braking import handover_drift
-from companion.guidance.fence import Fence, GeoPosition
+from companion.guidance.fence import Fence, Place
 from companion.guidance.reference import NorthEast, Vector, minus
 from companion.safety.table import fence_of
 
@@ -30,7 +30,7 @@ def brake_inside_fence(context: FlightContext) -> None:
 
 
 def only_upwind_is_inside(
-    fence: Fence, origin: GeoPosition | None, stopping_point: Vector, wind: NorthEast
+    fence: Fence, origin: Place | None, stopping_point: Vector, wind: NorthEast
 ) -> bool:
     """Whether the landing would drift out of the fence, but not if it began further upwind.
 

@@ -191,7 +191,7 @@ class DragMemory:
             Whether the vehicle's next flight begins with the learned drag: it was saved, and no
             configured drag takes precedence.
         """
-        if self._file is None or not self._estimate.is_certain:
+        if self._file is None or not self._estimate.certain:
             return False
         try:
             self._file.save(self._estimate.drag, self._estimate.top_speed)

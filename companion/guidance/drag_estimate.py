@@ -86,7 +86,7 @@ class DragEstimate:
         return min(max(float(self._state[4]), 0.0), _LARGEST_AXIS_DRAG)
 
     @property
-    def is_certain(self) -> bool:
+    def certain(self) -> bool:
         """Whether the vehicle moved fast enough, in calm enough air, for a reliable estimate."""
         if self._innovation_sum > _GUSTY_INNOVATION * self._measurement_count:
             return False

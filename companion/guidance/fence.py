@@ -19,7 +19,7 @@ EARTH_RADIUS = 6_371_000.0
 """Mean radius of the earth, m; over the size of a fence the earth counts as flat."""
 
 
-class GeoPosition(NamedTuple):
+class Place(NamedTuple):
     """Latitude and longitude of a place (WGS84), degrees."""
 
     latitude: float
@@ -35,7 +35,7 @@ class FenceCentre(NamedTuple):
     """
 
     position_ned: Vector
-    place: GeoPosition | None
+    place: Place | None
 
 
 class Breach(NamedTuple):
@@ -101,7 +101,7 @@ class Fence:
         return replace(self, radius=inf, polygon=(), places=())
 
     def breach(
-        self, offset: Vector, height: float | None, origin: GeoPosition | None, margin: float = 0.0
+        self, offset: Vector, height: float | None, origin: Place | None, margin: float = 0.0
     ) -> Breach | None:
         """The first limit of the fence that a place breaches; None: it breaches none.
 
@@ -188,7 +188,7 @@ class Fence:
         offset: Vector,
         velocity: Vector,
         height: float | None,
-        origin: GeoPosition | None,
+        origin: Place | None,
         margin: float = 0.0,
         acceleration: NorthEast = (0.0, 0.0),
         wind: NorthEast | None = None,
@@ -234,12 +234,12 @@ def circle_corners(radius: float, count: int) -> tuple[Corner, ...]:
     return tuple((radius * cos(angle), radius * sin(angle)) for angle in angles)
 
 
-def local_polygon(places: tuple[Corner, ...], origin: GeoPosition) -> tuple[Corner, ...]:
+def local_polygon(places: tuple[Corner, ...], origin: Place) -> tuple[Corner, ...]:
     """Convert corners from (latitude, longitude) in degrees to m north and east of `origin`."""
-    return tuple(local_offset(GeoPosition(*corner), origin) for corner in places)
+    return tuple(local_offset(Place(*corner), origin) for corner in places)
 
 
-def local_offset(place: GeoPosition, origin: GeoPosition) -> Corner:
+def local_offset(place: Place, origin: Place) -> Corner:
     """How far a place lies from `origin`, m north and east, the short way across ±180°."""
     return (
         EARTH_RADIUS * radians(place.latitude - origin.latitude),

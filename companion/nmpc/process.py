@@ -71,7 +71,7 @@ class Solver:
         report: called with each trouble, by the method that notices it.
 
     Attributes:
-        is_alive: False after `close`, or after the end of the process was noticed.
+        alive: False after `close`, or after the end of the process was noticed.
         pid: process id of the solver.
 
     Raises:
@@ -102,21 +102,21 @@ class Solver:
             )
         self.pid = self._process.pid
         use_normal_scheduler(self.pid)  # without real-time priority, because it always computes
-        self.is_alive = True
+        self.alive = True
 
     @property
-    def is_ready(self) -> bool:
+    def ready(self) -> bool:
         """Whether the process has started and takes requests."""
-        if not self._has_started and self.is_alive:
+        if not self._has_started and self.alive:
             self._has_started = self._receive() == READY_MESSAGE
-        return self._has_started and self.is_alive
+        return self._has_started and self.alive
 
     def request(self, request: Request) -> None:
         """Send a request without waiting; an earlier request without an answer counts as late.
 
-        If the process is not `is_ready`, the request is dropped.
+        If the process is not `ready`, the request is dropped.
         """
-        if not self.is_ready:
+        if not self.ready:
             return
         self._drop_pending("was not answered before the next one")
         try:
@@ -140,7 +140,7 @@ class Solver:
                 once.
         """
         deadline = monotonic() + timeout
-        while self.is_ready:
+        while self.ready:
             message = self._receive(
                 max(0.0, deadline - monotonic()) if self._pending_request else 0.0
             )
@@ -159,8 +159,8 @@ class Solver:
 
     def close(self) -> None:
         """End the process."""
-        if self.is_alive:
-            self.is_alive = False
+        if self.alive:
+            self.alive = False
             self._socket.close()
             self._process.kill()
             self._process.wait()

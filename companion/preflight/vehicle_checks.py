@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from companion.config import Config
-from companion.guidance.fence import GeoPosition, height_in_words, inside, local_polygon
+from companion.guidance.fence import Place, height_in_words, inside, local_polygon
 from companion.mavlink.messages import dialect
 from companion.preflight.evidence import Evidence, Stage
 from companion.preflight.finding import INEFFECTIVE, NOT_READY, SAFE, UNSAFE, Finding, Key
@@ -205,7 +205,7 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
             source,
         )
         return
-    here = GeoPosition(position.latitude_deg, position.longitude_deg)
+    here = Place(position.latitude_deg, position.longitude_deg)
     if inside(0.0, 0.0, local_polygon(corners, here)):
         yield Finding(Key.FENCE, SAFE, "the vehicle stands inside its fence", source=source)
         return

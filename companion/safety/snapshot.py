@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.attitude import Quaternion
 from companion.control.loop_record import Unanswered
-from companion.guidance.fence import GeoPosition
+from companion.guidance.fence import Place
 from companion.guidance.reference import NorthEast, Vector
 from companion.vehicle.records import Battery, Estimator, Gps
 from companion.vehicle.timesync import Uplink
@@ -43,7 +43,7 @@ class Motion(NamedTuple):
     """Distance from the reference, m; None without a reference."""
     thrust: float | None = None
     """Thrust last sent, 0..1; None while idle on the ground and without a command."""
-    origin: GeoPosition | None = None
+    origin: Place | None = None
     """Latitude and longitude of the fence's centre, or None if they are unknown."""
     acceleration: NorthEast = (0.0, 0.0)
     """Estimated horizontal acceleration, m/s², NED."""

@@ -6,7 +6,7 @@ from companion.attitude.representation import wrap_angle
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_loop import GuidanceLoop
 from companion.control.heading_frame import HeadingFrame
-from companion.guidance.fence import FenceCentre, GeoPosition
+from companion.guidance.fence import FenceCentre, Place
 from companion.guidance.reference import Vector, minus
 from companion.safety.counter_window import CounterWindow
 from companion.safety.frozen_telemetry import FrozenTelemetry
@@ -55,7 +55,7 @@ class SnapshotBuilder:
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
-        self._fence_place: GeoPosition | None = None
+        self._fence_place: Place | None = None
         self._began_at = 0.0
         self._frame_at_begin = HeadingFrame()
         self._shift_at_begin: Vector = (0.0, 0.0, 0.0)
@@ -201,9 +201,9 @@ class SnapshotBuilder:
             self._heading_drift.drift(now),
         )
 
-    def _place(self, now: float) -> GeoPosition | None:
+    def _place(self, now: float) -> Place | None:
         """Latitude and longitude of the vehicle, or None if they are old."""
         newest = self._link.state.global_position
         if newest is None or now - newest.received > _MAX_PLACE_AGE:
             return None
-        return GeoPosition(newest.latitude_deg, newest.longitude_deg)
+        return Place(newest.latitude_deg, newest.longitude_deg)

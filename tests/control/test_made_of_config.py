@@ -343,7 +343,7 @@ def test_predictive_control_gets_the_newest_attitude_and_the_estimated_wind():
     ],
 )
 def test_a_drag_that_is_far_off_is_told_with_the_keys_to_set(learned, certain, told):
-    made, _ = estimate(prior_drag=Drag(0.25, 0.0), drag=learned, top_speed=5.0, is_certain=certain)
+    made, _ = estimate(prior_drag=Drag(0.25, 0.0), drag=learned, top_speed=5.0, certain=certain)
     warning = made.mismatch_warning()
     assert (warning is None) is (told is None)
     if told is not None:

@@ -12,7 +12,7 @@ from companion.flight.fence_check import TRACKING_MARGIN, FenceCheck
 from companion.flight.maneuver_checks import require_inside
 from companion.flight.maneuvers import configured_maneuvers
 from companion.guidance import Pose
-from companion.guidance.fence import Fence, GeoPosition, distance_inside
+from companion.guidance.fence import Fence, Place, distance_inside
 from companion.guidance.predicted import predict
 from companion.guidance.trajectory.demand import Motion
 from companion.safety.motion_judges import braking
@@ -127,7 +127,7 @@ def test_a_polygon_is_judged_all_along_the_way(tmp_path, to, corners, words):
 
 
 def test_a_polygon_on_the_map_is_judged_as_soon_as_the_place_is_known():
-    here = GeoPosition(47.0, 8.0)
+    here = Place(47.0, 8.0)
     side = 10.0 / 111_195.0
     corners = [[47.0 - side, 7.9999], [47.0 + side, 7.9999], [47.0 + side, 8.0001]]
     corners.append([47.0 - side, 8.0001])

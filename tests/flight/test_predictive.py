@@ -90,7 +90,7 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
 class FakeSolver:
     """Answers what it is told to."""
 
-    is_alive = is_ready = True
+    alive = ready = True
 
     def __init__(self, report):
         self.report, self.answer, self.requests = report, None, []
@@ -103,7 +103,7 @@ class FakeSolver:
         self.requests.append(request)
 
     def close(self):
-        self.is_alive = False
+        self.alive = False
 
 
 def bench():

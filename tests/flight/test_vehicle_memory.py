@@ -129,7 +129,7 @@ def test_nothing_is_kept_of_a_flight_that_hardly_moved_or_of_nobody(tmp_path):
     for n in range(600):
         fast = 4.0 if n % 200 < 100 else -4.0
         estimate.observe(0.02, (fast, 0.0, 0.0), (-0.5 * fast, 0.0))
-    assert estimate.is_certain
+    assert estimate.certain
     moved.load(Identity(uid=None))
     assert not moved.save()
     assert list(tmp_path.iterdir()) == []

@@ -53,7 +53,7 @@ def bluff_deceleration(coefficient, air):
 def test_three_seconds_from_rest_tell_the_drag_of_a_vehicle_that_nobody_knows(vehicle):
     estimate = DragEstimate(ANY_VEHICLE)
     circled(estimate, TRUE[vehicle], 3.0)
-    assert estimate.is_certain
+    assert estimate.certain
     expected = TRUE[vehicle].per_velocity(5.0)
     assert estimate.drag.per_velocity(5.0) == pytest.approx(expected, abs=0.04)
 
@@ -70,7 +70,7 @@ def test_in_strong_gusts_the_drag_is_not_certain(gust, certain):
     """There it would be advised, and kept for the next flight, though it is wrong by half."""
     estimate = DragEstimate(ANY_VEHICLE)
     circled(estimate, Drag(1.0), 20.0, speed=2.0, wind=(3.0, 0.0), gust=gust)
-    assert estimate.is_certain == certain
+    assert estimate.certain == certain
 
 
 def test_two_speeds_tell_quadratic_drag_from_linear():
@@ -93,7 +93,7 @@ def test_a_hover_in_wind_teaches_nothing():
     estimate = DragEstimate(told(Drag(0.5)))
     circled(estimate, Drag(1.0), 60.0, speed=0.0, wind=(4.0, 1.0))
     assert estimate.drag.linear == pytest.approx(0.5, abs=0.01)
-    assert not estimate.is_certain
+    assert not estimate.certain
 
 
 @pytest.mark.parametrize("configured", [0.0, 0.5, 1.5, 3.0])

@@ -9,7 +9,7 @@ import pytest
 from companion.guidance.fence import (
     EARTH_RADIUS,
     Fence,
-    GeoPosition,
+    Place,
     distance_inside,
     inside,
     local_polygon,
@@ -17,7 +17,7 @@ from companion.guidance.fence import (
 
 SQUARE = ((-10.0, -10.0), (-10.0, 10.0), (10.0, 10.0), (10.0, -10.0))
 FENCE = Fence(50.0, 30.0, 2.0, (), (), 2.0, 0.5)
-HOME = GeoPosition(47.0, 8.0)
+HOME = Place(47.0, 8.0)
 
 
 def breach(north=0.0, east=0.0, down=0.0, height=10.0, fence=FENCE, **options):
@@ -107,7 +107,7 @@ def test_a_fence_on_the_map_needs_to_know_where_it_is():
 @pytest.mark.parametrize("origin", [180.0, -180.0, 179.99999, -179.99999])
 def test_a_fence_on_the_map_may_lie_across_the_date_line(origin):
     """Fiji: some corners have positive longitudes, the others negative ones."""
-    home = GeoPosition(-17.0, origin)
+    home = Place(-17.0, origin)
     degree = EARTH_RADIUS * radians(1.0)
     corners = tuple(
         (

@@ -49,9 +49,9 @@ class Flight:
 
     def warm(self):
         until = monotonic() + LONG
-        while self.solver.is_alive and not self.solver.is_ready and monotonic() < until:
+        while self.solver.alive and not self.solver.ready and monotonic() < until:
             sleep(0.01)
-        assert self.solver.is_ready
+        assert self.solver.ready
         return self
 
     @property
@@ -194,20 +194,20 @@ def test_a_killed_process_is_noticed_at_once_and_nothing_is_asked_of_it():
     with Flight() as flight:
         flight.warm().solver.request(request(1))
         os.kill(flight.solver.pid, signal.SIGKILL)
-        while flight.solver.is_alive:
+        while flight.solver.alive:
             assert flight.solver.take_answer(LONG) is None
         assert flight.kinds == [Trouble.DIED]
         assert "ended by signal 9" in flight.troubles[0][1]
         flight.solver.request(request(2))
         assert flight.solver.take_answer() is None
-        assert not flight.solver.is_ready
+        assert not flight.solver.ready
         assert flight.kinds == [Trouble.DIED]
 
 
 def test_a_process_that_cannot_begin_says_why():
     with Flight(trajectory=None) as flight:
-        while flight.solver.is_alive:
-            assert not flight.solver.is_ready
+        while flight.solver.alive:
+            assert not flight.solver.ready
             sleep(0.01)
         assert flight.kinds == [Trouble.DIED]
         assert "'NoneType' object has no attribute 'at'" in flight.troubles[0][1]
@@ -231,7 +231,7 @@ def test_a_solver_whose_flight_vanished_ends():
         "import os, time; from companion.nmpc import Settings, Solver;"
         "from companion.guidance.trajectory.figures import Hover;"
         "s = Solver(Settings(), Hover(1.0), print);\n"
-        "while not s.is_ready: time.sleep(0.01)\n"
+        "while not s.ready: time.sleep(0.01)\n"
         "print(s.pid, flush=True); os._exit(0)"
     )
     asked = [sys.executable, "-c", program]

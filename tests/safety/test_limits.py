@@ -6,7 +6,7 @@ import pytest
 
 from companion.config import Config
 from companion.control.loop_record import Unanswered
-from companion.guidance.fence import Fence, GeoPosition
+from companion.guidance.fence import Fence, Place
 from companion.safety import (
     Action,
     SafetyLadder,
@@ -260,7 +260,7 @@ def test_it_brakes_in_time_before_a_fence_on_the_map():
         offset=(80.0, 0.0, 0.0),
         velocity=(2.0, 0.0, 0.0),
         height=20.0,
-        origin=GeoPosition(47.0, 8.0),
+        origin=Place(47.0, 8.0),
     )
     assert judge(at(motion=moving), False) is None  # stops 2 m on
     fast = moving._replace(velocity=(12.0, 0.0, 0.0))  # stops 42 m on

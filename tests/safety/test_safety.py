@@ -7,7 +7,7 @@ import pytest
 
 from companion.config import Config
 from companion.control.loop_record import LoopRecord, Unanswered
-from companion.guidance.fence import GeoPosition, inside, local_polygon
+from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.actions import StreamEffect
 from companion.safety.counter_window import CounterWindow
@@ -40,7 +40,7 @@ FINE = Snapshot(
         6.0,
         0.2,
         0.5,
-        GeoPosition(47.0, 8.0),
+        Place(47.0, 8.0),
     ),
     Control(),
     Health(0.01, 0.02, 0.01, 0.01),
@@ -354,9 +354,7 @@ def test_the_polygon_is_judged_about_where_control_began_or_on_the_map():
     degree = 111_194.9  # m of latitude
     map_corners = [(47.0 + n / degree, 8.0 + e / degree / cos(radians(47.0))) for n, e in L_SHAPE]
     flat = [
-        value
-        for corner in local_polygon(tuple(map_corners), GeoPosition(47.0, 8.0))
-        for value in corner
+        value for corner in local_polygon(tuple(map_corners), Place(47.0, 8.0)) for value in corner
     ]
     assert flat == pytest.approx([value for corner in L_SHAPE for value in corner], abs=0.01)
     on_map = Config.model_validate({"safety": {"fence_polygon_deg": map_corners}})

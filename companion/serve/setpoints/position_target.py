@@ -9,7 +9,7 @@ autopilot.
 from math import hypot, isfinite, pi
 from typing import NamedTuple
 
-from companion.guidance.fence import GeoPosition, local_offset
+from companion.guidance.fence import Place, local_offset
 from companion.guidance.reference import Vector, rotate
 from companion.mavlink.messages import Message, dialect
 from companion.serve.setpoints.request import (
@@ -206,7 +206,7 @@ def _complete_vector(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...
 def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:
     """The commanded global position in the local frame, NED, m; the earth is taken as flat."""
     degrees = 1e-7
-    place = GeoPosition(message.lat_int * degrees, message.lon_int * degrees)
-    north, east = local_offset(place, GeoPosition(origin.latitude, origin.longitude))
+    place = Place(message.lat_int * degrees, message.lon_int * degrees)
+    north, east = local_offset(place, Place(origin.latitude, origin.longitude))
     zero_altitude = origin.home_altitude if above_home else 0.0
     return north, east, origin.altitude - zero_altitude - message.alt

@@ -123,7 +123,7 @@ def time_process() -> ProcessTimes:
 
 def _await_start(solver: Solver, troubles: list[tuple[Trouble, str]]) -> None:
     deadline = monotonic() + _START_TIMEOUT_S
-    while not solver.is_ready:
+    while not solver.ready:
         if troubles or monotonic() > deadline:
             raise ChildProcessError(troubles[0][1] if troubles else "the solver does not start")
         sleep(0.01)
