@@ -148,10 +148,10 @@ class FlightContext:
                 return
 
     async def _wait_for_heartbeat(self) -> None:
-        """Wait for a heartbeat like `fresh_heartbeat`, but do not wait again after a stall."""
+        """Wait for a heartbeat like `heartbeat_future`, but do not wait again after a stall."""
         loop = asyncio.get_running_loop()
         fresh_from = loop.time() + _BACKLOG_DRAIN_TIME
-        fresh_heartbeat = loop.create_future()
+        heartbeat_future = loop.create_future()
 
         async def request_heartbeat() -> None:
             nonlocal fresh_from
@@ -167,14 +167,14 @@ class FlightContext:
             if (
                 heartbeat is not None
                 and heartbeat.received >= fresh_from
-                and not fresh_heartbeat.done()
+                and not heartbeat_future.done()
             ):
-                fresh_heartbeat.set_result(None)
+                heartbeat_future.set_result(None)
 
         unsubscribe = self.link.subscribe("HEARTBEAT", on_heartbeat)
         request_task = asyncio.create_task(request_heartbeat())
         try:
-            await fresh_heartbeat
+            await heartbeat_future
         finally:
             request_task.cancel()
             unsubscribe()
