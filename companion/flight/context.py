@@ -148,7 +148,7 @@ class FlightContext:
                 return
 
     async def _wait_for_heartbeat(self) -> None:
-        """Wait for a heartbeat like `heartbeat_future`, but do not wait again after a stall."""
+        """Wait for a heartbeat like `fresh_heartbeat`, but do not wait again after a stall."""
         loop = asyncio.get_running_loop()
         fresh_from = loop.time() + _BACKLOG_DRAIN_TIME
         heartbeat_future = loop.create_future()
