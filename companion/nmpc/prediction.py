@@ -67,7 +67,7 @@ class Predictor:
 
         Raises:
             InvalidQuaternionError: the attitude is not a unit quaternion.
-            TiltedTooFarError: the tilt exceeds 78° now, or at the time `end_time`.
+            TiltedTooFarError: the tilt exceeds 78° now, or at `end_time`.
         """
         motion = motion_of(vehicle)
         time = vehicle.time

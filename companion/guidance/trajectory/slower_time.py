@@ -117,7 +117,7 @@ class SlowerTime:
         return self._progress(piece, u, index)
 
     def stretched_times(self, original_times: Floats) -> tuple[Floats, Progress]:
-        """Stretched times and progress (m,) at the original times `original_times` (m,), s."""
+        """Stretched times and progress (m,) at `original_times` (m,), s."""
         count = len(self.coefficients) - 3
         index = np.clip((original_times / self._piece_duration).astype(int), 0, count - 1)
         c = np.array(self.coefficients)
