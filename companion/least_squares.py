@@ -25,15 +25,15 @@ _MOST_STEPS = 60
 class Solution(NamedTuple):
     """The unknowns with the smallest sum of squares that was found."""
 
-    unknown: Floats
+    unknowns: Floats
     """Values of the nonlinear unknowns, (k,)."""
     weights: Floats
     """Values of the linear unknowns, (c,)."""
     residual: Floats
     """Measured minus modelled values, (m,)."""
     jacobian: Floats
-    """Jacobian of the residual with respect to `unknown`, (m, k), with the weights fitted again at
-    each value of `unknown`."""
+    """Jacobian of the residual with respect to `unknowns`, (m, k), with the weights fitted again at
+    each value of `unknowns`."""
 
     @property
     def rss(self) -> float:
@@ -53,7 +53,9 @@ def project(columns: Floats, measured: Floats) -> tuple[Floats, Floats]:
     return weights, residual
 
 
-def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Floats) -> Solution:
+def minimise(
+    projection: Projection, start: Floats, lower_bounds: Floats, upper_bounds: Floats
+) -> Solution:
     """Minimise the sum of squares by Levenberg–Marquardt steps from `start`, within bounds.
 
     The minimum may be a local one. The search ends after 60 steps at the latest.
@@ -61,37 +63,39 @@ def minimise(projection: Projection, start: Floats, lowest: Floats, highest: Flo
     Args:
         projection: eliminates the linear unknowns; also called up to 1e-4 outside the bounds.
         start: (k,), scaled so that a change of 1e-4 is small but has an effect.
-        lowest: (k,), lower bounds.
-        highest: (k,), upper bounds.
+        lower_bounds: (k,), lower bounds.
+        upper_bounds: (k,), upper bounds.
     """
-    unknown, damping = np.clip(start, lowest, highest), 1e-3
-    weights, residual = projection(unknown)
-    jacobian = _jacobian(projection, unknown)
+    unknowns, damping = np.clip(start, lower_bounds, upper_bounds), 1e-3
+    weights, residual = projection(unknowns)
+    jacobian = _jacobian(projection, unknowns)
     for _ in range(_MOST_STEPS):
         curvature, descent = jacobian.T @ jacobian, -(jacobian.T @ residual)
         damped_curvature = curvature + damping * np.diag(np.diagonal(curvature) + 1e-12)
-        trial = np.clip(unknown + np.linalg.solve(damped_curvature, descent), lowest, highest)
-        trial_weights, trial_residual = projection(trial)
+        trial_unknowns = np.clip(
+            unknowns + np.linalg.solve(damped_curvature, descent), lower_bounds, upper_bounds
+        )
+        trial_weights, trial_residual = projection(trial_unknowns)
         reduction = float(residual @ residual - trial_residual @ trial_residual)
-        largest_change = float(np.abs(trial - unknown).max())
+        largest_change = float(np.abs(trial_unknowns - unknowns).max())
         if reduction > 0.0:
-            unknown, weights, residual = trial, trial_weights, trial_residual
-            jacobian = _jacobian(projection, unknown)
+            unknowns, weights, residual = trial_unknowns, trial_weights, trial_residual
+            jacobian = _jacobian(projection, unknowns)
             damping = max(0.2 * damping, 1e-9)
         else:
             damping *= 5.0
         least_reduction = _SMALLEST_REDUCTION * float(residual @ residual)
         if largest_change < 1e-7 or 0.0 < reduction < least_reduction:
             break
-    return Solution(unknown, weights, residual, jacobian)
+    return Solution(unknowns, weights, residual, jacobian)
 
 
-def _jacobian(projection: Projection, unknown: Floats) -> Floats:
+def _jacobian(projection: Projection, unknowns: Floats) -> Floats:
     """Jacobian of the residual of `projection` by central differences, (m, k)."""
-    steps = _DIFFERENCE_STEP * np.eye(unknown.size)
+    steps = _DIFFERENCE_STEP * np.eye(unknowns.size)
     return np.stack(
         [
-            (projection(unknown + step)[1] - projection(unknown - step)[1])
+            (projection(unknowns + step)[1] - projection(unknowns - step)[1])
             / (2.0 * _DIFFERENCE_STEP)
             for step in steps
         ],

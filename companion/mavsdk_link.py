@@ -66,22 +66,22 @@ def connection_url(endpoint: str) -> str:
     Raises:
         EndpointError: the endpoint cannot be parsed, or MAVSDK cannot do what it demands.
     """
-    where = parse_endpoint(endpoint)
-    if isinstance(where, UdpIn | TcpServer) and where.peers:
+    parsed_endpoint = parse_endpoint(endpoint)
+    if isinstance(parsed_endpoint, UdpIn | TcpServer) and parsed_endpoint.peers:
         raise EndpointError(
             f"endpoint {endpoint!r}: MAVSDK accepts every sender; remove ?peer=, or use "
             "link.backend: direct"
         )
-    scheme = _SCHEMES[type(where)]
-    if isinstance(where, SerialPort):
-        return f"{scheme}://{where.device}:{where.baud}"
-    return f"{scheme}://{where.host}:{where.port}"
+    scheme = _SCHEMES[type(parsed_endpoint)]
+    if isinstance(parsed_endpoint, SerialPort):
+        return f"{scheme}://{parsed_endpoint.device}:{parsed_endpoint.baud}"
+    return f"{scheme}://{parsed_endpoint.host}:{parsed_endpoint.port}"
 
 
 _MOST_WAITING_FRAMES = 1000
 """Largest number of frames that wait for the event loop; if more wait, the oldest are dropped."""
 _SOURCE = slice(5, 7)  # system and component of a MAVLink 2 frame
-_OPEN_FAILURES = {
+_OPEN_ERROR_TEXTS = {
     "BIND_ERROR": "the port is in use by another program, or the address is not this computer's",
     "DESTINATION_IP_UNKNOWN": "the host is unknown; use its IP address",
     "CONNECTION_ERROR": "check that the device is there and that you may use it",
@@ -165,7 +165,7 @@ class MavsdkTransport:
 
 
 def _open_error(endpoint: str, message: str) -> str:
-    reasons = (reason for name, reason in _OPEN_FAILURES.items() if name in message)
+    reasons = (reason for name, reason in _OPEN_ERROR_TEXTS.items() if name in message)
     return f"{endpoint} cannot be opened by MAVSDK: {next(reasons, message)}"
 
 

@@ -156,7 +156,7 @@ class ProgramPlan:
         return Phase("stand by", _NEXT_CALL, self._next_request, inf)
 
     async def _next_request(self, context: FlightContext) -> None:
-        context.detail = _NEXT_CALL
+        context.waiting_for = _NEXT_CALL
         while not self._waiting_requests:
             self._new_request.clear()
             await self._new_request.wait()

@@ -38,7 +38,7 @@ def _activity(status: FlightStatus) -> str:
             "" if status.maneuver_duration is None else f" of {status.maneuver_duration:.0f}"
         )
         return f"{status.maneuver}, {status.maneuver_elapsed:.0f}{duration_text} s"
-    return f"{status.detail or 'working'} ({elapsed_text(status.elapsed, status.timeout)})"
+    return f"{status.waiting_for or 'working'} ({elapsed_text(status.elapsed, status.timeout)})"
 
 
 def elapsed_text(elapsed: float, timeout: float) -> str:

@@ -107,11 +107,11 @@ class TerminalObserver:
             lambda: self._print(f"[bold]{name:<10}[/] waiting for {waits_for}", True)
         )
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Print periodically what the phase waits for, unless live lines already show it."""
         if self._live_lines is None and elapsed - self._status_printed_at >= _STATUS_PERIOD:
             self._status_printed_at = elapsed
-            text = f"{name}: {detail or 'working'} ({elapsed_text(elapsed, timeout)})"
+            text = f"{name}: {waiting_for or 'working'} ({elapsed_text(elapsed, timeout)})"
             self._printer.queue_line(lambda: self._print(f"           {text}"))
 
     def status(self, status: FlightStatus) -> None:

@@ -99,7 +99,7 @@ class FlownSource:
             return None
         if not isinstance(source, ManeuverSource):
             return FlownPart(source.name, now - begun_at, None, source)
-        maneuver, elapsed = source.maneuvers.part_at(now - begun_at)
+        maneuver, elapsed = source.maneuvers.maneuver_at(now - begun_at)
         return FlownPart(maneuver.name, elapsed, maneuver.duration, maneuver)
 
     def followed_trajectory(self, now: float) -> FollowedTrajectory | None:
@@ -107,7 +107,7 @@ class FlownSource:
         source = self.source
         if not isinstance(source, ManeuverSource) or source.begun_at is None or self.pose is None:
             return None
-        maneuver, elapsed = source.maneuvers.part_at(now - source.begun_at)
+        maneuver, elapsed = source.maneuvers.maneuver_at(now - source.begun_at)
         if not isinstance(maneuver, Follow):
             return None
         return FollowedTrajectory(maneuver, elapsed, self.pose)

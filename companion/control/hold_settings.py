@@ -42,12 +42,12 @@ _CALM_BANDWIDTH = 1.0
 """Bandwidth of the disturbance estimate in a flight that identifies the vehicle, rad/s."""
 _POSITION_TIME_CONSTANT = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
-_POSITION_PULL = 4.0, 8.0
-"""`ObserverSettings.position_pull` with a slow and with a quick rate loop, 1/s. Without this pull,
-the velocities of PX4 and ArduPilot, off by 0.05 m/s for seconds (measured), would be trusted."""
-_TRUSTED_PULL_INCREASE = 5.0
-"""`ObserverSettings.pull_increase` with a quick rate loop, 1/s. With recorded errors of PX4's and
-ArduPilot's estimators the vehicle moves 5 to 25 % less than without the increase."""
+_POSITION_COUPLING = 4.0, 8.0
+"""`ObserverSettings.position_coupling` with a slow and with a quick rate loop, 1/s. Without it, the
+velocities of PX4 and ArduPilot, off by 0.05 m/s for seconds (measured), would be trusted."""
+_TRUSTED_COUPLING_INCREASE = 5.0
+"""`ObserverSettings.coupling_increase` with a quick rate loop, 1/s. With recorded errors of PX4's
+and ArduPilot's estimators the vehicle moves 5 to 25 % less than without the increase."""
 _CORRECTION_TIME_CONSTANT = 0.65
 """Time constant of the position corrections of PX4's and ArduPilot's estimators (measured), s."""
 _CORRECTION_FILTER_TIMES = 0.1, 0.04
@@ -126,7 +126,7 @@ def observer_quickness(config: Config) -> float:
 
 def observer_settings(config: Config) -> ObserverSettings:
     """The settings of the motion observer."""
-    slow, quick = _POSITION_PULL
+    slow, quick = _POSITION_COUPLING
     quickness = _falling_ramp(_rate_loop_delay(config), _STIFF_HOLD_DELAYS)
     return ObserverSettings(
         _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
@@ -134,7 +134,7 @@ def observer_settings(config: Config) -> ObserverSettings:
         slow + quickness * (quick - slow),
         config.guidance.max_disturbance_m_s2,
         _BANDWIDTH_INCREASE * observer_quickness(config),
-        quickness * _TRUSTED_PULL_INCREASE,
+        quickness * _TRUSTED_COUPLING_INCREASE,
     )
 
 

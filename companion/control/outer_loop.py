@@ -115,7 +115,7 @@ def linear_settings(config: Config) -> LinearSettings:
         ),
         tilt=tilt,
         heading=heading,
-        max_horizontal=limits.max_horizontal_acceleration,
+        max_horizontal_acceleration=limits.max_horizontal_acceleration,
         thrust_lag=config.thrust.lag,
         period=period,
     )

@@ -78,18 +78,18 @@ class Section(BaseModel):
         Paths that name nothing, are too long, or hold a null character are refused, too; `~` in a
         path is expanded.
         """
-        kinds = types_in(cls.model_fields[str(field.field_name)].annotation)
-        if bool in kinds and not isinstance(value, bool):
+        annotations = types_in(cls.model_fields[str(field.field_name)].annotation)
+        if bool in annotations and not isinstance(value, bool):
             raise ValueError("must be true or false")
-        if isinstance(value, bool) and bool not in kinds:
+        if isinstance(value, bool) and bool not in annotations:
             raise ValueError("must not be true or false")
         if not isinstance(value, str):
             return value
-        if kinds & {int, float} and not kinds & {str, Path}:
+        if annotations & {int, float} and not annotations & {str, Path}:
             raise ValueError("must be a number")
-        if Path in kinds and not is_path(value):
+        if Path in annotations and not is_path(value):
             raise ValueError("must name a file or a folder")
-        return expanded_path(value) if Path in kinds else value
+        return expanded_path(value) if Path in annotations else value
 
 
 class ConfigError(Exception):
@@ -100,7 +100,7 @@ class UnreadableFileError(ConfigError):
     """The file is missing or cannot be read."""
 
 
-class Place(NamedTuple):
+class SourceLocation(NamedTuple):
     """Where a key stands: file and line."""
 
     file: str
@@ -115,7 +115,7 @@ class Contents(NamedTuple):
     """A YAML file that was read but not yet checked against a model."""
 
     keys: dict[str, Any]
-    places: dict[KeyPath, Place]
+    places: dict[KeyPath, SourceLocation]
     """Where each key and each item of a list stands."""
 
 
@@ -157,14 +157,14 @@ def _contents(text: str, name: str, model: type[Section]) -> Contents:
     try:
         data, lines = bounded_yaml.read(text)
     except YamlError as error:
-        raise ConfigError(f"{Place(name, error.line)}: {error}") from error
+        raise ConfigError(f"{SourceLocation(name, error.line)}: {error}") from error
     if data is None:
         data = {}
     if not isinstance(data, dict):
-        first = next(iter(model.model_fields))
-        raise ConfigError(f"{name}: expected keys such as `{first}:` at the top level")
+        first_key = next(iter(model.model_fields))
+        raise ConfigError(f"{name}: expected keys such as `{first_key}:` at the top level")
     keys = {key: _value_or_section(key, value, model) for key, value in data.items()}
-    return Contents(keys, {where: Place(name, line) for where, line in lines.items()})
+    return Contents(keys, {where: SourceLocation(name, line) for where, line in lines.items()})
 
 
 def _value_or_section(key: Any, value: Any, model: type[Section]) -> Any:
@@ -172,9 +172,11 @@ def _value_or_section(key: Any, value: Any, model: type[Section]) -> Any:
     field = model.model_fields.get(key)
     if value is not None or field is None:
         return value
-    kinds = (field.annotation, *get_args(field.annotation))
-    sections = [kind for kind in kinds if isinstance(get_origin(kind) or kind, type)]
-    has_keys = any(issubclass(get_origin(kind) or kind, (BaseModel, dict)) for kind in sections)
+    annotations = (field.annotation, *get_args(field.annotation))
+    section_types = [kind for kind in annotations if isinstance(get_origin(kind) or kind, type)]
+    has_keys = any(
+        issubclass(get_origin(kind) or kind, (BaseModel, dict)) for kind in section_types
+    )
     return {} if has_keys else None
 
 
@@ -182,7 +184,7 @@ def validated(
     data: dict[str, Any],
     name: str,
     model: type[Model],
-    places: Mapping[KeyPath, Place] | None = None,
+    places: Mapping[KeyPath, SourceLocation] | None = None,
 ) -> Model:
     """Check data that was already read; errors begin with file and line of the key, or `name`.
 
@@ -196,11 +198,14 @@ def validated(
 
 
 def _config_error(
-    error: ValidationError, name: str, model: type[Section], places: Mapping[KeyPath, Place]
+    error: ValidationError,
+    name: str,
+    model: type[Section],
+    places: Mapping[KeyPath, SourceLocation],
 ) -> ConfigError:
     """The `ConfigError` for a pydantic error: up to five faults with file and line."""
     details = essential_details(error.errors(include_url=False))
-    faults, previous_place = [], Place("")
+    faults, previous_place = [], SourceLocation("")
     for detail in details[:_MOST_FAULTS_SHOWN]:
         place = nearest_place(detail["loc"], places, name)
         where = f"{place}: "
@@ -210,14 +215,21 @@ def _config_error(
             where = f"line {place.line}: "
         faults.append(where + error_sentence(detail, model, model.former_keys))
         previous_place = place
-    more = len(details) - _MOST_FAULTS_SHOWN
-    return ConfigError("; ".join(faults) + (f"; and {more} more" if more > 0 else ""))
+    hidden_count = len(details) - _MOST_FAULTS_SHOWN
+    return ConfigError(
+        "; ".join(faults) + (f"; and {hidden_count} more" if hidden_count > 0 else "")
+    )
 
 
-def nearest_place(where: KeyPath, places: Mapping[KeyPath, Place], name: str) -> Place:
+def nearest_place(
+    key_path: KeyPath, places: Mapping[KeyPath, SourceLocation], name: str
+) -> SourceLocation:
     """File and line of a key, or of the innermost section or list around the key with known line.
 
     If no line is known, the file `name` without a line.
     """
-    ends = range(len(where), 0, -1)
-    return next((places[where[:end]] for end in ends if where[:end] in places), Place(name))
+    prefix_lengths = range(len(key_path), 0, -1)
+    return next(
+        (places[key_path[:end]] for end in prefix_lengths if key_path[:end] in places),
+        SourceLocation(name),
+    )

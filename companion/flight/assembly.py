@@ -49,9 +49,9 @@ class AssembledFlight:
 
     def close(self) -> None:
         """End the solver's process, if the flight uses predictive control."""
-        predictive = self.context.guidance_loop.maker.predictive_control
-        if predictive is not None:
-            predictive.close()
+        predictive_control = self.context.guidance_loop.maker.predictive_control
+        if predictive_control is not None:
+            predictive_control.close()
 
 
 def assemble(
@@ -70,8 +70,8 @@ def assemble(
     for later flights.
     """
     clock: Callable[[], float] = asyncio.get_running_loop().time
-    record, real_time = recorder.file, environment.realtime and not config.link.lockstep
-    trace = FlightTrace(folder, record)
+    flight_recorder, real_time = recorder.file, environment.realtime and not config.link.lockstep
+    trace = FlightTrace(folder, flight_recorder)
     context = _context(config, link, plan, trace, environment)
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
     rate_requester = RateRequester(link, config.link)
@@ -82,16 +82,16 @@ def assemble(
     context.guidance_loop.recorder.note = rate_requester.note = recorder.note = flight.note
     memory = _drag_memory(context, folder, flight.note, changes)
     _prepare_trajectories(context, flight.note, real_time=real_time)
-    if record is not None:
-        record.metadata(
+    if flight_recorder is not None:
+        flight_recorder.metadata(
             "configuration", flattened(changes.config_at_flight_start.model_dump(mode="json"))
         )
-        record.begin(
+        flight_recorder.begin(
             flight.began, description(changes.config_at_flight_start, plan, real_time=real_time)
         )
-        ladder.on_change = record.alarm
-        memory.on_begin = lambda known: record.action(
-            clock(), "drag_prior", drag=known.drag or (nan, nan)
+        ladder.on_change = flight_recorder.alarm
+        memory.on_estimate_begin = lambda known_drag: flight_recorder.action(
+            clock(), "drag_prior", drag=known_drag.drag or (nan, nan)
         )
     dead_time_watch = DeadTimeWatch(trace, config.vehicle.axes, flight.note)
     reporter = _reporter(flight, context, ladder, trace, recorder, real_time=real_time)
@@ -138,10 +138,10 @@ def _drag_memory(
     context: FlightContext, folder: Path | None, note: Callable[[str], None], changes: Changes
 ) -> DragMemory:
     """Make the `DragMemory`, which gives checks and guidance the drag from earlier flights."""
-    remembered = None if folder is None else folder.parent
-    memory = DragMemory(context.config, remembered, context.guidance_loop.estimate.drag, note)
-    memory.on_known = changes.on_drag
-    context.preflight.drag_of = memory.load
+    memory_folder = None if folder is None else folder.parent
+    memory = DragMemory(context.config, memory_folder, context.guidance_loop.estimate.drag, note)
+    memory.on_known_drag = changes.on_known_drag
+    context.preflight.load_drag = memory.load
     return memory
 
 
@@ -149,13 +149,13 @@ def _prepare_trajectories(
     context: FlightContext, note: Callable[[str], None], *, real_time: bool
 ) -> None:
     """Note the messages about trajectory files; with `guidance.kind: nmpc`, start the solver."""
-    for part in context.maneuvers.parts:
-        if isinstance(part, Follow):
-            for text in part.notes:
+    for maneuver in context.maneuvers.parts:
+        if isinstance(maneuver, Follow):
+            for text in maneuver.notes:
                 note(text)
             if context.config.guidance.kind == "nmpc":
                 context.guidance_loop.maker.predictive_control = make_predictive_control(
-                    context.config, part, note, vehicle_waits=not real_time
+                    context.config, maneuver, note, vehicle_waits=not real_time
                 )
 
 
@@ -170,7 +170,7 @@ def _reporter(
 ) -> StatusReporter:
     """Make the reporter of the flight's state; it shows the state only if the observer wants it."""
 
-    def phase() -> tuple[Phase, float]:
+    def current_phase() -> tuple[Phase, float]:
         return flight.phase, recorder.phases[-1][0] if recorder.phases else flight.began
 
     return StatusReporter(
@@ -178,7 +178,7 @@ def _reporter(
         ladder,
         trace,
         flight.began,
-        phase,
+        current_phase,
         recorder.status if recorder.wants_status else None,
         asyncio.get_running_loop().time,
         real_time=real_time,

@@ -40,9 +40,9 @@ def require_moderate_change(before: Config, after: Config, name: str) -> None:
     for each in differences(before, after):
         if (each.section, each.key) not in changeable_keys():
             continue  # such as `include`, which is no value
-        why = _refusal(before, after, each)
-        if why is not None:
-            raise ConfigError(f"{name}: {why}")
+        refusal = _refusal(before, after, each)
+        if refusal is not None:
+            raise ConfigError(f"{name}: {refusal}")
 
 
 def _refusal(before: Config, after: Config, change: Difference) -> str | None:

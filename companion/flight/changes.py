@@ -45,10 +45,10 @@ class Change(NamedTuple):
     def __str__(self) -> str:
         return f"changed by {self.by}: {', '.join(map(str, self.keys))}"
 
-    def as_dict(self, began: float) -> dict[str, Any]:
-        """The change for JSON; its time counts from `began`, s on our clock."""
+    def as_dict(self, flight_began: float) -> dict[str, Any]:
+        """The change for JSON; its time counts from `flight_began`, s on our clock."""
         keys = {each.name: [each.before, each.after] for each in self.keys}
-        return {"time_s": round(self.time - began, 3), "by": self.by, "keys": keys}
+        return {"time_s": round(self.time - flight_began, 3), "by": self.by, "keys": keys}
 
 
 class Changes:
@@ -65,8 +65,8 @@ class Changes:
             contains it.
         note: called with each change in words; a flight replaces it while it runs.
         on_change: called with `wanted_config` after each change.
-        on_drag: called with the known drag of the vehicle, once its hardware id was read; some
-            checks of a change need the drag.
+        on_known_drag: called with the known drag of the vehicle, once its hardware id was read;
+            some checks of a change need the drag.
     """
 
     def __init__(self, start_config: Config) -> None:
@@ -75,14 +75,14 @@ class Changes:
         self.config_at_flight_start = start_config
         self.note: Callable[[str], None] = lambda _: None
         self.on_change: Callable[[Config], None] = lambda _: None
-        self.on_drag: Callable[[KnownDrag], None] = lambda _: None
+        self.on_known_drag: Callable[[KnownDrag], None] = lambda _: None
         self.start_config = start_config
         self._slew = Slew(start_config)
         self._earlier_configs: list[Config] = []
         self._count_before_flight = 0
         self._retuning: Retuning | None = None
-        self._refuses: Callable[[Config, Config], str | None] = _refuse_nothing
-        self._record: FlightRecorder | None = None
+        self._reason_to_refuse: Callable[[Config, Config], str | None] = _refuse_nothing
+        self._recorder: FlightRecorder | None = None
 
     @property
     def can_undo(self) -> bool:
@@ -90,7 +90,7 @@ class Changes:
         return bool(self._earlier_configs)
 
     @property
-    def made_in_flight(self) -> tuple[Change, ...]:
+    def changes_in_flight(self) -> tuple[Change, ...]:
         """The changes since the flight began, in order."""
         return tuple(self.all_changes[self._count_before_flight :])
 
@@ -137,31 +137,33 @@ class Changes:
         return text
 
     @contextmanager
-    def judged_by(self, refuses: Callable[[Config, Config], str | None]) -> Iterator[None]:
-        """Let `refuses` decide on each change and each undo while the `with` block runs.
+    def checked_by(
+        self, reason_to_refuse: Callable[[Config, Config], str | None]
+    ) -> Iterator[None]:
+        """Let `reason_to_refuse` decide on each change and each undo while the `with` block runs.
 
         Args:
-            refuses: called with the present configuration and the wanted one; returns why the
-                change is refused, as a sentence, or None.
+            reason_to_refuse: called with the present configuration and the wanted one; returns why
+                the change is refused, as a sentence, or None.
         """
-        self._refuses = refuses
+        self._reason_to_refuse = reason_to_refuse
         try:
             yield
         finally:
-            self._refuses = _refuse_nothing
+            self._reason_to_refuse = _refuse_nothing
 
     @contextmanager
     def applying(
-        self, retuning: Retuning, note: Callable[[str], None], record: FlightRecorder | None
+        self, retuning: Retuning, note: Callable[[str], None], recorder: FlightRecorder | None
     ) -> Iterator[None]:
         """Apply changes to the loops while the `with` block runs; apply earlier changes at once.
 
         Args:
             retuning: applies values to the control loop and to guidance.
             note: shows a change to the user, and records it in words.
-            record: records the values for a replay, or None.
+            recorder: records the values for a replay, or None.
         """
-        self._retuning, self._record = retuning, record
+        self._retuning, self._recorder = retuning, recorder
         if self.wanted_config is not self.start_config:
             self._slew.jump(self.wanted_config)
             retuning.apply(loop_settings(self.wanted_config))
@@ -172,7 +174,7 @@ class Changes:
             with retuning.before_each_step(self.step):
                 yield
         finally:
-            self._retuning = self._record = None
+            self._retuning = self._recorder = None
             self._slew.jump(self.wanted_config)
             self.note = note_before
 
@@ -202,7 +204,7 @@ class Changes:
             raise ChangeRefusedError(
                 f"{by}: these are the present values already; nothing has changed"
             )
-        refusal = self._refuses(self.wanted_config, wanted)
+        refusal = self._reason_to_refuse(self.wanted_config, wanted)
         if refusal is not None:
             raise ChangeRefusedError(f"{by}: {refusal}; nothing has changed")
         try:
@@ -223,11 +225,11 @@ class Changes:
 
     def _record_change(self, before: Config, *, at_once: bool) -> None:
         """Record for a replay the values in which `wanted_config` differs from `before`."""
-        if self._record is not None:
+        if self._recorder is not None:
             values: dict[str, dict[str, Any]] = {}
             for each in differences(before, self.wanted_config):
                 values.setdefault(each.section, {})[each.key] = each.after
-            self._record.change(values, at_once=at_once)
+            self._recorder.change(values, at_once=at_once)
 
 
 def _refuse_nothing(_before: Config, _after: Config) -> str | None:

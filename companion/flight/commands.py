@@ -15,19 +15,19 @@ from companion.vehicle.autopilot import Role
 from companion.vehicle.link import Link
 
 _MAX_TRIES = 4
-_EFFECT_TIMEOUT = 3.0
+_COMMAND_EFFECT_TIMEOUT = 3.0
 """If a repeated command is refused, longest wait for the effect of the first try, s. A take-off
 shows its effect later than a mode change."""
 _MODE_REPORT_TIMEOUT = 1.0
 """If an accepted mode is not reported within this time, s, the autopilot has left it again."""
-_TEXT_TIME = 0.3
+_REASON_TEXT_DELAY = 0.3
 """Largest time between a mode change and the STATUSTEXT that gives the reason, s."""
-_BY_FAILSAFE = "the autopilot's failsafe took over"
+_FAILSAFE_TEXT = "the autopilot's failsafe took over"
 _OFFBOARD_ONLY = frozenset({Role.OFFBOARD})
 
 IsDone = Callable[[], bool]
 """Returns whether the vehicle has obeyed the command; may raise `FlightEnded` instead."""
-RequireOurs = Callable[[], None]
+RequireControl = Callable[[], None]
 """Raises `FlightEnded` if we must not command the vehicle; most call `require_role`."""
 
 
@@ -63,11 +63,13 @@ def require_role(link: Link, allowed: Set[Role], released_by: str = "") -> None:
     if released_by and not link.state.mode_by_failsafe:
         raise ControlReleased(f"{released_by} commanded mode {link.state.mode}", Exit.RELEASE)
     if link.state.mode_by_failsafe:
-        raise FlightEnded(f"{_BY_FAILSAFE}: mode {link.state.mode}", Exit.RELEASE)
-    raise ModeTaken(f"the pilot or another station took over: mode {link.state.mode}", Exit.RELEASE)
+        raise FlightEnded(f"{_FAILSAFE_TEXT}: mode {link.state.mode}", Exit.RELEASE)
+    raise ModeTakenOver(
+        f"the pilot or another station took over: mode {link.state.mode}", Exit.RELEASE
+    )
 
 
-class ModeTaken(FlightEnded):
+class ModeTakenOver(FlightEnded):
     """The vehicle is in a mode that is not ours, and the autopilot reports no failsafe."""
 
 
@@ -77,28 +79,28 @@ async def with_cause(context: FlightContext, ended: FlightEnded) -> FlightEnded:
     ArduPilot reports a geofence breach only in a STATUSTEXT. Control is released before this
     function waits for the text.
     """
-    if not isinstance(ended, ModeTaken | ControlReleased):
+    if not isinstance(ended, ModeTakenOver | ControlReleased):
         return ended
     state, fence_text = context.link.state, context.link.autopilot.fence_text
     if fence_text is None:
         return ended
     context.release()
-    mode, since = state.mode, state.mode_received_at - _TEXT_TIME
-    await asyncio.sleep(_TEXT_TIME)
-    if not any(fence_text in each.text for each in state.texts if each.time >= since):
+    mode, earliest_text_time = state.mode, state.mode_received_at - _REASON_TEXT_DELAY
+    await asyncio.sleep(_REASON_TEXT_DELAY)
+    if not any(fence_text in each.text for each in state.texts if each.time >= earliest_text_time):
         return ended
-    return FlightEnded(f"{_BY_FAILSAFE}: mode {mode}", ended.exit)
+    return FlightEnded(f"{_FAILSAFE_TEXT}: mode {mode}", ended.exit)
 
 
 async def command_if_ours(
-    context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
+    context: FlightContext, command: Command, require_control: RequireControl, done: IsDone
 ) -> None:
     """Send a command until the autopilot answers; before each try, check who has control.
 
     A command is never repeated blindly. The vehicle may have obeyed a command whose answer was
     lost, and a pilot may have taken over since.
 
-    `require_ours`: called before each try; if it raises, nothing is sent. `done`: see `IsDone`;
+    `require_control`: called before each try; if it raises, nothing is sent. `done`: see `IsDone`;
     called before a repetition.
 
     Raises:
@@ -113,7 +115,7 @@ async def command_if_ours(
         context.replacement_detector.require()
         if attempt > 0 and done():
             return
-        require_ours()
+        require_control()
         try:
             await context.link.command(*command, retries=0)
             return
@@ -136,7 +138,7 @@ async def command_if_ours(
 
 
 async def change_mode(
-    context: FlightContext, command: Command, require_ours: RequireOurs, done: IsDone
+    context: FlightContext, command: Command, require_control: RequireControl, done: IsDone
 ) -> None:
     """Send a mode command like `command_if_ours`, and wait until the mode is reported.
 
@@ -145,7 +147,7 @@ async def change_mode(
         CommandUnfinished: the autopilot accepted the mode, but still obeys our setpoints.
         CommandRefused, CommandTimeout, LinkLost: see `command_if_ours`.
     """
-    await command_if_ours(context, command, require_ours, done)
+    await command_if_ours(context, command, require_control, done)
     accepted_at = asyncio.get_running_loop().time()
 
     def entered() -> bool:
@@ -168,18 +170,18 @@ async def change_mode(
     await context.until(entered)
 
 
-async def ask_to_hold(context: FlightContext, require_ours: RequireOurs) -> None:
+async def ask_to_hold(context: FlightContext, require_control: RequireControl) -> None:
     """Change to the autopilot's hold mode; raises what `change_mode` raises."""
     await change_mode(
         context,
         context.link.autopilot.hold(),
-        require_ours,
+        require_control,
         lambda: in_role(context.link, Role.HOLD),
     )
 
 
 async def leave_offboard(
-    context: FlightContext, cannot_arm_in: frozenset[Role] = _OFFBOARD_ONLY
+    context: FlightContext, roles_forbidding_arming: frozenset[Role] = _OFFBOARD_ONLY
 ) -> None:
     """Change a disarmed vehicle from offboard to hold mode, because offboard forbids arming.
 
@@ -187,24 +189,24 @@ async def leave_offboard(
     began there. PX4's pre-arm checks fail in AUTO.LAND, and in OFFBOARD without setpoints
     (measured). Other modes and armed vehicles are left alone.
 
-    `cannot_arm_in`: roles of the modes to leave.
+    `roles_forbidding_arming`: roles of the modes to leave.
 
     Raises:
         FlightEnded: somebody else armed the vehicle or changed its mode, or hold was refused.
     """
-    if context.armed() or not roles_of(context.link) & cannot_arm_in:
+    if context.armed() or not roles_of(context.link) & roles_forbidding_arming:
         return
     mode = context.link.state.mode
     context.note(disarmed_text(mode))
-    context.detail = f"the autopilot to leave {mode}"
+    context.waiting_for = f"the autopilot to leave {mode}"
 
-    def require_ours() -> None:
+    def require_control() -> None:
         if context.armed():
             raise FlightEnded("somebody else armed the vehicle", Exit.RELEASE)
-        require_role(context.link, cannot_arm_in)
+        require_role(context.link, roles_forbidding_arming)
 
     try:
-        await ask_to_hold(context, require_ours)
+        await ask_to_hold(context, require_control)
     except (CommandRefused, CommandTimeout) as error:
         raise FlightEnded(left_disarmed_text(mode, error), Exit.LEAVE) from error
 
@@ -227,7 +229,7 @@ def left_disarmed_text(mode: str | None, error: Exception) -> str:
 
 async def _takes_effect(context: FlightContext, done: IsDone) -> bool:
     try:
-        async with asyncio.timeout(_EFFECT_TIMEOUT):
+        async with asyncio.timeout(_COMMAND_EFFECT_TIMEOUT):
             await context.until(done)
     except TimeoutError:
         return False

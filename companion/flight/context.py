@@ -45,7 +45,7 @@ _MAX_STALLED_WAITS = 3
 """After this number of waits with a stall, a heartbeat counts as fresh: a computer that always
 stalls must still be able to hand back."""
 
-_ATTITUDE_AGE = 1.0
+_MAX_ATTITUDE_AGE = 1.0
 """Largest age of the attitude from which the tilt is computed, s."""
 
 _HEARTBEAT_ID = 0.0
@@ -67,7 +67,7 @@ class FlightContext:
     replacement_detector: ReplacementDetector
     known_drag: KnownDrag = field(default_factory=KnownDrag)
     """What was known of the vehicle's drag when the checks ended."""
-    detail: str = ""
+    waiting_for: str = ""
     """What the running phase waits for, shown to the user."""
     setpoint_rate_hz: float = 0.0
     """Rate of setpoints over the maneuvers, Hz."""
@@ -80,7 +80,7 @@ class FlightContext:
     must_disarm: bool = False
     """Whether the flight must disarm the vehicle on the ground, because we commanded arming or
     take-off."""
-    took_off_from: NorthEast | None = None
+    takeoff_position: NorthEast | None = None
     """Position (north, east) where we commanded the take-off, m; None before the take-off, and
     after the takeover or the start of the landing. If the link is lost during the take-off, the
     vehicle would hover without end, so it must land when it is heard again."""
@@ -120,16 +120,16 @@ class FlightContext:
         finally:
             self.release()
 
-    async def until(self, condition: Callable[[], bool], detail: str | None = None) -> None:
-        """Wait until `condition` holds; `detail` tells the user what the phase waits for."""
-        if detail is not None:
-            self.detail = detail
+    async def until(self, condition: Callable[[], bool], waiting_for: str | None = None) -> None:
+        """Wait until `condition` holds; `waiting_for` tells the user what the phase waits for."""
+        if waiting_for is not None:
+            self.waiting_for = waiting_for
         while not condition():  # noqa: ASYNC110 - telemetry sets no events
             await asyncio.sleep(_POLL_PERIOD)
 
     def timed_out(self, seconds: float, waited_for: str, exit_: Exit | None = None) -> FlightEnded:
         """The exception to raise for a wait that took longer than `seconds`."""
-        return FlightEnded(f"waited {seconds:g} s for {waited_for}: {self.detail}", exit_)
+        return FlightEnded(f"waited {seconds:g} s for {waited_for}: {self.waiting_for}", exit_)
 
     async def fresh_heartbeat(self) -> None:
         """Wait for a heartbeat that left the vehicle after this call.
@@ -140,9 +140,9 @@ class FlightContext:
         been queued, too, so this function waits again.
         """
         # The watch reads these counters on each heartbeat, so before the wait below ends.
-        counters, now = self.snapshot_builder.counters, asyncio.get_running_loop().time
+        counters, clock = self.snapshot_builder.counters, asyncio.get_running_loop().time
         for _ in range(_MAX_STALLED_WAITS):
-            began = now()
+            began = clock()
             await self._wait_for_heartbeat()
             if counters.stall_time(since=began) < _SHORTEST_STALL:
                 return
@@ -151,9 +151,9 @@ class FlightContext:
         """Wait for a heartbeat like `fresh_heartbeat`, but do not wait again after a stall."""
         loop = asyncio.get_running_loop()
         fresh_from = loop.time() + _BACKLOG_DRAIN_TIME
-        fresh = loop.create_future()
+        heartbeat_future = loop.create_future()
 
-        async def ask() -> None:
+        async def request_heartbeat() -> None:
             nonlocal fresh_from
             with suppress(LinkError):
                 for _ in range(2):  # PX4 sends the first heartbeat before its answer
@@ -164,13 +164,17 @@ class FlightContext:
 
         def on_heartbeat(_: object) -> None:
             heartbeat = self.link.state.heartbeat
-            if heartbeat is not None and heartbeat.received >= fresh_from and not fresh.done():
-                fresh.set_result(None)
+            if (
+                heartbeat is not None
+                and heartbeat.received >= fresh_from
+                and not heartbeat_future.done()
+            ):
+                heartbeat_future.set_result(None)
 
         unsubscribe = self.link.subscribe("HEARTBEAT", on_heartbeat)
-        request_task = asyncio.create_task(ask())
+        request_task = asyncio.create_task(request_heartbeat())
         try:
-            await fresh
+            await heartbeat_future
         finally:
             request_task.cancel()
             unsubscribe()
@@ -188,7 +192,7 @@ class FlightContext:
     def tilt(self) -> float | None:
         """Tilt of the vehicle, rad; None if its attitude is stale or no unit quaternion."""
         sample, now = self.loop.resets.newest_attitude, asyncio.get_running_loop().time()
-        if sample is None or now - sample.received > _ATTITUDE_AGE or not is_unit(sample.q):
+        if sample is None or now - sample.received > _MAX_ATTITUDE_AGE or not is_unit(sample.q):
             return None
         return tilt_angle(sample.q[1], sample.q[2])
 

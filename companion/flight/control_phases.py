@@ -28,13 +28,13 @@ _FALLING_SPEED = 2.5
 _UPRIGHT_TILT = radians(45.0)
 """Largest tilt of a vehicle that stands after a landing, rad; no slope to land on is steeper."""
 
-_MIN_HOLDING_TILT = 5.0
+_MIN_HOLDING_TILT_DEG = 5.0
 """Smallest tilt that limits.max_thrust must allow, °: the vehicle must hold against a breeze."""
 
-_TOLD_REDUCTION = 0.5
+_UNREPORTED_REDUCTION_DEG = 0.5
 """Largest reduction of the tilt that is not told, °: in whole degrees it would be none."""
 
-_MARGIN_WINDOW = 1.0
+_TILT_WINDOW = 1.0
 """Window over which `_TiltMargin` takes the maximum of the allowed tilt, s."""
 
 
@@ -45,13 +45,13 @@ async def maneuvers(context: FlightContext) -> None:
 
 async def fly_maneuvers(context: FlightContext, sequence: ManeuverSequence) -> None:
     """Fly `sequence` to its end, or until guidance aborts it."""
-    now = asyncio.get_running_loop().time
-    began = now()
+    clock = asyncio.get_running_loop().time
+    began = clock()
 
     def progress() -> str:
-        elapsed = now() - began
-        part, _ = sequence.part_at(elapsed)
-        return f"{part.name}, {elapsed:.0f} of {sequence.duration:.0f} s flown"
+        elapsed = clock() - began
+        maneuver, _ = sequence.maneuver_at(elapsed)
+        return f"{maneuver.name}, {elapsed:.0f} of {sequence.duration:.0f} s flown"
 
     await _fly(context, ManeuverSource(sequence), progress)
     context.guidance_loop.hold_reference()
@@ -65,7 +65,7 @@ async def fly_commanded(context: FlightContext, commands: Source) -> None:
     """
     await _fly(context, commands, lambda: f"commanded by {commands.name}")
     context.guidance_loop.hold_here()
-    context.detail = "the vehicle to stop"
+    context.waiting_for = "the vehicle to stop"
     await asyncio.sleep(context.guidance_loop.remaining_braking_time)
 
 
@@ -75,24 +75,24 @@ async def _fly(context: FlightContext, source: Source, progress: Callable[[], st
     Raises:
         FlightEnded: guidance gave up, the source failed, or the thrust is too small to steer.
     """
-    now = asyncio.get_running_loop().time
+    clock = asyncio.get_running_loop().time
     await asyncio.sleep(context.guidance_loop.remaining_braking_time)
-    began, sent = now(), context.loop.record.setpoints
+    began, setpoints_before = clock(), context.loop.record.setpoints
     tilt_margin = _TiltMargin(context)
     tilt_margin.check()
     context.guidance_loop.follow(source)
 
     def is_over() -> bool:
-        elapsed = now() - began
+        elapsed = clock() - began
         context.setpoint_rate_hz = (
-            (context.loop.record.setpoints - sent) / elapsed if elapsed > 0.0 else 0.0
+            (context.loop.record.setpoints - setpoints_before) / elapsed if elapsed > 0.0 else 0.0
         )
         if context.guidance_loop.hold.give_up_reason is not None:
             raise FlightEnded(context.guidance_loop.hold.give_up_reason)
         if source.failure is not None:
             raise FlightEnded(source.failure, Exit.HOLD)
         tilt_margin.check()
-        context.detail = progress()
+        context.waiting_for = progress()
         return context.guidance_loop.finished
 
     await context.until(is_over)
@@ -108,7 +108,7 @@ class _TiltMargin:
     def __init__(self, context: FlightContext) -> None:
         self._context = context
         self._reported = False
-        self._tilts: deque[tuple[float, float]] = deque()  # s on our clock, °
+        self._tilts_deg: deque[tuple[float, float]] = deque()  # s on our clock, °
 
     def check(self) -> None:
         """Report once if the thrust allows less tilt than `limits.max_tilt_deg`.
@@ -117,22 +117,22 @@ class _TiltMargin:
             FlightEnded: the thrust allows less than 5° of tilt.
         """
         limits, learning = self._context.config.limits, self._context.guidance_loop.learning
-        now, tilts = asyncio.get_running_loop().time(), self._tilts
-        tilts.append((now, degrees(learning.largest_tilt())))
-        while now - tilts[0][0] > _MARGIN_WINDOW:
-            tilts.popleft()
-        tilt, hover = max(each for _, each in tilts), learning.hover_thrust.present_hover
-        if tilt < _MIN_HOLDING_TILT:
+        now, tilts_deg = asyncio.get_running_loop().time(), self._tilts_deg
+        tilts_deg.append((now, degrees(learning.largest_tilt())))
+        while now - tilts_deg[0][0] > _TILT_WINDOW:
+            tilts_deg.popleft()
+        tilt_deg, hover = max(each for _, each in tilts_deg), learning.hover_thrust.present_hover
+        if tilt_deg < _MIN_HOLDING_TILT_DEG:
             raise FlightEnded(
                 f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "
                 f"{limits.max_thrust:g} leaves no thrust to steer with; raise limits.max_thrust, "
                 "or make the vehicle lighter"
             )
-        if tilt < limits.max_tilt_deg - _TOLD_REDUCTION and not self._reported:
+        if tilt_deg < limits.max_tilt_deg - _UNREPORTED_REDUCTION_DEG and not self._reported:
             self._reported = True
             self._context.note(
                 f"the vehicle hovers at a thrust of {hover:.2f}, so limits.max_thrust "
-                f"{limits.max_thrust:g} holds the height only up to {tilt:.0f}° of tilt; the "
+                f"{limits.max_thrust:g} holds the height only up to {tilt_deg:.0f}° of tilt; the "
                 "flight is limited to this tilt, although limits.max_tilt_deg is "
                 f"{limits.max_tilt_deg:g}"
             )
@@ -140,7 +140,7 @@ class _TiltMargin:
 
 async def hand_back(context: FlightContext) -> None:
     """Stop the motion, and send setpoints until the autopilot holds by itself."""
-    context.detail = "the autopilot to hold"
+    context.waiting_for = "the autopilot to hold"
     await hand_over_to_hold(context)
 
 
@@ -150,15 +150,15 @@ async def land(context: FlightContext) -> None:
     Raises:
         FlightEnded: somebody else has the vehicle or disarmed it, or it does not land in time.
     """
-    context.detail = "the autopilot to accept the landing"
+    context.waiting_for = "the autopilot to accept the landing"
     context.landing_requested = True
     await hand_over_to_landing(context)
-    context.took_off_from = None  # from here on only somebody else can end the landing
-    allowed = context.config.flight.landing_timeout_s
+    context.takeoff_position = None  # from here on only somebody else can end the landing
+    timeout = context.config.flight.landing_timeout_s
 
     def touched_down() -> bool:
         height = context.link.state.height
-        context.detail = "touchdown" + (
+        context.waiting_for = "touchdown" + (
             "" if height is None else f", now {height_in_words(height)}"
         )
         _require_landing(context)
@@ -166,12 +166,12 @@ async def land(context: FlightContext) -> None:
         return context.ground.touched_down
 
     try:
-        async with asyncio.timeout(allowed):
+        async with asyncio.timeout(timeout):
             await context.until(touched_down)
     except TimeoutError:
         raise FlightEnded(
-            f"waited {allowed:g} s for {context.detail}: watch the vehicle land, and if it stands "
-            "with turning motors, disarm it by transmitter or ground station"
+            f"waited {timeout:g} s for {context.waiting_for}: watch the vehicle land, and if it "
+            "stands with turning motors, disarm it by transmitter or ground station"
         ) from None
 
 
@@ -181,13 +181,13 @@ async def disarm(context: FlightContext) -> None:
     Raises:
         FlightEnded: somebody else has the vehicle, or it does not stand upright.
     """
-    context.detail = "the autopilot to disarm itself"
+    context.waiting_for = "the autopilot to disarm itself"
 
     def disarmed() -> bool:
         _require_landing(context)
         return not context.armed()
 
-    def require_ours() -> None:
+    def require_control() -> None:
         require_role(context.link, {Role.LAND})
         if not context.ground.touched_down:  # the autopilot's flag may have been wrong before
             raise FlightEnded("the vehicle reports that it flies again, so it is not disarmed")
@@ -201,8 +201,8 @@ async def disarm(context: FlightContext) -> None:
             "the autopilot to report that the vehicle stands on the ground",
         )
         if context.armed():
-            context.detail = "the autopilot to accept disarming"
-            await command_if_ours(context, DISARM, require_ours, disarmed)
+            context.waiting_for = "the autopilot to accept disarming"
+            await command_if_ours(context, DISARM, require_control, disarmed)
         await context.until(disarmed)
     await context.fresh_heartbeat()
     await leave_offboard(context)
@@ -212,8 +212,8 @@ async def disarm(context: FlightContext) -> None:
 def _require_not_falling(context: FlightContext) -> None:
     """Raise `FlightEnded` if the vehicle was disarmed in the air and falls."""
     position = context.fresh_position()
-    falls = position is not None and position.velocity_ned[2] > _FALLING_SPEED
-    if falls and not context.armed():
+    is_falling = position is not None and position.velocity_ned[2] > _FALLING_SPEED
+    if is_falling and not context.armed():
         raise FlightEnded(
             "the pilot, the autopilot or another station disarmed the vehicle in the air during "
             "the landing, and it fell",

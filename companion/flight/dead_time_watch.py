@@ -24,7 +24,7 @@ _MIN_ROW_AGE = 1.5
 _MAX_ROWS = 75_000
 """Largest number of records for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
-_TIME, _AGE = RATES.index("vehicle_time_s"), RATES.index("age_s")
+_TIME_COLUMN, _AGE_COLUMN = RATES.index("vehicle_time_s"), RATES.index("age_s")
 
 
 class DeadTimeWatch:
@@ -50,7 +50,7 @@ class DeadTimeWatch:
         self._axes = axes
         self._note = note
         self._due_at = -inf
-        self._measurements = 0
+        self._measurement_count = 0
         # Number of rows at each of the latest measurements.
         self._row_counts = deque([0], maxlen=_WINDOW_PERIODS + 1)
         self._suspected_axes: set[str] = set()
@@ -58,7 +58,7 @@ class DeadTimeWatch:
         time = np.arange(0.0, 3.0, 0.01)
         dead_time_by_correlation(time, np.sin(time), time, np.sin(time))  # the first use is slow
 
-    def after_answer(self, now: float) -> None:
+    def after_setpoint(self, now: float) -> None:
         """Measure the dead time of the next axis, if due at `now`, s on our clock."""
         if now < self._due_at:
             return
@@ -73,9 +73,9 @@ class DeadTimeWatch:
         self._row_counts.append(len(self._trace.rates))
         if len(self._row_counts) > _WINDOW_PERIODS:
             first_row = self._row_counts[0]
-            name = _AXES[self._measurements % len(_AXES)]
-            self._measurements += 1
-            self._judge_axis(name, self._dead_time(name, self._trace.rates.rows(first_row)))
+            name = _AXES[self._measurement_count % len(_AXES)]
+            self._measurement_count += 1
+            self._check_axis(name, self._dead_time(name, self._trace.rates.rows(first_row)))
 
     def measure_whole_flight(self) -> DeadTimes:
         """Measure the dead times over the last `_MAX_ROWS` records of the flight.
@@ -84,7 +84,7 @@ class DeadTimeWatch:
         """
         first_row = max(0, len(self._trace.rates) - _MAX_ROWS)
         rows = self._trace.rates.rows(first_row)
-        ages = rows[:, _AGE]
+        ages = rows[:, _AGE_COLUMN]
         ages = ages[np.isfinite(ages)]
         measured = DeadTimes(
             {name: self._dead_time(name, rows) for name in _AXES},
@@ -102,20 +102,20 @@ class DeadTimeWatch:
             commanded, measured = (
                 RATES.index(rate_names(which)[axis_number]) for which in ("commanded", "measured")
             )
-            time, commanded_rates, measured_rates = rows[:, [_TIME, commanded, measured]].T
-            is_certain = time < time[-1:] - _MIN_ROW_AGE
+            time, commanded_rates, measured_rates = rows[:, [_TIME_COLUMN, commanded, measured]].T
+            is_old_enough = time < time[-1:] - _MIN_ROW_AGE
             dead_time = dead_time_by_correlation(
-                time[is_certain],
-                commanded_rates[is_certain],
-                time[is_certain],
-                measured_rates[is_certain],
+                time[is_old_enough],
+                commanded_rates[is_old_enough],
+                time[is_old_enough],
+                measured_rates[is_old_enough],
                 axis.lag,
                 axis.acceleration_limit,
                 inf if axis.damping is None else axis.damping,
             )
         return AxisDeadTime(dead_time, axis.dead_time)
 
-    def _judge_axis(self, name: str, dead_time: AxisDeadTime) -> None:
+    def _check_axis(self, name: str, dead_time: AxisDeadTime) -> None:
         """Warn at the second wrong dead time in a row; a gust may cause a single wrong one."""
         if not dead_time.is_wrong:
             self._suspected_axes.discard(name)

@@ -21,7 +21,7 @@ TRACKING_MARGIN = 0.5
 _POINT_DISTANCE = 0.25
 """Distance between two checked points of a polygon fence, m."""
 
-_MAX_MOMENTS = 4000
+_MAX_CHECKED_TIMES = 4000
 """Approximate number of moments of a long motion that are checked to find when a breach begins."""
 
 
@@ -43,11 +43,11 @@ class FenceCheck:
         if worst is None:
             return None
         zeros = np.zeros_like(motion.velocity)
-        still = replace(motion, velocity=zeros, acceleration=zeros)
-        worst_at_rest = self._worst_breach(still)
+        motion_at_rest = replace(motion, velocity=zeros, acceleration=zeros)
+        worst_at_rest = self._worst_breach(motion_at_rest)
         slowing_helps = worst_at_rest is None
         time, breach = worst_at_rest or worst
-        begin = self._begin_time(motion if slowing_helps else still, time)
+        begin = self._begin_time(motion if slowing_helps else motion_at_rest, time)
         text, remedy = _breach_text(breach, begin, slowing_helps), _remedy(slowing_helps)
         return Violation(breach.limit, begin, time, text, remedy, slowing_helps=slowing_helps)
 
@@ -57,10 +57,10 @@ class FenceCheck:
         stopping_point = self.fence.stopping_point(
             columns(motion.position), columns(motion.velocity), (north, east)
         )
-        stops = np.stack(stopping_point, axis=1)
+        stopping_points = np.stack(stopping_point, axis=1)
         breaches = [
             (motion.times[k], breach)
-            for k in self._candidate_indices(stops)
+            for k in self._candidate_indices(stopping_points)
             if (breach := self._breach(motion, k)) is not None
         ]
         if not breaches:
@@ -68,18 +68,24 @@ class FenceCheck:
         time, breach = max(breaches, key=lambda each: each[1].distance_outside)
         return float(time), breach
 
-    def _candidate_indices(self, stops: Floats) -> list[int]:
-        """Indices of the stop points to check: the farthest, highest and lowest of `stops`.
+    def _candidate_indices(self, stopping_points: Floats) -> list[int]:
+        """Indices of the stopping points to check: the farthest, the highest and the lowest.
 
-        A stop point is where the vehicle would stop if it braked. For a polygon, stop points at
+        At a stopping point the vehicle would stop if it braked. For a polygon, stopping points at
         every `_POINT_DISTANCE` along their path are added.
         """
-        distance = np.hypot(stops[:, 0], stops[:, 1])
-        indices = {int(distance.argmax()), int(stops[:, 2].argmin()), int(stops[:, 2].argmax())}
+        distance = np.hypot(stopping_points[:, 0], stopping_points[:, 1])
+        indices = {
+            int(distance.argmax()),
+            int(stopping_points[:, 2].argmin()),
+            int(stopping_points[:, 2].argmax()),
+        }
         if self.fence.polygon or (self.fence.places and self.origin):
-            step_lengths = np.hypot(*np.diff(stops[:, :2], axis=0).T)
-            section = np.floor(np.concatenate(([0.0], np.cumsum(step_lengths))) / _POINT_DISTANCE)
-            indices.update(np.unique(section, return_index=True)[1].tolist())
+            step_lengths = np.hypot(*np.diff(stopping_points[:, :2], axis=0).T)
+            path_sections = np.floor(
+                np.concatenate(([0.0], np.cumsum(step_lengths))) / _POINT_DISTANCE
+            )
+            indices.update(np.unique(path_sections, return_index=True)[1].tolist())
         return sorted(indices)
 
     def _breach(self, motion: Motion, k: int) -> Breach | None:
@@ -95,7 +101,7 @@ class FenceCheck:
 
     def _begin_time(self, motion: Motion, worst_time: float) -> float:
         """Time of the first checked moment with a breach, s; `worst_time` if none is earlier."""
-        stride = max(1, motion.times.size // _MAX_MOMENTS)
+        stride = max(1, motion.times.size // _MAX_CHECKED_TIMES)
         for k in range(0, motion.times.size, stride):
             if motion.times[k] >= worst_time or self._breach(motion, k) is not None:
                 return float(min(motion.times[k], worst_time))

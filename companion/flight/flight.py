@@ -12,7 +12,7 @@ from companion.flight.observer import Observer
 from companion.flight.phase import Phase
 from companion.flight.phases import EXIT_PHASES, ground_phases
 from companion.flight.plan import Plan
-from companion.flight.vehicle_identity import ChecksVoid
+from companion.flight.vehicle_identity import VehicleReplaced
 from companion.flight.watch import Watch
 from companion.mavlink.errors import LinkError
 from companion.safety.actions import Exit, FlightEnded, fault_message
@@ -29,7 +29,7 @@ class Flight:
 
     Attributes:
         began: time when the flight began, s on our clock.
-        phase, failed_in: the running phase; the phase that failed, or None.
+        phase, failed_phase: the running phase; the phase that failed, or None.
         end_reason: why the flight ends or ended early, or None.
         events: (time since the flight began, s; text) of each event.
 
@@ -47,11 +47,11 @@ class Flight:
         ask_landing: AskLanding,
     ) -> None:
         self.phase = ground_phases(context.config.flight)[0]
-        self.failed_in: Phase | None = None
+        self.failed_phase: Phase | None = None
         self.end_reason: str | None = None
         self.events: list[tuple[float, str]] = []
         self._context, self._plan, self._watch = context, plan, watch
-        self._observer, self._ask_landing, self._asking_landing = observer, ask_landing, False
+        self._observer, self._ask_landing, self._is_asking_landing = observer, ask_landing, False
         self._clock = asyncio.get_running_loop().time
         self.began = self._phase_began = self._clock()
         self._interruption: FlightEnded | None = None
@@ -59,21 +59,21 @@ class Flight:
 
     async def run(self) -> str:
         """Fly; returns "ok" or the reason why the flight ended early."""
-        helpers = [
+        background_tasks = [
             asyncio.create_task(self._run_repeatedly(work))
             for work in (self._context.guidance_loop.run, self._watch_once, self._report_progress)
         ]
         try:
             await self._fly_all()
-        except FlightEnded as first:
-            self.failed_in, self.end_reason = self.phase, first.reason
-            ended = await with_cause(self._context, first)
+        except FlightEnded as first_failure:
+            self.failed_phase, self.end_reason = self.phase, first_failure.reason
+            ended = await with_cause(self._context, first_failure)
             self.end_reason = ended.reason
             self.note(ended.reason)
             await self._leave(ended.exit or self._usual_exit())
             return ended.result
         finally:
-            await self._context.stop(helpers)
+            await self._context.stop(background_tasks)
         return "ok"
 
     def end(self, ended: FlightEnded) -> None:
@@ -88,7 +88,7 @@ class Flight:
 
         An exit that has already begun continues without setpoints: they may have caused the fault.
         """
-        if self.failed_in is None:
+        if self.failed_phase is None:
             self.end(FlightEnded(fault_message(error, self._usual_exit())))
             return
         self._context.end_stream()
@@ -105,16 +105,16 @@ class Flight:
         usual_exit = self._usual_exit()
         exit_ = Exit.HOLD if usual_exit is Exit.LAND else usual_exit
         self._interruption = FlightEnded(reason, exit_)
-        if self.failed_in is None or self._asking_landing:
+        if self.failed_phase is None or self._is_asking_landing:
             self.end(self._interruption)
 
     def on_heartbeat(self) -> None:
         """On a new HEARTBEAT, check at once whether the phase may go on."""
-        self._judge(self._watch.judge)
+        self._run_check(self._watch.check)
 
     def on_current_mode(self) -> None:
         """On a new CURRENT_MODE, check at once whether the phase may go on."""
-        self._judge(self._watch.on_current_mode)
+        self._run_check(self._watch.on_current_mode)
 
     def note(self, text: str) -> None:
         """Record an event and show it."""
@@ -133,14 +133,14 @@ class Flight:
                 async with aclosing(self._plan.phases(self._context)) as phases:
                     async for phase in phases:
                         await self._fly(phase)
-            except ChecksVoid as void:
-                self.note(f"{void.reason}; the checks are repeated")
+            except VehicleReplaced as replacement:
+                self.note(f"{replacement.reason}; the checks are repeated")
                 self._context.release()
                 self._context.link.state.forget()
                 self._context.replacement_detector.begin()
                 self._end_future = self._new_end_future()
                 if self._interruption is not None:  # after the checks became void
-                    raise self._interruption from void
+                    raise self._interruption from replacement
             except FlightEnded:
                 raise
             except Exception as error:  # a fault of the plan: the exit must still run
@@ -157,7 +157,7 @@ class Flight:
         self.phase, self._phase_began = phase, self._clock()
         self._observer.phase(phase.name, phase.waits_for)
         if not self._end_future.done():
-            self._judge(self._watch.judge)  # before the phase commands anything
+            self._run_check(self._watch.check)  # before the phase commands anything
         if not self._end_future.done():
             await self._run_until_end(phase.work(self._context), phase.timeout)
         if self._end_future.done():
@@ -212,11 +212,11 @@ class Flight:
 
     async def _user_wants_landing(self) -> bool:
         """Ask the user whether to land; False if the flight ends before the answer."""
-        self._asking_landing = True
+        self._is_asking_landing = True
         try:
             return bool(await self._run_until_end(self._ask_landing(), inf))
         finally:
-            self._asking_landing = False
+            self._is_asking_landing = False
 
     async def _run_repeatedly(self, work: Callable[[], Awaitable[None]]) -> None:
         """Run `work` repeatedly while the phases run; an exception in `work` ends the flight."""
@@ -228,11 +228,11 @@ class Flight:
             await asyncio.sleep(_WATCH_PERIOD)
 
     async def _watch_once(self) -> None:
-        self._judge(self._watch.judge)
+        self._run_check(self._watch.check)
 
-    def _judge(self, judge: Callable[[Phase], None]) -> None:
+    def _run_check(self, check: Callable[[Phase], None]) -> None:
         try:
-            judge(self.phase)
+            check(self.phase)
         except FlightEnded as ended:
             self.end(ended)
         except Exception as error:  # the watch goes on: an exit needs it
@@ -242,7 +242,7 @@ class Flight:
         while True:
             await asyncio.sleep(_PROGRESS_PERIOD)
             phase, elapsed = self.phase, self._clock() - self._phase_began
-            self._observer.waiting(phase.name, self._context.detail, elapsed, phase.timeout)
+            self._observer.waiting(phase.name, self._context.waiting_for, elapsed, phase.timeout)
 
     @staticmethod
     def _new_end_future() -> asyncio.Future[FlightEnded]:

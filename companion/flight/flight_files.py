@@ -56,7 +56,7 @@ class FlightFiles:
         flies_maneuvers: bool,
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
-        self._counted_before: dict[str, int] = {}
+        self._counts_before: dict[str, int] = {}
         self._ended_at = 0.0
         self._failure_reported = self._is_open = False
         self.tap: TlogWriter | None = None
@@ -117,36 +117,39 @@ class FlightFiles:
 
     def recorder(self, observer: Observer) -> EventRecorder:
         """An observer that records phases and events (as STATUSTEXT, too) before `observer`."""
-        clock, texts = asyncio.get_running_loop().time, TextFrames(self._config.link.source_system)
+        clock, text_frames = (
+            asyncio.get_running_loop().time,
+            TextFrames(self._config.link.source_system),
+        )
 
-        def write(words: str) -> None:
+        def write(text: str) -> None:
             if self.tap is not None:
-                for frame in texts.frames(words):
+                for frame in text_frames.frames(text):
                     self.tap(clock(), frame)
             if self.mcap is not None:
-                self.mcap.event(words)
+                self.mcap.event(text)
 
         return EventRecorder(observer, clock, write, self.mcap)
 
     def begin_counting(self, stats: LinkStats) -> None:
         """Count only frames after this call, because the link may have been open before."""
-        self._counted_before = _counters(stats)
+        self._counts_before = _counters(stats)
 
     def summary(
         self,
         assembled: AssembledFlight,
         result: str,
-        grants: tuple[realtime.SettingResult, ...],
+        setting_results: tuple[realtime.SettingResult, ...],
     ) -> Summary:
         """Make the summary of a finished flight before the log is closed; save the learned drag.
 
-        `result`: "ok", or the reason why the flight ended early. `grants`: which requested
+        `result`: "ok", or the reason why the flight ended early. `setting_results`: which requested
         real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
         dead_times = assembled.dead_time_watch.measure_whole_flight()
-        drag_kept = assembled.drag_memory.save()
-        advice_texts = advice(assembled, dead_times, drag_kept=drag_kept)
+        is_drag_saved = assembled.drag_memory.save()
+        advice_texts = advice(assembled, dead_times, is_drag_saved=is_drag_saved)
         for text in advice_texts:  # shown with the figures, not here
             if text == dead_times.warning():
                 continue  # already reported in flight
@@ -155,12 +158,12 @@ class FlightFiles:
         self._ended_at = asyncio.get_running_loop().time() - flight.began
         return Summary(
             result=result,
-            phase=(flight.failed_in or flight.phase).name,
+            phase=(flight.failed_phase or flight.phase).name,
             planner=self._config.planner_name,
             gain=self._config.planner.gain_per_s,
             counts=loop_counts(assembled.context),
             link={
-                name: value - self._counted_before.get(name, 0)
+                name: value - self._counts_before.get(name, 0)
                 for name, value in _counters(assembled.context.link.stats).items()
             },
             trace=trace,
@@ -168,8 +171,8 @@ class FlightFiles:
             log=self.folder,
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
-            realtime={grant.name: grant.refusal or "granted" for grant in grants},
-            facts=facts_of(assembled, result, advice_texts, drag_kept=drag_kept),
+            realtime={each.name: each.refusal or "granted" for each in setting_results},
+            facts=facts_of(assembled, result, advice_texts, is_drag_saved=is_drag_saved),
         )
 
     def save(self, summary: Summary) -> Summary:
@@ -177,12 +180,14 @@ class FlightFiles:
 
         A write that fails or takes too long is noted as an event.
         """
-        dropped = sum(file.dropped for file in (self.tap, self.mcap) if file is not None)
+        dropped_count = sum(file.dropped for file in (self.tap, self.mcap) if file is not None)
         events = list(summary.events)
         failures = [file.failure for file in (self.tap, self.mcap) if file and file.failure]
         if failures and not any(text in failures for _, text in events):
             events.append((self._ended_at, failures[0]))  # found when the files were closed
-        completed = replace(summary, link={**summary.link, "not_recorded": dropped}, events=events)
+        completed = replace(
+            summary, link={**summary.link, "not_recorded": dropped_count}, events=events
+        )
         folder = self.folder
         if folder is None:
             return completed

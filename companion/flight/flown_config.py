@@ -36,8 +36,8 @@ def record(config: Config, folder: Path, *, flies_maneuvers: bool = True) -> Non
         OSError: a file cannot be read or written.
     """
     data = config.model_dump(mode="json")
-    for place in FILE_KEYS:
-        _make_absolute(data, place)
+    for key_path in FILE_KEYS:
+        _make_absolute(data, key_path)
     path = config.flight.trajectory
     if flies_maneuvers and path is not None and "trajectory" in config.flight.maneuvers:
         data["flight"]["trajectory"] = (
@@ -70,13 +70,13 @@ def description(config: Config, plan: Plan, *, real_time: bool) -> dict[str, str
     }
 
 
-def _assumed_drag(known: KnownDrag) -> dict[str, str]:
+def _assumed_drag(known_drag: KnownDrag) -> dict[str, str]:
     """The drag assumed for the maneuvers, which a replay needs; empty if it was unknown."""
-    if known.drag is None:
+    if known_drag.drag is None:
         return {}
     return {
-        "assumed_drag_per_s": repr(known.drag.linear),
-        "assumed_quadratic_drag_per_m": repr(known.drag.quadratic),
+        "assumed_drag_per_s": repr(known_drag.drag.linear),
+        "assumed_quadratic_drag_per_m": repr(known_drag.drag.quadratic),
     }
 
 
@@ -91,8 +91,8 @@ def flattened(section: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
     return values
 
 
-def _make_absolute(data: dict[str, Any], place: tuple[str, ...]) -> None:
-    *sections, key = place
+def _make_absolute(data: dict[str, Any], key_path: tuple[str, ...]) -> None:
+    *sections, key = key_path
     section: Any = data
     for name in sections:
         section = section.get(name) if isinstance(section, dict) else None

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 
 from companion.flight.commands import (
     IsDone,
-    RequireOurs,
+    RequireControl,
     ask_to_hold,
     change_mode,
     in_role,
@@ -33,8 +33,8 @@ _PILOT_WARNING = "Companion: vehicle does not land. Switch its mode!"
 ROLES_BEFORE_LANDING = frozenset({Role.TAKEOFF, Role.READY, Role.HOLD, Role.OFFBOARD})
 """Roles of the modes in which a vehicle that we have flown may be commanded to hold or to land."""
 
-_PrepareRepetition = Callable[[LinkError], Awaitable[RequireOurs]]
-"""Called with the error of a mode command: raises it, or returns `require_ours` for the retry."""
+_PrepareRepetition = Callable[[LinkError], Awaitable[RequireControl]]
+"""Called with the error of a mode command: raises it, or returns `require_control` for a retry."""
 
 
 async def hand_over_to_hold(context: FlightContext) -> None:
@@ -45,18 +45,20 @@ async def hand_over_to_hold(context: FlightContext) -> None:
         CommandRefused: the autopilot refused.
     """
 
-    def require_ours() -> None:
+    def require_control() -> None:
         require_role(context.link, ROLES_BEFORE_LANDING)
 
     def holding() -> bool:
         return in_role(context.link, Role.HOLD)
 
-    async def prepare(error: LinkError) -> RequireOurs:
+    async def prepare_repetition(error: LinkError) -> RequireControl:
         if isinstance(error, CommandRefused):
             raise error
-        return require_ours
+        return require_control
 
-    await _hand_over(context, context.link.autopilot.hold(), require_ours, holding, prepare)
+    await _hand_over(
+        context, context.link.autopilot.hold(), require_control, holding, prepare_repetition
+    )
 
 
 async def hand_over_to_landing(context: FlightContext) -> None:
@@ -74,7 +76,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     refusal_noted = False
     time_limit = _LandingTimeLimit(context)
 
-    def require_ours() -> None:
+    def require_control() -> None:
         require_role(context.link, ROLES_BEFORE_LANDING | {Role.LAND})
 
     def require_offboard_or_landing() -> None:
@@ -83,7 +85,7 @@ async def hand_over_to_landing(context: FlightContext) -> None:
     def landing() -> bool:
         return in_role(context.link, Role.LAND) or not context.armed()
 
-    async def prepare(error: LinkError) -> RequireOurs:
+    async def prepare_repetition(error: LinkError) -> RequireControl:
         nonlocal refusal_noted
         if isinstance(error, CommandRefused) and not refusal_noted:
             refusal_noted = True
@@ -92,10 +94,14 @@ async def hand_over_to_landing(context: FlightContext) -> None:
         was_offboard = in_role(context.link, Role.OFFBOARD)
         await asyncio.sleep(_REPETITION_PAUSE)
         if was_offboard and not landing():
-            await _hold_meanwhile(context, landing)
-        return require_offboard_or_landing if in_role(context.link, Role.OFFBOARD) else require_ours
+            await _hold_before_repetition(context, landing)
+        return (
+            require_offboard_or_landing if in_role(context.link, Role.OFFBOARD) else require_control
+        )
 
-    await _hand_over(context, context.link.autopilot.land(), require_ours, landing, prepare)
+    await _hand_over(
+        context, context.link.autopilot.land(), require_control, landing, prepare_repetition
+    )
 
 
 class _LandingTimeLimit:
@@ -113,34 +119,34 @@ class _LandingTimeLimit:
             FlightEnded: the time allowed is over, and the vehicle does not need our setpoints.
         """
         context, now = self._context, self._clock()
-        allowed = context.config.flight.landing_timeout_s
+        timeout = context.config.flight.landing_timeout_s
         if now - self._warned_at >= _PILOT_WARNING_TIME:
             self._warned_at = now
             for text in status_texts(_PILOT_WARNING, dialect.MAV_SEVERITY_CRITICAL, 1):
                 context.link.send(text)
-        if now - self._began < allowed:
+        if now - self._began < timeout:
             return
-        if not _drifts_without_us(context):
-            raise context.timed_out(allowed, "the autopilot to begin the landing")
+        if not _drifts_without_setpoints(context):
+            raise context.timed_out(timeout, "the autopilot to begin the landing")
         if not self._extension_noted:
             self._extension_noted = True
             context.note(
-                f"the vehicle has not begun to land for {allowed:g} s, and would drift without "
+                f"the vehicle has not begun to land for {timeout:g} s, and would drift without "
                 "setpoints, so the program holds it and asks it to land; switch its mode by "
                 "transmitter"
             )
 
 
-def _drifts_without_us(context: FlightContext) -> bool:
+def _drifts_without_setpoints(context: FlightContext) -> bool:
     """Whether the vehicle obeys our setpoints, and its autopilot would not stop it without them."""
-    obeys = context.loop.offboard_active and in_role(context.link, Role.OFFBOARD)
-    return obeys and not context.link.autopilot.offboard_loss_failsafe.brakes
+    is_obeying = context.loop.offboard_active and in_role(context.link, Role.OFFBOARD)
+    return is_obeying and not context.link.autopilot.offboard_loss_failsafe.brakes
 
 
 async def _hand_over(
     context: FlightContext,
     command: Command,
-    require_ours: RequireOurs,
+    require_control: RequireControl,
     done: IsDone,
     prepare_repetition: _PrepareRepetition,
 ) -> None:
@@ -154,11 +160,11 @@ async def _hand_over(
         while True:
             stop_moving(context)
             try:
-                await change_mode(context, command, require_ours, done)
+                await change_mode(context, command, require_control, done)
                 break
             except (CommandTimeout, CommandRefused, LinkLost) as error:
-                context.detail = str(error)
-                require_ours = await prepare_repetition(error)
+                context.waiting_for = str(error)
+                require_control = await prepare_repetition(error)
             if done():
                 break
     finally:
@@ -173,8 +179,8 @@ async def _release_when_offboard_ends(context: FlightContext) -> None:
         context.release()
 
 
-async def _hold_meanwhile(context: FlightContext, landing: IsDone) -> None:
-    """Command hold mode before the landing command is repeated, then release control.
+async def _hold_before_repetition(context: FlightContext, landing: IsDone) -> None:
+    """Command hold mode, then release control, before the landing command is repeated.
 
     Control is not released if the hold command fails or the autopilot has begun to land.
     """

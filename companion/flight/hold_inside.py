@@ -1,7 +1,7 @@
 """Holds the vehicle where the autopilot's landing will not drift out of the fence."""
 
 from companion.flight.context import FlightContext
-from companion.guidance.braking import drift
+from companion.guidance.braking import handover_drift
 from companion.guidance.fence import Fence, Place
 from companion.guidance.reference import NorthEast, Vector, minus
 from companion.safety.table import fence_of
@@ -21,24 +21,27 @@ def brake_inside_fence(context: FlightContext) -> None:
     centre, pose = context.snapshot_builder.flown_fence_centre(), guidance.flown_source.pose
     if not context.link.autopilot.modes_begin_level or centre is None or pose is None:
         return
-    stop, wind = minus(pose.position_ned, centre.position_ned), guidance.estimate.disturbance
-    if only_upwind_is_inside(fence_of(context.config), centre.place, stop, wind):
+    stopping_point, wind = (
+        minus(pose.position_ned, centre.position_ned),
+        guidance.estimate.disturbance,
+    )
+    if only_upwind_is_inside(fence_of(context.config), centre.place, stopping_point, wind):
         guidance.move_upwind()
 
 
 def only_upwind_is_inside(
-    fence: Fence, origin: Place | None, stop: Vector, wind: NorthEast
+    fence: Fence, origin: Place | None, stopping_point: Vector, wind: NorthEast
 ) -> bool:
     """Whether the landing would drift out of the fence, but not if it began further upwind.
 
     Args:
         fence: the fence; its ceiling and floor are not used.
         origin: place of the fence's centre; None: it is not known.
-        stop: where the vehicle stops, from the fence's centre, m NED.
+        stopping_point: where the vehicle stops, from the fence's centre, m NED.
         wind: acceleration that the wind gives a vehicle at rest, m/s², north and east.
     """
     walls = fence.walls
-    (north, east, down), (drift_north, drift_east) = stop, drift(wind)
+    (north, east, down), (drift_north, drift_east) = stopping_point, handover_drift(wind)
     downwind = (north + drift_north, east + drift_east, down)
     upwind = (north - drift_north, east - drift_east, down)
     return (

@@ -25,23 +25,23 @@ async def hold_when_heard(context: FlightContext) -> None:
     Raises:
         FlightEnded: the vehicle is not heard in time, must land, or is controlled by others.
     """
-    frames = context.link.stats.frames
-    heard = False
+    frames_before = context.link.stats.frames
+    was_heard = False
     try:
         async with asyncio.timeout(_LISTENING_TIMEOUT) as deadline:
-            await context.until(lambda: context.link.stats.frames > frames, "its next frame")
-            heard = True
+            await context.until(lambda: context.link.stats.frames > frames_before, "its next frame")
+            was_heard = True
             deadline.reschedule(asyncio.get_running_loop().time() + _HOLD_TIMEOUT)
             await _hold_if_ours(context)
     except TimeoutError:
-        if not heard:
+        if not was_heard:
             raise context.timed_out(_LISTENING_TIMEOUT, "the vehicle to be heard") from None
-        if _obeys(context):
+        if _obeys_setpoints(context):
             raise context.timed_out(_HOLD_TIMEOUT, "the vehicle to hold", Exit.LAND) from None
-        _note_left_alone(context, f", after {_HOLD_TIMEOUT:g} s without {context.detail}")
+        _note_left_alone(context, f", after {_HOLD_TIMEOUT:g} s without {context.waiting_for}")
 
 
-def _obeys(context: FlightContext) -> bool:
+def _obeys_setpoints(context: FlightContext) -> bool:
     return context.armed() and in_role(context.link, Role.OFFBOARD)
 
 
@@ -55,11 +55,11 @@ def _note_left_alone(context: FlightContext, reason: str = "") -> None:
 
 async def _hold_if_ours(context: FlightContext) -> None:
     """Command a vehicle that is heard again, and still obeys us, until it holds."""
-    context.detail = "the vehicle's heartbeat"
+    context.waiting_for = "the vehicle's heartbeat"
     await context.fresh_heartbeat()  # only now, because a request during the silence is lost
     mode = context.link.state.mode
     lost_in_takeoff = context.armed() and await is_in_our_takeoff(context)
-    if not (_obeys(context) or lost_in_takeoff):
+    if not (_obeys_setpoints(context) or lost_in_takeoff):
         _note_left_alone(context)
         return
     if context.landing_requested:
@@ -68,7 +68,7 @@ async def _hold_if_ours(context: FlightContext) -> None:
     if lost_in_takeoff:
         raise FlightEnded(f"the vehicle is heard again after its take-off, in {mode}", Exit.LAND)
     context.note(f"the vehicle is heard again, still in {mode}: asking it to hold")
-    context.detail = "the vehicle's report that it holds"
+    context.waiting_for = "the vehicle's report that it holds"
     while True:
         try:
             await ask_to_hold(context, lambda: require_role(context.link, {Role.OFFBOARD}))
@@ -77,6 +77,6 @@ async def _hold_if_ours(context: FlightContext) -> None:
             require_role(context.link, {Role.OFFBOARD})  # a pilot may have taken over meanwhile
             raise FlightEnded(str(error), Exit.LAND) from error
         except (CommandTimeout, LinkLost) as error:
-            context.detail = str(error)
+            context.waiting_for = str(error)
         else:
             return

@@ -26,7 +26,7 @@ from companion.guidance.trajectory import (
     Trajectory,
     TrajectoryError,
     Violation,
-    judge,
+    motion_violations,
     slow_down,
     violations,
 )
@@ -39,23 +39,23 @@ _SLOWER_IN_PROGRAM = (
 )
 
 
-def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
+def require_flyable(config: Config, maneuver: Maneuver, drag: KnownDrag) -> None:
     """Check a maneuver other than a trajectory against the fence; a circle also against limits.
 
     Raises:
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """
-    with naming_trajectory_errors(part.name):
-        motions = list(_predicted_motions(part, drag.least))
-        _require_motions_inside(config, part, motions, None)
-    if isinstance(part, HeldHeadingManeuver):
+    with naming_trajectory_errors(maneuver.name):
+        motions = list(_predicted_motions(maneuver, drag.least))
+        _require_motions_inside(config, maneuver, motions, None)
+    if isinstance(maneuver, HeldHeadingManeuver):
         envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
-        for violation in judge(motions[0], envelope):
-            _refuse_violation(part.name, violation, drag.assumption)
+        for violation in motion_violations(motions[0], envelope):
+            _refuse_violation(maneuver.name, violation, drag.assumption)
 
 
 def require_inside(
-    config: Config, parts: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
+    config: Config, maneuvers: Iterable[Maneuver], origin: Place | None, drag: KnownDrag
 ) -> None:
     """Check that all maneuvers stay inside the fence, even if it is in latitude and longitude.
 
@@ -64,8 +64,8 @@ def require_inside(
     Raises:
         ConfigError: a maneuver leaves the fence, or could not stop inside it.
     """
-    for part in parts:
-        _require_motions_inside(config, part, _predicted_motions(part, drag.least), origin)
+    for maneuver in maneuvers:
+        _require_motions_inside(config, maneuver, _predicted_motions(maneuver, drag.least), origin)
 
 
 def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: KnownDrag) -> None:
@@ -79,10 +79,14 @@ def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: 
     """
     if isinstance(maneuver, Follow | HeldHeadingManeuver):
         with naming_trajectory_errors(maneuver.name):
-            found = violations(maneuver.trajectory, _envelope_from(begin, config, drag))
-        if found:
-            remedy = _SLOWER_IN_PROGRAM if found[0].slowing_helps else found[0].remedy
-            raise ConfigError(f"{maneuver.name}: {found[0]}; {remedy}")
+            found_violations = violations(maneuver.trajectory, _envelope_from(begin, config, drag))
+        if found_violations:
+            remedy = (
+                _SLOWER_IN_PROGRAM
+                if found_violations[0].slowing_helps
+                else found_violations[0].remedy
+            )
+            raise ConfigError(f"{maneuver.name}: {found_violations[0]}; {remedy}")
 
 
 def slowed_from(
@@ -111,16 +115,17 @@ def require_still_flyable(config: Config, sequence: ManeuverSequence, drag: Know
     Raises:
         ConfigError: a maneuver cannot be computed, or leaves the limits or the fence.
     """
-    for part in sequence.parts:
-        if not isinstance(part, Follow):
-            require_flyable(config, part, drag)
+    for maneuver in sequence.parts:
+        if not isinstance(maneuver, Follow):
+            require_flyable(config, maneuver, drag)
             continue
-        with naming_trajectory_errors(part.name):
-            found = violations(part.trajectory, envelope_of(config, drag))
-        if found:
+        with naming_trajectory_errors(maneuver.name):
+            found_violations = violations(maneuver.trajectory, envelope_of(config, drag))
+        if found_violations:
             raise ConfigError(
-                f"{part.name}: {found[0]}; choose a value with which the trajectory keeps the "
-                f"limits, because it is not slowed down again in flight{drag.assumption}"
+                f"{maneuver.name}: {found_violations[0]}; choose a value with which the trajectory "
+                "keeps the limits, because it is not slowed down again in "
+                f"flight{drag.assumption}"
             )
 
 
@@ -138,33 +143,33 @@ def naming_trajectory_errors(name: str | Path) -> Iterator[None]:
 
 
 def _require_motions_inside(
-    config: Config, part: Maneuver, motions: Iterable[Motion], origin: Place | None
+    config: Config, maneuver: Maneuver, motions: Iterable[Motion], origin: Place | None
 ) -> None:
     """Check predicted motions of a maneuver; see `require_inside`."""
     check = _fence_check(config, origin)
     for motion in motions:
-        _refuse_violation(part.name, check(motion))
+        _refuse_violation(maneuver.name, check(motion))
 
 
-def _predicted_motions(part: Maneuver, drag: Drag) -> Iterator[Motion]:
+def _predicted_motions(maneuver: Maneuver, drag: Drag) -> Iterator[Motion]:
     """Predicted motions of a maneuver; for body-rate doublets, at eight initial headings."""
-    turns = 8 if isinstance(part, Doublets) else 1
-    for k in range(turns):
-        heading = tau * k / turns
+    heading_count = 8 if isinstance(maneuver, Doublets) else 1
+    for k in range(heading_count):
+        heading = tau * k / heading_count
         # Cached, because a flight checks its maneuvers several times. A `Follow` is not hashable.
-        if isinstance(part, Hashable):
-            yield _cached_motion(part, heading, drag)
+        if isinstance(maneuver, Hashable):
+            yield _cached_motion(maneuver, heading, drag)
         else:
-            yield _predicted_motion(part, heading, drag)
+            yield _predicted_motion(maneuver, heading, drag)
 
 
-def _predicted_motion(part: Maneuver, heading: float, drag: Drag) -> Motion:
+def _predicted_motion(maneuver: Maneuver, heading: float, drag: Drag) -> Motion:
     """The predicted motion of a maneuver that begins at a heading (rad)."""
     times, offset, velocity, acceleration = (
-        np.array(column) for column in zip(*predict(part, heading, drag), strict=True)
+        np.array(column) for column in zip(*predict(maneuver, heading, drag), strict=True)
     )
-    jerk, turning = np.zeros_like(offset), np.zeros_like(times)
-    return Motion(times, offset, velocity, acceleration, jerk, turning)
+    jerk, heading_rate = np.zeros_like(offset), np.zeros_like(times)
+    return Motion(times, offset, velocity, acceleration, jerk, heading_rate)
 
 
 _cached_motion = lru_cache(maxsize=32)(_predicted_motion)

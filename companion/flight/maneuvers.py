@@ -36,8 +36,10 @@ def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
     """A copy of the sequence that has not begun: a `Follow` stores the pose where it began."""
     return ManeuverSequence(
         [
-            replace(part, _with_turn=None, _pose=None) if isinstance(part, Follow) else part
-            for part in sequence.parts
+            replace(maneuver, _turned_trajectory=None, _pose=None)
+            if isinstance(maneuver, Follow)
+            else maneuver
+            for maneuver in sequence.parts
         ]
     )
 
@@ -45,9 +47,9 @@ def fresh_copy(sequence: ManeuverSequence) -> ManeuverSequence:
 def _maneuver(config: Config, name: str, drag: KnownDrag) -> Maneuver:
     if name == "trajectory":
         return _follow(config, drag)
-    part = _simple_maneuver(config, name)
-    require_flyable(config, part, drag)
-    return part
+    maneuver = _simple_maneuver(config, name)
+    require_flyable(config, maneuver, drag)
+    return maneuver
 
 
 def _simple_maneuver(config: Config, name: str) -> Maneuver:
@@ -78,7 +80,7 @@ def _doublets(identify: IdentifyConfig) -> Doublets:
         yaw_step_time=identify.yaw_duration_s,
         climb_acceleration=identify.climb_m_s2,
         climb_step_time=identify.climb_duration_s,
-        settle=identify.settle_s,
+        settle_time=identify.settle_s,
     )
 
 
@@ -96,9 +98,9 @@ def _follow(config: Config, drag: KnownDrag) -> Follow:
             reserve = config.flight.slow_down_reserve_m_s2
             notes = (*notes, *slow_down_notes(trajectory, slower, reserve))
             trajectory = slower.trajectory
-        elif found := violations(trajectory, envelope):
-            first = min(found, key=lambda one: one.slowing_helps)
-            assumption = drag.assumption if first.slowing_helps else ""
-            raise ConfigError(f"{path}: {first}; {first.remedy}{assumption}")
+        elif found_violations := violations(trajectory, envelope):
+            first_violation = min(found_violations, key=lambda one: one.slowing_helps)
+            assumption = drag.assumption if first_violation.slowing_helps else ""
+            raise ConfigError(f"{path}: {first_violation}; {first_violation.remedy}{assumption}")
     notes = (*notes, overview(trajectory))
     return Follow(trajectory, config.limits.max_yaw_rate, notes)

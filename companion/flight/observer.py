@@ -16,7 +16,7 @@ class Observer(Protocol):
     def phase(self, name: str, waits_for: str) -> None:
         """A phase began; `waits_for` names the condition that ends it, as shown to the user."""
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Once a second: name of the phase, what it waits for, elapsed time and timeout (s)."""
 
     def status(self, status: FlightStatus) -> None:
@@ -32,7 +32,7 @@ class SilentObserver:
     def phase(self, name: str, waits_for: str) -> None:
         """Ignore the phase."""
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Ignore the progress."""
 
     def status(self, status: FlightStatus) -> None:
@@ -53,10 +53,10 @@ class SeveralObservers:
         for observer in self._observers:
             observer.phase(name, waits_for)
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Pass the progress on to each observer."""
         for observer in self._observers:
-            observer.waiting(name, detail, elapsed, timeout)
+            observer.waiting(name, waiting_for, elapsed, timeout)
 
     def status(self, status: FlightStatus) -> None:
         """Pass the state on to each observer."""
@@ -112,11 +112,11 @@ class EventRecorder:
         self.write(f"phase: {name}")
         if self.file is not None:
             self.file.phase(name, waits_for)
-        self._tell(lambda observer: observer.phase(name, waits_for))
+        self._tell_observer(lambda observer: observer.phase(name, waits_for))
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Pass the progress on to the observer."""
-        self._tell(lambda observer: observer.waiting(name, detail, elapsed, timeout))
+        self._tell_observer(lambda observer: observer.waiting(name, waiting_for, elapsed, timeout))
 
     @property
     def wants_status(self) -> bool:
@@ -125,24 +125,24 @@ class EventRecorder:
 
     def status(self, status: FlightStatus) -> None:
         """Pass the state on; if the observer raises, the caller must pass on no more states."""
-        self._call(lambda observer: observer.status(status))
+        self._call_observer(lambda observer: observer.status(status))
 
     def event(self, time: float, text: str) -> None:
         """Record the event and pass it on."""
         self.write(text)
-        self._tell(lambda observer: observer.event(time, text))
+        self._tell_observer(lambda observer: observer.event(time, text))
 
-    def _tell(self, tell: Callable[[Observer], None]) -> None:
+    def _tell_observer(self, call: Callable[[Observer], None]) -> None:
         try:
-            self._call(tell)
+            self._call_observer(call)
         except Exception as error:
             self._observer = SilentObserver()
             self.note(f"the observer of this flight failed and gets no more messages: {error!r}")
 
-    def _call(self, tell: Callable[[Observer], None]) -> None:
+    def _call_observer(self, call: Callable[[Observer], None]) -> None:
         began = self._clock()
         try:
-            tell(self._observer)
+            call(self._observer)
         except SystemExit as error:  # would end the event loop of the flight
             raise RuntimeError(repr(error)) from error
         elapsed = self._clock() - began

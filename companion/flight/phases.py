@@ -89,8 +89,8 @@ def flight_phases(
     )
     if config.take_over:
         return (*handover_phases(config), maneuvers, HAND_BACK)
-    landed = replace(maneuvers, on_failure=Exit.LAND)
-    return (*takeoff_phases(config, autopilot), landed, *LANDING_PHASES)
+    maneuvers_then_landing = replace(maneuvers, on_failure=Exit.LAND)
+    return (*takeoff_phases(config, autopilot), maneuvers_then_landing, *LANDING_PHASES)
 
 
 def takeoff_phases(config: FlightConfig, autopilot: Autopilot) -> tuple[Phase, ...]:
@@ -129,10 +129,10 @@ def takeoff_for_client_phases(config: FlightConfig) -> tuple[Phase, ...]:
     return checks, _takeoff(config), _takeover(Exit.HOLD)
 
 
-def _checks(config: FlightConfig, ready: str, work: Work, roles: frozenset[Role]) -> Phase:
+def _checks(config: FlightConfig, purpose: str, work: Work, roles: frozenset[Role]) -> Phase:
     return Phase(
         "checks",
-        f"the vehicle to be ready {ready}",
+        f"the vehicle to be ready {purpose}",
         work,
         config.ready_timeout_s,
         allowed_roles=roles,

@@ -37,7 +37,7 @@ class PreflightChecks:
     Attributes:
         note: called once with each message that does not end the flight: warnings, unsafe findings
             in `flight.accept`, and message rates that the autopilot refused.
-        drag_of: called with the vehicle's identity; returns what is known of its drag.
+        load_drag: called with the vehicle's identity; returns what is known of its drag.
 
     Args:
         maneuvers: copy of the maneuvers of the flight, used only by the checks.
@@ -51,7 +51,7 @@ class PreflightChecks:
         maneuvers: ManeuverSequence,
     ) -> None:
         self.note: Callable[[str], None] = lambda _: None
-        self.drag_of: Callable[[Identity], KnownDrag] = lambda _: KnownDrag()
+        self.load_drag: Callable[[Identity], KnownDrag] = lambda _: KnownDrag()
         self._config, self._link, self._replacement_detector = config, link, replacement_detector
         self._maneuvers = maneuvers
         self._clock = asyncio.get_running_loop().time
@@ -80,32 +80,32 @@ class PreflightChecks:
         """Check the vehicle for `stage`; return the data that were checked.
 
         Raises:
-            ChecksVoid: the vehicle may have been replaced by another one.
+            VehicleReplaced: the vehicle may have been replaced by another one.
             FlightEnded: a finding blocks the flight.
             LinkLost: the connection was lost.
         """
-        before = evidence = self._evidence
+        earlier_evidence = evidence = self._evidence
         if evidence is None or self._clock() - self._gathered_at > _MAX_EVIDENCE_AGE:
-            evidence = await self._gather(stage, before)
+            evidence = await self._gather(stage, earlier_evidence)
             if self._report_low_rates(evidence):
                 await self.ask_for_telemetry()
-                evidence = await self._gather(stage, before)
+                evidence = await self._gather(stage, earlier_evidence)
             self._evidence, self._gathered_at = evidence, self._clock()
             self._replacement_detector.note_identity(evidence.identity)
         self._replacement_detector.require()
-        drag = self.drag_of(evidence.identity)
-        planned = self._maneuvers if self._maneuvers.parts else None
-        evidence = replace(evidence, stage=stage, maneuvers=planned, known_drag=drag)
-        self._act_on(run_checks(self._config, evidence, repeated=before is not None))
+        drag = self.load_drag(evidence.identity)
+        planned_maneuvers = self._maneuvers if self._maneuvers.parts else None
+        evidence = replace(evidence, stage=stage, maneuvers=planned_maneuvers, known_drag=drag)
+        self._act_on(run_checks(self._config, evidence, repeated=earlier_evidence is not None))
         return evidence
 
-    async def _gather(self, stage: Stage, before: Evidence | None) -> Evidence:
+    async def _gather(self, stage: Stage, earlier_evidence: Evidence | None) -> Evidence:
         return await gather(
             self._link,
             self._granted_rates,
             _COUNTING_TIME,
             stage=stage,
-            earlier_survey=None if before is None else before.survey,
+            earlier_survey=None if earlier_evidence is None else earlier_evidence.survey,
         )
 
     def _report_low_rates(self, evidence: Evidence) -> bool:
@@ -114,32 +114,32 @@ class PreflightChecks:
         A ground station that connects after the telemetry was requested lowers the rates.
         """
         streams = evidence.streams
-        low = [
+        low_streams = [
             name
             for name, (_, minimum) in minimum_rates(self._config.link).items()
             if name in streams and streams[name].achieved < minimum
         ]
-        for name in low:
+        for name in low_streams:
             self.note(low_rate_text(name, streams[name].requested))
-        return bool(low)
+        return bool(low_streams)
 
     def on_parameter(self, name: str, value: float) -> None:
         """Warn if a station sets a checked parameter of the armed vehicle to an unsafe value.
 
         The flight goes on, because its end may need the failsafe that the change has made unsafe.
         """
-        before = self._evidence
-        if before is None or self._link.state.armed is not True:
+        earlier_evidence = self._evidence
+        if earlier_evidence is None or self._link.state.armed is not True:
             return
-        survey = before.survey
-        newest_name = next((new for new, old in survey.present_names.items() if old == name), "")
-        if survey.values.get(newest_name, value) == value:
+        survey = earlier_evidence.survey
+        present_name = next((new for new, old in survey.present_names.items() if old == name), "")
+        if survey.values.get(present_name, value) == value:
             return
-        changed_survey = survey._replace(values={**survey.values, newest_name: float(value)})
-        self._evidence = replace(before, survey=changed_survey)
-        known = unsafe_findings(parameters(self._config, before))
+        changed_survey = survey._replace(values={**survey.values, present_name: float(value)})
+        self._evidence = replace(earlier_evidence, survey=changed_survey)
+        known_findings = unsafe_findings(parameters(self._config, earlier_evidence))
         for finding in unsafe_findings(parameters(self._config, self._evidence)):
-            if finding not in known:
+            if finding not in known_findings:
                 self._note_once(
                     "another station set a parameter to an unsafe value in flight: "
                     f"{finding.sentence()}"
@@ -147,19 +147,19 @@ class PreflightChecks:
 
     def _act_on(self, findings: list[Finding]) -> None:
         """End the flight if findings block it; report the other unsafe or ineffective findings."""
-        refused = blocking_findings(self._config, findings)
+        blocking = blocking_findings(self._config, findings)
         warnings = [
             finding.key
             for finding in findings
-            if finding.result is CheckResult.INEFFECTIVE and finding not in refused
+            if finding.result is CheckResult.INEFFECTIVE and finding not in blocking
         ]
         if warnings:
             self._note_once(f"preflight warnings: {', '.join(warnings)}; see `companion doctor`")
         for finding in unsafe_findings(findings):
-            if finding not in refused:
+            if finding not in blocking:
                 self._note_once(f"unsafe, but excepted by flight.accept: {finding.sentence()}")
-        if refused:
-            raise FlightEnded("; and ".join(finding.sentence() for finding in refused))
+        if blocking:
+            raise FlightEnded("; and ".join(finding.sentence() for finding in blocking))
 
     def _note_once(self, text: str) -> None:
         if text not in self._noted_texts:

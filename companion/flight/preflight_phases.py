@@ -26,7 +26,7 @@ _SHORTEST_HEARTBEAT_LIMIT = 0.8
 
 async def connect(context: FlightContext) -> None:
     """Wait for the autopilot's heartbeat."""
-    context.detail = f"no heartbeat yet on {context.config.link.endpoint}"
+    context.waiting_for = f"no heartbeat yet on {context.config.link.endpoint}"
     await context.link.wait_connected(context.config.flight.connect_timeout_s)
 
 
@@ -40,7 +40,7 @@ async def checks(context: FlightContext) -> None:
         await leave_offboard(context)
     await context.until(lambda: _ready(context))
     # Positions are sent only once the estimator has one, so the rates are counted now.
-    evidence = await judge_vehicle(context, Stage.GROUND)
+    evidence = await check_vehicle(context, Stage.GROUND)
     warning = gain_warning(context.config)
     if warning is not None:
         context.note(warning)
@@ -51,13 +51,13 @@ async def checks(context: FlightContext) -> None:
 async def request_telemetry(context: FlightContext) -> None:
     """Request the telemetry that a flight needs."""
     context.heartbeat_limit = INITIAL_HEARTBEAT_LIMIT
-    context.detail = "requesting telemetry"
+    context.waiting_for = "requesting telemetry"
     await context.preflight.ask_for_telemetry()
 
 
-async def judge_vehicle(context: FlightContext, stage: Stage) -> Evidence:
+async def check_vehicle(context: FlightContext, stage: Stage) -> Evidence:
     """Run the preflight checks; set `FlightContext.heartbeat_limit` from the heartbeat rate."""
-    context.detail = "counting telemetry rates and reading the autopilot's parameters"
+    context.waiting_for = "counting telemetry rates and reading the autopilot's parameters"
     evidence = await context.preflight.require(stage)
     heartbeats = evidence.streams.get("HEARTBEAT")  # not requested from PX4, whose rate is fixed
     if heartbeats is not None and heartbeats.achieved > 0.0:
@@ -80,8 +80,8 @@ def use_evidence(context: FlightContext, evidence: Evidence) -> None:
 async def stream(context: FlightContext) -> None:
     """Start to send setpoints, on the ground with zero thrust; wait until enough were sent."""
     context.loop.on = True
-    wanted_count = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
-    await context.until(lambda: context.loop.record.setpoints >= wanted_count, "setpoints to flow")
+    setpoint_goal = context.loop.record.setpoints + round(context.config.link.min_attitude_rate_hz)
+    await context.until(lambda: context.loop.record.setpoints >= setpoint_goal, "setpoints to flow")
 
 
 async def arm(context: FlightContext) -> None:
@@ -110,15 +110,15 @@ async def undo_arming(context: FlightContext) -> None:
     context.release()
     if not context.must_disarm:
         return
-    context.detail = "the autopilot to accept disarming"
+    context.waiting_for = "the autopilot to accept disarming"
 
-    def require_ours() -> None:
+    def require_control() -> None:
         require_role(context.link, {Role.READY, Role.TAKEOFF})
         if context.ground.lifted:  # earlier tries may have been lost
             raise FlightEnded("the vehicle has left the ground, so it is not disarmed", Exit.LAND)
 
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.
-    await command_if_ours(context, DISARM, require_ours, lambda: not context.armed())
+    await command_if_ours(context, DISARM, require_control, lambda: not context.armed())
     await context.fresh_heartbeat()
     await context.until(lambda: not context.armed())
 
@@ -127,12 +127,12 @@ async def _arm(context: FlightContext) -> None:
     """Arm, after the checks are repeated."""
     state = context.link.state
     await context.next_position()
-    context.detail = "the autopilot to accept arming"
+    context.waiting_for = "the autopilot to accept arming"
     autopilot = context.link.autopilot
     await command_if_ours(
         context,
         autopilot.set_mode(autopilot.ready_mode),
-        lambda: _require_untouched(context),
+        lambda: _require_unchanged_by_others(context),
         lambda: in_role(context.link, Role.READY),
     )
     await context.until(lambda: in_role(context.link, Role.READY))
@@ -144,17 +144,17 @@ async def _arm(context: FlightContext) -> None:
             raise FlightEnded("the pilot disarmed again", Exit.LEAVE)
         return context.armed()
 
-    def require_ours() -> None:
+    def require_control() -> None:
         _refuse_unsafe(vehicle_checks.armed(state))
         require_role(context.link, {Role.READY})
         context.must_disarm = True  # only now: a vehicle that somebody else armed is not disarmed
 
     context.replacement_detector.note_arming()
-    await command_if_ours(context, ARM, require_ours, armed)
+    await command_if_ours(context, ARM, require_control, armed)
     await context.until(armed, "the vehicle to be armed")
 
 
-def _require_untouched(context: FlightContext) -> None:
+def _require_unchanged_by_others(context: FlightContext) -> None:
     """Raise `FlightEnded` if somebody armed the vehicle or changed its mode since the checks."""
     state = context.link.state
     _refuse_unsafe(vehicle_checks.armed(state))
@@ -176,8 +176,8 @@ def _require_flyable_by_vehicle(context: FlightContext) -> None:
         if drag != drag_before_connecting(config):
             require_still_flyable(config, maneuvers, drag)
         if config.safety.fence_polygon_deg and global_position is not None:
-            place = Place(global_position.latitude_deg, global_position.longitude_deg)
-            require_inside(config, maneuvers.parts, place, drag)
+            position = Place(global_position.latitude_deg, global_position.longitude_deg)
+            require_inside(config, maneuvers.parts, position, drag)
     except ConfigError as error:
         raise FlightEnded(str(error)) from error
 
@@ -187,7 +187,7 @@ def _ready(context: FlightContext) -> bool:
     _refuse_unsafe(vehicle_checks.armed(state))
     _refuse_unsafe(vehicle_checks.battery(context.config, state))
     missing = context.link.autopilot.why_not_ready(state.readiness)
-    context.detail = "" if missing is None else f"{missing}, in mode {state.mode}"
+    context.waiting_for = "" if missing is None else f"{missing}, in mode {state.mode}"
     return missing is None
 
 
@@ -200,11 +200,11 @@ def _report_offboard_loss(context: FlightContext, values: Values) -> None:
     """Report the autopilot's reaction to the loss of our setpoints."""
     autopilot = context.link.autopilot
     failsafe = autopilot.offboard_loss_failsafe
-    seconds = values.get(failsafe.parameter)
-    how_long = "an unknown time" if seconds is None else f"{seconds:g} s"
+    hold_time = values.get(failsafe.parameter)
+    hold_time_text = "an unknown time" if hold_time is None else f"{hold_time:g} s"
     context.note(
         f"offboard loss: if our setpoints stop, {autopilot.name} holds the last rates for "
-        f"{how_long} ({failsafe.parameter}); then {failsafe.action}"
+        f"{hold_time_text} ({failsafe.parameter}); then {failsafe.action}"
     )
 
 

@@ -10,13 +10,13 @@ from companion.safety.snapshot import Health
 from companion.vehicle.link import Link
 from companion.vehicle.records import MAX_TELEMETRY_AGE
 
-_REQUEST_SHARE = 0.5
+_REQUEST_AGE_FRACTION = 0.5
 """A status message, such as SYS_STATUS, is requested again when its age exceeds this share of the
 age from which it counts as unknown."""
 _REQUEST_PERIOD = 5.0
 """Shortest time between two requests for one message, s. If the rate stays low, monitors end the
 flight sooner. QGroundControl lowers rates every 11 s while ArduPilot sends no BATTERY_STATUS."""
-_HEARD_AGE = 0.2
+_MAX_POSITION_AGE = 0.2
 """A status is requested only while positions are newer than this, s: else the link is silent."""
 _COUNTING_TIME = 0.1
 """Window in which `set_rates` counts messages, s; short, because the result is not used."""
@@ -43,19 +43,19 @@ class RateRequester:
         self._link_config = link_config
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._requested_at: dict[str, float] = {}
-        self._silent_at = -inf
+        self._last_silence = -inf
 
     def check(self, now: float, health: Health) -> None:
         """Request each message whose rate is too low at `now`, our clock, s."""
-        wanted = self._link_config
-        answers, positions = health.answer_rate, health.position_rate
+        settings = self._link_config
+        answer_rate, position_rate = health.answer_rate, health.position_rate
         # After a request, one more gap may have another cause; a low rate causes two at once.
         accepted_gaps = 1 if "ATTITUDE_QUATERNION" in self._tasks else 0
-        is_slow = answers is not None and answers < wanted.min_attitude_rate_hz
+        is_slow = answer_rate is not None and answer_rate < settings.min_attitude_rate_hz
         if is_slow or health.gaps > accepted_gaps:
-            self._request(now, "ATTITUDE_QUATERNION", wanted.attitude_rate_hz)
-        if positions is not None and positions < wanted.min_position_rate_hz:
-            self._request(now, "LOCAL_POSITION_NED", wanted.position_rate_hz)
+            self._request(now, "ATTITUDE_QUATERNION", settings.attitude_rate_hz)
+        if position_rate is not None and position_rate < settings.min_position_rate_hz:
+            self._request(now, "LOCAL_POSITION_NED", settings.position_rate_hz)
 
     def _request(self, now: float, message: str, rate: float) -> None:
         if now - self._requested_at.get(message, -inf) < _REQUEST_PERIOD:
@@ -71,9 +71,9 @@ class RateRequester:
             now: our clock, s.
             heartbeat_limit: age from which the mode counts as unknown, s.
         """
-        state, wanted = self._link.state, self._link.autopilot.wanted_rates
-        if state.position is None or now - state.position.received > _HEARD_AGE:
-            self._silent_at = now
+        state, wanted_rates = self._link.state, self._link.autopilot.wanted_rates
+        if state.position is None or now - state.position.received > _MAX_POSITION_AGE:
+            self._last_silence = now
             return
         statuses = (
             ("HEARTBEAT", state.heartbeat, heartbeat_limit),
@@ -83,11 +83,11 @@ class RateRequester:
             ("ESTIMATOR_STATUS", state.estimator, MAX_TELEMETRY_AGE),
             ("EKF_STATUS_REPORT", state.estimator, MAX_TELEMETRY_AGE),
         )
-        for message, status, unknown_from in statuses:
-            if message not in wanted or status is None:
+        for message, status, max_age in statuses:
+            if message not in wanted_rates or status is None:
                 continue
-            if now - max(status.received, self._silent_at) > _REQUEST_SHARE * unknown_from:
-                self._request(now, message, wanted[message])
+            if now - max(status.received, self._last_silence) > _REQUEST_AGE_FRACTION * max_age:
+                self._request(now, message, wanted_rates[message])
 
     async def _request_rate(self, message: str, rate: float) -> None:
         try:

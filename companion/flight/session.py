@@ -93,13 +93,13 @@ class Session:
         plan = ConfiguredPlan(self._config) if self._plan is None else self._plan
         environment = self._environment
         config = self.changes.begin_flight()
-        record = FlightFiles(
+        files = FlightFiles(
             config, self._folder, environment, self.note, flies_maneuvers=self._plan is None
         )
         settings = realtime_settings(self._config, environment)
-        with realtime.request_settings(settings) as grants, record:
-            recorder, opener = record.recorder(self._observer), environment.open_transport
-            async with make_link(self._config, record.tap, self.note, opener) as link:
+        with realtime.request_settings(settings) as setting_results, files:
+            recorder, opener = files.recorder(self._observer), environment.open_transport
+            async with make_link(self._config, files.tap, self.note, opener) as link:
                 self._assembled = assemble(
                     self._config,
                     link,
@@ -110,13 +110,13 @@ class Session:
                     environment,
                     self.changes,
                 )
-                for text in (*self._early_notes, *map(str, grants)):
+                for text in (*self._early_notes, *map(str, setting_results)):
                     self._assembled.flight.note(text)
                 async with connected(self._assembled):
                     result = await self._run(self._assembled.flight)
-            summary = record.summary(self._assembled, result, grants)
+            summary = files.summary(self._assembled, result, setting_results)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
-        return record.save(summary)
+        return files.save(summary)
 
     async def _run(self, flight: Flight) -> str:
         # In a task of its own: `leave` ends the flight but not the writing of the files.
@@ -124,5 +124,5 @@ class Session:
         try:
             return await self._flight_task
         except asyncio.CancelledError:
-            flight.failed_in = flight.failed_in or flight.phase
+            flight.failed_phase = flight.failed_phase or flight.phase
             return LEFT_BY_USER

@@ -18,9 +18,9 @@ def check_link(config: Config) -> None:
         ConfigError: an endpoint is not understood; the message names its key.
         SigningError: the key cannot be used.
     """
-    vehicle = link_settings(config).endpoint
+    vehicle_endpoint = link_settings(config).endpoint
     clients = [("serve.clients", client) for client in config.serve.clients]
-    for key, endpoint in [("link.endpoint", vehicle), *clients]:
+    for key, endpoint in [("link.endpoint", vehicle_endpoint), *clients]:
         try:
             parse_endpoint(endpoint)
         except EndpointError as error:

@@ -32,7 +32,7 @@ class FlightStatus(NamedTuple):
     airborne_time: float | None
     """Time since the vehicle left the ground, s."""
     phase: str
-    detail: str
+    waiting_for: str
     """What the phase waits for."""
     elapsed: float
     """Time since the phase began, s."""
@@ -72,7 +72,7 @@ class StatusReporter:
     """Records the motion in all phases, and shows the state of the flight.
 
     Attributes:
-        takeoff: time when the vehicle left the ground, s on our clock; None before the take-off.
+        takeoff_time: when the vehicle left the ground, s on our clock; None before the take-off.
         battery_at_takeoff: remaining charge at the take-off, 0..1; None: unknown.
         real_time: whether latencies are meaningful; False in lockstep.
 
@@ -90,28 +90,33 @@ class StatusReporter:
         ladder: SafetyLadder,
         trace: FlightTrace,
         began: float,
-        phase: Callable[[], tuple[Phase, float]],
+        current_phase: Callable[[], tuple[Phase, float]],
         show: Callable[[FlightStatus], None] | None,
         clock: Callable[[], float],
         *,
         real_time: bool,
     ) -> None:
-        self.takeoff: float | None = None
+        self.takeoff_time: float | None = None
         self.battery_at_takeoff: float | None = None
         self._context, self._safety_ladder, self._trace = context, ladder, trace
         self.real_time = real_time
-        self._began, self._phase, self._show, self._clock = began, phase, show, clock
+        self._began, self._current_phase, self._show, self._clock = (
+            began,
+            current_phase,
+            show,
+            clock,
+        )
         self._setpoint_counts: deque[tuple[float, int]] = deque()
         self._status_rows = StatusRows(context, trace.recorder, clock)
 
     async def run(self) -> None:
         """Record and show the state until cancelled; steps that were missed are not repeated."""
-        due = self._clock()
+        next_time = self._clock()
         while True:
             self.record()
             self._show_status()
-            due = max(due + _STATUS_PERIOD, self._clock())
-            await asyncio.sleep(due - self._clock())
+            next_time = max(next_time + _STATUS_PERIOD, self._clock())
+            await asyncio.sleep(next_time - self._clock())
 
     def _show_status(self) -> None:
         """Show the state; once the observer has raised an exception, show no more states."""
@@ -127,8 +132,8 @@ class StatusReporter:
         """Record the motion, and note the take-off."""
         now, context, state = self._clock(), self._context, self._context.link.state
         ground = context.ground
-        if self.takeoff is None and ground.takeoff_commanded and not ground.standing:
-            self.takeoff = now
+        if self.takeoff_time is None and ground.takeoff_commanded and not ground.standing:
+            self.takeoff_time = now
             self.battery_at_takeoff = None if state.battery is None else state.battery.remaining
         self._status_rows.record(now)
         vehicle_time, tilt = context.loop.record.last_vehicle_time, context.tilt()
@@ -145,13 +150,13 @@ class StatusReporter:
     def status(self) -> FlightStatus:
         """The present state."""
         now, context = self._clock(), self._context
-        (phase, phase_began), record = self._phase(), context.loop.record
+        (phase, phase_began), record = self._current_phase(), context.loop.record
         maneuver = context.guidance_loop.flown_source.part(now)
         return FlightStatus(
             time=now - self._began,
-            airborne_time=None if self.takeoff is None else now - self.takeoff,
+            airborne_time=None if self.takeoff_time is None else now - self.takeoff_time,
             phase=phase.name,
-            detail=context.detail,
+            waiting_for=context.waiting_for,
             elapsed=now - phase_began,
             timeout=phase.timeout,
             maneuver=None if maneuver is None else maneuver.name,
@@ -176,9 +181,9 @@ class StatusReporter:
         counts.append((now, record.setpoints))
         while len(counts) > 2 and now - counts[1][0] >= _RATE_WINDOW:
             counts.popleft()
-        since, before = counts[0]
-        sent = record.setpoints - before
-        return sent / (now - since) if sent and now > since else None
+        window_began, count_before = counts[0]
+        sent_count = record.setpoints - count_before
+        return sent_count / (now - window_began) if sent_count and now > window_began else None
 
     def _position(self, now: float) -> LocalPosition | None:
         position = self._context.link.state.position

@@ -35,7 +35,7 @@ class StatusRows:
     ) -> None:
         self._context, self._recorder = context, recorder
         self._fence = None if recorder is None else _FenceDrawing(context, recorder)
-        self._due = self._measured_at = clock()
+        self._next_resources_time = self._measured_at = clock()
         self._processor_s = process_time()
 
     def record(self, now: float) -> None:
@@ -45,8 +45,8 @@ class StatusRows:
             return
         self._fence.record(now)
         recorder.row(now, THRUST, self._thrust_row(now))
-        if now >= self._due:
-            self._due = now + _RESOURCES_PERIOD
+        if now >= self._next_resources_time:
+            self._next_resources_time = now + _RESOURCES_PERIOD
             recorder.row(now, RESOURCES, self._resources_row(now, recorder))
 
     def _thrust_row(self, now: float) -> tuple[float, ...]:
@@ -65,14 +65,14 @@ class StatusRows:
 
     def _resources_row(self, now: float, recorder: FlightRecorder) -> tuple[float, ...]:
         """The row of `RESOURCES`; in a test, the mock vehicle's processor time is included."""
-        processor_s, before = process_time(), self._processor_s
+        processor_s, earlier_processor_s = process_time(), self._processor_s
         elapsed, self._measured_at = now - self._measured_at, now
         self._processor_s = processor_s
         link, record = self._context.link, self._context.loop.record
         round_trip = link.timesync.round_trip_s
         return (
             now,
-            (processor_s - before) / elapsed if elapsed > 0.0 else nan,
+            (processor_s - earlier_processor_s) / elapsed if elapsed > 0.0 else nan,
             resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / _KB_PER_MB,
             recorder.waiting,
             recorder.dropped,
@@ -91,47 +91,56 @@ class _FenceDrawing:
     def __init__(self, context: FlightContext, recorder: FlightRecorder) -> None:
         self._context, self._recorder = context, recorder
         self._fence = fence_of(context.config)
-        self._due = -inf
+        self._next_drawing_time = -inf
 
     def record(self, now: float) -> None:
         """Record the fence if it is due at `now`, s on our clock."""
         snapshots, motion = self._context.snapshot_builder, self._context.guidance_loop.motion
         height, centre = self._context.link.state.height, snapshots.fence_centre
         origin = snapshots.fence_centre_ned
-        if now < self._due or centre is None or origin is None or motion is None or height is None:
+        if (
+            now < self._next_drawing_time
+            or centre is None
+            or origin is None
+            or motion is None
+            or height is None
+        ):
             return
-        self._due = now + _DRAWING_PERIOD
+        self._next_drawing_time = now + _DRAWING_PERIOD
         north, east, down = origin
-        heights = self._fence.floor - height - motion.position_ned[2], self._fence.ceiling - down
+        end_heights = (
+            self._fence.floor - height - motion.position_ned[2],
+            self._fence.ceiling - down,
+        )
         outlines = [circle_corners(self._fence.radius, _CIRCLE_SIDES)]
         if self._fence.places and centre.place is not None:
             outlines.append(local_polygon(self._fence.places, centre.place))
         elif self._fence.polygon:
             outlines.append(self._fence.polygon)
         points = [
-            (east + corner[1], north + corner[0], up)
+            (east + corner[1], north + corner[0], edge_height)
             for outline in outlines
-            for corner, up in _edges(outline, heights)
+            for corner, edge_height in _edges(outline, end_heights)
         ]
-        self._recorder.add(now, _write, points)
+        self._recorder.add(now, _write_fence, points)
 
 
 def _edges(
-    outline: Sequence[Corner], heights: tuple[float, float]
+    outline: Sequence[Corner], end_heights: tuple[float, float]
 ) -> Iterator[tuple[Corner, float]]:
     """Both ends (corner, m; height, m) of each edge of a prism, with only some upright edges."""
     edge_step = max(1, len(outline) // _UPRIGHT_EDGES)
     for number, (corner, next_corner) in enumerate(
         zip(outline, (*outline[1:], outline[0]), strict=True)
     ):
-        for up in heights:
-            yield corner, up
-            yield next_corner, up
+        for edge_height in end_heights:
+            yield corner, edge_height
+            yield next_corner, edge_height
         if number % edge_step == 0:
-            yield corner, heights[0]
-            yield corner, heights[1]
+            yield corner, end_heights[0]
+            yield corner, end_heights[1]
 
 
-def _write(writer: McapWriter, time_ns: int, points: list[Vector]) -> None:
+def _write_fence(writer: McapWriter, time_ns: int, points: list[Vector]) -> None:
     fence = Entity("fence", "world", lines=(Line(points, _FENCE_COLOR, separate_pairs=True),))
     writer.message("/fence", time_ns, scene_message(time_ns, (fence,)))

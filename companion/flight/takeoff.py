@@ -9,7 +9,7 @@ from companion.preflight.evidence import Stage
 from companion.safety.actions import Exit, FlightEnded
 from companion.vehicle.autopilot import Role
 
-_LARGEST_CLIMB = 0.3
+_MAX_HOLDING_CLIMB_SPEED = 0.3
 """Largest vertical speed of a vehicle that keeps its height, m/s."""
 
 MAX_UNDERSHOOT = 0.5
@@ -21,7 +21,7 @@ _MAX_OVERSHOOT = 3.0
 _LARGEST_DRIFT = 3.0
 """Largest distance by which wind carries a vehicle in its climb, m; else somebody flew it away."""
 
-_ARRIVAL_TIME = 2.0
+_ARRIVAL_TIMEOUT = 2.0
 """Time allowed to reach altitude after the mode changed to hold, s; then the climb has failed."""
 
 _SMALLEST_RISE = 0.3
@@ -31,7 +31,7 @@ _TIPPED_TILT = radians(60.0)
 """A vehicle on the ground that tilts more has tipped over, rad; the same limit as in PX4's failure
 detector."""
 
-_LIFT_OFF_TIME = 10.0
+_SHORTEST_LIFT_OFF_TIMEOUT = 10.0
 """Shortest time allowed to leave the ground, s; PX4 needs 4 s. Blocked or weak motors get full
 thrust meanwhile."""
 
@@ -48,7 +48,7 @@ def climb_has_ended(context: FlightContext) -> bool:
     position = context.fresh_position()
     return (
         position is not None
-        and abs(position.velocity_ned[2]) < _LARGEST_CLIMB
+        and abs(position.velocity_ned[2]) < _MAX_HOLDING_CLIMB_SPEED
         and not context.link.state.taking_off
     )
 
@@ -61,19 +61,19 @@ async def takeoff(context: FlightContext) -> None:
     await context.preflight.require(Stage.ARMED)
     await context.fresh_heartbeat()
     _require_ground(context)
-    context.detail = "the autopilot to accept the take-off"
+    context.waiting_for = "the autopilot to accept the take-off"
     height = context.config.flight.takeoff_height_m
     command = context.link.autopilot.take_off(height, _home_altitude(context))
     context.ground.command_takeoff()
     context.loop.drop_command()  # the idle command must not be sent from here on
     context.guidance_loop.step()
 
-    def require_ours() -> None:
+    def require_control() -> None:
         # Before each try: a disarmed PX4 stores the command and takes off once armed.
         _require_ground(context)
-        context.must_disarm, context.took_off_from = True, (north, east)
+        context.must_disarm, context.takeoff_position = True, (north, east)
 
-    await command_if_ours(context, command, require_ours, lambda: not state.landed)
+    await command_if_ours(context, command, require_control, lambda: not state.landed)
     climb = _Climb(context, height)
     await context.until(climb.is_over)
 
@@ -83,18 +83,18 @@ async def is_in_our_takeoff(context: FlightContext) -> bool:
 
     If the vehicle holds lower or elsewhere, somebody else has stopped it or flown it there.
     """
-    state, place = context.link.state, context.took_off_from
-    if place is None:
+    state, takeoff_position = context.link.state, context.takeoff_position
+    if takeoff_position is None:
         return False
     position = await context.next_position()
-    if dist(place, position.position_ned[:2]) > _LARGEST_DRIFT:
+    if dist(takeoff_position, position.position_ned[:2]) > _LARGEST_DRIFT:
         return False
     if in_role(context.link, Role.TAKEOFF):
         return True
     if not in_role(context.link, Role.READY) or state.mode_by_failsafe or state.height is None:
         return False
-    above = state.height - context.config.flight.takeoff_height_m
-    return -MAX_UNDERSHOOT < above < _MAX_OVERSHOOT
+    height_error = state.height - context.config.flight.takeoff_height_m
+    return -MAX_UNDERSHOOT < height_error < _MAX_OVERSHOOT
 
 
 class _Climb:
@@ -103,11 +103,11 @@ class _Climb:
     def __init__(self, context: FlightContext, height: float) -> None:
         self._context, self._height = context, height
         self._began = asyncio.get_running_loop().time()
-        allowed = _LIFT_OFF_FRACTION * context.config.flight.takeoff_timeout_s
-        self._lift_off_time = max(_LIFT_OFF_TIME, allowed)
+        timeout = _LIFT_OFF_FRACTION * context.config.flight.takeoff_timeout_s
+        self._lift_off_timeout = max(_SHORTEST_LIFT_OFF_TIMEOUT, timeout)
         self._has_begun = False
-        self._held_at: float | None = None
-        self._high_on_ground_from: float | None = None
+        self._hold_began: float | None = None
+        self._ground_flag_at_height_since: float | None = None
         motion = context.guidance_loop.motion
         self._start_down = None if motion is None else motion.position_ned[2]
 
@@ -123,16 +123,16 @@ class _Climb:
         height, position = state.height, context.fresh_position()
         if height is None or position is None:
             return False
-        context.detail = f"{self._height:g} m, now {height:.1f} m"
+        context.waiting_for = f"{self._height:g} m, now {height:.1f} m"
         if height > self._height + _MAX_OVERSHOOT:
-            raise self._jump(height) or FlightEnded(
+            raise self._jump_failure(height) or FlightEnded(
                 f"the vehicle climbed to {height:.1f} m, but flight.takeoff_height_m is "
                 f"{self._height:g}"
             )
         self._require_lift_off()
         is_near_height = height > self._height - MAX_UNDERSHOOT
         if not is_near_height and self._was_stopped():
-            raise self._jump(height) or FlightEnded(
+            raise self._jump_failure(height) or FlightEnded(
                 f"the pilot, the autopilot or another station stopped the climb at {height:.1f} m",
                 Exit.RELEASE,
             )
@@ -142,18 +142,21 @@ class _Climb:
         return is_near_height and climb_has_ended(context)
 
     def _was_stopped(self) -> bool:
-        """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIME` ago."""
+        """Whether the mode changed from take-off to hold more than `_ARRIVAL_TIMEOUT` ago."""
         now = asyncio.get_running_loop().time()
         if in_role(self._context.link, Role.TAKEOFF):
-            self._has_begun, self._held_at = True, None
-        elif self._has_begun and self._held_at is None:
-            self._held_at = now
-        return self._held_at is not None and now - self._held_at > _ARRIVAL_TIME
+            self._has_begun, self._hold_began = True, None
+        elif self._has_begun and self._hold_began is None:
+            self._hold_began = now
+        return self._hold_began is not None and now - self._hold_began > _ARRIVAL_TIMEOUT
 
     def _require_lift_off(self) -> None:
         """Raise `FlightEnded` if the vehicle tips over, or still stands after the time allowed."""
-        elapsed, climbed = asyncio.get_running_loop().time() - self._began, self._climbed()
-        if climbed is None or climbed >= _SMALLEST_RISE:
+        elapsed, climbed_height = (
+            asyncio.get_running_loop().time() - self._began,
+            self._climbed_height(),
+        )
+        if climbed_height is None or climbed_height >= _SMALLEST_RISE:
             return
         tilt = self._context.tilt()
         if tilt is not None and tilt > _TIPPED_TILT:
@@ -161,14 +164,14 @@ class _Climb:
                 f"the vehicle tilts by {degrees(tilt):.0f}° on the ground: it tipped over in the "
                 "take-off"
             )
-        if elapsed > self._lift_off_time:
+        if elapsed > self._lift_off_timeout:
             raise FlightEnded(
-                f"the vehicle has not left the ground {self._lift_off_time:g} s after the take-off "
-                "was commanded: check motors, propellers, weight and battery; motors that spool up "
-                "slowly need a longer flight.takeoff_timeout_s"
+                f"the vehicle has not left the ground {self._lift_off_timeout:g} s after the "
+                "take-off was commanded: check motors, propellers, weight and battery; motors that "
+                "spool up slowly need a longer flight.takeoff_timeout_s"
             )
 
-    def _climbed(self) -> float | None:
+    def _climbed_height(self) -> float | None:
         """Climb since the take-off command, m, without jumps of home or of the estimate."""
         motion = self._context.guidance_loop.motion
         if motion is None or self._start_down is None:
@@ -178,27 +181,27 @@ class _Climb:
     def _require_leaving_ground(self, height: float) -> None:
         """Raise `FlightEnded` if, at this height (m), ground contact is reported for too long."""
         now = asyncio.get_running_loop().time()
-        if self._high_on_ground_from is None:
-            self._high_on_ground_from = now
-        if now - self._high_on_ground_from > _GROUND_FLAG_TIME:
+        if self._ground_flag_at_height_since is None:
+            self._ground_flag_at_height_since = now
+        if now - self._ground_flag_at_height_since > _GROUND_FLAG_TIME:
             raise FlightEnded(
                 f"the height above home is {height:.1f} m, but the autopilot reports that the "
                 "vehicle is on the ground: home or the height estimate has jumped",
                 Exit.LAND,
             )
 
-    def _jump(self, height: float) -> FlightEnded | None:
+    def _jump_failure(self, height: float) -> FlightEnded | None:
         """The end of the flight if a jump explains the wrong `height` above home (m)."""
-        climbed = self._climbed()
-        if climbed is None:
+        climbed_height = self._climbed_height()
+        if climbed_height is None:
             return None
         too_low = height < self._height
-        if too_low and climbed <= self._height - MAX_UNDERSHOOT:
+        if too_low and climbed_height <= self._height - MAX_UNDERSHOOT:
             return None
-        if not too_low and climbed > self._height + _MAX_OVERSHOOT:
+        if not too_low and climbed_height > self._height + _MAX_OVERSHOOT:
             return None
         return FlightEnded(
-            f"after a climb of {climbed:.1f} m the height above home is {height:.1f} m: "
+            f"after a climb of {climbed_height:.1f} m the height above home is {height:.1f} m: "
             "home or the height estimate has jumped",
             Exit.LAND,
         )

@@ -9,8 +9,8 @@ from companion.attitude.kinematics import tilt_angle
 from companion.flight.commands import change_mode, in_role, require_role
 from companion.flight.context import FlightContext
 from companion.flight.preflight_phases import (
+    check_vehicle,
     checks,
-    judge_vehicle,
     request_telemetry,
     stream,
     use_evidence,
@@ -57,23 +57,27 @@ async def wait_for_handover(context: FlightContext) -> None:
     A vehicle that still takes off or climbs is not held yet. A vehicle that holds because of a
     failsafe, such as offboard loss, was not handed over.
     """
-    state, ready = context.link.state, context.link.autopilot.ready_mode
-    lowest = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
+    state, ready_mode = context.link.state, context.link.autopilot.ready_mode
+    min_height = context.config.flight.takeoff_height_m - MAX_UNDERSHOOT
 
     def handed_over() -> bool:
         if not context.armed() or not state.flying:
-            context.detail = "the pilot to take off"
+            context.waiting_for = "the pilot to take off"
             return False
         context.ground.note_flying()
-        if state.height is None or state.height < lowest:
+        if state.height is None or state.height < min_height:
             height = "unknown" if state.height is None else f"{state.height:.1f} m"
-            context.detail = f"a height of {lowest:.1f} m (flight.takeoff_height_m), now {height}"
+            context.waiting_for = (
+                f"a height of {min_height:.1f} m (flight.takeoff_height_m), now {height}"
+            )
             return False
-        if state.mode != ready or not in_role(context.link, Role.READY):
-            by_failsafe = " by the autopilot's failsafe" if state.mode == ready else ""
-            context.detail = f"the pilot to switch to {ready}, now {state.mode}{by_failsafe}"
+        if state.mode != ready_mode or not in_role(context.link, Role.READY):
+            by_failsafe = " by the autopilot's failsafe" if state.mode == ready_mode else ""
+            context.waiting_for = (
+                f"the pilot to switch to {ready_mode}, now {state.mode}{by_failsafe}"
+            )
             return False
-        context.detail = "the vehicle to keep its height"
+        context.waiting_for = "the vehicle to keep its height"
         return climb_has_ended(context)
 
     await context.until(handed_over)
@@ -114,7 +118,7 @@ async def _check_stage(
     await _wait_for_landed_state(context)
     require(context)
     await context.next_position()
-    evidence = await judge_vehicle(context, stage)
+    evidence = await check_vehicle(context, stage)
     use_evidence(context, evidence)
     require(context)
 
@@ -140,19 +144,19 @@ def _require_armed_on_ground(context: FlightContext) -> None:
 
 async def offboard(context: FlightContext) -> None:
     """Check the vehicle again, take over, and hold for `_SETTLE_TIME`."""
-    context.detail = "the preflight checks before the takeover"
+    context.waiting_for = "the preflight checks before the takeover"
     await context.preflight.require(Stage.AIRBORNE)
     await _wait_until_held(context)
     await _require_learned_hover(context)
     context.guidance_loop.hold_here()
     context.snapshot_builder.begin(asyncio.get_running_loop().time(), context.fence_centre)
-    jump = hypot(*context.loop.resets.position_shift)
-    if jump and context.took_off_from is not None:  # the monitors count from here on
-        context.note(f"before the takeover the estimated position jumped by {jump:.1f} m")
+    position_jump = hypot(*context.loop.resets.position_shift)
+    if position_jump and context.takeoff_position is not None:  # the monitors count from here on
+        context.note(f"before the takeover the estimated position jumped by {position_jump:.1f} m")
     await _take_over(context)
     context.guidance_loop.hold_here()
     context.loop.offboard_active, context.loop.taking_over = True, False
-    context.took_off_from = None
+    context.takeoff_position = None
     await asyncio.sleep(_SETTLE_TIME)
 
 
@@ -167,8 +171,8 @@ async def _wait_until_held(context: FlightContext) -> None:
             await context.until(lambda: _is_held(context), "the autopilot to hold the vehicle")
     except TimeoutError:
         raise FlightEnded(
-            f"not taken over: waited {_BRAKING_TIME:g} s for {context.detail}; fly in less wind, "
-            "check the compass if it flew in circles, or take over a vehicle that hovers"
+            f"not taken over: waited {_BRAKING_TIME:g} s for {context.waiting_for}; fly in less "
+            "wind, check the compass if it flew in circles, or take over a vehicle that hovers"
         ) from None
 
 
@@ -190,11 +194,14 @@ async def _require_learned_hover(context: FlightContext) -> None:
 
 
 def _is_held(context: FlightContext) -> bool:
-    sample, position = context.loop.resets.newest_attitude, context.fresh_position()
-    if sample is None or position is None:
+    attitude_sample, position = context.loop.resets.newest_attitude, context.fresh_position()
+    if attitude_sample is None or position is None:
         return False
-    tilt, speed = tilt_angle(sample.q[1], sample.q[2]), hypot(*position.velocity_ned[:2])
-    context.detail = (
+    tilt, speed = (
+        tilt_angle(attitude_sample.q[1], attitude_sample.q[2]),
+        hypot(*position.velocity_ned[:2]),
+    )
+    context.waiting_for = (
         f"the autopilot to hold the vehicle (tilt {degrees(tilt):.0f}°, speed {speed:.1f} m/s)"
     )
     return tilt <= context.config.limits.max_tilt and speed <= _LARGEST_HELD_SPEED
@@ -207,7 +214,7 @@ async def _take_over(context: FlightContext) -> None:
     autopilot = context.link.autopilot
     if autopilot.control_entry is ControlEntry.BY_COMMAND and not context.loop.on:
         await stream(context)
-    context.detail = "the autopilot to obey our rates"
+    context.waiting_for = "the autopilot to obey our rates"
     context.loop.taking_over = True
     if autopilot.control_entry is ControlEntry.BY_FIRST_SETPOINT:
         # The known mode may be a second old, and a pilot may have taken over since.

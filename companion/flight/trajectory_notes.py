@@ -41,11 +41,12 @@ def slow_down_notes(before: Trajectory, slow_down: SlowDown, reserve: float) -> 
         f"its highest speed is "
         + (f"still {slowed}" if slowed == unslowed else f"{slowed} instead of {unslowed}")
     )
-    if slow_down.even:
-        (whole,) = slow_down.parts
+    if slow_down.is_even:
+        (whole_part,) = slow_down.parts
         note = (
-            f"{before.name} is slowed down evenly, by a factor of {whole.factor:.2f}, because "
-            f"{slow_down.reason}; its tightest limit is {_tightest_limit(after, whole, reserve)}"
+            f"{before.name} is slowed down evenly, by a factor of {whole_part.factor:.2f}, because "
+            f"{slow_down.reason}; its tightest limit is "
+            f"{_tightest_limit(after, whole_part, reserve)}"
         )
         return note, result
     parts = "; ".join(

@@ -18,8 +18,8 @@ _LONGEST_UPDATE_INTERVAL = 0.1
 """A longer interval between two updates is our own stall and does not count as silence, s."""
 
 
-class ChecksVoid(FlightEnded):
-    """The checked vehicle may have been replaced before arming, so the checks must be repeated."""
+class VehicleReplaced(FlightEnded):
+    """The vehicle was perhaps replaced after the checks, so the checks must be repeated."""
 
 
 class ReplacementDetector:
@@ -37,20 +37,23 @@ class ReplacementDetector:
 
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
-        self._begun = self._arming_noted = False
-        self._peers = self._restarts = 0
+        self._has_begun = self._arming_noted = False
+        self._peer_count = self._restart_count = 0
         self.uid: str | None = None
         self._other_uid: str | None = None
-        self._frames = 0
+        self._frame_count = 0
         self._updated_at = clock()
         self._silence = self._long_silence = 0.0
 
     def begin(self) -> None:
         """Begin to watch: from now on, all frames must come from the same vehicle."""
-        self._begun, self._arming_noted = True, False
+        self._has_begun, self._arming_noted = True, False
         self.uid = self._other_uid = None
-        self._peers, self._restarts = self._link.stats.peers, self._link.clock.restart_count
-        self._frames, self._updated_at = self._link.stats.frames, self._clock()
+        self._peer_count, self._restart_count = (
+            self._link.stats.peers,
+            self._link.clock.restart_count,
+        )
+        self._frame_count, self._updated_at = self._link.stats.frames, self._clock()
         self._silence = self._long_silence = 0.0
 
     def note_arming(self) -> None:
@@ -64,12 +67,12 @@ class ReplacementDetector:
         """Measure the silence; the watch calls this 50 times a second."""
         now, frames = self._clock(), self._link.stats.frames
         interval, self._updated_at = now - self._updated_at, now
-        if frames == self._frames:
+        if frames == self._frame_count:
             self._silence += min(interval, _LONGEST_UPDATE_INTERVAL)
             return
         if self._silence > LONGEST_SILENCE and not self._arming_noted:
             self._long_silence = self._silence
-        self._frames, self._silence = frames, 0.0
+        self._frame_count, self._silence = frames, 0.0
 
     def note_identity(self, identity: Identity) -> None:
         """Take the identity from AUTOPILOT_VERSION; an unknown hardware id is ignored."""
@@ -82,34 +85,34 @@ class ReplacementDetector:
     def is_same_vehicle(self) -> bool:
         """Whether there is no sign of a replacement; the control loop asks at every sample."""
         return (
-            self._peers == self._link.stats.peers
-            and self._restarts == self._link.clock.restart_count
+            self._peer_count == self._link.stats.peers
+            and self._restart_count == self._link.clock.restart_count
             and self._other_uid is None
             and not self._long_silence
             and (self._silence <= LONGEST_SILENCE or self._arming_noted)
-        ) or not self._begun
+        ) or not self._has_begun
 
     def require(self) -> None:
         """Require the same vehicle.
 
         Raises:
-            ChecksVoid: it may be another vehicle, and nothing is armed yet.
+            VehicleReplaced: it may be another vehicle, and nothing is armed yet.
             FlightEnded: it may be another vehicle; control is released.
         """
         if self.is_same_vehicle or (reason := self._sign_of_replacement()) is None:
             return
         if self._arming_noted:
             raise FlightEnded(reason, Exit.RELEASE)
-        raise ChecksVoid(reason)
+        raise VehicleReplaced(reason)
 
     def _sign_of_replacement(self) -> str | None:
         """The sign of a replacement, in words.
 
         None: there is no sign, or the vehicle is still silent; a silence counts when it ends.
         """
-        if self._peers != self._link.stats.peers:
+        if self._peer_count != self._link.stats.peers:
             return "the vehicle is heard from another address or connection than before"
-        if self._restarts != self._link.clock.restart_count:
+        if self._restart_count != self._link.clock.restart_count:
             return f"the autopilot may have restarted: {self._link.clock.last_change}"
         if self._other_uid is not None:
             return f"another vehicle answers: hardware id {self._other_uid}, not {self.uid}"
@@ -128,8 +131,9 @@ class DragMemory:
         note: called with messages for the user.
 
     Attributes:
-        on_begin: called when the estimate begins with a vehicle's learned drag, or without one.
-        on_known: called with what is known of the drag, once for each vehicle.
+        on_estimate_begin: called when the estimate begins with a vehicle's learned drag, or
+            without one.
+        on_known_drag: called with what is known of the drag, once for each vehicle.
     """
 
     def __init__(
@@ -144,8 +148,8 @@ class DragMemory:
         self._file: LearnedFile | None = None
         self._uid: str | None = None
         self._known_drag: KnownDrag | None = None
-        self.on_begin: Callable[[KnownDrag], None] = lambda _: None
-        self.on_known: Callable[[KnownDrag], None] = lambda _: None
+        self.on_estimate_begin: Callable[[KnownDrag], None] = lambda _: None
+        self.on_known_drag: Callable[[KnownDrag], None] = lambda _: None
 
     def load(self, identity: Identity) -> KnownDrag:
         """Return what is known of this vehicle's drag.
@@ -156,10 +160,10 @@ class DragMemory:
             self._uid = identity.uid
             self._known_drag = drag_of_vehicle(self._config, self._directory, identity.uid)
             self._begin_estimate(self._known_drag)
-            self.on_known(self._known_drag)
+            self.on_known_drag(self._known_drag)
         return self._known_drag
 
-    def _begin_estimate(self, known: KnownDrag) -> None:
+    def _begin_estimate(self, known_drag: KnownDrag) -> None:
         """Restart the estimate if the vehicle has changed; without a hardware id, do nothing."""
         if self._uid is None or self._directory is None:
             return
@@ -169,14 +173,15 @@ class DragMemory:
         self._file = file
         if self._config.guidance.drag is not None:
             return
-        self._estimate.begin(prior_of(known.drag))
-        self.on_begin(known)
-        if known.file_fault is not None:
-            self._note(known.file_fault)
-        if known.drag is not None:
+        self._estimate.begin(prior_of(known_drag.drag))
+        self.on_estimate_begin(known_drag)
+        if known_drag.file_fault is not None:
+            self._note(known_drag.file_fault)
+        if known_drag.drag is not None:
             self._note(
-                f"drag from an earlier flight of this vehicle: linear {known.drag.linear:.2f} 1/s, "
-                f"quadratic {known.drag.quadratic:.3f} 1/m ({file.path})"
+                "drag from an earlier flight of this vehicle: linear "
+                f"{known_drag.drag.linear:.2f} 1/s, quadratic {known_drag.drag.quadratic:.3f} 1/m "
+                f"({file.path})"
             )
 
     def save(self) -> bool:

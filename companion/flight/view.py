@@ -35,10 +35,10 @@ def view(context: FlightContext, now: float) -> dict[str, Any]:
         unanswered=sum(loop.record.unanswered.values()),
         offboard_active=loop.offboard_active,
     )
-    known = ((name, value) for name, value in values.items() if value is not None)
+    known_values = ((name, value) for name, value in values.items() if value is not None)
     return {
         name: round(value, 5) if isinstance(value, float) else value
-        for name, value in known
+        for name, value in known_values
         if isfinite(value)
     }
 
@@ -75,8 +75,8 @@ def _motion_values(context: FlightContext, now: float) -> dict[str, float | None
         if thrust > 0.0:  # in free fall no direction of the thrust is wanted
             values.update(reference_north=north / thrust, reference_east=east / thrust)
         if height is not None:
-            above = motion.position_ned[2] - reference.position_ned[2]
-            values.update(reference_height_m=height + above)
+            height_difference = motion.position_ned[2] - reference.position_ned[2]
+            values.update(reference_height_m=height + height_difference)
     return values
 
 

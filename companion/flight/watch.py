@@ -42,12 +42,12 @@ class Watch:
         self._clock = clock
         self._rate_requester = rate_requester
         # Whether setpoints were stopped while the autopilot obeyed them: it may still wait for us.
-        self._stopped_in_control = False
-        self._current_mode_at = self._heartbeat_asked_at = -inf
+        self._was_stopped_in_control = False
+        self._current_mode_received = self._heartbeat_requested_at = -inf
         self._heartbeat_request: asyncio.Task[None] | None = None
         self._mode_request: asyncio.Task[None] | None = None
 
-    def judge(self, phase: Phase) -> None:
+    def check(self, phase: Phase) -> None:
         """Check the vehicle's identity, its mode and heartbeat, and the safety monitors once.
 
         Raises:
@@ -60,14 +60,14 @@ class Watch:
         self._context.replacement_detector.require()
         in_control = phase.monitored and self._context.loop.offboard_active
         if in_control and self._context.link.state.armed is False:
-            self._judge_snapshot(now)  # first: ArduPilot also changes its mode then
+            self._check_snapshot(now)  # first: ArduPilot also changes its mode then
         if phase.allowed_roles:
             require_role(self._context.link, phase.allowed_roles, self._context.released_by())
         if in_control:
-            self._judge_snapshot(now)
+            self._check_snapshot(now)
         if phase.allowed_roles:
             self._rate_requester.check_statuses(now, self._context.heartbeat_limit)
-            self._judge_heartbeat(now, monitored=phase.monitored)
+            self._check_heartbeat(now, monitored=phase.monitored)
 
     def on_current_mode(self, phase: Phase) -> None:
         """Check a CURRENT_MODE, which comes twice a second and at once after a status change.
@@ -76,19 +76,22 @@ class Watch:
         heartbeat can confirm it, so the watch requests a heartbeat.
 
         Raises:
-            FlightEnded: the phase must end; see `judge`.
+            FlightEnded: the phase must end; see `check`.
         """
         now = self._clock()
-        is_early, self._current_mode_at = now - self._current_mode_at < _CURRENT_MODE_PERIOD, now
+        is_early, self._current_mode_received = (
+            now - self._current_mode_received < _CURRENT_MODE_PERIOD,
+            now,
+        )
         if is_early:
             self._request_heartbeat(now)
-        self.judge(phase)
+        self.check(phase)
 
     def _request_heartbeat(self, now: float) -> None:
         """Request a heartbeat, unless one was requested within `_HEARTBEAT_REQUEST_PERIOD`."""
         is_requesting = self._heartbeat_request is not None and not self._heartbeat_request.done()
-        if not is_requesting and now - self._heartbeat_asked_at >= _HEARTBEAT_REQUEST_PERIOD:
-            self._heartbeat_asked_at = now
+        if not is_requesting and now - self._heartbeat_requested_at >= _HEARTBEAT_REQUEST_PERIOD:
+            self._heartbeat_requested_at = now
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
     def ask_mode(self) -> None:
@@ -115,7 +118,7 @@ class Watch:
                 self._context.guidance_loop.step()  # the newest command leads to the old place
             loop.resume()
 
-    def _judge_snapshot(self, now: float) -> None:
+    def _check_snapshot(self, now: float) -> None:
         """Run the safety monitors on a snapshot, and take the action that they demand."""
         self._context.link.timesync.probe()
         snapshot = self._context.snapshot_builder.snapshot(now)
@@ -133,10 +136,10 @@ class Watch:
             self._context.release()
         elif verdict.stream is StreamEffect.ENDS:
             self._context.end_stream()
-        self._stopped_in_control |= verdict.stream is not StreamEffect.CONTINUES
+        self._was_stopped_in_control |= verdict.stream is not StreamEffect.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])
 
-    def _judge_heartbeat(self, now: float, *, monitored: bool) -> None:
+    def _check_heartbeat(self, now: float, *, monitored: bool) -> None:
         """Judge the age of the mode and of the heartbeat at `now`, s on our clock.
 
         Stalls of this program count as age only in a monitored phase while the autopilot obeys us:
@@ -145,17 +148,17 @@ class Watch:
         """
         state, loop = self._context.link.state, self._context.loop
         # In a takeover the autopilot may obey a setpoint before a heartbeat reports the new mode.
-        in_control = loop.offboard_active or loop.taking_over or self._stopped_in_control
-        climbs_alone = self._context.took_off_from is not None
-        exit_ = Exit.LISTEN if in_control or climbs_alone else Exit.RELEASE
+        in_control = loop.offboard_active or loop.taking_over or self._was_stopped_in_control
+        climbs_without_us = self._context.takeoff_position is not None
+        exit_ = Exit.LISTEN if in_control or climbs_without_us else Exit.RELEASE
 
         def age(received: float) -> float:
             stalled = self._context.snapshot_builder.counters.stall_time(since=received)
             return now - received - (0.0 if in_control and monitored else stalled)
 
         # While the autopilot flies by itself, as in a take-off, a short silence changes nothing.
-        shortest_limit = 0.0 if in_control else INITIAL_HEARTBEAT_LIMIT
-        if age(state.mode_received_at) > max(self._context.heartbeat_limit, shortest_limit):
+        min_limit = 0.0 if in_control else INITIAL_HEARTBEAT_LIMIT
+        if age(state.mode_received_at) > max(self._context.heartbeat_limit, min_limit):
             raise FlightEnded(
                 "no heartbeat from the vehicle, so its mode is not known any more", exit_
             )

@@ -18,14 +18,14 @@ from companion.vehicle.state import VehicleState
 
 @asynccontextmanager
 async def connected(
-    assembled: AssembledFlight, *works: Coroutine[Any, Any, None]
+    assembled: AssembledFlight, *background_work: Coroutine[Any, Any, None]
 ) -> AsyncIterator[None]:
     """Connect the flight to its link and report its state while the block runs the flight.
 
     Only one flight at a time may be connected to a link.
 
-    `works`: coroutines to run beside the flight. An exception in a coroutine, or in the reporter,
-    is noted as an event and does not end the flight.
+    `background_work`: coroutines to run beside the flight. An exception in a coroutine, or in the
+    reporter, is noted as an event and does not end the flight.
     """
 
     async def run_guarded(work: Coroutine[Any, Any, None]) -> None:
@@ -36,8 +36,8 @@ async def connected(
 
     try:
         with _callbacks(assembled):
-            all_works = assembled.reporter.run(), *works
-            tasks = [asyncio.create_task(run_guarded(work)) for work in all_works]
+            all_work = assembled.reporter.run(), *background_work
+            tasks = [asyncio.create_task(run_guarded(work)) for work in all_work]
             try:
                 yield
             finally:
@@ -52,14 +52,14 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
     """Connect the flight to the link's callbacks and to changed values while the block runs."""
     flight, context, link = assembled.flight, assembled.context, assembled.context.link
     loop, guidance_loop = context.loop, context.guidance_loop
-    time = asyncio.get_running_loop().time
+    clock = asyncio.get_running_loop().time
     dead_time_watch = assembled.dead_time_watch
 
     def on_attitude(sample: AttitudeSample) -> None:
         loop.on_sample(sample)
         guidance_loop.note_attitude(sample)
         if loop.offboard_active:
-            dead_time_watch.after_answer(sample.received)
+            dead_time_watch.after_setpoint(sample.received)
 
     state_logger = StateLogger(link.state, flight.note)
 
@@ -73,7 +73,7 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
 
     def on_attitude_target(message: Message) -> None:
         if loop.offboard_active:
-            context.snapshot_builder.echo.take(message, time())
+            context.snapshot_builder.echo.take(message, clock())
 
     link.on_attitude = on_attitude
     link.on_error = flight.fail
@@ -85,8 +85,8 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
         link.subscribe_parameters(context.preflight.on_parameter),
     )
     try:
-        retuning, record = Retuning(loop, guidance_loop), assembled.trace.recorder
-        with assembled.changes.applying(retuning, flight.note, record):
+        retuning, recorder = Retuning(loop, guidance_loop), assembled.trace.recorder
+        with assembled.changes.applying(retuning, flight.note, recorder):
             yield
     finally:
         link.on_attitude = link.on_error = None
@@ -125,8 +125,8 @@ class StateLogger:
             self._note("armed" if state.armed else "disarmed")
 
     def _new_texts(self) -> list[StatusText]:
-        last, texts = self._last_text, self._state.texts
-        new = [*takewhile(lambda text: text is not last, reversed(texts))][::-1]
-        if new:
-            self._last_text = new[-1]
-        return new
+        last_text, texts = self._last_text, self._state.texts
+        new_texts = [*takewhile(lambda text: text is not last_text, reversed(texts))][::-1]
+        if new_texts:
+            self._last_text = new_texts[-1]
+        return new_texts

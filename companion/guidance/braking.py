@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from companion.guidance.reference import NorthEast, Reference, Vector, VehicleMotion
 
-_DECELERATION_SHARE = 0.47
+_MEAN_DECELERATION_FRACTION = 0.47
 """Mean deceleration of a smooth stop, as a share of the deceleration that the tilt limit allows in
 the present wind. The peak is a share of 0.7; the other 0.3 are for gusts and feedback."""
 _LARGEST_JERK = 8.0
@@ -14,16 +14,16 @@ _REST_SPEED = 0.1
 """A vehicle slower than this counts as at rest, m/s."""
 _UPWIND_PEAK_ACCELERATION = 1.5
 """Largest acceleration of the move upwind, m/s²; it leaves tilt for braking and for the wind."""
-_DRIFT_TIME_SQUARED = 0.47
+_DRIFT_PER_WIND_ACCELERATION = 0.47
 """Drift of a vehicle that leans against wind when PX4 takes over, m per m/s² of acceleration by
 wind, s². PX4 in simulation drifted by 1.40 and 1.42 m at 3.0 m/s² and was farthest after 3 s. The
 drift grows if MPC_XY_P, MPC_XY_VEL_P_ACC or MPC_XY_VEL_I_ACC is smaller."""
-_PEAK = 1.5
+_PEAK_PER_MEAN = 1.5
 """Peak deceleration of a smooth stop (`Braking`), per mean deceleration."""
 _LEAST_ACCELERATION = 0.3
 """Lower bound of the acceleration assumed for braking, m/s², so that the stopping distance stays
 finite in wind that needs the whole tilt."""
-_NOTICE_TIME = 0.1
+_BREACH_DETECTION_TIME = 0.1
 """Time within which the fence's monitor and guidance notice a breach, s."""
 
 
@@ -31,12 +31,12 @@ class AssumedBraking(NamedTuple):
     """Braking assumed by the fence's monitor; the vehicle must not need a longer stopping distance.
 
     Attributes:
-        reaction: delay before the vehicle brakes, s (`safety.reaction_s`).
+        reaction_time: delay before the vehicle brakes, s (`safety.reaction_s`).
         deceleration: constant deceleration after this delay, m/s² (`safety.braking_m_s2`), if the
             tilt allows it; see `mean_deceleration`.
     """
 
-    reaction: float
+    reaction_time: float
     deceleration: float
 
 
@@ -53,20 +53,20 @@ def acceleration_beside_wind(largest: float, velocity: NorthEast, wind: NorthEas
     speed = hypot(*velocity)
     if speed == 0.0:
         return max(largest - hypot(*wind), _LEAST_ACCELERATION)
-    along = (wind[0] * velocity[0] + wind[1] * velocity[1]) / speed
-    across = (wind[0] * velocity[1] - wind[1] * velocity[0]) / speed
-    left = sqrt(max(0.0, largest * largest - across * across))
-    return max(left - along, _LEAST_ACCELERATION)
+    wind_along = (wind[0] * velocity[0] + wind[1] * velocity[1]) / speed
+    wind_across = (wind[0] * velocity[1] - wind[1] * velocity[0]) / speed
+    remaining = sqrt(max(0.0, largest * largest - wind_across * wind_across))
+    return max(remaining - wind_along, _LEAST_ACCELERATION)
 
 
-def mean_deceleration(assumed: float, acceleration: float) -> float:
+def mean_deceleration(assumed_deceleration: float, acceleration: float) -> float:
     """Mean deceleration of the hardest stop, m/s².
 
     Args:
-        assumed: deceleration that is assumed if the tilt allows it, m/s².
+        assumed_deceleration: deceleration that is assumed if the tilt allows it, m/s².
         acceleration: largest acceleration against the motion, m/s².
     """
-    return min(assumed, acceleration / _PEAK)
+    return min(assumed_deceleration, acceleration / _PEAK_PER_MEAN)
 
 
 def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> float:
@@ -82,10 +82,12 @@ def braking_time(speed: float, acceleration: float, assumed: AssumedBraking) -> 
     """
     if speed < _REST_SPEED:
         return 0.0
-    reaction = max(0.0, assumed.reaction - _NOTICE_TIME)
-    longest_time = 2.0 * reaction + speed / mean_deceleration(assumed.deceleration, acceleration)
+    reaction_time = max(0.0, assumed.reaction_time - _BREACH_DETECTION_TIME)
+    longest_time = 2.0 * reaction_time + speed / mean_deceleration(
+        assumed.deceleration, acceleration
+    )
     smooth_time = max(
-        speed / (_DECELERATION_SHARE * acceleration), sqrt(6.0 * speed / _LARGEST_JERK)
+        speed / (_MEAN_DECELERATION_FRACTION * acceleration), sqrt(6.0 * speed / _LARGEST_JERK)
     )
     return min(smooth_time, longest_time)
 
@@ -179,18 +181,18 @@ class BrakingUpwind(NamedTuple):
         speed = 30.0 * u * u * (1.0 - u) * (1.0 - u) / duration
         acceleration = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (duration * duration)
 
-        def added(vector: Vector, factor: float) -> Vector:
+        def add_scaled(vector: Vector, factor: float) -> Vector:
             north, east = self.displacement
             return (vector[0] + factor * north, vector[1] + factor * east, vector[2])
 
         return reference._replace(
-            position_ned=added(reference.position_ned, distance),
-            velocity_ned=added(reference.velocity_ned, speed),
-            acceleration_ned=added(reference.acceleration_ned, acceleration),
+            position_ned=add_scaled(reference.position_ned, distance),
+            velocity_ned=add_scaled(reference.velocity_ned, speed),
+            acceleration_ned=add_scaled(reference.acceleration_ned, acceleration),
         )
 
 
-def drift(wind: NorthEast) -> NorthEast:
+def handover_drift(wind: NorthEast) -> NorthEast:
     """How far the vehicle drifts downwind after the autopilot takes over, m north and east.
 
     The autopilot's modes begin level, without the tilt that balances the wind
@@ -199,18 +201,18 @@ def drift(wind: NorthEast) -> NorthEast:
     Args:
         wind: acceleration that the wind gives a vehicle at rest, m/s², north and east.
     """
-    return _DRIFT_TIME_SQUARED * wind[0], _DRIFT_TIME_SQUARED * wind[1]
+    return _DRIFT_PER_WIND_ACCELERATION * wind[0], _DRIFT_PER_WIND_ACCELERATION * wind[1]
 
 
 def brake_upwind(now: float, braking: Braking, wind: NorthEast) -> BrakingUpwind | Braking:
-    """Add a move upwind to `braking`: it begins now and is as long as the expected `drift`.
+    """Add a move upwind to `braking`: it begins now and is as long as the `handover_drift`.
 
     Args:
         now: event-loop time, s.
         braking: the braking that is flown.
-        wind: as in `drift`.
+        wind: as in `handover_drift`.
     """
-    north, east = drift(wind)
+    north, east = handover_drift(wind)
     distance = hypot(north, east)
     if distance == 0.0:
         return braking

@@ -23,9 +23,9 @@ class ClimbBias:
 
     def __init__(self) -> None:
         self.bias = 0.0
-        self._time = 0.0
-        self._down: float | None = None
-        self._speed = 0.0
+        self._last_time = 0.0
+        self._last_down: float | None = None
+        self._last_speed = 0.0
 
     def corrected_speed(self, time: float, down: float, speed: float) -> float:
         """Take a vertical position and speed; return the speed without its bias, m/s.
@@ -35,14 +35,14 @@ class ClimbBias:
             down: vertical position, m, positive down.
             speed: vertical speed, m/s, positive down.
         """
-        dt, last_down = time - self._time, self._down
-        mean_speed = 0.5 * (self._speed + speed)
-        self._time, self._speed = time, speed
+        dt, last_down = time - self._last_time, self._last_down
+        mean_speed = 0.5 * (self._last_speed + speed)
+        self._last_time, self._last_speed = time, speed
         if last_down is None or not 0.0 < dt < _LONGEST_GAP:
-            self._down = down
+            self._last_down = down
             return speed - self.bias
         predicted = last_down + dt * (mean_speed - self.bias)
-        error = down - predicted
-        self._down = predicted + min(2.0 * _FILTER_BANDWIDTH * dt, 1.0) * error
-        self.bias = clamp(self.bias - _FILTER_BANDWIDTH**2 * dt * error, _LARGEST_BIAS)
+        position_error = down - predicted
+        self._last_down = predicted + min(2.0 * _FILTER_BANDWIDTH * dt, 1.0) * position_error
+        self.bias = clamp(self.bias - _FILTER_BANDWIDTH**2 * dt * position_error, _LARGEST_BIAS)
         return speed - self.bias

@@ -8,7 +8,7 @@ from companion.attitude import BodyRates
 from companion.guidance.maneuvers import check_times_between
 from companion.guidance.reference import Pose, Reference, VerticalMode
 
-_FIRST_DOUBLET_SHARE = 0.5
+_FIRST_DOUBLET_FRACTION = 0.5
 """Size of the first doublet of an axis, relative to the second one. With doublets of equal size, a
 slew limit could not be told from a lag."""
 _REST_TIME = 0.5
@@ -52,11 +52,11 @@ class _Doublet(NamedTuple):
             speed = time - 4.0 * step
             height = 0.5 * speed * speed
         north, east, down = hold.position_ned
-        up = self.climb_acceleration
+        climb_acceleration = self.climb_acceleration
         return hold._replace(
-            position_ned=(north, east, down - up * height),
-            velocity_ned=(0.0, 0.0, -up * speed),
-            acceleration_ned=(0.0, 0.0, -up * self._doublet_sign(time)),
+            position_ned=(north, east, down - climb_acceleration * height),
+            velocity_ned=(0.0, 0.0, -climb_acceleration * speed),
+            acceleration_ned=(0.0, 0.0, -climb_acceleration * self._doublet_sign(time)),
             vertical=VerticalMode.HEIGHT_IN_STEPS,
         )
 
@@ -73,7 +73,7 @@ class Doublets:
     Each axis is excited with half its rate, then with the full rate. The angle changes by A·T at
     most and then returns to its value before the doublet. Three equal doublets of the vertical
     acceleration follow, in closed loop: the reference contains the doublet. Position hold corrects
-    the drift for `settle` seconds before each doublet and at the end.
+    the drift for `settle_time` seconds before each doublet and at the end.
 
     Attributes:
         tilt_rate: A of roll and pitch, rad/s.
@@ -82,7 +82,7 @@ class Doublets:
         yaw_step_time: T of yaw, s; yaw responds more slowly.
         climb_acceleration: A of the vertical acceleration, m/s².
         climb_step_time: T of the vertical acceleration, s.
-        settle: time of position hold before each doublet and at the end, s.
+        settle_time: time of position hold before each doublet and at the end, s.
     """
 
     tilt_rate: float
@@ -91,46 +91,48 @@ class Doublets:
     yaw_step_time: float
     climb_acceleration: float
     climb_step_time: float
-    settle: float
+    settle_time: float
     name: str = "identify"
 
     @property
     def duration(self) -> float:
         """Duration of all doublets, their rests and the times of position hold, s."""
-        return self.settle + sum(part.duration + self.settle for part in self._doublets)
+        return self.settle_time + sum(
+            doublet.duration + self.settle_time for doublet in self._doublets
+        )
 
     @cached_property
     def _doublets(self) -> tuple[_Doublet, ...]:
-        tilt, yaw = self.tilt_rate, self.yaw_rate
-        rates = [
-            _Doublet(step, BodyRates(*(share * rate for rate in axis)))
+        tilt_rate, yaw_rate = self.tilt_rate, self.yaw_rate
+        rate_doublets = [
+            _Doublet(step, BodyRates(*(fraction * rate for rate in axis)))
             for step, axis in (
-                (self.tilt_step_time, (tilt, 0.0, 0.0)),
-                (self.tilt_step_time, (0.0, tilt, 0.0)),
-                (self.yaw_step_time, (0.0, 0.0, yaw)),
+                (self.tilt_step_time, (tilt_rate, 0.0, 0.0)),
+                (self.tilt_step_time, (0.0, tilt_rate, 0.0)),
+                (self.yaw_step_time, (0.0, 0.0, yaw_rate)),
             )
-            for share in (_FIRST_DOUBLET_SHARE, 1.0)
+            for fraction in (_FIRST_DOUBLET_FRACTION, 1.0)
         ]
-        climb = _Doublet(self.climb_step_time, climb_acceleration=self.climb_acceleration)
-        return *rates, *(_CLIMB_COUNT * [climb])
+        climb_doublet = _Doublet(self.climb_step_time, climb_acceleration=self.climb_acceleration)
+        return *rate_doublets, *(_CLIMB_COUNT * [climb_doublet])
 
     def check_times(self) -> list[float]:
         """Times to check, s: the beginning, every 0.01 s of doublets and rests, and the end."""
         times, begin = [0.0], 0.0
-        for part in self._doublets:
-            begin += self.settle
-            times += check_times_between(begin, begin + part.duration)
-            begin += part.duration
+        for doublet in self._doublets:
+            begin += self.settle_time
+            times += check_times_between(begin, begin + doublet.duration)
+            begin += doublet.duration
         return [*times, self.duration]
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference: body rates or a climb in a doublet, position hold between doublets."""
         hold = Reference(start.position_ned, heading=start.heading)
-        for part in self._doublets:
-            time -= self.settle
+        for doublet in self._doublets:
+            time -= self.settle_time
             if time < 0.0:
                 break
-            if time < part.duration:
-                return part.at(time, hold)
-            time -= part.duration
+            if time < doublet.duration:
+                return doublet.at(time, hold)
+            time -= doublet.duration
         return hold

@@ -15,7 +15,7 @@ _MEASUREMENT_DEVIATION = 0.2
 """Standard deviation of a measurement, m/s², from velocity noise and the thrust's direction."""
 _WIND_DEVIATION = 2.0
 """Initial standard deviation of the acceleration by wind, m/s²."""
-_WIND_CHANGE = 0.2
+_WIND_RANDOM_WALK = 0.2
 """Standard deviation of the change of the acceleration by wind in 1 s, m/s²."""
 _CLAMP_DEVIATIONS = 3.0
 """An innovation is clamped to this many standard deviations, so that bumps do not count as drag."""
@@ -75,9 +75,9 @@ class DragEstimate:
         self.top_speed = 0.0
         self._state = np.array([prior.drag.linear, prior.drag.quadratic, 0.0, 0.0, 0.0])
         drag_deviations = prior.linear_deviation, prior.quadratic_deviation
-        others = _WIND_DEVIATION, _WIND_DEVIATION, _AXIS_DRAG_DEVIATION
-        self._covariance = np.diag([each**2 for each in (*drag_deviations, *others)])
-        self._innovation_sum, self._measurements = 0.0, 0
+        other_deviations = _WIND_DEVIATION, _WIND_DEVIATION, _AXIS_DRAG_DEVIATION
+        self._covariance = np.diag([each**2 for each in (*drag_deviations, *other_deviations)])
+        self._innovation_sum, self._measurement_count = 0.0, 0
         self._forget_window()
 
     @property
@@ -88,7 +88,7 @@ class DragEstimate:
     @property
     def certain(self) -> bool:
         """Whether the vehicle moved fast enough, in calm enough air, for a reliable estimate."""
-        if self._innovation_sum > _GUSTY_INNOVATION * self._measurements:
+        if self._innovation_sum > _GUSTY_INNOVATION * self._measurement_count:
             return False
         speed, p = self.top_speed, self._covariance
         variance = p[0, 0] + 2.0 * speed * p[0, 1] + speed * speed * p[1, 1]
@@ -114,32 +114,32 @@ class DragEstimate:
             self._displacement[axis] += dt * velocity[axis]
             self._speed_times_velocity[axis] += dt * speed * velocity[axis]
             self._residual[axis] += dt * residual[axis]
-        self._span += dt
-        if self._span >= _SHORTEST_WINDOW:
+        self._window_duration += dt
+        if self._window_duration >= _SHORTEST_WINDOW:
             self._update_filter()
             self._forget_window()
 
     def _update_filter(self) -> None:
         """Update the filter with the mean residuals since the last update, north and then east."""
-        span = self._span
-        self.top_speed = max(self.top_speed, hypot(*self._displacement) / span)
-        for wind in (2, 3):
-            self._covariance[wind, wind] += span * _WIND_CHANGE**2
+        duration = self._window_duration
+        self.top_speed = max(self.top_speed, hypot(*self._displacement) / duration)
+        for wind_state in (2, 3):
+            self._covariance[wind_state, wind_state] += duration * _WIND_RANDOM_WALK**2
         for axis in (0, 1):
             observation = np.zeros(5)
-            observation[0] = -self._displacement[axis] / span
-            observation[1] = -self._speed_times_velocity[axis] / span
+            observation[0] = -self._displacement[axis] / duration
+            observation[1] = -self._speed_times_velocity[axis] / duration
             observation[2 + axis] = 1.0
-            observation[4] = -self._along_axes[axis] / span
+            observation[4] = -self._along_axes[axis] / duration
             cross_covariance = self._covariance @ observation
             variance = float(observation @ cross_covariance) + _MEASUREMENT_DEVIATION**2
             limit = _CLAMP_DEVIATIONS * sqrt(variance)
             innovation = clamp(
-                self._residual[axis] / span - float(observation @ self._state), limit
+                self._residual[axis] / duration - float(observation @ self._state), limit
             )
             gain = cross_covariance / variance
             self._innovation_sum += innovation * innovation / variance
-            self._measurements += 1
+            self._measurement_count += 1
             self._state = self._state + gain * innovation
             self._covariance = self._covariance - np.outer(gain, cross_covariance)
         self.drag = self._drag_within_bounds()
@@ -158,6 +158,6 @@ class DragEstimate:
         )
 
     def _forget_window(self) -> None:
-        self._span = 0.0
+        self._window_duration = 0.0
         self._displacement, self._residual = [0.0, 0.0], [0.0, 0.0]
         self._speed_times_velocity, self._along_axes = [0.0, 0.0], [0.0, 0.0]

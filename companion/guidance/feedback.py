@@ -67,9 +67,9 @@ def horizontal_gains(weights: Weights, lag: float, drag: float = 0.0) -> Horizon
     a = np.array([[0.0, 1.0, 0.0], [0.0, -drag, 1.0], [0.0, 0.0, -1.0 / lag]])
     b = np.array([[0.0], [0.0], [1.0 / lag]])
     q = np.diag([weights.position, weights.velocity, 0.0])
-    values, vectors = np.linalg.eig(np.block([[a, -b @ b.T], [-q, -a.T]]))
-    stable = vectors[:, np.argsort(values.real)[:3]]
-    riccati = np.real(stable[3:] @ np.linalg.inv(stable[:3]))
+    eigenvalues, eigenvectors = np.linalg.eig(np.block([[a, -b @ b.T], [-q, -a.T]]))
+    stable_eigenvectors = eigenvectors[:, np.argsort(eigenvalues.real)[:3]]
+    riccati = np.real(stable_eigenvectors[3:] @ np.linalg.inv(stable_eigenvectors[:3]))
     position, velocity, acceleration = (b.T @ riccati)[0].tolist()
     gains = HorizontalGains(position, velocity, acceleration)
     if not all(isfinite(gain) and gain > 0.0 for gain in (position, velocity, acceleration)):
@@ -99,7 +99,11 @@ class HeightGains:
 
 
 def acceleration_down(
-    gains: HeightGains, reference: Reference, motion: VehicleMotion, ahead: Reference, drag: Drag
+    gains: HeightGains,
+    reference: Reference,
+    motion: VehicleMotion,
+    future_reference: Reference,
+    drag: Drag,
 ) -> float:
     """Acceleration that thrust and gravity together shall give, m/s² downwards, from −g/2 to g/2.
 
@@ -107,15 +111,16 @@ def acceleration_down(
         gains: gains and limits of the height cascade.
         reference: the reference now.
         motion: the present motion.
-        ahead: the reference one rotor lag later; its acceleration and velocity are fed forward.
+        future_reference: the reference one rotor lag later; its acceleration and velocity are fed
+            forward.
         drag: drag of the vehicle, which thrust balances in climb and descent; with
             `VerticalMode.ACCELERATION` neither drag nor feedback is added.
     """
-    wanted = ahead.acceleration_ned[2]
+    acceleration = future_reference.acceleration_ned[2]
     if reference.vertical is not VerticalMode.ACCELERATION:
         error = reference.position_ned[2] - motion.position_ned[2]
         speed = reference.velocity_ned[2] + gains.height * error
         speed = min(max(speed, -gains.max_climb), gains.max_descent)
-        wanted += gains.climb * (speed - motion.velocity_ned[2])
-        wanted += drag.deceleration(ahead.velocity_ned)[2]
-    return min(max(wanted, -_LARGEST_VERTICAL_ACCELERATION), _LARGEST_VERTICAL_ACCELERATION)
+        acceleration += gains.climb * (speed - motion.velocity_ned[2])
+        acceleration += drag.deceleration(future_reference.velocity_ned)[2]
+    return min(max(acceleration, -_LARGEST_VERTICAL_ACCELERATION), _LARGEST_VERTICAL_ACCELERATION)

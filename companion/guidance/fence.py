@@ -74,7 +74,7 @@ class Fence:
         polygon: corners, m north and east of where control began; empty: only the cylinder.
         places: corners as (latitude, longitude) in degrees, instead of `polygon`.
         deceleration: deceleration that the vehicle reaches if its tilt allows it, m/s².
-        reaction: assumed delay before the vehicle brakes, s.
+        reaction_time: assumed delay before the vehicle brakes, s.
         estimate_delay: delay of the estimated horizontal motion behind the true one, s.
         tilt_acceleration: largest horizontal acceleration by tilt, m/s². A part of it balances the
             wind; the rest limits horizontal braking.
@@ -86,7 +86,7 @@ class Fence:
     polygon: tuple[Corner, ...]
     places: tuple[Corner, ...]
     deceleration: float
-    reaction: float
+    reaction_time: float
     estimate_delay: float = 0.0
     tilt_acceleration: float = inf
 
@@ -123,11 +123,11 @@ class Fence:
             return Breach("safety.fence_polygon_deg", "but needed by", where, 0.0)
         corners = local_polygon(self.places, origin) if origin and self.places else self.polygon
         if corners:
-            outside = -distance_inside(north, east, corners) if margin else 0.0
-            if outside > -margin or not inside(north, east, corners):
+            distance_outside = -distance_inside(north, east, corners) if margin else 0.0
+            if distance_outside > -margin or not inside(north, east, corners):
                 key = "safety.fence_polygon_deg" if self.places else "safety.fence_polygon_m"
                 where = f"{north:.1f} m north and {east:.1f} m east of where control began"
-                return Breach(key, "outside", where, outside)
+                return Breach(key, "outside", where, distance_outside)
         if -down > self.ceiling - margin:
             where = f"{0.0 - down:.1f} m above where control began"
             return Breach("limits.fence_ceiling_m", "above", where, -down - self.ceiling)
@@ -147,8 +147,8 @@ class Fence:
 
         From a horizontal or vertical velocity v, the vehicle stops after v·t + v²/(2b). b is
         `deceleration`, or horizontally less if tilt limit and wind allow only less. t is
-        `reaction`, horizontally plus `estimate_delay`. A horizontal acceleration a that makes the
-        vehicle faster is assumed to last for the time t; the vehicle then stops after
+        `reaction_time`, horizontally plus `estimate_delay`. A horizontal acceleration a that makes
+        the vehicle faster is assumed to last for the time t; the vehicle then stops after
         v·t + a·t²/2 + (v + a·t)²/(2b). An acceleration that brakes is ignored, because it may end
         at any moment.
 
@@ -161,22 +161,26 @@ class Fence:
                 wind; required if the other arguments are arrays.
         """
         north, east, down = velocity
-        reaction = self.reaction + self.estimate_delay
-        dv_north, dv_east = reaction * acceleration[0], reaction * acceleration[1]
+        reaction_time = self.reaction_time + self.estimate_delay
+        dv_north, dv_east = reaction_time * acceleration[0], reaction_time * acceleration[1]
         # The square of the speed after the reaction time, minus the square of the present speed.
         increase = dv_north * (2.0 * north + dv_north) + dv_east * (2.0 * east + dv_east)
         is_faster = (increase > 0.0) * 1.0
         dv_north, dv_east = is_faster * dv_north, is_faster * dv_east
         later_north, later_east = north + dv_north, east + dv_east
         later_speed = (later_north * later_north + later_east * later_east) ** 0.5
-        available = self.tilt_acceleration
+        available_acceleration = self.tilt_acceleration
         if wind is not None:
-            available = acceleration_beside_wind(available, (later_north, later_east), wind)
-        half_braking_time = 0.5 * later_speed / mean_deceleration(self.deceleration, available)
+            available_acceleration = acceleration_beside_wind(
+                available_acceleration, (later_north, later_east), wind
+            )
+        half_braking_time = (
+            0.5 * later_speed / mean_deceleration(self.deceleration, available_acceleration)
+        )
         return (
-            offset[0] + reaction * (north + 0.5 * dv_north) + half_braking_time * later_north,
-            offset[1] + reaction * (east + 0.5 * dv_east) + half_braking_time * later_east,
-            offset[2] + (self.reaction + 0.5 * abs(down) / self.deceleration) * down,
+            offset[0] + reaction_time * (north + 0.5 * dv_north) + half_braking_time * later_north,
+            offset[1] + reaction_time * (east + 0.5 * dv_east) + half_braking_time * later_east,
+            offset[2] + (self.reaction_time + 0.5 * abs(down) / self.deceleration) * down,
         )
 
     def breach_at_stopping_point(
@@ -203,11 +207,11 @@ def inside(north: float, east: float, polygon: Sequence[Corner]) -> bool:
 
     A ray northwards from a place inside crosses the sides an odd number of times.
     """
-    odd = False
+    is_inside = False
     for (n0, e0), (n1, e1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
         if (e0 > east) is not (e1 > east) and north < n0 + (east - e0) / (e1 - e0) * (n1 - n0):
-            odd = not odd
-    return odd
+            is_inside = not is_inside
+    return is_inside
 
 
 def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> float:
@@ -215,10 +219,10 @@ def distance_inside(north: float, east: float, polygon: Sequence[Corner]) -> flo
     nearest = inf
     for (n0, e0), (n1, e1) in zip(polygon, (*polygon[1:], polygon[0]), strict=True):
         along_north, along_east = n1 - n0, e1 - e0
-        square = along_north * along_north + along_east * along_east
+        squared_length = along_north * along_north + along_east * along_east
         projection = (north - n0) * along_north + (east - e0) * along_east
-        share = min(max(projection / square, 0.0), 1.0) if square > 0.0 else 0.0
-        distance = hypot(north - n0 - share * along_north, east - e0 - share * along_east)
+        fraction = min(max(projection / squared_length, 0.0), 1.0) if squared_length > 0.0 else 0.0
+        distance = hypot(north - n0 - fraction * along_north, east - e0 - fraction * along_east)
         nearest = min(nearest, distance)
     return nearest if inside(north, east, polygon) else -nearest
 

@@ -21,7 +21,7 @@ def circle(radius: float, speed: float, laps: float) -> "HeldHeadingManeuver":
         laps: number of laps, including speeding up and slowing down. If it is not whole, the
             circle does not end where it began.
     """
-    return HeldHeadingManeuver(steady_circle(radius, speed, laps, longest=inf))
+    return HeldHeadingManeuver(steady_circle(radius, speed, laps, longest_duration=inf))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class Follow:
     trajectory: Trajectory
     yaw_rate: float
     notes: tuple[str, ...] = ()
-    _with_turn: Trajectory | None = None
+    _turned_trajectory: Trajectory | None = None
     _pose: Pose | None = None
 
     @property
@@ -84,16 +84,18 @@ class Follow:
 
         Before the maneuver begins, the angle of the turn is unknown and counts as 360°.
         """
-        if self._with_turn is not None:
-            return self._with_turn.duration
-        longest_turn = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
-        return longest_turn + self.trajectory.duration
+        if self._turned_trajectory is not None:
+            return self._turned_trajectory.duration
+        longest_turn_duration = 0.0 if self.trajectory.holds_heading else tau / self.yaw_rate
+        return longest_turn_duration + self.trajectory.duration
 
     @property
     def turn_duration(self) -> float:
         """Duration of the turn before the trajectory, s; 0 until the start is known."""
         return (
-            0.0 if self._with_turn is None else self._with_turn.duration - self.trajectory.duration
+            0.0
+            if self._turned_trajectory is None
+            else self._turned_trajectory.duration - self.trajectory.duration
         )
 
     def check_times(self) -> list[float]:
@@ -102,11 +104,11 @@ class Follow:
 
     def at(self, time: float, start: Pose) -> Reference:
         """The reference `time` seconds after the maneuver (its turn first) began at `start`."""
-        if self._with_turn is None or start is not self._pose:
+        if self._turned_trajectory is None or start is not self._pose:
             self._pose = start
-            self._with_turn = turned_first(self.trajectory, start.heading, self.yaw_rate)
+            self._turned_trajectory = turned_first(self.trajectory, start.heading, self.yaw_rate)
         heading = start.heading if self.trajectory.holds_heading else 0.0
-        return _reference_from(start, self._with_turn.at(time), heading)
+        return _reference_from(start, self._turned_trajectory.at(time), heading)
 
 
 def _reference_from(start: Pose, sample: Sample, heading: float) -> Reference:

@@ -27,8 +27,8 @@ class ThrustSettings:
         correction_limit: limit of learning. The learned hover thrust in N is at most
             (1 + correction_limit) times the configured one, and at least 1/(1 + correction_limit).
         correction_time: time constant with which the learned hover thrust follows a change, s.
-        lowest: smallest normalised thrust that is sent, 0..1.
-        highest: largest normalised thrust that is sent, 0..1.
+        min_thrust: smallest normalised thrust that is sent, 0..1.
+        max_thrust: largest normalised thrust that is sent, 0..1.
         curve_factor: factor of `ThrustCurve`.
         battery_exponent: exponent of `BatterySag`.
         lag: lag of the rotors, s.
@@ -39,8 +39,8 @@ class ThrustSettings:
     hover: float
     correction_limit: float
     correction_time: float
-    lowest: float
-    highest: float
+    min_thrust: float
+    max_thrust: float
     curve_factor: float = 0.0
     battery_exponent: float = 0.0
     lag: float = 0.0
@@ -63,13 +63,13 @@ class HoverThrust:
             self._curve.share(settings.hover), settings.correction_limit, settings.correction_time
         )
         self._window_start: tuple[float, float] | None = None
-        self._share_sum = 0.0
-        self._share_count = 0
+        self._thrust_share_sum = 0.0
+        self._thrust_share_count = 0
 
     @property
     def limits(self) -> tuple[float, float]:
         """Smallest and largest normalised thrust that is sent, 0..1."""
-        return self._settings.lowest, self._settings.highest
+        return self._settings.min_thrust, self._settings.max_thrust
 
     @property
     def configured_hover(self) -> float:
@@ -94,7 +94,7 @@ class HoverThrust:
     @property
     def largest_specific_thrust(self) -> float:
         """Specific thrust at the largest normalised thrust that is sent, m/s²."""
-        return self._to_specific(self._settings.highest)
+        return self._to_specific(self._settings.max_thrust)
 
     @property
     def largest_tilted_thrust(self) -> float:
@@ -103,12 +103,12 @@ class HoverThrust:
         An autopilot that compensates the tilt itself may give more than `largest_specific_thrust`.
         """
         settings = self._settings
-        return self._to_specific(1.0 if settings.tilt_compensated else settings.highest)
+        return self._to_specific(1.0 if settings.tilt_compensated else settings.max_thrust)
 
     @property
     def smallest_specific_thrust(self) -> float:
         """Specific thrust at the smallest normalised thrust that is sent, m/s²."""
-        return self._to_specific(self._settings.lowest)
+        return self._to_specific(self._settings.min_thrust)
 
     def normalised_thrust(
         self, acceleration_down: float, q: Quaternion, body_rates: BodyRates
@@ -125,33 +125,33 @@ class HoverThrust:
 
     def within_limits(self, normalised: float) -> float:
         """A normalised thrust, clamped to `limits`."""
-        return min(max(normalised, self._settings.lowest), self._settings.highest)
+        return min(max(normalised, self._settings.min_thrust), self._settings.max_thrust)
 
     def note_thrust(self, normalised: float, q: Quaternion) -> None:
         """Note a normalised thrust that the vehicle follows, and the vehicle's attitude `q`."""
         vertical_share = self._curve.share(normalised) * self._battery.factor
         if not self._settings.tilt_compensated:
             vertical_share *= cos_tilt(q[1], q[2])
-        self._share_sum += vertical_share
-        self._share_count += 1
+        self._thrust_share_sum += vertical_share
+        self._thrust_share_count += 1
 
     def observe(self, time: float, velocity_down: float) -> None:
         """Learn the hover thrust from a vertical velocity (m/s, down) at a vehicle time (s)."""
         if self._window_start is None:
             self._begin_window(time, velocity_down)
             return
-        began, before = self._window_start
-        span = time - began
-        if 0.0 <= span < SHORTEST_WINDOW:
+        began, earlier_velocity = self._window_start
+        duration = time - began
+        if 0.0 <= duration < SHORTEST_WINDOW:
             return
-        if span <= _LONGEST_WINDOW and self._share_count:
-            velocity = 0.5 * (before + velocity_down)
-            acceleration = (velocity_down - before) / span
-            measured = GRAVITY - acceleration - self._settings.drag * velocity
-            if _PLAUSIBLE_THRUST[0] <= measured <= _PLAUSIBLE_THRUST[1]:
+        if duration <= _LONGEST_WINDOW and self._thrust_share_count:
+            velocity = 0.5 * (earlier_velocity + velocity_down)
+            acceleration = (velocity_down - earlier_velocity) / duration
+            measured_thrust = GRAVITY - acceleration - self._settings.drag * velocity
+            if _PLAUSIBLE_THRUST[0] <= measured_thrust <= _PLAUSIBLE_THRUST[1]:
                 extra_variance = (_DRAG_DEVIATION * velocity) ** 2
-                mean_share = self._share_sum / self._share_count
-                self._filter.learn(span, mean_share, measured, extra_variance)
+                mean_share = self._thrust_share_sum / self._thrust_share_count
+                self._filter.learn(duration, mean_share, measured_thrust, extra_variance)
         self._begin_window(time, velocity_down)
 
     def pause(self) -> None:
@@ -160,7 +160,7 @@ class HoverThrust:
 
     def note_voltage(self, time: float, voltage: float | None) -> None:
         """Take the battery voltage (V; None: unknown), received at `time`, s of event-loop time."""
-        self._battery.note(time, voltage)
+        self._battery.note_voltage(time, voltage)
 
     def on_ground(self) -> None:
         """Note that the vehicle is on the ground: pause learning, forget the take-off voltage."""
@@ -175,5 +175,5 @@ class HoverThrust:
 
     def _begin_window(self, time: float, velocity_down: float) -> None:
         self._window_start = (time, velocity_down)
-        self._share_sum = 0.0
-        self._share_count = 0
+        self._thrust_share_sum = 0.0
+        self._thrust_share_count = 0

@@ -17,7 +17,7 @@ _PATH_STEP = 2e-3
 _INTEGRATION_STEP = 1e-3
 """Step of the integration in `step_time`, s."""
 _MOST_STEPS = 60_000
-_COVERED_SHARE = 1.0 - exp(-1.0)
+_STEP_FRACTION_AT_TIME_CONSTANT = 1.0 - exp(-1.0)
 """Share of a step that a first-order response covers in its time constant."""
 
 
@@ -65,7 +65,7 @@ class InnerResponse:
         speeds = deque([0.0] * (1 + round(delay / _INTEGRATION_STEP)))
         c = speed = 0.0
         for k in range(_MOST_STEPS):
-            if c >= _COVERED_SHARE * step_size:
+            if c >= _STEP_FRACTION_AT_TIME_CONSTANT * step_size:
                 return k * _INTEGRATION_STEP + (self.dead_time if self.follows_model else 0.0)
             # Without a model, the present error takes effect one dead time later.
             speeds.append(min(self.gain * (step_size - c), max_speed))
@@ -78,12 +78,12 @@ class InnerResponse:
     def target(self, path: CoefficientPath, time: float) -> Coefficients:
         """The target at `time` that makes the coefficients follow `path` without error."""
         effect_time = time + self.dead_time
-        before, then, after = (path(effect_time + dt) for dt in (-_PATH_STEP, 0.0, _PATH_STEP))
+        before, middle, after = (path(effect_time + dt) for dt in (-_PATH_STEP, 0.0, _PATH_STEP))
         # The planner compares the target with its model at `effect_time`, or measures at `time`.
-        compared = then if self.follows_model or self.dead_time == 0.0 else path(time)
+        compared_value = middle if self.follows_model or self.dead_time == 0.0 else path(time)
         return Coefficients(
-            compared.north + self._lead(before.north, then.north, after.north),
-            compared.east + self._lead(before.east, then.east, after.east),
+            compared_value.north + self._lead(before.north, middle.north, after.north),
+            compared_value.east + self._lead(before.east, middle.east, after.east),
         )
 
     def heading_target(self, heading: Callable[[float], float], time: float) -> tuple[float, float]:
@@ -97,28 +97,28 @@ class InnerResponse:
             time: s of event-loop time.
         """
         effect_time = time + self.dead_time
-        then = heading(effect_time)
-        before = then - wrap_angle(then - heading(effect_time - _PATH_STEP))
-        after = then + wrap_angle(heading(effect_time + _PATH_STEP) - then)
-        rate, acceleration = _derivatives(before, then, after)
-        compared = then if self.follows_model else heading(time)
+        middle = heading(effect_time)
+        before = middle - wrap_angle(middle - heading(effect_time - _PATH_STEP))
+        after = middle + wrap_angle(heading(effect_time + _PATH_STEP) - middle)
+        rate, acceleration = _derivatives(before, middle, after)
+        compared_value = middle if self.follows_model else heading(time)
         if self.gain == 0.0:
-            return compared, rate
-        return compared + self.lag * acceleration / self.gain, rate
+            return compared_value, rate
+        return compared_value + self.lag * acceleration / self.gain, rate
 
-    def _lead(self, before: float, then: float, after: float) -> float:
+    def _lead(self, before: float, middle: float, after: float) -> float:
         """Target minus coefficient c, so that c follows its path: (ċ + lag·c̈)/gain.
 
         The arguments are three values of c on the path, `_PATH_STEP` seconds apart.
         """
-        speed, acceleration = _derivatives(before, then, after)
+        speed, acceleration = _derivatives(before, middle, after)
         return (speed + self.lag * acceleration) / self.gain
 
 
-def _derivatives(before: float, then: float, after: float) -> tuple[float, float]:
+def _derivatives(before: float, middle: float, after: float) -> tuple[float, float]:
     """First and second derivative of three values, `_PATH_STEP` s apart, by central differences."""
-    first = 0.5 * (after - before) / _PATH_STEP
-    return first, (after - 2.0 * then + before) / (_PATH_STEP * _PATH_STEP)
+    first_derivative = 0.5 * (after - before) / _PATH_STEP
+    return first_derivative, (after - 2.0 * middle + before) / (_PATH_STEP * _PATH_STEP)
 
 
 IMMEDIATE = InnerResponse(gain=inf, lag=0.0, dead_time=0.0, follows_model=True)

@@ -31,7 +31,7 @@ class LinearSettings:
         height: gains of the height hold.
         tilt: response of the acceleration coefficients to their targets.
         heading: response of the heading to its target.
-        max_horizontal: largest horizontal acceleration that is commanded, m/s².
+        max_horizontal_acceleration: largest horizontal acceleration that is commanded, m/s².
         thrust_lag: lag of the rotors, s.
         period: period of the guidance loop, s; within it the target moves, but the feedback is
             constant.
@@ -41,7 +41,7 @@ class LinearSettings:
     height: HeightGains
     tilt: InnerResponse
     heading: InnerResponse
-    max_horizontal: float
+    max_horizontal_acceleration: float
     thrust_lag: float
     period: float = 0.0
 
@@ -124,20 +124,20 @@ class Trim:
     def __init__(self) -> None:
         self._sum = 0j
         self._count = 0
-        self._pausing = False
+        self._was_pausing = False
 
-    def take(self, target: Target, *, pausing: bool) -> None:
+    def add(self, target: Target, *, is_pausing: bool) -> None:
         """Take the target of a closed-loop guidance step; each new pause begins a new mean."""
-        if pausing:
-            if not self._pausing:
+        if is_pausing:
+            if not self._was_pausing:
                 self._sum, self._count = 0j, 0
             self._sum += complex(target.north, target.east)
             self._count += 1
-        self._pausing = pausing
+        self._was_pausing = is_pausing
 
     def coefficients(self, command: TiltCommand) -> Coefficients:
         """The open-loop coefficients to fly: those commanded, plus the mean if `trimmed`."""
-        self._pausing = False
+        self._was_pausing = False
         if not command.trimmed or self._count == 0:
             return command.coefficients
         mean = self._sum / self._count
@@ -175,12 +175,16 @@ class LinearGuidance:
         `time`: the present time, s.
         """
         reference, settings = reference_at(time), self._settings
-        ahead = reference_at(time + settings.thrust_lag)
-        down = acceleration_down(settings.height, reference, inputs.now, ahead, inputs.drag)
-        ends = time, time + settings.period
+        future_reference = reference_at(time + settings.thrust_lag)
+        down = acceleration_down(
+            settings.height, reference, inputs.now, future_reference, inputs.drag
+        )
+        period_ends = time, time + settings.period
         if isinstance(reference.horizontal, TiltCommand):
             north, east = self._trim.coefficients(reference.horizontal)
-            target, later = (Target(north, east, *self._heading(reference_at, at)) for at in ends)
+            target, later = (
+                Target(north, east, *self._heading(reference_at, at)) for at in period_ends
+            )
             return LinearCommand(target, later, down)
         feedback = self._feedback(reference, reference_at(time + self.acts_after), inputs)
 
@@ -188,32 +192,35 @@ class LinearGuidance:
             return self._coefficients(reference_at(at), feedback, down, inputs)
 
         target, later = (
-            Target(*settings.tilt.target(path, at), *self._heading(reference_at, at)) for at in ends
+            Target(*settings.tilt.target(path, at), *self._heading(reference_at, at))
+            for at in period_ends
         )
-        pausing = reference.horizontal is HorizontalMode.ACCELERATION
-        self._trim.take(target, pausing=pausing)
+        is_pausing = reference.horizontal is HorizontalMode.ACCELERATION
+        self._trim.add(target, is_pausing=is_pausing)
         return LinearCommand(target, later, down)
 
-    def _feedback(self, now: Reference, later: Reference, inputs: GuidanceInput) -> NorthEast:
+    def _feedback(
+        self, reference: Reference, at_effect: Reference, inputs: GuidanceInput
+    ) -> NorthEast:
         """Horizontal acceleration that corrects errors and disturbance, m/s².
 
-        `later` is the reference at the time when the feedback takes effect.
+        `at_effect` is the reference at the time when the feedback takes effect.
         """
         settings, gains, wind = self._settings, self._settings.gains, inputs.disturbance
-        if now.horizontal is HorizontalMode.ACCELERATION:
-            return clamp_length(-wind[0], -wind[1], settings.max_horizontal)
-        wanted, drag = [], inputs.deceleration(inputs.now.velocity_ned)
+        if reference.horizontal is HorizontalMode.ACCELERATION:
+            return clamp_length(-wind[0], -wind[1], settings.max_horizontal_acceleration)
+        feedback, drag = [], inputs.deceleration(inputs.now.velocity_ned)
         for axis in (0, 1):
-            position_error = inputs.predicted.position_ned[axis] - later.position_ned[axis]
-            velocity_error = inputs.predicted.velocity_ned[axis] - later.velocity_ned[axis]
+            position_error = inputs.predicted.position_ned[axis] - at_effect.position_ned[axis]
+            velocity_error = inputs.predicted.velocity_ned[axis] - at_effect.velocity_ned[axis]
             acceleration = inputs.thrust[axis] - drag[axis] + wind[axis]
-            wanted.append(
+            feedback.append(
                 -gains.position * position_error
                 - gains.velocity * velocity_error
-                - gains.acceleration * (acceleration - now.acceleration_ned[axis])
+                - gains.acceleration * (acceleration - reference.acceleration_ned[axis])
                 - wind[axis]
             )
-        return clamp_length(wanted[0], wanted[1], settings.max_horizontal)
+        return clamp_length(feedback[0], feedback[1], settings.max_horizontal_acceleration)
 
     def _coefficients(
         self, reference: Reference, feedback: NorthEast, down: float, inputs: GuidanceInput
@@ -227,7 +234,7 @@ class LinearGuidance:
         north, east = clamp_length(
             reference.acceleration_ned[0] + drag[0] + feedback[0],
             reference.acceleration_ned[1] + drag[1] + feedback[1],
-            self._settings.max_horizontal,
+            self._settings.max_horizontal_acceleration,
         )
         north, east, down = acceleration_within_thrust((north, east, down), *inputs.thrust_limits)
         # The vertical part of the thrust is g − a_D.

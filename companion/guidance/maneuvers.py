@@ -49,17 +49,17 @@ class Steps:
 
     Before each doublet the position hold pauses, so that the attitude comes to rest. c is added to
     the coefficients of this attitude. With an ideal response and no drag the vehicle ends where it
-    began, at rest. Position hold corrects the remaining error for `settle` seconds.
+    began, at rest. Position hold corrects the remaining error for `settle_time` seconds.
 
     Attributes:
         coefficient: length of the coefficients c: the sine of the tilt.
         step_time: T, the duration of the first part of a doublet, s.
-        settle: time of position hold after each doublet, s.
+        settle_time: time of position hold after each doublet, s.
     """
 
     coefficient: float
     step_time: float
-    settle: float
+    settle_time: float
     name: str = "steps"
 
     DIRECTIONS = ((1.0, 0.0), (0.0, 1.0), (math.sqrt(0.5), -math.sqrt(0.5)))
@@ -71,7 +71,7 @@ class Steps:
 
     @property
     def _doublet_period(self) -> float:
-        return _HOLD_PAUSE + 4.0 * self.step_time + self.settle
+        return _HOLD_PAUSE + 4.0 * self.step_time + self.settle_time
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over each doublet, s; pauses and settling are not checked."""
@@ -106,29 +106,29 @@ class Corners:
     the attitude comes to rest. The corners are added to the coefficients of this attitude. The
     acceleration goes round the rectangle twice, the second time mirrored. With an ideal response
     and no drag the vehicle ends where it began, at rest. Position hold corrects the remaining error
-    for `settle` seconds.
+    for `settle_time` seconds.
 
     Attributes:
         north, east: absolute values of the corners' coefficients; the sine of the tilt is
             √(north² + east²). 0.4 and 0.5 give the step in figure 2 of Xu & Pei.
         corner_time: duration of each corner, s; the corner at which the second round begins lasts
             twice as long.
-        settle: time of position hold at the end, s.
+        settle_time: time of position hold at the end, s.
     """
 
     north: float
     east: float
     corner_time: float
-    settle: float
+    settle_time: float
     name: str = "corners"
 
-    _ROUND = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
-    CORNERS = (*_ROUND, *reversed(_ROUND))
+    _ONE_ROUND = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
+    CORNERS = (*_ONE_ROUND, *reversed(_ONE_ROUND))
 
     @property
     def duration(self) -> float:
         """The pause before the steps, all corners, and the settling, s."""
-        return _HOLD_PAUSE + len(self.CORNERS) * self.corner_time + self.settle
+        return _HOLD_PAUSE + len(self.CORNERS) * self.corner_time + self.settle_time
 
     def check_times(self) -> list[float]:
         """Times 0.01 s apart over the corners, and the end, s."""
@@ -161,30 +161,30 @@ class ManeuverSequence:
     @property
     def name(self) -> str:
         """The names of the parts."""
-        return ", ".join(part.name for part in self.parts)
+        return ", ".join(maneuver.name for maneuver in self.parts)
 
     @property
     def duration(self) -> float:
         """Sum of the durations of the parts, s."""
-        return sum(part.duration for part in self.parts)
+        return sum(maneuver.duration for maneuver in self.parts)
 
-    def part_at(self, time: float) -> tuple[Maneuver, float]:
-        """The part that is flown at `time`, and the time since that part began.
+    def maneuver_at(self, time: float) -> tuple[Maneuver, float]:
+        """The maneuver that is flown at `time`, and the time since that maneuver began.
 
-        Before the beginning, the first part is returned; after the end, the last part is returned.
+        Before the beginning it is the first maneuver; after the end it is the last one.
 
         Raises:
             ValueError: the sequence is empty.
         """
         if not self.parts:
             raise ValueError("a sequence without maneuvers has no part")
-        for part in self.parts[:-1]:
-            if time < part.duration:
-                return part, time
-            time -= part.duration
+        for maneuver in self.parts[:-1]:
+            if time < maneuver.duration:
+                return maneuver, time
+            time -= maneuver.duration
         return self.parts[-1], time
 
     def at(self, time: float, start: Pose) -> Reference:
-        """The reference of the part that is flown at `time`."""
-        part, part_time = self.part_at(time)
-        return part.at(part_time, start)
+        """The reference of the maneuver that is flown at `time`."""
+        maneuver, maneuver_time = self.maneuver_at(time)
+        return maneuver.at(maneuver_time, start)

@@ -9,16 +9,16 @@ from typing import NamedTuple
 from companion.attitude.history import locate_time
 from companion.guidance.reference import NorthEast, VehicleMotion, clamp_length, rotate
 
-_LARGEST_PULL_TIMES_STEP = 0.5
-"""Largest product of `ObserverSettings.pull` and the time between two measurements. With a larger
-product, the observer is unstable at low position rates, and takes a gap in positions for wind."""
+_LARGEST_COUPLING_TIMES_STEP = 0.5
+"""Largest product of `ObserverSettings.coupling` and the time between two measurements. With more,
+the observer is unstable at low position rates, and takes a gap in positions for wind."""
 
 
 class ObserverGains(NamedTuple):
     """The observer's gains: correction of each state per error.
 
     The position is corrected by its own error. Velocity and disturbance are corrected by the error
-    of the velocity plus `ObserverSettings.pull` times the error of the position.
+    of the velocity plus `ObserverSettings.coupling` times the error of the position.
 
     Attributes:
         position: correction of the position per error, m per m.
@@ -38,25 +38,28 @@ class ObserverSettings:
     Attributes:
         bandwidth: both poles of the error of velocity and disturbance, rad/s.
         position_time: time constant with which the position follows the measured one, s.
-        position_pull: velocity error that has the effect of 1 m of position error, 1/s.
+        position_coupling: velocity error that has the effect of 1 m of position error, 1/s.
         largest_disturbance: largest estimated disturbance, m/s².
         bandwidth_increase: relative increase of `bandwidth` at a `PositionCorrection.trust` of 1.
-        pull_increase: increase of `position_pull` at a `PositionCorrection.trust` of 1, 1/s.
+        coupling_increase: increase of `position_coupling` at a `trust` of 1, 1/s.
     """
 
     bandwidth: float
     position_time: float
-    position_pull: float
+    position_coupling: float
     largest_disturbance: float
     bandwidth_increase: float = 0.0
-    pull_increase: float = 0.0
+    coupling_increase: float = 0.0
 
-    def pull(self, dt: float, trust: float) -> float:
-        """`position_pull` increased by `trust`, and limited so that the observer is stable, 1/s.
+    def coupling(self, dt: float, trust: float) -> float:
+        """`position_coupling` increased by `trust`, limited so that the observer is stable, 1/s.
 
         The arguments are those of `gains`.
         """
-        return min(self.position_pull + trust * self.pull_increase, _LARGEST_PULL_TIMES_STEP / dt)
+        return min(
+            self.position_coupling + trust * self.coupling_increase,
+            _LARGEST_COUPLING_TIMES_STEP / dt,
+        )
 
     def gains(self, dt: float, trust: float = 0.0) -> ObserverGains:
         """The gains for two measurements that are `dt` seconds apart.
@@ -117,9 +120,9 @@ class MotionObserver:
             self._motion = measured
             return
         settings, disturbance = self._settings, self.disturbance
-        gains, pull = settings.gains(dt, trust), settings.pull(dt, trust)
+        gains, coupling = settings.gains(dt, trust), settings.coupling(dt, trust)
         position, velocity = list(measured.position_ned), list(measured.velocity_ned)
-        estimated = [0.0, 0.0]
+        new_disturbance = [0.0, 0.0]
         for axis in (0, 1):
             acceleration = modelled[axis] + disturbance[axis]
             p = motion.position_ned[axis] + dt * (
@@ -127,14 +130,16 @@ class MotionObserver:
             )
             v = motion.velocity_ned[axis] + dt * acceleration
             position_error = position[axis] - p
-            error = velocity[axis] - v + pull * position_error
+            coupled_error = velocity[axis] - v + coupling * position_error
             position[axis] = p + gains.position * position_error
-            velocity[axis] = v + gains.velocity * error
-            estimated[axis] = disturbance[axis] + gains.disturbance * error
+            velocity[axis] = v + gains.velocity * coupled_error
+            new_disturbance[axis] = disturbance[axis] + gains.disturbance * coupled_error
         self._motion = VehicleMotion(
             (position[0], position[1], position[2]), (velocity[0], velocity[1], velocity[2])
         )
-        self.disturbance = clamp_length(estimated[0], estimated[1], settings.largest_disturbance)
+        self.disturbance = clamp_length(
+            new_disturbance[0], new_disturbance[1], settings.largest_disturbance
+        )
 
     def rotate_disturbance(self, angle: float) -> None:
         """Rotate the disturbance by `angle` (rad), by which the estimated heading has jumped.
@@ -166,7 +171,7 @@ class MotionObserver:
         )
 
 
-_KEPT_ATTITUDES = 200
+_MAX_ATTITUDES = 200
 """Number of attitudes kept: 0.8 s at 250 Hz, longer than the delay of any position."""
 
 
@@ -181,8 +186,8 @@ class SlopeHistory:
     """
 
     def __init__(self) -> None:
-        self._times: deque[float] = deque(maxlen=_KEPT_ATTITUDES)
-        self._sums: deque[NorthEast] = deque(maxlen=_KEPT_ATTITUDES)
+        self._times: deque[float] = deque(maxlen=_MAX_ATTITUDES)
+        self._integrals: deque[NorthEast] = deque(maxlen=_MAX_ATTITUDES)
         self.newest: NorthEast = (0.0, 0.0)
 
     def add(self, time: float, slope: NorthEast) -> None:
@@ -194,18 +199,18 @@ class SlopeHistory:
         """
         if not self._times or time <= self._times[-1]:
             self._times.clear()
-            self._sums.clear()
+            self._integrals.clear()
             self._times.append(time)
-            self._sums.append((0.0, 0.0))
+            self._integrals.append((0.0, 0.0))
         else:
             dt = time - self._times[-1]
-            north, east = self._sums[-1]
-            before = self.newest
+            north, east = self._integrals[-1]
+            last_slope = self.newest
             self._times.append(time)
-            self._sums.append(
+            self._integrals.append(
                 (
-                    north + 0.5 * dt * (before[0] + slope[0]),
-                    east + 0.5 * dt * (before[1] + slope[1]),
+                    north + 0.5 * dt * (last_slope[0] + slope[0]),
+                    east + 0.5 * dt * (last_slope[1] + slope[1]),
                 )
             )
         self.newest = slope
@@ -216,7 +221,7 @@ class SlopeHistory:
         Called after the estimated heading jumped: older attitudes refer to another north.
         """
         self._times.clear()
-        self._sums.clear()
+        self._integrals.clear()
 
     def mean(self, start: float, end: float) -> NorthEast:
         """The mean slope between two vehicle times, s.
@@ -235,11 +240,11 @@ class SlopeHistory:
         The integral is linear between attitudes, and extrapolated linearly before the first and
         after the last.
         """
-        times, sums = self._times, self._sums
+        times, integrals = self._times, self._integrals
         if time >= times[-1] or len(times) == 1:
-            after = time - times[-1]
-            north, east = sums[-1]
-            return north + after * self.newest[0], east + after * self.newest[1]
-        later, share = locate_time(times, time)
-        (n0, e0), (n1, e1) = islice(sums, later - 1, later + 1)
-        return n0 + share * (n1 - n0), e0 + share * (e1 - e0)
+            elapsed = time - times[-1]
+            north, east = integrals[-1]
+            return north + elapsed * self.newest[0], east + elapsed * self.newest[1]
+        later_index, fraction = locate_time(times, time)
+        (n0, e0), (n1, e1) = islice(integrals, later_index - 1, later_index + 1)
+        return n0 + fraction * (n1 - n0), e0 + fraction * (e1 - e0)

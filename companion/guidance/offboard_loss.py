@@ -2,7 +2,7 @@
 
 First the autopilot holds the last rates and the last thrust: the thrust axis keeps turning along a
 great circle, while drag slows the vehicle. The part of the rates that is feedback may have any
-direction, so it adds a spread to the result. Then the autopilot's failsafe levels the vehicle, and
+direction, so it adds a radius to the result. Then the autopilot's failsafe levels the vehicle, and
 brakes it or lets it drift. `tests/flight/test_killed.py` compares this worst case with
 the mock vehicles.
 """
@@ -69,20 +69,21 @@ class Reach(NamedTuple):
 
     Attributes:
         place: point (north, east) of the stop if the last rates contain no feedback, m.
-        spread: radius around `place` in which the stop lies if the last rates contain feedback, m.
-        up: largest climb, m.
-        down: largest fall, m.
+        stop_radius: radius around `place` in which the stop lies if the last rates contain
+            feedback, m.
+        max_climb: largest climb, m.
+        max_fall: largest fall, m.
     """
 
     place: tuple[float, float]
-    spread: float
-    up: float
-    down: float
+    stop_radius: float
+    max_climb: float
+    max_fall: float
 
     @property
     def largest_distance(self) -> float:
         """Largest horizontal distance from where the setpoints ended to the stop, m."""
-        return hypot(*self.place) + self.spread
+        return hypot(*self.place) + self.stop_radius
 
 
 class _HeldMotion(NamedTuple):
@@ -120,7 +121,7 @@ def reach(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> Reach:
         for displacement, component in zip(held.displacement[:2], held.velocity[:2], strict=True)
     )
     up_speed = max(0.0, held.feedback_speed - held.velocity[2])
-    up = (
+    max_climb = (
         held.greatest_height
         + held.feedback_displacement
         + up_speed * _FAILSAFE_DELAY
@@ -129,7 +130,7 @@ def reach(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> Reach:
     return Reach(
         (north, east),
         held.feedback_displacement + farthest_stop - stop,
-        up,
+        max_climb,
         _fall_distance(held, specific_thrust),
     )
 
@@ -142,14 +143,18 @@ def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
     axis = _scaled(at_loss.thrust, 1.0 / specific_thrust)
     axial = sum(a * b for a, b in zip(axis, at_loss.thrust_rate, strict=True))
     lateral = _plus_scaled(at_loss.thrust_rate, axis, -axial)
-    rate = hypot(*lateral) / specific_thrust
-    direction = _scaled(lateral, 1.0 / (rate * specific_thrust)) if rate > 0.0 else (0.0, 0.0, 0.0)
-    rate = min(rate, failsafe.max_tilt_rate)
-    feedback = min(_FEEDBACK_RATE, failsafe.max_tilt_rate)
+    rotation_rate = hypot(*lateral) / specific_thrust
+    direction = (
+        _scaled(lateral, 1.0 / (rotation_rate * specific_thrust))
+        if rotation_rate > 0.0
+        else (0.0, 0.0, 0.0)
+    )
+    rotation_rate = min(rotation_rate, failsafe.max_tilt_rate)
+    feedback_rate = min(_FEEDBACK_RATE, failsafe.max_tilt_rate)
     displacement, velocity, thrust = (0.0, 0.0, 0.0), at_loss.velocity, axis
     feedback_displacement = feedback_speed = greatest_height = 0.0
     for index in range(_INTEGRATION_STEPS):
-        angle = rate * (index + 0.5) * step
+        angle = rotation_rate * (index + 0.5) * step
         thrust = _plus_scaled(_scaled(axis, cos(angle)), direction, sin(angle))
         velocity = _plus_scaled(
             _after_drag(velocity, failsafe.drag, step), thrust, specific_thrust * step
@@ -157,12 +162,12 @@ def _held_motion(at_loss: MotionAtLoss, failsafe: LossFailsafe) -> _HeldMotion:
         velocity = (velocity[0], velocity[1], velocity[2] + GRAVITY * step)
         displacement = _plus_scaled(displacement, velocity, step)
         # The acceleration by a thrust axis that feedback has turned by this angle.
-        feedback_angle = min(pi, feedback * (index + 0.5) * step)
+        feedback_angle = min(pi, feedback_rate * (index + 0.5) * step)
         acceleration = 2.0 * specific_thrust * sin(0.5 * feedback_angle)
         feedback_speed += (acceleration - failsafe.drag.linear * feedback_speed) * step
         feedback_displacement += feedback_speed * step
         greatest_height = max(greatest_height, -displacement[2])
-    tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback * duration
+    tilt = acos(max(-1.0, min(1.0, -thrust[2]))) + feedback_rate * duration
     return _HeldMotion(
         displacement,
         velocity,

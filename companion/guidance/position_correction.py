@@ -18,7 +18,7 @@ _FILTER_TIME_PER_NOISE = 0.1
 _SMOOTH_BELOW, _NOISY_ABOVE = 0.2, 0.6
 """Noise of r below which positions count as smooth, and noise above which they count as noisy, m/s.
 PX4 and ArduPilot make at most 0.1 m/s; white position noise of 3 mm at 50 Hz makes 0.5 m/s."""
-_LARGEST_CHANGE = 0.08
+_LARGEST_R_CHANGE = 0.08
 """Each new value of r is clamped to within this distance of the filtered r, m/s. ArduPilot stamps
 its position in whole milliseconds: at 5 m/s an error of 1 ms changes one value of r by 0.25 m/s.
 Real corrections of its estimator change r by 0.02 m/s, with peaks of 0.1 m/s (measured)."""
@@ -71,12 +71,12 @@ class PositionCorrection:
     def reset(self) -> None:
         """Forget the correction, because the estimate has jumped."""
         self._time = 0.0
-        self._before: VehicleMotion | None = None
+        self._last_motion: VehicleMotion | None = None
         self._newest_r: NorthEast = (0.0, 0.0)
         self._filtered_r: NorthEast = (0.0, 0.0)
         self._correction: NorthEast = (0.0, 0.0)
-        self._noise = 0.0
-        self._motion_share = 0.0
+        self._noise_variance = 0.0
+        self._speed_fraction = 0.0
 
     @property
     def trust(self) -> float:
@@ -84,8 +84,8 @@ class PositionCorrection:
 
         The trust is 0 if positions are noisy or rounded, or if the vehicle is at rest.
         """
-        smoothness = (_NOISY_ABOVE - sqrt(self._noise)) / (_NOISY_ABOVE - _SMOOTH_BELOW)
-        return min(max(0.0, smoothness), 1.0) * self._motion_share
+        smoothness = (_NOISY_ABOVE - sqrt(self._noise_variance)) / (_NOISY_ABOVE - _SMOOTH_BELOW)
+        return min(max(0.0, smoothness), 1.0) * self._speed_fraction
 
     def corrected_motion(self, time: float, measured: VehicleMotion) -> VehicleMotion:
         """A measured motion with its horizontal position corrected.
@@ -95,15 +95,15 @@ class PositionCorrection:
             measured: measured motion, NED.
         """
         settings = self._settings
-        before, dt = self._before, time - self._time
-        self._time, self._before = time, measured
-        self._motion_share = min(
+        last_motion, dt = self._last_motion, time - self._time
+        self._time, self._last_motion = time, measured
+        self._speed_fraction = min(
             hypot(measured.velocity_ned[0], measured.velocity_ned[1]) / _MOVING_SPEED, 1.0
         )
-        if before is None or not _SHORTEST_GAP < dt < _LONGEST_GAP:
+        if last_motion is None or not _SHORTEST_GAP < dt < _LONGEST_GAP:
             self._newest_r = self._filtered_r = self._correction = (0.0, 0.0)
         else:
-            self._filter_unexplained_velocity(before, measured, dt)
+            self._filter_unexplained_velocity(last_motion, measured, dt)
         (north, east, down), velocity = measured
         return VehicleMotion(
             (
@@ -115,38 +115,42 @@ class PositionCorrection:
         )
 
     def _filter_unexplained_velocity(
-        self, before: VehicleMotion, now: VehicleMotion, dt: float
+        self, last_motion: VehicleMotion, now: VehicleMotion, dt: float
     ) -> None:
         """Filter r = ṗ − v, the change of the position that the velocity does not explain."""
         settings = self._settings
-        (p_before, v_before), (p_now, v_now) = before, now
-        raw, filtered, correction = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
+        (p_before, v_before), (p_now, v_now) = last_motion, now
+        new_r, filtered, correction = [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]
         for axis in (0, 1):
-            explained = 0.5 * (v_before[axis] + v_now[axis])
-            raw[axis] = (p_now[axis] - p_before[axis]) / dt - explained
-        kept_share = exp(-dt / self._filter_time(raw, dt))
+            explained_velocity = 0.5 * (v_before[axis] + v_now[axis])
+            new_r[axis] = (p_now[axis] - p_before[axis]) / dt - explained_velocity
+        old_weight = exp(-dt / self._filter_time(new_r, dt))
         change = clamp_length(
-            raw[0] - self._filtered_r[0], raw[1] - self._filtered_r[1], _LARGEST_CHANGE
+            new_r[0] - self._filtered_r[0], new_r[1] - self._filtered_r[1], _LARGEST_R_CHANGE
         )
         for axis in (0, 1):
-            filtered[axis] = self._filtered_r[axis] + (1.0 - kept_share) * change[axis]
-            wanted = settings.estimator_time * filtered[axis]
-            correction[axis] = wanted + kept_share * (self._correction[axis] - wanted)
-        self._newest_r = raw[0], raw[1]
-        largest = (
+            filtered[axis] = self._filtered_r[axis] + (1.0 - old_weight) * change[axis]
+            complete_correction = settings.estimator_time * filtered[axis]
+            correction[axis] = complete_correction + old_weight * (
+                self._correction[axis] - complete_correction
+            )
+        self._newest_r = new_r[0], new_r[1]
+        largest_r = (
             settings.largest_correction / settings.estimator_time
             if settings.estimator_time > 0.0
             else 0.0
         )
-        self._filtered_r = clamp_length(filtered[0], filtered[1], largest)
+        self._filtered_r = clamp_length(filtered[0], filtered[1], largest_r)
         self._correction = clamp_length(correction[0], correction[1], settings.largest_correction)
 
-    def _filter_time(self, raw: list[float], dt: float) -> float:
-        """Update the noise of r with its new value `raw`, m/s; return the filter time, s."""
-        change = hypot(raw[0] - self._newest_r[0], raw[1] - self._newest_r[1])
-        kept_share = exp(-dt / _NOISE_TIME)
-        self._noise = change * change + kept_share * (self._noise - change * change)
+    def _filter_time(self, new_r: list[float], dt: float) -> float:
+        """Update the noise of r with its new value `new_r`, m/s; return the filter time, s."""
+        change = hypot(new_r[0] - self._newest_r[0], new_r[1] - self._newest_r[1])
+        old_weight = exp(-dt / _NOISE_TIME)
+        self._noise_variance = change * change + old_weight * (
+            self._noise_variance - change * change
+        )
         shortest = self._settings.filter_time
         longest = max(shortest, _LONGEST_FILTER_TIME)
-        filter_time = min(shortest + _FILTER_TIME_PER_NOISE * sqrt(self._noise), longest)
-        return (2.0 - self._motion_share) * filter_time
+        filter_time = min(shortest + _FILTER_TIME_PER_NOISE * sqrt(self._noise_variance), longest)
+        return (2.0 - self._speed_fraction) * filter_time

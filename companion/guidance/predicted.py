@@ -44,17 +44,17 @@ def predict(
         TrajectoryError: the maneuver is too long to be checked.
     """
     start = Pose((0.0, 0.0, 0.0), heading)
-    before, open_loop = 0.0, _OpenLoop(heading, drag)
+    last_time, open_loop = 0.0, _OpenLoop(heading, drag)
     for time in maneuver.check_times():
         reference = maneuver.at(time, start)
-        midway = maneuver.at(0.5 * (before + time), start)
+        midway = maneuver.at(0.5 * (last_time + time), start)
         motion = PredictedMotion(
             time, reference.position_ned, reference.velocity_ned, reference.acceleration_ned
         )
-        yield motion if midway.closed_loop else open_loop.advance(motion, midway, time - before)
+        yield motion if midway.closed_loop else open_loop.advance(motion, midway, time - last_time)
         if reference.closed_loop:
             open_loop = _OpenLoop(heading, drag)
-        before = time
+        last_time = time
 
 
 class _OpenLoop:
@@ -74,9 +74,9 @@ class _OpenLoop:
             `motion`, with the integrated motion as its horizontal motion.
         """
         (north, east), (v_north, v_east) = self._offset, self._velocity
-        by_tilt = self._acceleration(reference, duration)
+        tilt_acceleration = self._acceleration(reference, duration)
         drag = self._drag.deceleration((v_north, v_east, 0.0))
-        a_north, a_east = by_tilt[0] - drag[0], by_tilt[1] - drag[1]
+        a_north, a_east = tilt_acceleration[0] - drag[0], tilt_acceleration[1] - drag[1]
         self._offset = (
             north + duration * (v_north + 0.5 * duration * a_north),
             east + duration * (v_east + 0.5 * duration * a_east),
@@ -85,7 +85,7 @@ class _OpenLoop:
         return motion._replace(
             offset=(*self._offset, motion.offset[2]),
             velocity=(*self._velocity, motion.velocity[2]),
-            acceleration=(*by_tilt, motion.acceleration[2]),
+            acceleration=(*tilt_acceleration, motion.acceleration[2]),
         )
 
     def _acceleration(self, reference: Reference, duration: float) -> NorthEast:

@@ -98,7 +98,7 @@ class CommandedSource:
 
     Args:
         max_age: largest age of a reference that is flown, s.
-        begins_within: time allowed for the first reference, s.
+        first_reference_timeout: time allowed for the first reference, s.
 
     Attributes:
         name: who gives the references.
@@ -106,23 +106,23 @@ class CommandedSource:
         failure: why control must end: `fail` was called, or references stopped coming; else None.
     """
 
-    def __init__(self, name: str, max_age: float, begins_within: float) -> None:
+    def __init__(self, name: str, max_age: float, first_reference_timeout: float) -> None:
         self.name = name
         self.pose: Pose | None = None
         self._max_age = max_age
-        self._begins_within = begins_within
+        self._first_reference_timeout = first_reference_timeout
         self._hold_reference: Reference | None = None
         self._newest: Reference | None = None
-        self._given_at = 0.0
+        self._newest_time = 0.0
         self._jerk = _NO_JERK
-        self._earlier: Reference | None = None
-        self._earlier_at = 0.0
+        self._earlier_reference: Reference | None = None
+        self._earlier_time = 0.0
         self._ended = False
         self.failure: str | None = None
 
     def begin(self, now: float, pose: Pose) -> None:
         """Hold `pose` until the first reference."""
-        self.pose, self._given_at = pose, now
+        self.pose, self._newest_time = pose, now
 
     def give(self, reference: Reference, now: float, jerk_ned: Vector | None = None) -> None:
         """Take a new reference.
@@ -132,11 +132,11 @@ class CommandedSource:
             now: event-loop time, s.
             jerk_ned: derivative of the reference's acceleration, m/s³. None: it is computed from
                 an earlier reference; 0 for the first reference, after a jump of the acceleration,
-                and if the two are commanded in different ways (`_loops_closed`).
+                and if the two are commanded in different ways (`_closed_loops`).
         """
         self._check_age(now)
         self._jerk = self._jerk_towards(reference, now) if jerk_ned is None else jerk_ned
-        self._newest, self._given_at = reference, now
+        self._newest, self._newest_time = reference, now
 
     def _jerk_towards(self, reference: Reference, now: float) -> Vector:
         """Jerk from an earlier reference to this one, m/s³; 0 if it cannot be computed.
@@ -144,13 +144,19 @@ class CommandedSource:
         If this reference comes less than `_SHORTEST_JERK_TIME` after the earlier one, the last jerk
         is returned.
         """
-        before, elapsed = self._earlier, now - self._earlier_at
-        if before is not None and elapsed < _SHORTEST_JERK_TIME:
-            return self._jerk if _loops_closed(before) == _loops_closed(reference) else _NO_JERK
-        self._earlier, self._earlier_at = reference, now
-        if before is None or _loops_closed(before) != _loops_closed(reference):
+        earlier_reference, elapsed = self._earlier_reference, now - self._earlier_time
+        if earlier_reference is not None and elapsed < _SHORTEST_JERK_TIME:
+            return (
+                self._jerk
+                if _closed_loops(earlier_reference) == _closed_loops(reference)
+                else _NO_JERK
+            )
+        self._earlier_reference, self._earlier_time = reference, now
+        if earlier_reference is None or _closed_loops(earlier_reference) != _closed_loops(
+            reference
+        ):
             return _NO_JERK
-        old, new = before.acceleration_ned, reference.acceleration_ned
+        old, new = earlier_reference.acceleration_ned, reference.acceleration_ned
         north, east, down = change_rate(old, new, elapsed, LARGEST_JERK) or _NO_JERK
         return north, east, down
 
@@ -164,9 +170,9 @@ class CommandedSource:
         If the newest reference is too old, the present position is held.
         """
         self._check_age(now)
-        newest, given_at, jerk = self._newest, self._given_at, self._jerk
+        newest, newest_time, jerk = self._newest, self._newest_time, self._jerk
         if newest is not None and self.failure is None:
-            return lambda time: extrapolated_reference(newest, jerk, time - given_at)
+            return lambda time: extrapolated_reference(newest, jerk, time - newest_time)
         if self._hold_reference is None or newest is None:
             self._hold_reference = self._hold(motion)
         hold_reference = self._hold_reference
@@ -181,9 +187,9 @@ class CommandedSource:
 
     def _check_age(self, now: float) -> None:
         """Note a failure if the newest reference is too old, or the first one is overdue."""
-        allowed = self._begins_within if self._newest is None else self._max_age
-        if self.failure is None and not self._ended and now - self._given_at > allowed:
-            self.failure = f"{self.name} gave no new command for {allowed:g} s"
+        timeout = self._first_reference_timeout if self._newest is None else self._max_age
+        if self.failure is None and not self._ended and now - self._newest_time > timeout:
+            self.failure = f"{self.name} gave no new command for {timeout:g} s"
 
     def fail(self, reason: str) -> None:
         """Note that no more references will come; `reason` is for the user."""
@@ -194,7 +200,7 @@ class CommandedSource:
         return self._ended
 
 
-def _loops_closed(reference: Reference) -> tuple[bool, bool, bool]:
+def _closed_loops(reference: Reference) -> tuple[bool, bool, bool]:
     """Whether a reference closes the horizontal loop, holds the position, and holds the height.
 
     The accelerations of two references are comparable only if all three are equal.

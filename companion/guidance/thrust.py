@@ -25,8 +25,8 @@ def specific_thrust(acceleration_down: float, cos_tilt: float) -> float:
     return wanted / cos_tilt
 
 
-def predicted_cos_tilt(q: Quaternion, body_rates: BodyRates, ahead: float) -> float:
-    """Cosine of the tilt in `ahead` seconds, if the vehicle keeps rotating at `body_rates` (rad/s).
+def predicted_cos_tilt(q: Quaternion, body_rates: BodyRates, lead_time: float) -> float:
+    """Cosine of the tilt in `lead_time` s, if the vehicle keeps rotating at `body_rates`, rad/s.
 
     Thrust for this tilt instead of the present one compensates the lag of the rotors while the
     vehicle tilts, to first order (T + lag·Ṫ). Source: third row of Ṙ = R·[ω]ₓ.
@@ -35,7 +35,7 @@ def predicted_cos_tilt(q: Quaternion, body_rates: BodyRates, ahead: float) -> fl
     lasts as long as the lag, and `specific_thrust` reduces the thrust beyond 60°.
     """
     x, y, z = down_in_body(q)
-    cosine = z + ahead * (x * body_rates.pitch - y * body_rates.roll)
+    cosine = z + lead_time * (x * body_rates.pitch - y * body_rates.roll)
     return min(max(cosine, _MIN_COSINE if z > _MIN_COSINE else -1.0), 1.0)
 
 
@@ -71,8 +71,8 @@ def acceleration_within_thrust(wanted: Vector, smallest: float, largest: float) 
     """
     north, east, down = wanted
     lift = min(max(GRAVITY - down, 0.0), largest)
-    spare = (TILT_THRUST_SHARE * largest) ** 2 - lift * lift
-    length, limit = hypot(north, east), sqrt(max(spare, 0.0))
+    squared_horizontal_thrust = (TILT_THRUST_SHARE * largest) ** 2 - lift * lift
+    length, limit = hypot(north, east), sqrt(max(squared_horizontal_thrust, 0.0))
     if length > limit:
         north, east, length = north * limit / length, east * limit / length, limit
     if lift * lift + length * length < smallest * smallest:
@@ -139,7 +139,7 @@ class BatterySag:
         self._first_voltage = None
         self._ratio = self.factor = 1.0
 
-    def note(self, time: float, voltage: float | None) -> None:
+    def note_voltage(self, time: float, voltage: float | None) -> None:
         """Take the voltage of the whole battery (V) at `time` (s); an unusable one is ignored."""
         if voltage is None or not isfinite(voltage) or voltage <= 0.0 or self._exponent == 0.0:
             return

@@ -94,8 +94,10 @@ class ThrustFilter:
             max(self._variance, self._first_variance),
         )
         innovation = specific_thrust - self.measured_gain * share
-        expected = share * share * self._variance + self._noise + extra_variance
-        ratio = innovation * innovation / (_GATE_DEVIATIONS * _GATE_DEVIATIONS * expected)
+        innovation_variance = share * share * self._variance + self._noise + extra_variance
+        ratio = (
+            innovation * innovation / (_GATE_DEVIATIONS * _GATE_DEVIATIONS * innovation_variance)
+        )
         new_weight = min(1.0, duration / _REJECTION_TIME)
         self._filtered_rejection += new_weight * (
             copysign(min(ratio, 1.0), innovation) - self._filtered_rejection
@@ -107,7 +109,7 @@ class ThrustFilter:
                 )
                 self._filtered_rejection = 0.0
             return
-        kalman_gain = self._variance * share / expected
+        kalman_gain = self._variance * share / innovation_variance
         self.measured_gain += kalman_gain * innovation
         self._variance *= 1.0 - kalman_gain * share
         self._learn_noise(duration, share, specific_thrust - self.measured_gain * share)
@@ -122,6 +124,6 @@ class ThrustFilter:
         return (innovation / (_GATE_DEVIATIONS * share)) ** 2 if share > 0.0 else 0.0
 
     def _learn_noise(self, duration: float, share: float, residual: float) -> None:
-        estimate = residual * residual + share * share * self._variance
-        noise = self._noise + min(1.0, duration / _NOISE_TIME) * (estimate - self._noise)
+        new_noise = residual * residual + share * share * self._variance
+        noise = self._noise + min(1.0, duration / _NOISE_TIME) * (new_noise - self._noise)
         self._noise = min(max(noise, _SMALLEST_NOISE), _LARGEST_NOISE)

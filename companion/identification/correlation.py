@@ -16,7 +16,7 @@ from companion.identification.lags import (
     slew_limited,
     value_at,
 )
-from companion.identification.record import LONGEST_DEAD_TIME, Stretch, stretches
+from companion.identification.record import LONGEST_DEAD_TIME, Segment, segments
 from companion.least_squares import Floats
 
 _GRID_PERIOD = 0.004
@@ -28,7 +28,7 @@ _CENTRE_PHASE = 0.38
 _CENTRE_FREQUENCIES = 5.0, 9.0
 """Bounds of the centre frequency, rad/s. At 8 rad/s on PX4 and 9 rad/s on ArduPilot, the dead times
 measured in steps, circles, figure-eights and doublets agree within 3 ms."""
-_FILTER_REACH = 3.5
+_FILTER_HALF_WIDTH = 3.5
 """Half width of the filter's impulse response, in standard deviations of its Gaussian."""
 _LEAST_EXPLAINED = 0.985
 """Smallest usable R² of a correlation; with less, gusts or another axis distort the delay."""
@@ -72,11 +72,13 @@ def dead_time_by_correlation(
     if slew is not None and not slew > 0.0:
         raise ValueError(f"slew must be positive, not {slew}")
     taps = _band_pass(lag, damping)
-    record = stretches(time, commanded, measured_time, measured)
-    filtered = [
-        pair for stretch in record if (pair := _filter(stretch, lag, slew, taps)) is not None
+    record_segments = segments(time, commanded, measured_time, measured)
+    filtered_pairs = [
+        filtered_pair
+        for segment in record_segments
+        if (filtered_pair := _filter(segment, lag, slew, taps)) is not None
     ]
-    correlation = _correlation(filtered)
+    correlation = _correlation(filtered_pairs)
     delay = None if correlation is None else _peak_delay(correlation)
     return None if delay is None else max(0.0, delay - _second_order_delay(lag, damping))
 
@@ -126,7 +128,7 @@ def _band_pass(lag: float, damping: float) -> Floats:
     """
     frequency = _centre_frequency(lag, damping)
     deviation = 3.0**0.5 / frequency
-    half_count = int(_FILTER_REACH * deviation / _GRID_PERIOD)
+    half_count = int(_FILTER_HALF_WIDTH * deviation / _GRID_PERIOD)
     time = _GRID_PERIOD * np.arange(-half_count, half_count + 1)
     scaled_time = time / deviation
     shape = scaled_time * (3.0 - scaled_time**2) * np.exp(-0.5 * scaled_time**2)
@@ -135,23 +137,23 @@ def _band_pass(lag: float, damping: float) -> Floats:
 
 
 def _filter(
-    stretch: Stretch, lag: float, slew: float | None, taps: Floats
+    segment: Segment, lag: float, slew: float | None, taps: Floats
 ) -> tuple[Floats, Floats] | None:
     """Filtered commands (n + `_DELAY_COUNT`,) and measurements (n,), both sampled on the grid.
 
     Both arrays end at the same time. None: the measurements are shorter than the filter.
     """
-    first_time, last_time = stretch.measured_time[0], stretch.measured_time[-1]
+    first_time, last_time = segment.measured_time[0], segment.measured_time[-1]
     count = int((last_time - first_time) / _GRID_PERIOD)
     if count <= taps.size:
         return None
     times = last_time - _GRID_PERIOD * np.arange(count + _DELAY_COUNT)[::-1]
-    times = np.maximum(times, stretch.time[0])
-    knots = held_commands(stretch.time, stretch.commanded)
+    times = np.maximum(times, segment.time[0])
+    knots = held_commands(segment.time, segment.commanded)
     if slew is not None:
         knots = slew_limited(knots, slew)
     commands = first_order_response(knots, lag, times) if lag > 0.0 else value_at(knots, times)
-    response = np.interp(times[_DELAY_COUNT:], stretch.measured_time, stretch.measured)
+    response = np.interp(times[_DELAY_COUNT:], segment.measured_time, segment.measured)
     return np.convolve(commands, taps, "valid"), np.convolve(response, taps, "valid")
 
 

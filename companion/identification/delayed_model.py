@@ -16,7 +16,7 @@ from companion.identification.lags import (
     slew_limited,
     value_at,
 )
-from companion.identification.record import LONGEST_DEAD_TIME, Stretch
+from companion.identification.record import LONGEST_DEAD_TIME, Segment
 from companion.identification.residual_analysis import FitQuality
 from companion.least_squares import Floats, Solution, minimise, project
 
@@ -32,8 +32,8 @@ class Model(Protocol):
     lower_bounds: Floats
     upper_bounds: Floats
 
-    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
-        """(m,), response at the times `at` (m,), s, from the steady state of the first command."""
+    def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
+        """(m,), response at `times` (m,), s, from the steady state of the first command."""
         ...
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
@@ -49,9 +49,9 @@ class FirstOrder:
 
     lower_bounds, upper_bounds = np.log([0.001]), np.log([1.0])
 
-    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
+    def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return first_order_response(commands, exp(log_params[0]), at)
+        return first_order_response(commands, exp(log_params[0]), times)
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
@@ -67,9 +67,9 @@ class SecondOrder:
 
     lower_bounds, upper_bounds = np.log([0.002, 0.2]), np.log([1.0, 4.0])
 
-    def response(self, log_params: Floats, commands: Knots, at: Floats) -> Floats:
+    def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
         """The response of this lag; see `Model.response`."""
-        return second_order_response(commands, *frequency_damping(log_params), at)
+        return second_order_response(commands, *frequency_damping(log_params), times)
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
         """The free responses of this lag; see `Model.free_responses`."""
@@ -116,17 +116,17 @@ class SecondOrderFit:
 
 DEAD_TIME_RANGE = 0.0, LONGEST_DEAD_TIME - 0.01
 """Range in which the dead time is searched, s."""
-_RAMP_TIMES = 0.01, 0.5
+_RAMP_TIME_RANGE = 0.01, 0.5
 """Bounds of the search for the slew limit: the time, s, that the largest change of the commands
 takes at that limit."""
-_SAME_COMMAND_SHARE = 0.005
+_SAME_COMMAND_FRACTION = 0.005
 """Largest difference of commands that count as the same, as a share of the commands' range."""
 
 
 class DelayedModel:
     """The response of a model to the commands of a record, compared with every n-th sample.
 
-    y(t) = gain·x(t − dead time) + offset + free response of each stretch, where x is the model's
+    y(t) = gain·x(t − dead time) + offset + free response of each segment, where x is the model's
     exact response. Linear regression gives the offset, the initial states, and the gain if it is
     not given. The other unknowns are searched: the logarithms of the model's parameters, the dead
     time (s), and optionally the logarithm of the slew limit.
@@ -135,62 +135,64 @@ class DelayedModel:
         model: response without dead time, of first or second order.
         gain: the given gain; None: the gain is fitted.
         thinning: n; every n-th sample is used.
-        commands: commands of each stretch, before the slew limit.
-        times: times of the samples of each stretch, s.
-        measured: (m,), the samples of all stretches.
+        commands: commands of each segment, before the slew limit.
+        times: times of the samples of each segment, s.
+        measured: (m,), the samples of all segments.
         largest_change: largest change of a command.
     """
 
     def __init__(
-        self, record: list[Stretch], model: Model, gain: float | None, thinning: int = 1
+        self, record: list[Segment], model: Model, gain: float | None, thinning: int = 1
     ) -> None:
         self.model, self.gain, self.thinning = model, gain, thinning
         self._dead_time_index = model.lower_bounds.size
-        span = max(float(np.ptp(stretch.commanded)) for stretch in record)
+        span = max(float(np.ptp(segment.commanded)) for segment in record)
         self.commands = [
-            held_commands(stretch.time, stretch.commanded, _SAME_COMMAND_SHARE * span)
-            for stretch in record
+            held_commands(segment.time, segment.commanded, _SAME_COMMAND_FRACTION * span)
+            for segment in record
         ]
-        self.times = [stretch.measured_time[::thinning] for stretch in record]
-        self.measured = np.concatenate([stretch.measured[::thinning] for stretch in record])
+        self.times = [segment.measured_time[::thinning] for segment in record]
+        self.measured = np.concatenate([segment.measured[::thinning] for segment in record])
         changes = [np.abs(np.diff(knots.value)).max(initial=0.0) for knots in self.commands]
         self.largest_change = float(max(changes))
         self._slew_cache: tuple[float, list[Knots]] = (nan, [])
 
-    def projection(self, unknown: Floats) -> tuple[Floats, Floats]:
+    def projection(self, unknowns: Floats) -> tuple[Floats, Floats]:
         """Best gain, offset and initial states for these unknowns, and the residual, (m,)."""
-        response = self.response(unknown)
+        response = self.response(unknowns)
         if self.gain is None:
-            columns = np.column_stack((response, self._offset_columns(unknown)))
+            columns = np.column_stack((response, self._offset_columns(unknowns)))
             return project(columns, self.measured)
-        columns = self._offset_columns(unknown)
+        columns = self._offset_columns(unknowns)
         weights, residual = project(columns, self.measured - self.gain * response)
         return np.concatenate(([self.gain], weights)), residual
 
-    def response(self, unknown: Floats) -> Floats:
+    def response(self, unknowns: Floats) -> Floats:
         """(m,), response of the model to the delayed commands."""
-        log_params = unknown[: self._dead_time_index]
-        return self._per_stretch(
-            unknown, lambda knots, at: self.model.response(log_params, knots, at)
+        log_params = unknowns[: self._dead_time_index]
+        return self._per_segment(
+            unknowns, lambda knots, at: self.model.response(log_params, knots, at)
         )
 
-    def delayed_commands(self, unknown: Floats, extra_delay: float = 0.0) -> Floats:
+    def delayed_commands(self, unknowns: Floats, extra_delay: float = 0.0) -> Floats:
         """(m,), the commands after slew limit, dead time and `extra_delay`, s."""
-        return self._per_stretch(
-            unknown, lambda knots, at: value_at(knots, np.maximum(at - extra_delay, knots.time[0]))
+        return self._per_segment(
+            unknowns, lambda knots, at: value_at(knots, np.maximum(at - extra_delay, knots.time[0]))
         )
 
-    def dead_time(self, unknown: Floats) -> float:
+    def dead_time(self, unknowns: Floats) -> float:
         """The dead time contained in the unknowns, s."""
-        return float(unknown[self._dead_time_index])
+        return float(unknowns[self._dead_time_index])
 
-    def slew(self, unknown: Floats) -> float | None:
+    def slew(self, unknowns: Floats) -> float | None:
         """The slew limit contained in the unknowns, per second; None if there is none."""
-        return exp(unknown[-1]) if unknown.size > self._dead_time_index + 1 else None
+        return exp(unknowns[-1]) if unknowns.size > self._dead_time_index + 1 else None
 
     def search(self, start: Floats) -> Solution:
         """The best fit, searched from the unknowns `start`."""
-        slew_limits = [log(self.largest_change / ramp_time) for ramp_time in reversed(_RAMP_TIMES)]
+        slew_limits = [
+            log(self.largest_change / ramp_time) for ramp_time in reversed(_RAMP_TIME_RANGE)
+        ]
         bounds = [
             *zip(self.model.lower_bounds, self.model.upper_bounds, strict=True),
             DEAD_TIME_RANGE,
@@ -209,32 +211,39 @@ class DelayedModel:
         deviation = self.measured - self.measured.mean()
         return 1.0 - solution.rss / float(deviation @ deviation) if deviation.any() else 0.0
 
-    def _offset_columns(self, unknown: Floats) -> Floats:
-        """(m, 1 + number of initial states): ones, and free responses of each stretch.
+    def _offset_columns(self, unknowns: Floats) -> Floats:
+        """(m, 1 + number of initial states): ones, and free responses of each segment.
 
-        A free response begins at the first sample of its stretch. A free response from the first
+        A free response begins at the first sample of its segment. A free response from the first
         command on would be nearly 0 at the samples, and its weight would be unbounded.
         """
-        log_params = unknown[: self._dead_time_index]
-        decays = [self.model.free_responses(log_params, times - times[0]) for times in self.times]
-        columns = np.zeros((self.measured.size, 1 + sum(decay.shape[1] for decay in decays)))
+        log_params = unknowns[: self._dead_time_index]
+        free_responses = [
+            self.model.free_responses(log_params, times - times[0]) for times in self.times
+        ]
+        columns = np.zeros(
+            (
+                self.measured.size,
+                1 + sum(free_response.shape[1] for free_response in free_responses),
+            )
+        )
         columns[:, 0] = 1.0
         row, column = 0, 1
-        for decay in decays:
-            rows, count = decay.shape
-            columns[row : row + rows, column : column + count] = decay
-            row, column = row + rows, column + count
+        for free_response in free_responses:
+            row_count, column_count = free_response.shape
+            columns[row : row + row_count, column : column + column_count] = free_response
+            row, column = row + row_count, column + column_count
         return columns
 
-    def _per_stretch(self, unknown: Floats, compute: Callable[[Knots, Floats], Floats]) -> Floats:
-        """(m,), results of `compute` for the slew-limited, delayed commands of each stretch."""
-        slew, delay = self.slew(unknown), self.dead_time(unknown)
+    def _per_segment(self, unknowns: Floats, compute: Callable[[Knots, Floats], Floats]) -> Floats:
+        """(m,), results of `compute` for the slew-limited, delayed commands of each segment."""
+        slew, delay = self.slew(unknowns), self.dead_time(unknowns)
         commands = self.commands if slew is None else self._slew_limited(slew)
         pairs = zip(commands, self.times, strict=True)
         return np.concatenate([compute(knots, times - delay) for knots, times in pairs])
 
     def _slew_limited(self, slew: float) -> list[Knots]:
-        """The commands of each stretch after the slew limit; the latest result is cached."""
+        """The commands of each segment after the slew limit; the latest result is cached."""
         if slew != self._slew_cache[0]:
             self._slew_cache = slew, [slew_limited(knots, slew) for knots in self.commands]
         return self._slew_cache[1]

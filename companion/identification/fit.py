@@ -18,7 +18,7 @@ from companion.identification.delayed_model import (
     SecondOrderFit,
     frequency_damping,
 )
-from companion.identification.record import Stretch, most_excited_windows
+from companion.identification.record import Segment, most_excited_windows
 from companion.identification.residual_analysis import FitQuality, analyse_residual
 from companion.least_squares import Floats, Solution
 
@@ -76,7 +76,7 @@ class LagFit:
 
 
 def fit_lag(
-    record: list[Stretch], gain: float | None = None, *, search_slew_limit: bool = True
+    record: list[Segment], gain: float | None = None, *, search_slew_limit: bool = True
 ) -> LagFit | None:
     """The best first-order fit; None if no command changes, or there are fewer than 10 samples.
 
@@ -86,97 +86,109 @@ def fit_lag(
         search_slew_limit: whether to search for a slew limit.
     """
     record = most_excited_windows(record)
-    count = sum(stretch.measured.size for stretch in record)
-    if count < _FEWEST_SAMPLES or all(np.ptp(stretch.commanded) == 0.0 for stretch in record):
+    count = sum(segment.measured.size for segment in record)
+    if count < _FEWEST_SAMPLES or all(np.ptp(segment.commanded) == 0.0 for segment in record):
         return None
     fine_thinning, coarse_thinning = 1 + count // _MOST_SAMPLES, 1 + count // _COARSE_SAMPLES
-    fine = DelayedModel(record, FirstOrder(), gain, fine_thinning)
-    coarse = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
-    best = _best_without_slew(fine, _grid_start(coarse))
+    fine_model = DelayedModel(record, FirstOrder(), gain, fine_thinning)
+    coarse_model = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
+    best = _best_without_slew(fine_model, _grid_start(coarse_model))
     if search_slew_limit:
-        best = _with_slew_if_better(best, fine, coarse)
-    free_gain, best_free_gain = fine, best
+        best = _with_slew_if_better(best, fine_model, coarse_model)
+    free_gain_model, free_gain_solution = fine_model, best
     if gain is not None:
-        free_gain = DelayedModel(record, FirstOrder(), None, fine_thinning)
-        best_free_gain = free_gain.search(best.unknown)
+        free_gain_model = DelayedModel(record, FirstOrder(), None, fine_thinning)
+        free_gain_solution = free_gain_model.search(best.unknowns)
     return LagFit(
-        dead_time=fine.dead_time(best.unknown),
-        lag=exp(best.unknown[0]),
-        gain=float(best_free_gain.weights[0]),
-        slew=fine.slew(best.unknown),
-        fit=_quality(fine, best),
-        second_order=_second_order_fit(record, free_gain, best_free_gain, coarse_thinning),
+        dead_time=fine_model.dead_time(best.unknowns),
+        lag=exp(best.unknowns[0]),
+        gain=float(free_gain_solution.weights[0]),
+        slew=fine_model.slew(best.unknowns),
+        fit=_quality(fine_model, best),
+        second_order=_second_order_fit(
+            record, free_gain_model, free_gain_solution, coarse_thinning
+        ),
         offset=float(best.weights[1]),
     )
 
 
-def _with_slew_if_better(best: Solution, fine: DelayedModel, coarse: DelayedModel) -> Solution:
+def _with_slew_if_better(
+    best: Solution, fine_model: DelayedModel, coarse_model: DelayedModel
+) -> Solution:
     """The best fit with a slew limit if it is clearly better than `best`, else `best`."""
-    coarse_solution = coarse.search(_slewed_start(best, coarse))
-    if coarse_solution.rss > _CLEARLY_BETTER_SHARE * coarse.search(best.unknown).rss:
+    coarse_solution = coarse_model.search(_slewed_start(best, coarse_model))
+    if coarse_solution.rss > _CLEARLY_BETTER_SHARE * coarse_model.search(best.unknowns).rss:
         return best
-    best_limited = fine.search(coarse_solution.unknown)
-    return best_limited if best_limited.rss < _CLEARLY_BETTER_SHARE * best.rss else best
+    limited_solution = fine_model.search(coarse_solution.unknowns)
+    return limited_solution if limited_solution.rss < _CLEARLY_BETTER_SHARE * best.rss else best
 
 
-def _slewed_start(best: Solution, coarse: DelayedModel) -> Floats:
+def _slewed_start(best: Solution, coarse_model: DelayedModel) -> Floats:
     """(3,), start of the search with a slew limit: the best point of a coarse grid.
 
     A slew limit delays too, so smaller lags and dead times than without it are tried.
     """
-    lag, dead_time = exp(best.unknown[0]), float(best.unknown[1])
-    tried = product(_TRIED_RAMP_TIMES, _LAG_SHARES, _DEAD_TIME_SHARES)
-    return coarse.best_of(
+    lag, dead_time = exp(best.unknowns[0]), float(best.unknowns[1])
+    tried_values = product(_TRIED_RAMP_TIMES, _LAG_SHARES, _DEAD_TIME_SHARES)
+    return coarse_model.best_of(
         [
-            np.array([log(lag_share * lag), share * dead_time, log(coarse.largest_change / ramp)])
-            for ramp, lag_share, share in tried
+            np.array(
+                [
+                    log(lag_share * lag),
+                    dead_time_share * dead_time,
+                    log(coarse_model.largest_change / ramp_time),
+                ]
+            )
+            for ramp_time, lag_share, dead_time_share in tried_values
         ]
     )
 
 
 def _second_order_fit(
-    record: list[Stretch], first_order_model: DelayedModel, first_order: Solution, thinning: int
+    record: list[Segment], first_order_model: DelayedModel, first_order: Solution, thinning: int
 ) -> SecondOrderFit | None:
     """The best second-order fit, gain included; None: not clearly better than first order."""
-    lag, dead_time, *slew = first_order.unknown.tolist()
+    lag, dead_time, *slew = first_order.unknowns.tolist()
     delay = exp(lag) + dead_time
     model: Model = SecondOrder()
     start = DelayedModel(record, model, None, thinning).best_of(
         [
-            np.array([log((1.0 - share) * delay), log(damping), share * delay, *slew])
+            np.array(
+                [log((1.0 - dead_time_share) * delay), log(damping), dead_time_share * delay, *slew]
+            )
             for damping in _TRIED_DAMPINGS
-            for share in _TRIED_DEAD_TIME_SHARES
+            for dead_time_share in _TRIED_DEAD_TIME_SHARES
         ]
     )
     delayed_model = DelayedModel(record, model, None, first_order_model.thinning)
     solution = delayed_model.search(start)
     if solution.rss > _CLEARLY_BETTER_SHARE * first_order.rss:
         return None
-    frequency, damping = frequency_damping(solution.unknown)
+    frequency, damping = frequency_damping(solution.unknowns)
     return SecondOrderFit(
         frequency=frequency,
         damping=damping,
-        dead_time=delayed_model.dead_time(solution.unknown),
+        dead_time=delayed_model.dead_time(solution.unknowns),
         gain=float(solution.weights[0]),
-        slew=delayed_model.slew(solution.unknown),
+        slew=delayed_model.slew(solution.unknowns),
         fit=_quality(delayed_model, solution),
     )
 
 
 def _quality(delayed_model: DelayedModel, solution: Solution) -> FitQuality:
     """The quality of a fit of either order."""
-    unknown, lag = solution.unknown, exp(solution.unknown[0])
-    commands = delayed_model.delayed_commands(unknown)
+    unknowns, lag = solution.unknowns, exp(solution.unknowns[0])
+    commands = delayed_model.delayed_commands(unknowns)
     span = float(np.ptp(commands))
     excited_samples = int(
-        (np.abs(delayed_model.response(unknown) - commands) > _EXCITED_SHARE * span).sum()
+        (np.abs(delayed_model.response(unknowns) - commands) > _EXCITED_SHARE * span).sum()
     )
-    response_duration = _RESPONSE_DURATION_FACTOR * (lag + delayed_model.dead_time(unknown))
+    response_duration = _RESPONSE_DURATION_FACTOR * (lag + delayed_model.dead_time(unknowns))
     sample_period = float(np.median(np.diff(np.concatenate(delayed_model.times))))
     misfit, standard_errors = analyse_residual(
         solution.residual,
         solution.jacobian,
-        lambda delay: delayed_model.delayed_commands(unknown, delay),
+        lambda delay: delayed_model.delayed_commands(unknowns, delay),
         response_duration,
         excited_samples,
         correlated_samples=1 + int(response_duration / max(sample_period, 1e-4)),
@@ -199,7 +211,7 @@ def _best_without_slew(delayed_model: DelayedModel, start: Floats) -> Solution:
     the same sum of lag and dead time. Neighbouring minima are therefore tried too.
     """
     solution = delayed_model.search(start)
-    lag, dead_time = exp(solution.unknown[0]), float(solution.unknown[1])
+    lag, dead_time = exp(solution.unknowns[0]), float(solution.unknowns[1])
     neighbours = [
         delayed_model.search(np.array([log(lag - shift), dead_time + shift]))
         for shift in (-_NEIGHBOUR_DISTANCE, _NEIGHBOUR_DISTANCE)

@@ -29,20 +29,20 @@ _ACCEPTED_DAMPINGS = 0.3, 10.0
 class AxisValues(NamedTuple):
     """The configuration values of one axis."""
 
-    lag: float
+    lag_ms: float
     """Lag, ms."""
-    dead_time: float
+    dead_time_ms: float
     """Dead time, ms."""
-    slew: float | None
+    slew_deg_s2: float | None
     """Slew limit, °/s²; None: no limit."""
     damping: float | None = None
     """Damping ratio ζ of a second-order lag; None: first order."""
 
     def described(self) -> str:
         """Text for the user: the values in one line."""
-        slew = "" if self.slew is None else f", slew {self.slew:.0f} °/s²"
+        slew = "" if self.slew_deg_s2 is None else f", slew {self.slew_deg_s2:.0f} °/s²"
         damping = "" if self.damping is None else f", damping {self.damping:.2f}"
-        return f"lag {self.lag:.1f} ms, dead time {self.dead_time:.1f} ms{slew}{damping}"
+        return f"lag {self.lag_ms:.1f} ms, dead time {self.dead_time_ms:.1f} ms{slew}{damping}"
 
 
 def vehicle_fragment(
@@ -87,7 +87,7 @@ def vehicle_fragment(
     identified = [f"  identified: {bounded_yaml.dump_value(flight)}"] if flight else []
     flown_by = [f"  autopilot: {bounded_yaml.dump_value(autopilot)}"] if autopilot else []
     lines += ["vehicle:", *identified, *flown_by, *_tilt_lines(axes["roll"], axes["pitch"])]
-    lines += _axis_lines("yaw", axes["yaw"], axes["roll"].slew)
+    lines += _axis_lines("yaw", axes["yaw"], axes["roll"].slew_deg_s2)
     return "\n".join(lines) + "\n"
 
 
@@ -134,11 +134,11 @@ def _fitted_values(response: RateResponse) -> AxisValues:
 def _tilt_lines(roll: AxisValues, pitch: AxisValues) -> list[str]:
     """YAML lines of roll and pitch; if they hardly differ, mean values for roll, null for pitch."""
     if not _nearly_same_axes(roll, pitch):
-        return _axis_lines("roll", roll) + _axis_lines("pitch", pitch, roll.slew)
+        return _axis_lines("roll", roll) + _axis_lines("pitch", pitch, roll.slew_deg_s2)
     mean = AxisValues(
-        0.5 * (roll.lag + pitch.lag),
-        0.5 * (roll.dead_time + pitch.dead_time),
-        _mean(roll.slew, pitch.slew),
+        0.5 * (roll.lag_ms + pitch.lag_ms),
+        0.5 * (roll.dead_time_ms + pitch.dead_time_ms),
+        _mean(roll.slew_deg_s2, pitch.slew_deg_s2),
         _mean(roll.damping, pitch.damping),
     )
     return _axis_lines("roll", mean) + [f"  pitch_{key}: null" for key in _AXIS_KEYS]
@@ -150,12 +150,13 @@ def _mean(one: float | None, other: float | None) -> float | None:
 
 def _nearly_same_axes(one: AxisValues, other: AxisValues) -> bool:
     return (
-        max(abs(one.lag - other.lag), abs(one.dead_time - other.dead_time))
+        max(abs(one.lag_ms - other.lag_ms), abs(one.dead_time_ms - other.dead_time_ms))
         <= _NEGLIGIBLE_TIME_DIFFERENCE_MS
         and _nearly_equal(
-            one.slew,
-            other.slew,
-            _NEGLIGIBLE_SLEW_DIFFERENCE_SHARE * max(one.slew or 0.0, other.slew or 0.0),
+            one.slew_deg_s2,
+            other.slew_deg_s2,
+            _NEGLIGIBLE_SLEW_DIFFERENCE_SHARE
+            * max(one.slew_deg_s2 or 0.0, other.slew_deg_s2 or 0.0),
         )
         and _nearly_equal(one.damping, other.damping, _NEGLIGIBLE_DAMPING_DIFFERENCE)
     )
@@ -171,10 +172,10 @@ def _axis_lines(name: str, axis: AxisValues, roll_slew: float | None = None) -> 
 
     Keys without a value are written as null, so that no value of another file remains in effect.
     """
-    slew = axis.slew if axis.slew is not None or roll_slew is None else _NO_SLEW_LIMIT
+    slew = axis.slew_deg_s2 if axis.slew_deg_s2 is not None or roll_slew is None else _NO_SLEW_LIMIT
     values = {
-        "lag_ms": f"{axis.lag:.1f}",
-        "dead_time_ms": f"{axis.dead_time:.1f}",
+        "lag_ms": f"{axis.lag_ms:.1f}",
+        "dead_time_ms": f"{axis.dead_time_ms:.1f}",
         "acceleration_limit_deg_s2": "null" if slew is None else f"{slew:.0f}",
         "damping": "null" if axis.damping is None else f"{axis.damping:.2f}",
     }

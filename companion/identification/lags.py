@@ -78,27 +78,29 @@ def _start_values(commands: Knots, slew: float) -> Floats:
     return np.array(outputs)
 
 
-def first_order_response(commands: Knots, lag: float, at: Floats) -> Floats:
-    """(m,), response of a first-order lag of `lag` > 0 s to the commands, at the times `at`, s.
+def first_order_response(commands: Knots, lag: float, times: Floats) -> Floats:
+    """(m,), response of a first-order lag of `lag` > 0 s to the commands, at `times`, s.
 
     The response starts in the steady state of the first command. No time may be before it.
     """
-    return np.asarray(complex_lag_response(commands, lag, at), dtype=np.float64)
+    return np.asarray(complex_lag_response(commands, lag, times), dtype=np.float64)
 
 
-def complex_lag_response(commands: Knots, lag: complex, at: Floats) -> Numbers:
+def complex_lag_response(commands: Knots, lag: complex, times: Floats) -> Numbers:
     """Like `first_order_response`, for a complex lag, s.
 
     An underdamped second-order response is a weighted sum of two such responses with complex
     conjugate lags.
     """
-    steady = commands.value - commands.slope * lag
-    ends = steady[:-1] + commands.slope[:-1] * np.diff(commands.time)
-    jumps = np.concatenate(([commands.value[0] - steady[0]], ends - steady[1:]))
+    steady_output = commands.value - commands.slope * lag
+    steady_at_ends = steady_output[:-1] + commands.slope[:-1] * np.diff(commands.time)
+    jumps = np.concatenate(
+        ([commands.value[0] - steady_output[0]], steady_at_ends - steady_output[1:])
+    )
     transients = _transients_at_knots(commands.time / lag, jumps)
-    pieces = np.searchsorted(commands.time, at, side="right") - 1
-    elapsed = at - commands.time[pieces]
-    steady_response = steady[pieces] + commands.slope[pieces] * elapsed
+    pieces = np.searchsorted(commands.time, times, side="right") - 1
+    elapsed = times - commands.time[pieces]
+    steady_response = steady_output[pieces] + commands.slope[pieces] * elapsed
     response: Numbers = steady_response + transients[pieces] * np.exp(-elapsed / lag)
     return response
 
@@ -109,24 +111,24 @@ def _transients_at_knots(scaled_times: Numbers, jumps: Numbers) -> Numbers:
     `scaled_times` are the times of the knots divided by the lag. The sums are computed in parts so
     short that no exponential overflows.
     """
-    sums = np.empty_like(jumps)
+    transients = np.empty_like(jumps)
     real_times = np.real(scaled_times)
     start, previous_sum = 0, 0.0 * jumps[0]
     while start < jumps.size:
         end = int(np.searchsorted(real_times, real_times[start] + _LARGEST_EXPONENT, side="right"))
         growth = np.exp(scaled_times[start:end] - scaled_times[start])
-        sums[start:end] = (previous_sum + np.cumsum(jumps[start:end] * growth)) / growth
+        transients[start:end] = (previous_sum + np.cumsum(jumps[start:end] * growth)) / growth
         if end < jumps.size:
             elapsed = scaled_times[end] - scaled_times[end - 1]
-            previous_sum = sums[end - 1] * np.exp(-elapsed)
+            previous_sum = transients[end - 1] * np.exp(-elapsed)
         start = end
-    return sums
+    return transients
 
 
-def value_at(commands: Knots, at: Floats) -> Floats:
-    """(m,), values of the commands at the times `at` (m,), s; none may be before the first knot."""
-    piece = np.searchsorted(commands.time, at, side="right") - 1
-    values: Floats = commands.value[piece] + commands.slope[piece] * (at - commands.time[piece])
+def value_at(commands: Knots, times: Floats) -> Floats:
+    """(m,), values of the commands at `times` (m,), s; none may be before the first knot."""
+    piece = np.searchsorted(commands.time, times, side="right") - 1
+    values: Floats = commands.value[piece] + commands.slope[piece] * (times - commands.time[piece])
     return values
 
 
@@ -134,24 +136,26 @@ _NEARLY_CRITICAL = 1e-6
 """Smallest |ζ² − 1| that is used; at 0 both lags would be equal, with a division by 0."""
 
 
-def second_order_response(commands: Knots, frequency: float, damping: float, at: Floats) -> Floats:
+def second_order_response(
+    commands: Knots, frequency: float, damping: float, times: Floats
+) -> Floats:
     """(m,), response of a second-order lag, from the steady state of the first command.
 
     Args:
-        commands: the commands; no time in `at` may be before the first knot.
+        commands: the commands; no time in `times` may be before the first knot.
         frequency: natural frequency ω, rad/s.
         damping: damping ratio ζ.
-        at: (m,), times, s.
+        times: (m,), times, s.
     """
     first_lag, second_lag = _two_lags(frequency, damping)
     if first_lag.imag:
         response: Floats = (
-            np.imag(first_lag * complex_lag_response(commands, first_lag, at)) / first_lag.imag
+            np.imag(first_lag * complex_lag_response(commands, first_lag, times)) / first_lag.imag
         )
         return response
     slow_lag, quick_lag = first_lag.real, second_lag.real
-    slow_response = first_order_response(commands, slow_lag, at)
-    quick_response = first_order_response(commands, quick_lag, at)
+    slow_response = first_order_response(commands, slow_lag, times)
+    quick_response = first_order_response(commands, quick_lag, times)
     return (slow_lag * slow_response - quick_lag * quick_response) / (slow_lag - quick_lag)
 
 

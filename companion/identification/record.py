@@ -1,4 +1,4 @@
-"""Commands and measurements, divided into stretches at pauses of control."""
+"""Commands and measurements, divided into segments at pauses of control."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from companion.least_squares import Floats
 LONGEST_DEAD_TIME = 0.5
 """Longest dead time that can be found, s."""
 _LONGEST_HOLD = 0.5
-"""Longest time between two commands of a stretch, s. Autopilots react to missing setpoints only
+"""Longest time between two commands of a segment, s. Autopilots react to missing setpoints only
 later: by default PX4 after 1 s, ArduPilot after 3 s."""
 
 _MOST_ROWS = 16_000
@@ -23,7 +23,7 @@ _WINDOW_LEAD = 1.5
 time plus the longest slew-limited change of command in the search."""
 
 
-class Stretch(NamedTuple):
+class Segment(NamedTuple):
     """A part of a record without a pause: n commands, each held until the next, and m samples."""
 
     time: Floats
@@ -37,10 +37,10 @@ class Stretch(NamedTuple):
     """(m,), the samples, in the unit of the commands."""
 
 
-def stretches(
+def segments(
     time: ArrayLike, commanded: ArrayLike, measured_time: ArrayLike, measured: ArrayLike
-) -> list[Stretch]:
-    """The stretches of a record that contain at least one sample.
+) -> list[Segment]:
+    """The segments of a record that contain at least one sample.
 
     Args:
         time: (n,), vehicle time of the sample to which each command responds, s, in any order.
@@ -53,52 +53,52 @@ def stretches(
     """
     t, u = _checked_series(time, commanded)
     sample_times, y = _checked_series(measured_time, measured)
-    found = []
+    found_segments = []
     for rows in np.split(np.arange(t.size), np.flatnonzero(np.diff(t) > _LONGEST_HOLD) + 1):
         if rows.size == 0:
             continue
         first_time, last_time = t[rows[0]], t[rows[-1]]
         is_inside = (sample_times >= first_time + LONGEST_DEAD_TIME) & (sample_times <= last_time)
         if is_inside.any():
-            found.append(Stretch(t[rows], u[rows], sample_times[is_inside], y[is_inside]))
-    return found
+            found_segments.append(Segment(t[rows], u[rows], sample_times[is_inside], y[is_inside]))
+    return found_segments
 
 
-def most_excited_windows(record: list[Stretch]) -> list[Stretch]:
+def most_excited_windows(record: list[Segment]) -> list[Segment]:
     """The record or, if it is long, only the windows in which the commands varied most.
 
     Half an hour of flight contains hardly more information on the response than its most excited
     half minute. Each window also contains the commands from the `_WINDOW_LEAD` before the window.
     """
-    if sum(stretch.time.size + stretch.measured_time.size for stretch in record) <= _MOST_ROWS:
+    if sum(segment.time.size + segment.measured_time.size for segment in record) <= _MOST_ROWS:
         return record
-    windows = [window for stretch in record for window in _windows(stretch)]
+    windows = [window for segment in record for window in _windows(segment)]
     windows.sort(key=lambda window: float(np.std(window.commanded)), reverse=True)
-    kept: list[Stretch] = []
-    rows = 0
+    chosen_windows: list[Segment] = []
+    row_count = 0
     for window in windows:
-        rows += window.time.size + window.measured_time.size
-        if kept and rows > _MOST_ROWS:
+        row_count += window.time.size + window.measured_time.size
+        if chosen_windows and row_count > _MOST_ROWS:
             break
-        kept.append(window)
-    return sorted(kept, key=lambda window: float(window.time[0]))
+        chosen_windows.append(window)
+    return sorted(chosen_windows, key=lambda window: float(window.time[0]))
 
 
-def _windows(stretch: Stretch) -> list[Stretch]:
-    """A stretch divided into windows; those without a sample are left out."""
+def _windows(segment: Segment) -> list[Segment]:
+    """A segment divided into windows; those without a sample are left out."""
     windows = []
-    for start in np.arange(stretch.measured_time[0], stretch.measured_time[-1], _WINDOW_DURATION):
+    for start in np.arange(segment.measured_time[0], segment.measured_time[-1], _WINDOW_DURATION):
         end = start + _WINDOW_DURATION
-        samples = slice(*np.searchsorted(stretch.measured_time, (start, end)))
-        first_command, end_command = np.searchsorted(stretch.time, (start - _WINDOW_LEAD, end))
+        samples = slice(*np.searchsorted(segment.measured_time, (start, end)))
+        first_command, end_command = np.searchsorted(segment.time, (start - _WINDOW_LEAD, end))
         commands = slice(max(int(first_command) - 1, 0), end_command)
-        if stretch.measured_time[samples].size:
+        if segment.measured_time[samples].size:
             windows.append(
-                Stretch(
-                    stretch.time[commands],
-                    stretch.commanded[commands],
-                    stretch.measured_time[samples],
-                    stretch.measured[samples],
+                Segment(
+                    segment.time[commands],
+                    segment.commanded[commands],
+                    segment.measured_time[samples],
+                    segment.measured[samples],
                 )
             )
     return windows
@@ -115,7 +115,7 @@ def _checked_series(time: ArrayLike, values: ArrayLike) -> tuple[Floats, Floats]
         raise ValueError(
             f"times {t.shape} and values {v.shape} must be one-dimensional and equally long"
         )
-    finite = np.isfinite(t) & np.isfinite(v)
-    t, v = t[finite], v[finite]
+    is_finite = np.isfinite(t) & np.isfinite(v)
+    t, v = t[is_finite], v[is_finite]
     order = np.argsort(t, kind="stable")
     return t[order], v[order]

@@ -61,15 +61,15 @@ def analyse_residual(
         The misfit, which is the RMS of the part that the commands explain, in the unit of the
             measurements; and the standard errors of the unknowns, (k,), in the unit of each.
     """
-    delays = min(_MOST_DELAYS, excited_samples // _SAMPLES_PER_DELAY)
+    delay_count = min(_MOST_DELAYS, excited_samples // _SAMPLES_PER_DELAY)
     noise = residual
-    if delays:
+    if delay_count:
         # Negative delays too, because the fitted dead time may be too long.
-        delay_values = np.linspace(-0.25 * response_duration, response_duration, delays)
+        delay_values = np.linspace(-0.25 * response_duration, response_duration, delay_count)
         columns = np.column_stack([commands(delay) for delay in delay_values.tolist()])
         _, noise = project(np.column_stack((columns, np.ones(residual.size))), residual)
     # The regression takes one degree of freedom for each delay.
-    correction = excited_samples / max(excited_samples - delays, 1)
+    correction = excited_samples / max(excited_samples - delay_count, 1)
     standard_errors = _standard_errors(jacobian, noise, correlated_samples) * np.sqrt(correction)
     return float(np.sqrt(np.mean(np.square(residual - noise)))), standard_errors
 
@@ -77,12 +77,14 @@ def analyse_residual(
 def _standard_errors(jacobian: Floats, noise: Floats, correlated_samples: int) -> Floats:
     """(k,), standard errors of the unknowns that allow for correlated noise (Newey & West)."""
     scores = jacobian * noise[:, np.newaxis]
-    spread = scores.T @ scores
+    score_covariance = scores.T @ scores
     for offset in range(1, min(correlated_samples, noise.size)):
         lagged_product = scores[offset:].T @ scores[:-offset]
-        spread += (1.0 - offset / correlated_samples) * (lagged_product + lagged_product.T)
+        score_covariance += (1.0 - offset / correlated_samples) * (
+            lagged_product + lagged_product.T
+        )
     # Derivatives near the smallest float have no inverse: such unknowns are not determined.
     with np.errstate(over="ignore", invalid="ignore"):
         inverse = np.linalg.pinv(jacobian.T @ jacobian)
-        errors: Floats = np.sqrt(np.maximum(np.diagonal(inverse @ spread @ inverse), 0.0))
+        errors: Floats = np.sqrt(np.maximum(np.diagonal(inverse @ score_covariance @ inverse), 0.0))
     return np.where(np.isnan(errors), np.inf, errors)

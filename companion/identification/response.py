@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from companion.identification.delayed_model import DEAD_TIME_RANGE
 from companion.identification.fit import LAG_RANGE, LagFit, fit_lag
-from companion.identification.record import stretches
+from companion.identification.record import segments
 from companion.identification.residual_analysis import FitQuality
 
 
@@ -109,9 +109,9 @@ def fit_rate_response(
 ) -> RateResponse:
     """Fit a first-order lag with dead time, and with a slew limit if there is one (least squares).
 
-    Each command is held until the next; a pause of more than 0.5 s ends a stretch of control. The
-    first half second of each stretch is left out, since it depends on commands before the stretch.
-    A constant offset of the measurements and the rate at the start of each stretch are fitted too.
+    Each command is held until the next; a pause of more than 0.5 s ends a segment of control. The
+    first half second of each segment is left out, since it depends on commands before the segment.
+    A constant offset of the measurements and the rate at the start of each segment are fitted too.
 
     A slew limit differs visibly from a slow lag only if some commands are much larger than others.
 
@@ -130,7 +130,7 @@ def fit_rate_response(
     Raises:
         ValueError: a time series and its values are not one-dimensional and equally long.
     """
-    fit = fit_lag(stretches(time, commanded, measured_time, measured), gain)
+    fit = fit_lag(segments(time, commanded, measured_time, measured), gain)
     if fit is None:
         return _NOT_FOUND
     gain = fit.gain if fit.second_order is None else fit.second_order.gain

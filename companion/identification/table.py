@@ -54,11 +54,11 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
     verdict = "good" if response.is_good() else "bad"
     if isnan(response.lag):
         return *(_NO_VALUE,) * 6, verdict
-    shown = second_order or response
-    fit, slew = shown.fit, shown.slew
+    shown_fit = second_order or response
+    fit, slew = shown_fit.fit, shown_fit.slew
     return (
-        f"{1e3 * shown.lag:.1f} ± {1e3 * fit.lag_error:.1f}",
-        f"{1e3 * shown.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f}",
+        f"{1e3 * shown_fit.lag:.1f} ± {1e3 * fit.lag_error:.1f}",
+        f"{1e3 * shown_fit.dead_time:.1f} ± {1e3 * fit.dead_time_error:.1f}",
         _NO_VALUE if second_order is None else f"{second_order.damping:.2f}",
         f"{response.gain:.2f}",
         _NO_VALUE if slew is None else f"{degrees(slew):.0f}",
@@ -69,14 +69,14 @@ def _cells(response: RateResponse, second_order: SecondOrderFit | None) -> tuple
 
 def _model_line(name: str, response: RateResponse, second_order: SecondOrderFit | None) -> str:
     """A line that says which model the row of an axis shows, and why."""
-    share, better = f"{response.fit.explained:.1%}", response.second_order
-    explains = f"explains {share} of the variance"
+    explained_percent, better_fit = f"{response.fit.explained:.1%}", response.second_order
+    explains = f"explains {explained_percent} of the variance"
     if second_order is not None:
         explained = f"explains {second_order.fit.explained:.1%} of the variance"
-        return f"{name}: second order, which {explained}; first order explains {share}"
-    if better is None:
+        return f"{name}: second order, which {explained}; first order explains {explained_percent}"
+    if better_fit is None:
         return f"{name}: a lag of first order {explains}; second order is not clearly better"
-    return f"{name}: written as first order, which {explains}; a better fit: {better.described}"
+    return f"{name}: written as first order, which {explains}; a better fit: {better_fit.described}"
 
 
 def _thrust_line(thrust: ThrustMap | None, gravity: float) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from companion.identification.fit import fit_lag
-from companion.identification.record import Stretch, stretches
+from companion.identification.record import Segment, segments
 
 _LEAST_EXPLAINED = 0.8
 """Smallest R² of a usable map."""
@@ -66,25 +66,25 @@ class ThrustMap:
         )
 
 
-def _excited_samples(record: list[Stretch]) -> list[Stretch]:
+def _excited_samples(record: list[Segment]) -> list[Segment]:
     """The record without samples of steady thrust, which contain only vibration and gusts.
 
     A sample stays if it follows an excited command within `_LARGEST_DELAY`.
     """
     if not record:
         return []
-    thrust = np.concatenate([stretch.commanded for stretch in record])
+    thrust = np.concatenate([segment.commanded for segment in record])
     median, least_change = float(np.median(thrust)), _EXCITED_SHARE * float(np.ptp(thrust))
-    excited_stretches = []
-    for stretch in record:
-        change_times = stretch.time[np.abs(stretch.commanded - median) > least_change]
-        latest_change = np.searchsorted(change_times, stretch.measured_time, side="right")
-        elapsed = stretch.measured_time - np.concatenate(([-np.inf], change_times))[latest_change]
-        is_kept = elapsed < _LARGEST_DELAY
-        if is_kept.any():
-            measured = stretch.measured_time[is_kept], stretch.measured[is_kept]
-            excited_stretches.append(Stretch(stretch.time, stretch.commanded, *measured))
-    return excited_stretches
+    excited_segments = []
+    for segment in record:
+        change_times = segment.time[np.abs(segment.commanded - median) > least_change]
+        latest_change = np.searchsorted(change_times, segment.measured_time, side="right")
+        elapsed = segment.measured_time - np.concatenate(([-np.inf], change_times))[latest_change]
+        is_excited = elapsed < _LARGEST_DELAY
+        if is_excited.any():
+            measured = segment.measured_time[is_excited], segment.measured[is_excited]
+            excited_segments.append(Segment(segment.time, segment.commanded, *measured))
+    return excited_segments
 
 
 def fit_thrust_map(
@@ -108,7 +108,7 @@ def fit_thrust_map(
     Raises:
         ValueError: a time series and its values are not one-dimensional and equally long.
     """
-    record = _excited_samples(stretches(time, thrust, measured_time, specific_thrust))
+    record = _excited_samples(segments(time, thrust, measured_time, specific_thrust))
     fit = fit_lag(record, search_slew_limit=False)
     if fit is None:
         return None

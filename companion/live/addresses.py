@@ -129,13 +129,13 @@ def _host_and_port(address: str, option: str, default_port: int) -> tuple[str, i
 
 def _bind(listening_socket: socket.socket, host: str, port: int) -> None:
     """Bind the socket; ask the page or stream of an ended flight to release the port."""
-    deadline, release_agreed = time.monotonic() + _ANSWER_TIMEOUT, False
+    deadline, is_release_agreed = time.monotonic() + _ANSWER_TIMEOUT, False
     while True:
         try:
             listening_socket.bind((host, port))
         except OSError as error:
-            if not release_agreed and ask_to_release(port):
-                deadline, release_agreed = time.monotonic() + _RELEASE_TIMEOUT, True
+            if not is_release_agreed and ask_to_release(port):
+                deadline, is_release_agreed = time.monotonic() + _RELEASE_TIMEOUT, True
             if error.errno != errno.EADDRINUSE or time.monotonic() > deadline:
                 raise
             time.sleep(0.05)

@@ -11,7 +11,7 @@ from companion.live.addresses import release_socket_name
 
 _LONGEST_TIME_WITHOUT_USERS = 5.0
 """Time after which a page or stream without users ends, s."""
-_LONGEST_STAY = 3600.0
+_LONGEST_TIME_AFTER_FLIGHT = 3600.0
 """Longest time that a page or stream stays after the flight, s."""
 
 
@@ -22,13 +22,13 @@ async def until_unused(port: int, is_open: Callable[[], bool]) -> None:
     """
     async with _release_request(port) as release_requested:
         time_without_users = 0.0
-        for _ in range(int(_LONGEST_STAY)):
+        for _ in range(int(_LONGEST_TIME_AFTER_FLIGHT)):
             time_without_users = 0.0 if is_open() else time_without_users + 1.0
             if release_requested.is_set() or time_without_users > _LONGEST_TIME_WITHOUT_USERS:
                 break
-            waiting = asyncio.create_task(release_requested.wait())
-            await asyncio.wait({waiting}, timeout=1.0)
-            waiting.cancel()
+            request_task = asyncio.create_task(release_requested.wait())
+            await asyncio.wait({request_task}, timeout=1.0)
+            request_task.cancel()
 
 
 @asynccontextmanager

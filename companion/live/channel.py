@@ -22,17 +22,17 @@ class Channel:
         is_open: whether the other end existed at the last attempt.
     """
 
-    def __init__(self, end: socket.socket) -> None:
+    def __init__(self, our_socket: socket.socket) -> None:
         self.dropped = 0
         self.is_open = True
-        self._socket = end
+        self._socket = our_socket
 
     @staticmethod
     def pair() -> "tuple[Channel, socket.socket]":
         """Make our end, and the socket for the other process."""
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        ours.setblocking(False)
-        return Channel(ours), theirs
+        our_socket, other_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        our_socket.setblocking(False)
+        return Channel(our_socket), other_socket
 
     def fileno(self) -> int:
         """File descriptor, for `add_reader`."""
@@ -80,15 +80,15 @@ class Feed:
         dropped: number of datagrams that were not sent: the buffer was full, or the process gone.
     """
 
-    def __init__(self, end: socket.socket) -> None:
+    def __init__(self, our_socket: socket.socket) -> None:
         self.dropped = 0
-        self._socket = end
+        self._socket = our_socket
 
     @staticmethod
     def pair() -> "tuple[Feed, socket.socket]":
         """Make our end, and the socket for the other process."""
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        return Feed(ours), theirs
+        our_socket, other_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        return Feed(our_socket), other_socket
 
     def send(self, datagram: bytes) -> None:
         """Send a datagram, or drop it."""
@@ -102,11 +102,11 @@ class Feed:
         self._socket.close()
 
 
-def datagrams(end: socket.socket, max_count: int) -> Iterator[bytes]:
+def datagrams(our_socket: socket.socket, max_count: int) -> Iterator[bytes]:
     """Yield at most `max_count` arrived datagrams, and b"" if the other end was closed."""
     for _ in range(max_count):
         try:
-            datagram = end.recv(_LARGEST_MESSAGE)
+            datagram = our_socket.recv(_LARGEST_MESSAGE)
         except BlockingIOError:
             return
         except OSError:

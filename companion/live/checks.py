@@ -29,17 +29,19 @@ class ChangeChecks:
     """Checks requested changes of values against the configuration of the flight.
 
     Attributes:
-        start: the configuration with which the flight began.
-        current: the configuration after the newest change.
+        start_config: the configuration with which the flight began.
+        current_config: the configuration after the newest change.
     """
 
-    def __init__(self, start: Config, *, flies_maneuvers: bool) -> None:
-        self.start = self.current = start
-        self._drag = drag_before_connecting(start)
+    def __init__(self, start_config: Config, *, flies_maneuvers: bool) -> None:
+        self.start_config = self.current_config = start_config
+        self._drag = drag_before_connecting(start_config)
         self._maneuvers: ManeuverSequence | None = None
         self._maneuvers_error: ConfigError | None = None
         try:
-            self._maneuvers = configured_maneuvers(start, self._drag) if flies_maneuvers else None
+            self._maneuvers = (
+                configured_maneuvers(start_config, self._drag) if flies_maneuvers else None
+            )
         except ConfigError as error:  # a file has changed since the flight read it
             self._maneuvers_error = error
 
@@ -65,13 +67,13 @@ class ChangeChecks:
                 the planner or guidance of this flight, or the maneuvers of this flight could not
                 be loaded.
         """
-        wanted = changed_in_flight(self.start, self.current, values, name)
-        reason = reason_against_changes(self.start)
+        wanted = changed_in_flight(self.start_config, self.current_config, values, name)
+        reason = reason_against_changes(self.start_config)
         if reason is not None:
             raise ConfigError(f"{name}: {reason}")
         try:
-            require_moderate_change(self.current, wanted, name)
-            _require_margins(self.start, wanted, name)
+            require_moderate_change(self.current_config, wanted, name)
+            _require_margins(self.start_config, wanted, name)
         except (ValueError, ArithmeticError) as error:
             raise ConfigError(f"{name}: {error}") from error
         if self._maneuvers_error is not None:

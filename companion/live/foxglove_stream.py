@@ -26,19 +26,19 @@ class _Subscriptions(ServerListener):
     """Tracks whether somebody has the stream open. The library calls it in its own threads."""
 
     def __init__(self) -> None:
-        self._active: set[tuple[int, int]] = set()
+        self._active_subscriptions: set[tuple[int, int]] = set()
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
         """Count a subscription."""
-        self._active.add((client.id, channel.id))
+        self._active_subscriptions.add((client.id, channel.id))
 
     def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
         """End a subscription; a client that leaves also unsubscribes."""
-        self._active.discard((client.id, channel.id))
+        self._active_subscriptions.discard((client.id, channel.id))
 
     def exist(self) -> bool:
         """Whether a client has subscribed to a channel."""
-        return bool(self._active)
+        return bool(self._active_subscriptions)
 
 
 class LiveStream:

@@ -78,7 +78,7 @@ class Helper:
     async def run_while_serving(self, work: Coroutine[Any, Any, T]) -> T:
         """Run `work`, and handle the requests of the process at the same time."""
         loop = asyncio.get_running_loop()
-        self.changes.on_change, self.changes.on_drag = self._tell_change, self._tell_drag
+        self.changes.on_change, self.changes.on_known_drag = self._send_change, self._send_drag
         loop.add_reader(self._channel.fileno(), self._on_readable)
         try:
             return await work
@@ -97,8 +97,8 @@ class Helper:
         """Send a phase to the process."""
         self._send("phase", name=name, waits_for=waits_for)
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
-        """Do nothing: `status` sends the same detail."""
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
+        """Do nothing: `status` sends the same text."""
 
     def status(self, status: FlightStatus) -> None:
         """Send the state of the flight to the process."""
@@ -107,7 +107,7 @@ class Helper:
             "status",
             time_s=round(status.time, 3),
             phase=status.phase,
-            detail=status.detail,
+            detail=status.waiting_for,
             maneuver=status.maneuver,
             maneuver_elapsed_s=round(status.maneuver_elapsed, 1),
             maneuver_duration_s=status.maneuver_duration,
@@ -142,11 +142,11 @@ class Helper:
             self._has_ended = True
             self.note(f"{self._name} has ended by itself; the flight goes on without it")
 
-    def _tell_change(self, config: Config) -> None:
+    def _send_change(self, config: Config) -> None:
         change = str(self.changes.all_changes[-1])
         self._send("config", config=_as_json(config), can_undo=self.changes.can_undo, text=change)
 
-    def _tell_drag(self, known_drag: KnownDrag) -> None:
+    def _send_drag(self, known_drag: KnownDrag) -> None:
         drag, source = known_drag.drag, known_drag.source
         self._send(
             "drag",
@@ -173,8 +173,8 @@ class Helper:
                 text = self.changes.undo(by)
             else:
                 text = self.changes.change(message.get("values") or {}, by)
-        except (ChangeRefusedError, ValueError, ArithmeticError) as refused:
-            self._send("answer", id=message.get("id"), refusal=str(refused))
+        except (ChangeRefusedError, ValueError, ArithmeticError) as error:
+            self._send("answer", id=message.get("id"), refusal=str(error))
         else:
             self._send("answer", id=message.get("id"), refusal=None, text=text)
 
@@ -223,5 +223,5 @@ def _first_message(tasks: HelperTasks, config: Config) -> Message:
 
 
 def _as_json(config: Config) -> Message:
-    plain: Message = json.loads(config.model_dump_json())
-    return plain
+    json_config: Message = json.loads(config.model_dump_json())
+    return json_config

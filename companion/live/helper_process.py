@@ -45,9 +45,9 @@ class FlightConnection:
         self._request_lock = asyncio.Lock()
         asyncio.get_running_loop().add_reader(channel.fileno(), self._on_readable)
 
-    def listen(self, take: Callable[[Message], None]) -> None:
-        """Call `take` with each further message of the flight."""
-        self._listeners.append(take)
+    def listen(self, listener: Callable[[Message], None]) -> None:
+        """Call `listener` with each further message of the flight."""
+        self._listeners.append(listener)
 
     async def change(self, values: Values, by: str) -> str:
         """Check new values and request them from the flight; return the change in words.
@@ -89,8 +89,10 @@ class FlightConnection:
         answer = self._pending_answers[number] = asyncio.get_running_loop().create_future()
         try:
             if self.flight_ended.is_set() or not self._channel.send({**message, "id": number}):
-                ended = self.flight_ended.is_set() or not self._channel.is_open
-                reason = "the flight has ended" if ended else "the flight is too busy to take it"
+                has_ended = self.flight_ended.is_set() or not self._channel.is_open
+                reason = (
+                    "the flight has ended" if has_ended else "the flight is too busy to take it"
+                )
                 raise ChangeRefusedError(f"{reason}; nothing has changed")
             async with asyncio.timeout(_ANSWER_TIMEOUT):
                 reply = await answer
@@ -115,11 +117,11 @@ class FlightConnection:
                 asyncio.get_running_loop().remove_reader(self._channel.fileno())
                 self.flight_ended.set()
             else:
-                self._take(message)
+                self._take_message(message)
 
-    def _take(self, message: Message) -> None:
+    def _take_message(self, message: Message) -> None:
         if message["kind"] == "config":
-            self.checks.current = Config.model_validate(message["config"])
+            self.checks.current_config = Config.model_validate(message["config"])
         elif message["kind"] == "drag":
             self.checks.note_drag(message)
         answer = self._pending_answers.get(message.get("id", -1))
@@ -132,21 +134,21 @@ class FlightConnection:
 async def watch(connection: FlightConnection, path: Path) -> None:
     """Apply the edits of a file until the flight ends."""
     config_as_read = Config.model_validate(connection.first_message["config_as_read"])
-    watched = WatchedFile(path, config_as_read, connection.checks.check)
+    watched_file = WatchedFile(path, config_as_read, connection.checks.check)
     connection.note(f"edits of {path.name} are applied from now on")
     while not connection.flight_ended.is_set():
-        edit = await asyncio.to_thread(watched.newest_edit)
+        edit = await asyncio.to_thread(watched_file.newest_edit)
         if edit is not None and edit.refusal is not None:
             connection.note(edit.refusal)
         elif edit is not None:
             try:
                 await connection.change(edit.values, path.name)
-                watched.accept()
+                watched_file.accept()
             except (ConfigError, ChangeRefusedError) as refused:
                 connection.note(f"{path.name} is not applied: {refused}")
             except NoAnswerError as error:
                 connection.note(f"{path.name}: {error}")
-                watched.accept()  # so that an edit back to the old values is sent
+                watched_file.accept()  # so that an edit back to the old values is sent
         await asyncio.sleep(_CHECK_PERIOD_S)
 
 
@@ -160,11 +162,11 @@ async def _serve(channel_fd: int, page_fd: int, feed_fd: int) -> None:
             stream; −1: no live stream.
     """
     channel = Channel(socket.socket(fileno=channel_fd))
-    first = next(channel.received_messages(1))
-    if first is None:
+    first_message = next(channel.received_messages(1))
+    if first_message is None:
         return
     os.set_blocking(channel_fd, False)
-    connection = FlightConnection(channel, first)
+    connection = FlightConnection(channel, first_message)
     serving: list[Awaitable[None]] = [_watch_until_ended(connection)]
     if feed_fd >= 0:
         from companion.live.foxglove_stream import serve_stream  # noqa: PLC0415  needs the extra
@@ -180,10 +182,10 @@ async def _serve(channel_fd: int, page_fd: int, feed_fd: int) -> None:
 async def _watch_until_ended(connection: FlightConnection) -> None:
     """Wait for the end of the flight; until then watch the file, if a file is to be watched."""
     path = connection.first_message["watched_file"]
-    watching = None if path is None else asyncio.create_task(watch(connection, Path(path)))
+    watch_task = None if path is None else asyncio.create_task(watch(connection, Path(path)))
     await connection.flight_ended.wait()
-    if watching is not None:
-        watching.cancel()
+    if watch_task is not None:
+        watch_task.cancel()
 
 
 if __name__ == "__main__":

@@ -109,7 +109,7 @@ class CommandClient:
                 result = await self._exchange(command, params, timeout_s, retries, answers)
             if result != _ACCEPTED:
                 await asyncio.sleep(_REASON_DELAY_S)
-                texts = self._texts.since(start_time)
+                texts = self._texts.texts_since(start_time)
                 raise CommandRefused(command_name(command), result, result_name(result), texts)
 
     async def _exchange(

@@ -24,8 +24,8 @@ class MessageDispatcher:
 
     def __init__(self, stats: LinkStats) -> None:
         self._stats = stats
-        self._decoded: dict[int, list[Callable[[Message], None]]] = {}
-        self._raw: dict[int, list[Callable[[bytes], None]]] = {}
+        self._message_callbacks: dict[int, list[Callable[[Message], None]]] = {}
+        self._payload_callbacks: dict[int, list[Callable[[bytes], None]]] = {}
         self.on_error: Callable[[Exception], None] | None = None
 
     def subscribe(self, name: str, callback: Callable[[Message], None]) -> Unsubscribe:
@@ -34,7 +34,7 @@ class MessageDispatcher:
         Raises:
             UnknownMessage: the dialect has no such message.
         """
-        return _add(self._decoded, message_id(name), callback)
+        return _add(self._message_callbacks, message_id(name), callback)
 
     def subscribe_raw(self, name: str, callback: Callable[[bytes], None]) -> Unsubscribe:
         """Call `callback` with each payload of this message; return how to unsubscribe.
@@ -44,13 +44,13 @@ class MessageDispatcher:
         Raises:
             UnknownMessage: neither the dialect nor `UNDECODED` has such a message.
         """
-        return _add(self._raw, UNDECODED.get(name) or message_id(name), callback)
+        return _add(self._payload_callbacks, UNDECODED.get(name) or message_id(name), callback)
 
     def dispatch(self, message_id: int, payload: bytes) -> None:
         """Pass one message to its subscribers."""
-        for raw_callback in tuple(self._raw.get(message_id, ())):
+        for raw_callback in tuple(self._payload_callbacks.get(message_id, ())):
             self.guard(raw_callback, payload)
-        callbacks = self._decoded.get(message_id)
+        callbacks = self._message_callbacks.get(message_id)
         if not callbacks:
             return
         try:
@@ -79,8 +79,8 @@ class MessageDispatcher:
             _LOG.exception("the callback on_error of the link raised an error")
 
 
-def _add(table: dict[int, list[C]], message_id: int, callback: C) -> Unsubscribe:
-    callbacks = table.setdefault(message_id, [])
+def _add(callbacks_by_id: dict[int, list[C]], message_id: int, callback: C) -> Unsubscribe:
+    callbacks = callbacks_by_id.setdefault(message_id, [])
     callbacks.append(callback)
 
     def unsubscribe() -> None:

@@ -35,7 +35,7 @@ class FrameFilter:
         self._vehicle_ids = (settings.target_system, settings.target_component)
         self._signing = settings.signing
         self._stats, self._notify = stats, notice
-        self._noticed: set[str] = set()
+        self._notified_texts: set[str] = set()
 
     @property
     def needs_timesync_answer(self) -> bool:
@@ -76,6 +76,6 @@ class FrameFilter:
 
     def notify_once(self, text: str) -> None:
         """Pass a notice to the user, unless the same text was passed before."""
-        if text not in self._noticed:
-            self._noticed.add(text)
+        if text not in self._notified_texts:
+            self._notified_texts.add(text)
             self._notify(text)

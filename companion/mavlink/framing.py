@@ -95,12 +95,12 @@ class FrameScanner:
         if len(data) - start < _V2_HEADER_LENGTH:
             return _INCOMPLETE
         # Indexing single bytes is quicker than `struct` when the caches are cold.
-        incompatible = data[start + 2]
-        if incompatible & ~SIGNED_FLAG:
+        incompatible_flags = data[start + 2]
+        if incompatible_flags & ~SIGNED_FLAG:
             return _NOT_A_FRAME
         message_id = data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
         checksum_start = start + _V2_HEADER_LENGTH + data[start + 1]
-        end = checksum_start + (2 + SIGNATURE_LENGTH if incompatible else 2)
+        end = checksum_start + (2 + SIGNATURE_LENGTH if incompatible_flags else 2)
         skipped = self._skipped_length(data, start, checksum_start, end, message_id)
         if skipped is not None:
             return skipped
@@ -112,7 +112,7 @@ class FrameScanner:
                 data[start + 4],
                 data[start + _V2_HEADER_LENGTH : checksum_start],
                 data[start:end],
-                incompatible != 0,
+                incompatible_flags != 0,
             )
         )
         return end - start
@@ -141,13 +141,13 @@ class FrameScanner:
             None if they are; else `_NOT_A_FRAME`, `_INCOMPLETE`, or the length of a frame of an
             unknown message, which is skipped.
         """
-        extra = CRC_EXTRA.get(message_id)
-        if extra is None:
+        crc_extra = CRC_EXTRA.get(message_id)
+        if crc_extra is None:
             return self._skipped_length_of_unknown(data, start, end)
         if end > len(data):
             return _INCOMPLETE
         received_checksum = data[checksum_start] | data[checksum_start + 1] << 8
-        if crc16.mcrf4xx(data[start + 1 : checksum_start] + extra) == received_checksum:
+        if crc16.mcrf4xx(data[start + 1 : checksum_start] + crc_extra) == received_checksum:
             return None
         self._stats.bad_crc += 1
         return _NOT_A_FRAME

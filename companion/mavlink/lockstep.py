@@ -26,7 +26,7 @@ BEACON_TIMEOUT_S = 2.0
 time advances without beacons.
 """
 
-_SPIN_S = 0.0005
+_BUSY_WAIT_S = 0.0005
 """Wall time of polling for the next beacon before the process sleeps, s."""
 
 _TIMERS_IN_ORDER = 1_000_000
@@ -82,13 +82,13 @@ class _BeaconClock:
         """Start the timeout for the vehicle's next beacon."""
         self._waiting_since = time.monotonic()
 
-    def time_left(self) -> float | None:
+    def beacon_time_left(self) -> float | None:
         """Wall time left for the next beacon, s; `None` before the first beacon."""
         if self._vehicle_time is None:
             return None
         return max(0.0, self._waiting_since + BEACON_TIMEOUT_S - time.monotonic())
 
-    def advance_alone(self) -> None:
+    def advance_without_beacon(self) -> None:
         """Advance time although the vehicle sent no beacon in time."""
         self._offset += BEACON_TIMEOUT_S
         self.start_waiting()
@@ -107,7 +107,7 @@ class SettlingSelector(HotSelector, ABC):
         self._on_settled, self._iterations = callback, 0
 
     @property
-    def settling(self) -> bool:
+    def is_settling(self) -> bool:
         """Whether a step is open: ready callbacks and due timers run, and no I/O happens."""
         return self._on_settled is not None
 
@@ -135,29 +135,29 @@ class _SteppingSelector(SettlingSelector):
         self._clock = clock
 
     def select(self, timeout: float | None = None) -> ReadyKeys:
-        was_settling = self.settling
+        was_settling = self.is_settling
         ready = super().select(timeout)
-        if was_settling and not self.settling:
+        if was_settling and not self.is_settling:
             self._clock.start_waiting()
         return ready
 
     def wait(self, timeout: float | None) -> ReadyKeys:
-        time_left = None if timeout == 0 else self._clock.time_left()
-        if time_left is None:
+        beacon_time_left = None if timeout == 0 else self._clock.beacon_time_left()
+        if beacon_time_left is None:
             return HotSelector.select(self, timeout)
-        ready = self._spin()
-        if not ready and not self.settling:
-            ready = HotSelector.select(self, time_left)
-        if not self.settling and self._clock.time_left() == 0.0:
-            self._clock.advance_alone()
+        ready = self._busy_wait()
+        if not ready and not self.is_settling:
+            ready = HotSelector.select(self, beacon_time_left)
+        if not self.is_settling and self._clock.beacon_time_left() == 0.0:
+            self._clock.advance_without_beacon()
         return ready
 
-    def _spin(self) -> ReadyKeys:
+    def _busy_wait(self) -> ReadyKeys:
         """Poll for the next beacon without sleeping: waking up would take longer."""
-        deadline = time.perf_counter() + _SPIN_S
+        deadline = time.perf_counter() + _BUSY_WAIT_S
         while time.perf_counter() < deadline:
             ready = HotSelector.select(self, 0)
-            if ready or self.settling:
+            if ready or self.is_settling:
                 return ready
             os.sched_yield()  # let other processes use this core
         return []

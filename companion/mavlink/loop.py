@@ -31,31 +31,31 @@ class HotSelector(selectors.DefaultSelector):
 
     def __init__(self) -> None:
         super().__init__()
-        self._hot: dict[int, Callable[[], None]] = {}
+        self._hot_callbacks: dict[int, Callable[[], None]] = {}
         self._poll = select.poll()
         self._poll.register(self.fileno(), select.POLLIN)
 
-    def serve(self, fd: int, callback: Callable[[], None]) -> None:
+    def add_hot_reader(self, fd: int, callback: Callable[[], None]) -> None:
         """Call `callback` as soon as `fd` is readable."""
         self._poll.register(fd, select.POLLIN)
-        self._hot[fd] = callback
+        self._hot_callbacks[fd] = callback
 
-    def release(self, fd: int) -> None:
+    def remove_hot_reader(self, fd: int) -> None:
         """Stop serving `fd`."""
         self._poll.unregister(fd)
-        del self._hot[fd]
+        del self._hot_callbacks[fd]
 
     def select(self, timeout: float | None = None) -> ReadyKeys:
         """Wait for I/O; hot readers are called before `select` returns."""
-        others_ready = False
+        is_other_ready = False
         # Rounded up: a timer that is woken early would only poll again.
         for fd, _ in self._poll.poll(None if timeout is None else ceil(timeout * 1e3)):
-            callback = self._hot.get(fd)
+            callback = self._hot_callbacks.get(fd)
             if callback is not None:
                 callback()
             else:
-                others_ready = True
-        return super().select(0) if others_ready else []
+                is_other_ready = True
+        return super().select(0) if is_other_ready else []
 
 
 class LinkEventLoop(asyncio.SelectorEventLoop):
@@ -76,7 +76,7 @@ class LinkEventLoop(asyncio.SelectorEventLoop):
 def watch(loop: asyncio.AbstractEventLoop, fd: int, callback: Callable[[], None]) -> None:
     """Call `callback` when `fd` is readable, in the fastest way that the loop has."""
     if isinstance(loop, LinkEventLoop):
-        loop.hot_selector.serve(fd, callback)
+        loop.hot_selector.add_hot_reader(fd, callback)
     else:
         loop.add_reader(fd, callback)
 
@@ -84,7 +84,7 @@ def watch(loop: asyncio.AbstractEventLoop, fd: int, callback: Callable[[], None]
 def unwatch(loop: asyncio.AbstractEventLoop, fd: int) -> None:
     """Undo `watch`."""
     if isinstance(loop, LinkEventLoop):
-        loop.hot_selector.release(fd)
+        loop.hot_selector.remove_hot_reader(fd)
     else:
         loop.remove_reader(fd)
 

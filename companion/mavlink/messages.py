@@ -47,16 +47,19 @@ class CurrentModeMessage:
         return self.msgname
 
 
-_CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMessage}
+_MESSAGE_CLASSES: dict[int, Any] = {**dialect.mavlink_map, CURRENT_MODE: CurrentModeMessage}
 
 UNDECODED = {"EVENT": 410, "CURRENT_EVENT_SEQUENCE": 411}
 """Ids of messages of MAVLink common that pymavlink lacks; their payloads are not decoded."""
 
 MESSAGE_IDS: dict[str, int] = {
-    message_class.msgname: number for number, message_class in _CLASSES.items()
+    message_class.msgname: number for number, message_class in _MESSAGE_CLASSES.items()
 }
 CRC_EXTRA: dict[int, bytes] = {
-    **{number: bytes([message_class.crc_extra]) for number, message_class in _CLASSES.items()},
+    **{
+        number: bytes([message_class.crc_extra])
+        for number, message_class in _MESSAGE_CLASSES.items()
+    },
     410: bytes([160]),
     411: bytes([106]),
 }
@@ -64,7 +67,7 @@ CRC_EXTRA: dict[int, bytes] = {
 
 _IN_FIELD_ORDER: dict[int, Callable[[tuple[Any, ...]], tuple[Any, ...]]] = {
     number: itemgetter(*message_class.orders)
-    for number, message_class in _CLASSES.items()
+    for number, message_class in _MESSAGE_CLASSES.items()
     if len(message_class.orders) > 1
     and set(message_class.lengths) == {1}
     and "s" not in message_class.unpacker.format
@@ -90,19 +93,19 @@ def message_id(name: str) -> int:
 
 def decode(message_id: int, payload: bytes) -> Message:
     """Build the message object from a payload whose checksum was already checked."""
-    message_class = _CLASSES[message_id]
+    message_class = _MESSAGE_CLASSES[message_id]
     size = message_class.unpacker.size
-    flat = message_class.unpacker.unpack(payload[:size].ljust(size, b"\0"))
+    wire_values = message_class.unpacker.unpack(payload[:size].ljust(size, b"\0"))
     if message_id in _IN_FIELD_ORDER:
-        return message_class(*_IN_FIELD_ORDER[message_id](flat))
+        return message_class(*_IN_FIELD_ORDER[message_id](wire_values))
     fields: list[Any] = []  # in the order of the payload
     index = 0
     for length in message_class.lengths:
-        value = flat[index]
+        value = wire_values[index]
         if isinstance(value, bytes):
             fields.append(value.rstrip(b"\0"))
         else:
-            fields.append(value if length == 1 else list(flat[index : index + length]))
+            fields.append(value if length == 1 else list(wire_values[index : index + length]))
         index += length
     return message_class(*(fields[order] for order in message_class.orders))
 

@@ -76,17 +76,18 @@ class ParameterClient:
         self._require_valid_name(name)
         async with self._locks.setdefault(name, asyncio.Lock()):
             param_type = (await self._request_value(name, timeout_s, retries)).param_type
-            value_wanted = _Value(self._encoded(name, value, param_type), param_type)
-            payload = _SET_LAYOUT.pack(value_wanted.raw, *self._target, name.encode(), param_type)
-            value_held = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
-            if value_held != value_wanted:
+            wanted_value = _Value(self._encoded(name, value, param_type), param_type)
+            payload = _SET_LAYOUT.pack(wanted_value.raw, *self._target, name.encode(), param_type)
+            reported_value = await self._exchange("PARAM_SET", payload, name, timeout_s, retries)
+            if reported_value != wanted_value:
                 # It may be a late or second answer to an earlier read.
-                value_held = await self._request_value(name, timeout_s, retries)
-            if value_held != value_wanted:
+                reported_value = await self._request_value(name, timeout_s, retries)
+            if reported_value != wanted_value:
                 raise ParameterRefused(
-                    f"{name}: the autopilot keeps {self._decoded(value_held)} instead of {value}"
+                    f"{name}: the autopilot keeps {self._decoded(reported_value)} instead of "
+                    f"{value}"
                 )
-            return self._decoded(value_held)
+            return self._decoded(reported_value)
 
     async def _request_value(self, name: str, timeout_s: float, retries: int) -> _Value:
         payload = _READ_LAYOUT.pack(_INDEX_BY_NAME, *self._target, name.encode())

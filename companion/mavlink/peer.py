@@ -60,8 +60,8 @@ def plain_host(host: str) -> str:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:
         return host
-    mapped = address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None
-    return str(mapped or address)
+    mapped_ipv4 = address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None
+    return str(mapped_ipv4 or address)
 
 
 def host_and_port(address: Any) -> str:
@@ -76,7 +76,7 @@ PEER_NOTICE = "link.endpoint: "
 CLAIM_DURATION_S = 5.0
 """Time without a heartbeat of the peer after which another sender may become the peer, s."""
 
-_CONTROL_DURATION_S = 2.0
+_TIME_AFTER_SETPOINT_S = 2.0
 """Time after the last setpoint during which only a silent peer is replaced, s."""
 
 HEARTBEAT = 0
@@ -126,7 +126,7 @@ class PeerRule:
             or fields[_TYPE_OFFSET] == dialect.MAV_TYPE_GCS
         )
 
-    def renew(self) -> None:
+    def renew_claim(self) -> None:
         """Note that the peer has repeated its claim."""
         self._claimed_at = self._clock()
 
@@ -135,14 +135,14 @@ class PeerRule:
         if self._every_frame_claims:
             return False
         now = self._clock()
-        if now - self._last_setpoint() < _CONTROL_DURATION_S:
+        if now - self._last_setpoint() < _TIME_AFTER_SETPOINT_S:
             return False
         return now - self._claimed_at > CLAIM_DURATION_S
 
     def set_peer(self, sender: str) -> None:
         """Make `sender`, given as HOST:PORT, the peer; count a change and report it to the user."""
         old_peer, self._peer = self._peer, sender
-        self.renew()
+        self.renew_claim()
         if old_peer is not None and old_peer != sender:
             self._stats.peers += 1
             self._notify(

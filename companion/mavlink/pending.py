@@ -15,7 +15,7 @@ class AnswerQueue(Generic[T]):
     """
 
     def __init__(self, registry: "AnswerQueueRegistry") -> None:
-        self._waiting = registry.waiting
+        self._waiting_queues = registry.waiting_queues
         self._queue: asyncio.Queue[T | LinkLost] = asyncio.Queue()
 
     def put(self, answer: T | LinkLost) -> None:
@@ -36,24 +36,25 @@ class AnswerQueue(Generic[T]):
         return answer
 
     def __enter__(self) -> "AnswerQueue[T]":
-        self._waiting[self] = None
+        self._waiting_queues[self] = None
         return self
 
     def __exit__(self, *_: object) -> None:
-        del self._waiting[self]
+        del self._waiting_queues[self]
 
 
 class AnswerQueueRegistry:
     """All queues of a link on which a task waits.
 
     Attributes:
-        waiting: the queues, as keys of a dict, because a dict keeps their order and a set does not.
+        waiting_queues: the queues, as keys of a dict, because a dict keeps their order and a set
+            does not.
     """
 
     def __init__(self) -> None:
-        self.waiting: dict[AnswerQueue[Any], None] = {}
+        self.waiting_queues: dict[AnswerQueue[Any], None] = {}
 
     def fail(self, reason: str) -> None:
         """End every wait with `LinkLost`, whose message names `reason`."""
-        for queue in tuple(self.waiting):
+        for queue in tuple(self.waiting_queues):
             queue.put(LinkLost(f"the link dropped while waiting for an answer ({reason})"))

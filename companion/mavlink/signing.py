@@ -16,7 +16,13 @@ from pathlib import Path
 from companion.mavlink.errors import SigningError
 from companion.mavlink.framing import SIGNATURE_LENGTH, Frame
 from companion.mavlink.stamp_file import StampFile
-from companion.mavlink.stamps import LATEST_TICKS, TICKS_PER_S, SignatureResult, StampJudge, Stamps
+from companion.mavlink.stamps import (
+    LATEST_TICKS,
+    TICKS_PER_S,
+    SignatureResult,
+    StampChecker,
+    Stamps,
+)
 
 _STAMP_BYTES = 6
 _HASH_BYTES = 6
@@ -91,25 +97,25 @@ class Signing:
         self._key = key
         self._link_id = bytes([link_id])
         self.file = file
-        kept_stamps, load_error = file.load() if file is not None else (Stamps(), None)
-        self._judge = StampJudge(kept_stamps, clock, monotonic_clock)
-        self.remarks = self._judge.remarks
-        self.write_requested = self._judge.write_requested
+        stored_stamps, load_error = file.load() if file is not None else (Stamps(), None)
+        self._stamp_checker = StampChecker(stored_stamps, clock, monotonic_clock)
+        self.remarks = self._stamp_checker.remarks
+        self.write_requested = self._stamp_checker.write_requested
         if load_error is not None:
             self.remarks.append(load_error)
-        self._newest_stamp = kept_stamps.newest_sent
+        self._newest_stamp = stored_stamps.newest_sent
         self._timesync_requests: deque[bytes] = deque(maxlen=_MAX_REQUESTS)
         self.needs_timesync_answer = False
 
     def sign(self, frame: bytes) -> bytes:
         """Append the signature to a frame built with `signed=True`."""
-        self._newest_stamp = max(self._newest_stamp + 1, self._judge.date())
+        self._newest_stamp = max(self._newest_stamp + 1, self._stamp_checker.program_date())
         if frame[_ID_BYTES] == _TIMESYNC_ID_BYTES:
             tc1, ts1 = _timesync_fields(frame[_PAYLOAD_OFFSET : _PAYLOAD_OFFSET + frame[1]])
             if not any(tc1):
                 self._timesync_requests.append(ts1)
-        tail = self._link_id + self._newest_stamp.to_bytes(_STAMP_BYTES, "little")
-        return frame + tail + self._hash(frame + tail)
+        signature_start = self._link_id + self._newest_stamp.to_bytes(_STAMP_BYTES, "little")
+        return frame + signature_start + self._hash(frame + signature_start)
 
     def check(self, frame: Frame) -> SignatureResult:
         """Check the signature of a frame; only a good one updates the stamps of its stream."""
@@ -122,10 +128,13 @@ class Signing:
         stamp = int.from_bytes(signature[1 : 1 + _STAMP_BYTES], "little")
         stream = (frame.system, frame.component, signature[0])
         answers_timesync = self._answers_timesync(frame)
-        result = self._judge.judge(stream, stamp, answers_timesync=answers_timesync)
+        result = self._stamp_checker.check(stream, stamp, answers_timesync=answers_timesync)
         if result is SignatureResult.GOOD:
             self._newest_stamp = max(self._newest_stamp, stamp)
-        elif result is SignatureResult.AHEAD and self._judge.answer_would_prove(stamp):
+        elif (
+            result is SignatureResult.DATED_TOO_FAR_AHEAD
+            and self._stamp_checker.timesync_answer_would_prove(stamp)
+        ):
             # The vehicle would ignore a request with a stamp older than those it has seen.
             self._newest_stamp = max(self._newest_stamp, stamp)
             self.needs_timesync_answer = True
@@ -133,7 +142,9 @@ class Signing:
 
     def stamps(self) -> Stamps:
         """The stamps of this run, to be written to the file; called by another thread."""
-        return Stamps(self._judge.date(), self._newest_stamp, self._judge.streams())
+        return Stamps(
+            self._stamp_checker.program_date(), self._newest_stamp, self._stamp_checker.streams()
+        )
 
     def _answers_timesync(self, frame: Frame) -> bool:
         """Whether a frame answers a TIMESYNC request of this run, which no recording can do."""
@@ -160,7 +171,7 @@ class StampWriter:
 
     def __init__(self, signing: Signing, file: StampFile) -> None:
         self._signing, self._file = signing, file
-        self._ended = self._failed = False
+        self._is_ending = self._failure_reported = False
         self._thread = threading.Thread(target=self._run, name="time stamps", daemon=True)
 
     def start(self) -> None:
@@ -171,26 +182,26 @@ class StampWriter:
         """Write the last stamps; wait 2 s at most for the disk."""
         if self._thread.ident is None:
             return  # not started
-        self._ended = True
+        self._is_ending = True
         self._signing.write_requested.set()
         self._thread.join(_LAST_WRITE_TIMEOUT_S)
 
     def _run(self) -> None:
-        while not self._ended:
+        while not self._is_ending:
             self._signing.write_requested.clear()
             self._write(_with_reserve(self._signing.stamps()))
-            if not self._ended:
+            if not self._is_ending:
                 self._signing.write_requested.wait(WRITE_PERIOD_S)
         self._write(self._signing.stamps())
 
     def _write(self, stamps: Stamps) -> None:
         try:
             # The file may also hold streams that other programs heard, of vehicles with this key.
-            others = self._file.load()[0].streams
-            self._file.save(replace(stamps, streams=others | stamps.streams))
+            stored_streams = self._file.load()[0].streams
+            self._file.save(replace(stamps, streams=stored_streams | stamps.streams))
         except OSError as error:
-            if not self._failed:
-                self._failed = True
+            if not self._failure_reported:
+                self._failure_reported = True
                 self._signing.remarks.append(
                     f"the time stamps of signatures cannot be written to {self._file.path} "
                     f"({error.strerror}), so after the next start a recording of this flight may "

@@ -64,9 +64,11 @@ class StampFile:
         self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         text = json.dumps(
             {
-                "date": stamps.date,
+                "date": stamps.program_date,
                 "sent": stamps.newest_sent,
-                "streams": {"/".join(map(str, key)): kept for key, kept in stamps.streams.items()},
+                "streams": {
+                    "/".join(map(str, key)): stored for key, stored in stamps.streams.items()
+                },
             }
         )
         write_whole(self.path, text, mode=0o600)
@@ -86,12 +88,12 @@ def _state_directory() -> Path:
 
 
 def _parsed(text: bytes) -> Stamps:
-    kept = json.loads(text)
+    stored = json.loads(text)
     streams = {
         _stream(name): tuple(_valid_ticks(stamp) for stamp in stamps)
-        for name, stamps in kept["streams"].items()
+        for name, stamps in stored["streams"].items()
     }
-    return Stamps(_valid_ticks(kept["date"]), _valid_ticks(kept["sent"]), streams)
+    return Stamps(_valid_ticks(stored["date"]), _valid_ticks(stored["sent"]), streams)
 
 
 def _stream(name: str) -> SignatureStream:

@@ -16,14 +16,14 @@ from threading import Event
 EPOCH_UNIX_S = 1420070400
 """2015-01-01 UTC as Unix time, s; time stamps count 10 us since then."""
 TICKS_PER_S = 100_000
-_DAY = 86_400 * TICKS_PER_S
-_MINUTE = 60 * TICKS_PER_S
-_PROGRAM_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
+_DAY_TICKS = 86_400 * TICKS_PER_S
+_MINUTE_TICKS = 60 * TICKS_PER_S
+_RELEASE_DATE = (1_788_220_800 - EPOCH_UNIX_S) * TICKS_PER_S
 """2026-09-01, ticks. A correct clock is never earlier; raise this date with a release."""
-_MAX_AHEAD = 5 * 365 * _DAY
+_MAX_LEAD = 5 * 365 * _DAY_TICKS
 """Largest time by which an accepted stamp may be ahead of the date, ticks."""
 
-LATEST_TICKS = 2**48 - 2 * _MAX_AHEAD
+LATEST_TICKS = 2**48 - 2 * _MAX_LEAD
 """Latest date that is used (2094), ticks, so that every stamp fits into 48 bits."""
 
 SignatureStream = tuple[int, int, int]
@@ -39,22 +39,22 @@ class SignatureResult(Enum):
     UNSIGNED = "not signed"
     WRONG_KEY = "signed with another key"
     REPLAYED = "not newer than an earlier frame, or too old: repeated by the link, or a recording"
-    AHEAD = "signed with the configured key, but dated too far in the future"
+    DATED_TOO_FAR_AHEAD = "signed with the configured key, but dated too far in the future"
 
 
 @dataclass(frozen=True)
 class Stamps:
     """The stamps kept from one run of the program to the next, in ticks of 10 us."""
 
-    date: int = 0
+    program_date: int = 0
     """This program's date when the stamps were written."""
     newest_sent: int = 0
     streams: dict[SignatureStream, tuple[int, ...]] = field(default_factory=dict)
     """The newest stamps accepted on each stream: one near this program's date, and one far ahead of
-    it, if the vehicle proved that date (see `StampJudge`)."""
+    it, if the vehicle proved that date (see `StampChecker`)."""
 
 
-class StampJudge:
+class StampChecker:
     """Judges the time stamps of signatures made with the right key.
 
     The date of this program is the latest of three: the computer's clock at the start, the date
@@ -81,7 +81,7 @@ class StampJudge:
 
     def __init__(
         self,
-        kept_stamps: Stamps,
+        stored_stamps: Stamps,
         clock: Callable[[], float],
         monotonic_clock: Callable[[], float],
     ) -> None:
@@ -90,30 +90,32 @@ class StampJudge:
         self._remarked: set[str] = set()
         self._monotonic_clock = monotonic_clock
         clock_date = int((clock() - EPOCH_UNIX_S) * TICKS_PER_S)
-        self._check_clock(clock_date, kept_stamps.date)
-        self._start_date = min(max(clock_date, kept_stamps.date, _PROGRAM_DATE), LATEST_TICKS)
+        self._check_clock(clock_date, stored_stamps.program_date)
+        self._start_date = min(
+            max(clock_date, stored_stamps.program_date, _RELEASE_DATE), LATEST_TICKS
+        )
         self._start_monotonic = monotonic_clock()
-        self._ahead_limit = self._start_date + _DAY
-        self._kept_streams = kept_stamps.streams
+        self._far_ahead_limit = self._start_date + _DAY_TICKS
+        self._stored_streams = stored_stamps.streams
         # The newest stamps of all streams. True: of stamps far ahead of the date; False: of others.
         self._newest = {False: 0, True: 0}
         self._newest_by_stream: dict[tuple[SignatureStream, bool], int] = {}
-        self._vehicle_date_proven = False
+        self._is_vehicle_date_proven = False
 
-    def date(self) -> int:
+    def program_date(self) -> int:
         """The date of this program now, ticks."""
         return self._start_date + int(
             (self._monotonic_clock() - self._start_monotonic) * TICKS_PER_S
         )
 
-    def answer_would_prove(self, stamp: int) -> bool:
+    def timesync_answer_would_prove(self, stamp: int) -> bool:
         """Whether `stamp` would be accepted if its frame answered a TIMESYNC request."""
-        date = self.date()
-        is_far_ahead = date + _DAY < stamp <= date + _MAX_AHEAD
+        date = self.program_date()
+        is_far_ahead = date + _DAY_TICKS < stamp <= date + _MAX_LEAD
         # Once a stamp near the date was accepted, no other stamp changes the date.
-        return is_far_ahead and not self._vehicle_date_proven and not self._newest[False]
+        return is_far_ahead and not self._is_vehicle_date_proven and not self._newest[False]
 
-    def judge(
+    def check(
         self, stream: SignatureStream, stamp: int, *, answers_timesync: bool
     ) -> SignatureResult:
         """Judge a stamp; only a good one is remembered.
@@ -123,84 +125,93 @@ class StampJudge:
             stamp: the time stamp, ticks.
             answers_timesync: whether the frame answers a TIMESYNC request of this run.
         """
-        date = self.date()
-        ahead = stamp > date + _DAY
-        if stamp > date + _MAX_AHEAD:
-            self._remark_ahead(stamp - date, f"and refused; {SET_CLOCK}, or the vehicle's")
-            return SignatureResult.AHEAD
-        if stamp <= self._lower_bound(stream, ahead, date):
-            if date - stamp > _MINUTE and not self._newest[ahead]:
+        date = self.program_date()
+        is_far_ahead = stamp > date + _DAY_TICKS
+        if stamp > date + _MAX_LEAD:
+            self._remark_dated_ahead(stamp - date, f"and refused; {SET_CLOCK}, or the vehicle's")
+            return SignatureResult.DATED_TOO_FAR_AHEAD
+        if stamp <= self._lower_bound(stream, is_far_ahead, date):
+            if date - stamp > _MINUTE_TICKS and not self._newest[is_far_ahead]:
                 self._remark(
-                    f"the vehicle's signatures are dated {_days(date - stamp)} before this "
+                    f"the vehicle's signatures are dated {_days_text(date - stamp)} before this "
                     "computer's date, and refused; this is a recording, or the vehicle has no date "
                     f"yet (GPS), or this computer's clock is ahead: {SET_CLOCK}"
                 )
             return SignatureResult.REPLAYED
-        if ahead and not self._vehicle_date_proven:
+        if is_far_ahead and not self._is_vehicle_date_proven:
             if not answers_timesync:
-                self._remark_ahead(
+                self._remark_dated_ahead(
                     stamp - date,
                     f"and refused until the vehicle answers a TIMESYNC request; {SET_CLOCK}",
                 )
-                return SignatureResult.AHEAD
-            self._vehicle_date_proven = True
+                return SignatureResult.DATED_TOO_FAR_AHEAD
+            self._is_vehicle_date_proven = True
             self._remark(
-                f"this computer's clock is wrong: it is {_days(stamp - date)} behind the vehicle, "
-                f"which has the right key and answers, so its date is used; {SET_CLOCK}"
+                f"this computer's clock is wrong: it is {_days_text(stamp - date)} behind the "
+                "vehicle, which has the right key and answers, so its date is used; "
+                f"{SET_CLOCK}"
             )
-        if (stream, ahead) not in self._newest_by_stream:
+        if (stream, is_far_ahead) not in self._newest_by_stream:
             self.write_requested.set()
-        self._newest_by_stream[stream, ahead] = stamp
-        self._newest[ahead] = max(self._newest[ahead], stamp)
+        self._newest_by_stream[stream, is_far_ahead] = stamp
+        self._newest[is_far_ahead] = max(self._newest[is_far_ahead], stamp)
         return SignatureResult.GOOD
 
     def streams(self) -> dict[SignatureStream, tuple[int, ...]]:
         """The newest stamps of each stream that was heard in this run; see `Stamps.streams`."""
-        heard = dict(self._newest_by_stream)  # a copy: another thread calls this
-        newest = {}
-        for stream in {stream for stream, _ in heard}:
+        newest_by_stream = dict(self._newest_by_stream)  # a copy: another thread calls this
+        newest_stamps = {}
+        for stream in {stream for stream, _ in newest_by_stream}:
             stamps = (
-                heard.get((stream, ahead), self._kept_stamp(stream, ahead))
-                for ahead in (False, True)
+                newest_by_stream.get(
+                    (stream, is_far_ahead), self._stored_stamp(stream, is_far_ahead)
+                )
+                for is_far_ahead in (False, True)
             )
-            newest[stream] = tuple(stamp for stamp in stamps if stamp)
-        return newest
+            newest_stamps[stream] = tuple(stamp for stamp in stamps if stamp)
+        return newest_stamps
 
-    def _lower_bound(self, stream: SignatureStream, ahead: bool, date: int) -> int:
+    def _lower_bound(self, stream: SignatureStream, is_far_ahead: bool, date: int) -> int:
         """Lower bound of the next stamp of this stream, exclusive, ticks."""
-        heard = self._newest_by_stream.get((stream, ahead))
-        if heard is not None:
-            return heard
-        newest = self._newest[ahead] if ahead else max(self._newest[ahead], date)
-        return max(self._kept_stamp(stream, ahead), newest - _MINUTE)
+        newest_by_stream = self._newest_by_stream.get((stream, is_far_ahead))
+        if newest_by_stream is not None:
+            return newest_by_stream
+        newest = (
+            self._newest[is_far_ahead] if is_far_ahead else max(self._newest[is_far_ahead], date)
+        )
+        return max(self._stored_stamp(stream, is_far_ahead), newest - _MINUTE_TICKS)
 
-    def _kept_stamp(self, stream: SignatureStream, ahead: bool) -> int:
+    def _stored_stamp(self, stream: SignatureStream, is_far_ahead: bool) -> int:
         """The newest stamp of a stream on disk, ticks; 0 without one.
 
-        `ahead`: True: only stamps far ahead of the date count; False: only the other stamps.
+        `is_far_ahead`: True: only stamps far ahead of the date count; False: only the other stamps.
         """
-        stamps = (s for s in self._kept_streams.get(stream, ()) if (s > self._ahead_limit) == ahead)
+        stamps = (
+            s
+            for s in self._stored_streams.get(stream, ())
+            if (s > self._far_ahead_limit) == is_far_ahead
+        )
         return max(stamps, default=0)
 
-    def _check_clock(self, clock_date: int, kept_date: int) -> None:
+    def _check_clock(self, clock_date: int, stored_date: int) -> None:
         """Remark that the clock's date, ticks, is before the date on disk or of the release."""
-        if clock_date < kept_date - _MINUTE and kept_date > _PROGRAM_DATE:
+        if clock_date < stored_date - _MINUTE_TICKS and stored_date > _RELEASE_DATE:
             self._remark(
-                f"this computer's clock is wrong: it says {_date(clock_date)}, but an earlier run "
-                f"ended at {_date(kept_date)}, so the later date is used; {SET_CLOCK}; if the "
-                "clock was ahead in the earlier run, delete the file of time stamps "
+                f"this computer's clock is wrong: it says {_date_text(clock_date)}, but an earlier "
+                f"run ended at {_date_text(stored_date)}, so the later date is used; {SET_CLOCK}; "
+                "if the clock was ahead in the earlier run, delete the file of time stamps "
                 "(docs/signing.md)"
             )
-        elif clock_date < _PROGRAM_DATE:
+        elif clock_date < _RELEASE_DATE:
             self._remark(
-                f"this computer's clock is wrong: it says {_date(clock_date)}, before this program "
-                f"was released, so {_date(_PROGRAM_DATE)} is used; {SET_CLOCK}"
+                f"this computer's clock is wrong: it says {_date_text(clock_date)}, before this "
+                f"program was released, so {_date_text(_RELEASE_DATE)} is used; {SET_CLOCK}"
             )
 
-    def _remark_ahead(self, ticks: int, rest: str) -> None:
-        days = _days(ticks)
+    def _remark_dated_ahead(self, ticks: int, advice: str) -> None:
+        days = _days_text(ticks)
         self._remark(
-            f"the vehicle's signatures are dated {days} ahead of this computer's date, {rest}"
+            f"the vehicle's signatures are dated {days} ahead of this computer's date, {advice}"
         )
 
     def _remark(self, text: str) -> None:
@@ -209,10 +220,10 @@ class StampJudge:
             self.remarks.append(text)
 
 
-def _days(ticks: int) -> str:
-    days = ticks / _DAY
+def _days_text(ticks: int) -> str:
+    days = ticks / _DAY_TICKS
     return f"{24.0 * days:.1f} hours" if days < 2.0 else f"{days:.0f} days"
 
 
-def _date(ticks: int) -> str:
+def _date_text(ticks: int) -> str:
     return time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime(EPOCH_UNIX_S + ticks // TICKS_PER_S))

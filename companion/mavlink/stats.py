@@ -71,19 +71,19 @@ class FrameCounter:
     def __init__(self, stats: LinkStats) -> None:
         self._stats = stats
         self._last_sequence: int | None = None
-        self._explained_by_unknown = 0
+        self._counted_unknown = 0
 
     def count(self, message_id: int, sequence: int) -> None:
         """Count one accepted frame."""
         stats = self._stats
-        missing = self._missing(sequence)
-        if missing < 0:
+        missing_count = self._missing_count(sequence)
+        if missing_count < 0:
             stats.repeated += 1
-        elif missing:
+        elif missing_count:
             # A frame of an unknown message has a sequence number too. It came, so it is not lost.
-            explained = min(missing, stats.unknown - self._explained_by_unknown)
-            self._explained_by_unknown += explained
-            stats.lost += missing - explained
+            unknown_count = min(missing_count, stats.unknown - self._counted_unknown)
+            self._counted_unknown += unknown_count
+            stats.lost += missing_count - unknown_count
         stats.frames += 1
         stats.by_message[message_id] = stats.by_message.get(message_id, 0) + 1
 
@@ -91,13 +91,15 @@ class FrameCounter:
         """Forget the last sequence number after a reconnect, so that no gap is counted."""
         self._last_sequence = None
 
-    def _missing(self, sequence: int) -> int:
+    def _missing_count(self, sequence: int) -> int:
         """Number of frames missing before the frame with the number `sequence`.
 
         −1 if that frame is repeated, or late by up to 127 frames.
         """
-        step = 1 if self._last_sequence is None else (sequence - self._last_sequence) & 0xFF
-        if step == 0 or step > 128:
+        sequence_step = (
+            1 if self._last_sequence is None else (sequence - self._last_sequence) & 0xFF
+        )
+        if sequence_step == 0 or sequence_step > 128:
             return -1
         self._last_sequence = sequence
-        return step - 1
+        return sequence_step - 1

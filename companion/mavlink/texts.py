@@ -32,7 +32,7 @@ class TextAssembler:
 
     def __init__(self) -> None:
         self.texts: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
-        self._id = 0
+        self._text_id = 0
         self._pieces: list[str] = []
         self._severity = 6
         self._events: deque[StatusText] = deque(maxlen=_MAX_TEXTS)
@@ -49,26 +49,26 @@ class TextAssembler:
         text: str = message.text
         if message.id == 0:
             self._finish(now)
-            self._keep(now, message.severity, text)
+            self._append_text(now, message.severity, text)
             return
-        if message.id != self._id:
+        if message.id != self._text_id:
             self._finish(now)
-            self._id = message.id
+            self._text_id = message.id
         self._severity = message.severity
         self._pieces.append(text)
         if len(text) < _CHUNK_CHARACTERS:  # a shorter piece is the last one
             self._finish(now)
 
-    def since(self, start: float) -> tuple[str, ...]:
+    def texts_since(self, start: float) -> tuple[str, ...]:
         """All texts that arrived at the event-loop time `start` (s) or later."""
         return tuple(entry.text for entry in self.texts if entry.time >= start)
 
     def _finish(self, now: float) -> None:
         if self._pieces:
-            self._keep(now, self._severity, "".join(self._pieces))
-        self._id, self._pieces = 0, []
+            self._append_text(now, self._severity, "".join(self._pieces))
+        self._text_id, self._pieces = 0, []
 
-    def _keep(self, now: float, severity: int, text: str) -> None:
+    def _append_text(self, now: float, severity: int, text: str) -> None:
         text = text.strip()
         if text and not _is_repetition(self._events, text, now):
             self.texts.append(StatusText(now, severity, text))

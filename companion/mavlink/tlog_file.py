@@ -24,7 +24,7 @@ _SHORTEST_HEADER = 6
 _V1_OVERHEAD, _V2_OVERHEAD = 8, 12  # bytes of header and checksum
 _LONGEST_DAMAGED_BEGINNING = 1 << 16
 """Largest offset of the first intact frame in a `.tlog` with a damaged beginning, bytes."""
-_OTHER_LOGS = {
+_OTHER_LOG_KINDS = {
     b"ULog\x01\x12\x35": "a ULog",
     b"\xa3\x95\x80": "a DataFlash log",
 }
@@ -49,11 +49,12 @@ def messages(
     reader = _RecordReader(path, {MESSAGE_IDS[name] for name in names})
     for frame in reader.frames():
         yield frame, decode(frame.message_id, frame.payload)
-    if reader.damaged_at and on_damage is not None:
-        count = len(reader.damaged_at)
+    if reader.damage_offsets and on_damage is not None:
+        count = len(reader.damage_offsets)
         on_damage(
             f"{path}: damaged at {count} {'place' if count == 1 else 'places'}, the first after "
-            f"{reader.damaged_at[0]} bytes; the damaged records are left out, all others were read"
+            f"{reader.damage_offsets[0]} bytes; the damaged records are left out, all others were "
+            "read"
         )
 
 
@@ -61,12 +62,12 @@ class _RecordReader:
     """Reads the records of a log; after a damaged one it goes on with the next intact frame.
 
     Attributes:
-        damaged_at: where damaged records begin, bytes after the beginning of the file.
+        damage_offsets: where damaged records begin, bytes after the beginning of the file.
     """
 
-    def __init__(self, path: Path, wanted: Set[int]) -> None:
-        self.damaged_at: list[int] = []
-        self._path, self._wanted = path, wanted
+    def __init__(self, path: Path, wanted_ids: Set[int]) -> None:
+        self.damage_offsets: list[int] = []
+        self._path, self._wanted_ids = path, wanted_ids
         try:
             self._data = path.read_bytes()
         except OSError as error:
@@ -79,58 +80,60 @@ class _RecordReader:
         Raises:
             LogError: the file has no intact record near its beginning.
         """
-        start, end_of_data = self._first_record(), len(self._data)
+        start, end_of_data = self._first_frame_start(), len(self._data)
         while start + _SHORTEST_HEADER <= end_of_data:
             frame, end = self._intact_frame(start), start + self._frame_length(start)
             if frame is not None:
-                if frame.message_id in self._wanted:
+                if frame.message_id in self._wanted_ids:
                     yield frame
                 start = end + _STAMP_BYTES
             elif self._may_skip(start, end):
                 start = end + _STAMP_BYTES
             else:
-                following = self._next_intact(start + 1)
-                if following is not None or end <= end_of_data:  # otherwise the end is incomplete
-                    self.damaged_at.append(start)
-                start = end_of_data if following is None else following
+                next_start = self._next_intact_start(start + 1)
+                if next_start is not None or end <= end_of_data:  # otherwise the end is incomplete
+                    self.damage_offsets.append(start)
+                start = end_of_data if next_start is None else next_start
 
-    def _first_record(self) -> int:
+    def _first_frame_start(self) -> int:
         """Where the frame of the first intact record begins."""
         if self._frame_length(_STAMP_BYTES):
             return _STAMP_BYTES
         if not self._data.strip(b"\0"):  # a crash leaves zeros in a file that was just begun
             raise LogError(f"{self._path} is empty: its flight ended before anything was recorded")
-        for beginning, kind in _OTHER_LOGS.items():
+        for beginning, kind in _OTHER_LOG_KINDS.items():
             if self._data.startswith(beginning):
                 raise LogError(
                     f"{self._path}: this is {kind}; give the .tlog that a ground station or this "
                     "program recorded"
                 )
-        first = None
+        first_offset = None
         if self._intact_frame(0) is None:  # otherwise the records have no time
-            first = self._next_intact(_STAMP_BYTES, _LONGEST_DAMAGED_BEGINNING)
-        if first is None:
+            first_offset = self._next_intact_start(_STAMP_BYTES, _LONGEST_DAMAGED_BEGINNING)
+        if first_offset is None:
             raise LogError(
                 f"{self._path}: not a .tlog; expected MAVLink frames, each after 8 bytes with its "
                 "time"
             )
-        self.damaged_at.append(0)
-        return first
+        self.damage_offsets.append(0)
+        return first_offset
 
     def _may_skip(self, start: int, end: int) -> bool:
         """Whether `start`..`end` may be a frame of a message that is unknown or not wanted.
 
         The checksum is not used: another dialect may use the same message id for another message.
         """
-        if end == start or self._message_id(start) in self._wanted:
+        if end == start or self._message_id(start) in self._wanted_ids:
             return False
-        following = end + _STAMP_BYTES
-        return end <= len(self._data) <= following or bool(self._frame_length(following))
+        next_start = end + _STAMP_BYTES
+        return end <= len(self._data) <= next_start or bool(self._frame_length(next_start))
 
-    def _next_intact(self, begin: int, end: int | None = None) -> int | None:
+    def _next_intact_start(self, begin: int, end: int | None = None) -> int | None:
         """Where the next intact frame of a known message begins, or None."""
-        found = _MAGIC.finditer(self._data, begin, len(self._data) if end is None else end)
-        return next((each.start() for each in found if self._intact_frame(each.start())), None)
+        magic_matches = _MAGIC.finditer(self._data, begin, len(self._data) if end is None else end)
+        return next(
+            (each.start() for each in magic_matches if self._intact_frame(each.start())), None
+        )
 
     def _intact_frame(self, start: int) -> Frame | None:
         """The intact frame of a known message that begins at `start`, or None."""

@@ -61,25 +61,27 @@ class Predictor:
         self._advance = integrator(self._model)
 
     def predict(
-        self, vehicle: VehicleSnapshot, inputs: Sequence[ControlInput], until: float
+        self, vehicle: VehicleSnapshot, inputs: Sequence[ControlInput], end_time: float
     ) -> Motion:
-        """The motion at the time `until`, s; an input takes effect one dead time after its `time`.
+        """The motion at `end_time`, s; an input takes effect one dead time after its `time`.
 
         Raises:
             InvalidQuaternionError: the attitude is not a unit quaternion.
-            TiltedTooFarError: the tilt exceeds 78° now, or at the time `until`.
+            TiltedTooFarError: the tilt exceeds 78° now, or at `end_time`.
         """
         motion = motion_of(vehicle)
         time = vehicle.time
         conditions = conditions_of(vehicle)
         constants = list(self._model.constants_of(conditions, motion))
-        in_effect = [each for each in inputs if self._effect_time(each) <= time]
-        (current,) = in_effect[-1:] or inputs[:1] or [self._holding_input(time, motion)]
-        for next_input in [each for each in inputs if time < self._effect_time(each) < until]:
+        effective_inputs = [each for each in inputs if self._effect_time(each) <= time]
+        (current_input,) = (
+            effective_inputs[-1:] or inputs[:1] or [self._holding_input(time, motion)]
+        )
+        for next_input in [each for each in inputs if time < self._effect_time(each) < end_time]:
             duration = self._effect_time(next_input) - time
-            motion = self._integrate(motion, current, duration, constants)
-            time, current = self._effect_time(next_input), next_input
-        motion = self._integrate(motion, current, until - time, constants)
+            motion = self._integrate(motion, current_input, duration, constants)
+            time, current_input = self._effect_time(next_input), next_input
+        motion = self._integrate(motion, current_input, end_time - time, constants)
         if hypot(motion.north, motion.east) > _LONGEST_COEFFICIENTS:
             raise TiltedTooFarError
         return motion
@@ -94,14 +96,19 @@ class Predictor:
         return ControlInput(time, motion.north, motion.east, motion.heading, thrust)
 
     def _integrate(
-        self, motion: Motion, current: ControlInput, duration: float, constants: list[float]
+        self, motion: Motion, current_input: ControlInput, duration: float, constants: list[float]
     ) -> Motion:
-        """The motion `duration` seconds later, with the control input `current` in effect."""
-        heading = motion.heading + wrap_angle(current.heading - motion.heading)
+        """The motion `duration` seconds later, with the control input `current_input` in effect."""
+        heading = motion.heading + wrap_angle(current_input.heading - motion.heading)
         # The planner shortens a target that exceeds its tilt limit.
-        length = hypot(current.north, current.east)
+        length = hypot(current_input.north, current_input.east)
         scale = min(1.0, sin(self._settings.max_tilt) / max(length, 1e-9))
-        control = (scale * current.north, scale * current.east, heading, current.thrust)
+        control = (
+            scale * current_input.north,
+            scale * current_input.east,
+            heading,
+            current_input.thrust,
+        )
         steps = int(duration / _LONGEST_STEP) + 1
         for _ in range(steps):
             next_state = self._advance(motion, control, constants, duration / steps)

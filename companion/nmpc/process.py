@@ -27,7 +27,7 @@ from companion.nmpc.settings import Settings
 from companion.realtime import use_normal_scheduler
 
 _LARGEST_MESSAGE = 4096  # bytes
-_EXIT_TIME = 0.02
+_EXIT_TIMEOUT = 0.02
 """Time allowed for the process to exit after its socket has closed, s; it usually takes < 1 ms."""
 _ANSWER_TOLERANCE = 0.02
 """Margin for rounding when an answer is checked, as a share of the tilt limit and of gravity."""
@@ -50,7 +50,7 @@ ReportTrouble = Callable[[Trouble, str], None]
 """Called with the kind of trouble and a description."""
 
 
-class _Pending(NamedTuple):
+class _PendingRequest(NamedTuple):
     """The request that has no answer yet."""
 
     number: int
@@ -82,8 +82,8 @@ class Solver:
         require("casadi", "nmpc", "Predictive control")
         self._settings = settings
         self._report = report
-        self._pending: _Pending | None = None
-        self._ready = False
+        self._pending_request: _PendingRequest | None = None
+        self._has_started = False
         self._socket, worker_socket = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.setblocking(False)
         # Files instead of pipes, which could fill up: the process reads its input late, and its
@@ -107,9 +107,9 @@ class Solver:
     @property
     def ready(self) -> bool:
         """Whether the process has started and takes requests."""
-        if not self._ready and self.alive:
-            self._ready = self._receive() == READY_MESSAGE
-        return self._ready and self.alive
+        if not self._has_started and self.alive:
+            self._has_started = self._receive() == READY_MESSAGE
+        return self._has_started and self.alive
 
     def request(self, request: Request) -> None:
         """Send a request without waiting; an earlier request without an answer counts as late.
@@ -128,29 +128,31 @@ class Solver:
         else:
             _, ax, ay = half_tilt_products(*request.vehicle.q)
             longest_target = max(sin(self._settings.max_tilt), 2.0 * hypot(ax, ay))
-            self._pending = _Pending(request.number, monotonic(), longest_target)
+            self._pending_request = _PendingRequest(request.number, monotonic(), longest_target)
 
-    def take_answer(self, wait: float = 0.0) -> Answer | None:
+    def take_answer(self, timeout: float = 0.0) -> Answer | None:
         """The answer to the last request if it has arrived and is usable; else None.
 
         Each answer is returned once.
 
         Args:
-            wait: longest time to wait for the answer, s. In real time use 0: the call returns at
+            timeout: longest time to wait for the answer, s. In real time use 0: the call returns at
                 once.
         """
-        deadline = monotonic() + wait
+        deadline = monotonic() + timeout
         while self.ready:
-            message = self._receive(max(0.0, deadline - monotonic()) if self._pending else 0.0)
+            message = self._receive(
+                max(0.0, deadline - monotonic()) if self._pending_request else 0.0
+            )
             if not message:
                 break
             answer: Answer = pickle.loads(message)  # trusted: this program started the process
-            if self._pending is not None and answer.number == self._pending.number:
-                pending, self._pending = self._pending, None
+            if self._pending_request is not None and answer.number == self._pending_request.number:
+                pending, self._pending_request = self._pending_request, None
                 return self._usable_answer(pending, answer)
         if (
-            self._pending is not None
-            and monotonic() - self._pending.sent_at > self._settings.deadline
+            self._pending_request is not None
+            and monotonic() - self._pending_request.sent_at > self._settings.deadline
         ):
             self._drop_pending(f"has no answer after {1e3 * self._settings.deadline:.0f} ms")
         return None
@@ -164,10 +166,10 @@ class Solver:
             self._process.wait()
             self._output.close()
 
-    def _receive(self, wait: float = 0.0) -> bytes:
+    def _receive(self, timeout: float = 0.0) -> bytes:
         """The next message; empty if there is none, or if the process has ended."""
-        if wait > 0.0:
-            select.select([self._socket], [], [], wait)
+        if timeout > 0.0:
+            select.select([self._socket], [], [], timeout)
         try:
             message = self._socket.recv(_LARGEST_MESSAGE)
         except BlockingIOError:
@@ -178,7 +180,7 @@ class Solver:
             self._handle_exit()
         return message
 
-    def _usable_answer(self, pending: _Pending, answer: Answer) -> Answer | None:
+    def _usable_answer(self, pending: _PendingRequest, answer: Answer) -> Answer | None:
         """The answer if it is usable; otherwise report the trouble and return None."""
         elapsed = answer.computed_at - pending.sent_at
         if elapsed > self._settings.deadline:
@@ -187,9 +189,9 @@ class Solver:
             reason = answer.status.name.lower().replace("_", " ")
             message = f"request {pending.number} was not solved: {reason}"
             self._report(Trouble.FAILED, message)
-        elif implausible := _why_implausible(answer, pending.longest_target, self._settings):
+        elif why_implausible := _why_implausible(answer, pending.longest_target, self._settings):
             self._report(
-                Trouble.IMPLAUSIBLE, f"the answer to request {pending.number} has {implausible}"
+                Trouble.IMPLAUSIBLE, f"the answer to request {pending.number} has {why_implausible}"
             )
         else:
             return answer
@@ -197,20 +199,24 @@ class Solver:
 
     def _drop_pending(self, reason: str) -> None:
         """Report the pending request as late, if there is one."""
-        if self._pending is not None:
-            self._report(Trouble.LATE, f"request {self._pending.number} {reason}")
-            self._pending = None
+        if self._pending_request is not None:
+            self._report(Trouble.LATE, f"request {self._pending_request.number} {reason}")
+            self._pending_request = None
 
     def _handle_exit(self) -> None:
         """Report how the process ended, after it has closed its socket."""
         with suppress(subprocess.TimeoutExpired):  # if it hangs, `close` kills it
-            self._process.wait(_EXIT_TIME)
-        code = self._process.returncode
+            self._process.wait(_EXIT_TIMEOUT)
+        exit_code = self._process.returncode
         self._output.seek(0)
         output = self._output.read().decode(errors="replace").strip().splitlines()
         self.close()
-        self._pending = None
-        exit_text = f"was ended by signal {-code}" if code is not None and code < 0 else "has ended"
+        self._pending_request = None
+        exit_text = (
+            f"was ended by signal {-exit_code}"
+            if exit_code is not None and exit_code < 0
+            else "has ended"
+        )
         self._report(
             Trouble.DIED, f"the solver {exit_text}" + (f": {output[-1]}" if output else "")
         )

@@ -42,12 +42,12 @@ class RecedingHorizon:
         self._solver = SqpSolver(self._model, settings)
         inputs = [self._model.state, self._model.control, self._model.constants]
         self._target_function = ca.Function("target", inputs, [self._model.target])
-        self._previous: Floats | None = None
+        self._previous_plan: Floats | None = None
         self._previous_time = 0.0
 
     def forget(self) -> None:
         """Start the next solve from the reference instead of the previous plan."""
-        self._previous = None
+        self._previous_plan = None
 
     def solve(
         self, time: float, motion: Motion, nodes: Sequence[Node], conditions: Conditions
@@ -78,7 +78,7 @@ class RecedingHorizon:
         if not (solution.solved and np.isfinite(solution.unknowns).all()):
             self.forget()
             return None
-        self._previous, self._previous_time = solution.unknowns, time
+        self._previous_plan, self._previous_time = solution.unknowns, time
         control = solution.unknowns[len(start) : len(start) + model.control.numel()]
         target = np.asarray(
             self._target_function(start, control, constants), dtype=np.float64
@@ -87,10 +87,10 @@ class RecedingHorizon:
 
     def _guess(self, time: float, nodes: Sequence[Node]) -> Floats:
         """The solver's initial guess: the previous plan shifted to `time`, or the reference."""
-        if self._previous is None or not time >= self._previous_time:
+        if self._previous_plan is None or not time >= self._previous_time:
             return plan_on_reference(self._model, nodes, self._settings)
         steps = (time - self._previous_time) / self._settings.step_duration
-        return shifted_plan(self._model, self._previous, steps)
+        return shifted_plan(self._model, self._previous_plan, steps)
 
 
 def shifted_plan(model: Model, plan: Floats, steps: float) -> Floats:
@@ -116,10 +116,12 @@ def plan_on_reference(model: Model, nodes: Sequence[Node], settings: Settings) -
 def _shift_rows(rows: Floats, steps: float) -> Floats:
     """Rows, one for each node, shifted to a time `steps` steps later; the last row repeats."""
     whole_steps = floor(steps)
-    last = len(rows) - 1
-    before = np.minimum(np.arange(len(rows)) + whole_steps, last)
-    after = np.minimum(before + 1, last)
-    return np.asarray(rows[before] + (steps - whole_steps) * (rows[after] - rows[before]))
+    last_index = len(rows) - 1
+    lower_index = np.minimum(np.arange(len(rows)) + whole_steps, last_index)
+    upper_index = np.minimum(lower_index + 1, last_index)
+    return np.asarray(
+        rows[lower_index] + (steps - whole_steps) * (rows[upper_index] - rows[lower_index])
+    )
 
 
 def _interleave(states: Floats, controls: Floats) -> Floats:

@@ -103,8 +103,8 @@ def worst_reach(
             breach, breach_time = _breach(config, motion.offset, reached, loss.fence), time
         worst = WorstReach(
             max(worst.largest_distance, reached.largest_distance),
-            max(worst.climb, reached.up),
-            max(worst.fall, reached.down),
+            max(worst.climb, reached.max_climb),
+            max(worst.fall, reached.max_fall),
             breach,
             breach_time,
         )
@@ -119,15 +119,15 @@ def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str
     """
     north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
     distance = hypot(north, east)
-    outward = 1.0 + reached.spread / distance if distance > 0.0 else 1.0
+    outward = 1.0 + reached.stop_radius / distance if distance > 0.0 else 1.0
     farthest: Vector = (north * outward, east * outward, offset[2])
     if distance == 0.0:
-        farthest = (reached.spread, 0.0, offset[2])
+        farthest = (reached.stop_radius, 0.0, offset[2])
     height = config.flight.takeoff_height_m - offset[2]
     for place, height_there in (
         (farthest, height),
-        ((north, east, offset[2] - reached.up), height),
-        ((north, east, offset[2]), height - reached.down),
+        ((north, east, offset[2] - reached.max_climb), height),
+        ((north, east, offset[2]), height - reached.max_fall),
     ):
         breach = fence.breach(place, height_there, None)
         if breach is not None:

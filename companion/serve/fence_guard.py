@@ -167,7 +167,7 @@ class _FencePart:
         self._fence = replace(
             fence,
             deceleration=min(fence.deceleration, _BRAKING_SHARE * acceleration),
-            reaction=fence.reaction + _BRAKING_LEAD,
+            reaction_time=fence.reaction_time + _BRAKING_LEAD,
         )
         self._stopped_for: Breach | None = None
 

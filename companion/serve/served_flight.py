@@ -122,7 +122,7 @@ class ServedFlight:
         has_begun = self._source.start_pose is not None
         flown = self._assembled.context.guidance_loop.flown_source
         is_replaced = has_begun and flown.source is not self._source
-        return is_replaced or self._assembled.flight.failed_in is not None
+        return is_replaced or self._assembled.flight.failed_phase is not None
 
     @property
     def fence_centre(self) -> FenceCentre | None:
@@ -154,7 +154,7 @@ class ServedFlight:
 
     async def run(self, command: ControlRequest | None) -> bool:
         """Fly; answer `command`, if there is one; return whether control had begun."""
-        with self._records.recording(self._record), self._changes.judged_by(change_refusal):
+        with self._records.recording(self._record), self._changes.checked_by(change_refusal):
             result = "stopped at once"
             self._record.begin_counting(self._assembled.context.link.stats)
             try:
@@ -188,7 +188,7 @@ class ServedFlight:
             self._answer(command, REJECTED)
             return
         if result == "ok":
-            released = self._assembled.flight.failed_in is not None
+            released = self._assembled.flight.failed_phase is not None
             result = "released by the client" if released else "handed back"
         self._component.tell(f"control by {self._owner_name} has ended: {result}")
 

@@ -110,7 +110,7 @@ def fit_second_order(step: Step, path: Floats) -> SecondOrderModel:
         return np.empty(0), (measured - second_order_path(step, _fit_from(unknown), time)).ravel()
 
     start = np.array([log(2.0 * step.gain), 0.0, 1.0 / step.rate_hz])
-    return _fit_from(minimise(residual, start, _LOWER_BOUNDS, _UPPER_BOUNDS).unknown)
+    return _fit_from(minimise(residual, start, _LOWER_BOUNDS, _UPPER_BOUNDS).unknowns)
 
 
 def _fit_from(unknown: Floats) -> SecondOrderModel:

@@ -67,7 +67,7 @@ class _VirtualSelector(SettlingSelector):
             # Most messages only call functions of the program, and schedule nothing.
             while (
                 self.scheduled_count == count_before
-                and not self.settling
+                and not self.is_settling
                 and self._clock.now < until
             ):
                 self._world.advance(until)

@@ -95,15 +95,15 @@ def _observer_responses(
     x = (I − K·C)·(A·x/z + B·a) + K·y, where a is the mean acceleration over the past period.
     """
     # The largest trust, in motion, leaves the smallest margins.
-    gains, pull = observer.gains(period, trust=1.0), observer.pull(period, trust=1.0)
+    gains, coupling = observer.gains(period, trust=1.0), observer.coupling(period, trust=1.0)
     a = np.array([[1.0, period, 0.5 * period**2], [0.0, 1.0, period], [0.0, 0.0, 1.0]])
     b = np.array([0.5 * period**2, period, 0.0])
     c = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     k = np.array(
         [
             [gains.position, 0.0],
-            [gains.velocity * pull, gains.velocity],
-            [gains.disturbance * pull, gains.disturbance],
+            [gains.velocity * coupling, gains.velocity],
+            [gains.disturbance * coupling, gains.disturbance],
         ]
     )
     i_minus_kc = np.eye(3) - k @ c

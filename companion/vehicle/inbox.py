@@ -155,7 +155,7 @@ class Inbox:
 
     def _accept(self, frame: Frame, received_ns: int) -> None:
         if frame.message_id == HEARTBEAT and self._peer_rule.makes_sender_peer(frame):
-            self._peer_rule.renew()
+            self._peer_rule.renew_claim()
         self._distribute(frame, received_ns)
 
     def _distribute(self, frame: Frame, received_ns: int) -> None:

@@ -22,7 +22,9 @@ from companion.vehicle.clock import VehicleClock
 from companion.vehicle.records import AttitudeSample, LocalPosition
 from tests.control.kept_messages import KeptMessages
 
-DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step_time=0.25, settle=1.0)
+DOUBLETS = Doublets(
+    1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step_time=0.25, settle_time=1.0
+)
 IN_FIRST_DOUBLET, IN_HOLD, IN_CLIMB = 1.1, 3.0, DOUBLETS.duration - 1.5
 HERE = (3.0, 4.0, -5.0)
 

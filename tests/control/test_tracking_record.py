@@ -18,7 +18,9 @@ from companion.recording.trace import FlightTrace, ManeuverMark
 
 POSE = Pose((1.0, 2.0, -3.0), 0.5)
 HERE = VehicleMotion((1.5, 2.5, -3.5), (0.0, 0.0, 0.0))
-DOUBLETS = Doublets(1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step_time=0.25, settle=1.0)
+DOUBLETS = Doublets(
+    1.0, 0.25, 0.8, 1.0, climb_acceleration=2.0, climb_step_time=0.25, settle_time=1.0
+)
 
 
 class Steps:

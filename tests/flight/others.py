@@ -16,7 +16,7 @@ class When(SilentObserver):
         if self.after == 0.0:
             self._act(name)
 
-    def waiting(self, name, detail, elapsed, timeout):
+    def waiting(self, name, waiting_for, elapsed, timeout):
         if elapsed >= self.after:
             self._act(name)
 

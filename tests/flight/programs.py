@@ -51,7 +51,7 @@ def _run_mock(arguments, words):
 
 def _leave_cores():
     """No program waits by polling: the cores are busy with other flights."""
-    server.SPIN_S = lockstep._SPIN_S = 0.0
+    server.SPIN_S = lockstep._BUSY_WAIT_S = 0.0
 
 
 def checked_here(config: Path) -> None:

@@ -19,7 +19,7 @@ from companion.mavlink.transport.free_port import free_port
 from tests.flight.fly import LOOP_HZ, merged, quick_flight, quick_vehicle
 from tests.flight.programs import start_mock
 
-lockstep._SPIN_S = 0.0  # the cores are busy with other flights
+lockstep._BUSY_WAIT_S = 0.0  # the cores are busy with other flights
 
 QUICK = {"speed": 20.0, "lockstep": {"patience_s": 0.5}}
 

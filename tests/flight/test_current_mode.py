@@ -141,7 +141,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
         watch = Watch(context, None, None, lambda: 0.0)
         watch.ask_mode()
         await asyncio.sleep(0)
-        watch.judge(PHASE)  # the one that waited to be read
+        watch.check(PHASE)  # the one that waited to be read
         assert resumed == []
         state.mode, state.failsafe = mode, failsafe
         answer.set()

@@ -38,7 +38,7 @@ class Bench:
             self.now += PERIOD
             stamp = self.now - 7.0 - np.nan_to_num(old)
             self.trace.rates.add([stamp, self.now, *asked, 0.5, *got, old])
-            self.watch.after_answer(self.now)
+            self.watch.after_setpoint(self.now)
 
 
 def turns(seconds, dead_times, amplitude=0.5, seed=1):

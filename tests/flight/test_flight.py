@@ -9,14 +9,14 @@ from companion.flight.context import cancel
 from companion.flight.flight import Flight
 from companion.flight.observer import SilentObserver, decline_landing
 from companion.flight.phase import Phase
-from companion.flight.vehicle_identity import ChecksVoid
+from companion.flight.vehicle_identity import VehicleReplaced
 from companion.safety.actions import Exit
 
 
 class Bench:
     """A flight of made-up phases, each of which lasts `lasts` s; `judge` is the watch's."""
 
-    def __init__(self, monkeypatch, judge, lasts=0.0):
+    def __init__(self, monkeypatch, check, lasts=0.0):
         self.done, self.begun, self.lasts = [], 0, lasts
         self.running = None
         first, second = self.phase("checks"), self.phase("maneuvers", Exit.LAND)
@@ -39,9 +39,9 @@ class Bench:
             release=lambda: None,
             end_stream=lambda: None,
             stop=self.stop,
-            detail="",
+            waiting_for="",
         )
-        self.watch = SimpleNamespace(judge=lambda phase: judge(self, phase))
+        self.watch = SimpleNamespace(check=lambda phase: check(self, phase))
 
     def phase(self, name, on_failure=Exit.LEAVE):
         async def work(_):
@@ -72,7 +72,7 @@ class Bench:
 def test_another_vehicle_before_arming_is_checked_from_the_beginning(monkeypatch):
     def judge(bench, phase):
         if phase.name == "maneuvers" and bench.begun == 0:
-            raise ChecksVoid("another vehicle answers")
+            raise VehicleReplaced("another vehicle answers")
 
     bench = Bench(monkeypatch, judge)
     result, events = bench.fly()
@@ -84,7 +84,7 @@ def test_an_interrupt_just_as_the_checks_become_void_ends_the_flight(monkeypatch
     def judge(bench, phase):
         if phase.name == bench.running == "maneuvers" and bench.begun == 0:
             asyncio.get_running_loop().call_soon(bench.flight.interrupt, "Ctrl-C")
-            raise ChecksVoid("another vehicle answers")
+            raise VehicleReplaced("another vehicle answers")
 
     bench = Bench(monkeypatch, judge, lasts=0.1)
     result, _ = bench.fly()
@@ -94,7 +94,7 @@ def test_an_interrupt_just_as_the_checks_become_void_ends_the_flight(monkeypatch
 def test_vehicles_that_change_all_the_time_are_given_up(monkeypatch):
     def judge(_, phase):
         if phase.name == "maneuvers":
-            raise ChecksVoid("another vehicle answers")
+            raise VehicleReplaced("another vehicle answers")
 
     result, _ = Bench(monkeypatch, judge).fly()
     assert result == (

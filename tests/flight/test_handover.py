@@ -167,9 +167,9 @@ def test_after_an_offboard_loss_it_waits_until_the_pilot_commands_hold():
     waits = []
 
     class Pilot(When):
-        def waiting(self, name, detail, elapsed, timeout):
-            waits.append(detail)
-            super().waiting(name, detail, elapsed, timeout)
+        def waiting(self, name, waiting_for, elapsed, timeout):
+            waits.append(waiting_for)
+            super().waiting(name, waiting_for, elapsed, timeout)
 
     pilot = Pilot("hand over", lambda: hold(mock), after=2.0)
     summary = testing.fly(handed_over("px4", takeoff_height_m=2.0), mock, None, pilot)

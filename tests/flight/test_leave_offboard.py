@@ -40,7 +40,7 @@ class Vehicle:
 
     def __init__(self, mode, *, armed=False, meanwhile=lambda _: None, refuses=False):
         self.mode, self.is_armed, self.meanwhile, self.refuses = mode, armed, meanwhile, refuses
-        self.sent, self.notes, self.detail = 0, [], ""
+        self.sent, self.notes, self.waiting_for = 0, [], ""
         self.mode_by_failsafe = self.mode_not_intended = False
         self.link = self.autopilot = self.state = self
         self.note = self.notes.append

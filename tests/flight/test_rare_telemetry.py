@@ -28,7 +28,7 @@ class Lowers(SilentObserver):
     def __init__(self, mock, message, hz, times):
         self.mock, self.message, self.hz, self.left, self.tilt = mock, message, hz, times, 0.0
 
-    def waiting(self, name, detail, elapsed, timeout):
+    def waiting(self, name, waiting_for, elapsed, timeout):
         if name == "maneuvers" and elapsed > 2.5 and self.left:
             self.left -= 1
             self.mock.command(SET_MESSAGE_INTERVAL, self.message, 1e6 / self.hz)

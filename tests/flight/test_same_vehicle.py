@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion.flight.vehicle_identity import ChecksVoid, ReplacementDetector
+from companion.flight.vehicle_identity import ReplacementDetector, VehicleReplaced
 from companion.preflight.evidence import Identity
 from companion.safety.actions import Exit, FlightEnded
 
@@ -67,7 +67,7 @@ def test_before_arming_it_voids_the_checks_which_can_be_made_anew(change):
     vehicle.require()
     change(link)
     assert not vehicle.is_same_vehicle
-    with pytest.raises(ChecksVoid, match=CHANGES[change]):
+    with pytest.raises(VehicleReplaced, match=CHANGES[change]):
         vehicle.require()
     vehicle.begin()
     vehicle.require()
@@ -82,7 +82,7 @@ def test_once_armed_it_ends_the_flight(change):
     with pytest.raises(FlightEnded, match=CHANGES[change]) as ended:
         vehicle.require()
     assert ended.value.exit is Exit.RELEASE
-    assert not isinstance(ended.value, ChecksVoid)
+    assert not isinstance(ended.value, VehicleReplaced)
 
 
 def test_once_armed_silence_is_the_watchs_matter():

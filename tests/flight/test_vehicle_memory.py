@@ -98,7 +98,7 @@ def test_it_is_the_vehicles_own(tmp_path):
     LearnedFile(tmp_path, "aa").save(Drag(0.8, 0.02), 5.0)
     memory, estimate, notes = remembered(tmp_path)
     known = []
-    memory.on_known = known.append
+    memory.on_known_drag = known.append
     memory.load(Identity(uid=None))
     assert memory.load(Identity(uid="bb")) == KnownDrag()
     assert estimate.drag == ANY_VEHICLE.drag

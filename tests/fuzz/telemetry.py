@@ -55,7 +55,7 @@ class Outcome:
         if self.channel is not None:
             self.channel.phase(name)
 
-    def waiting(self, name: str, detail: str, elapsed: float, timeout: float) -> None:
+    def waiting(self, name: str, waiting_for: str, elapsed: float, timeout: float) -> None:
         """Nothing."""
 
     def status(self, status: FlightStatus) -> None:

@@ -15,7 +15,7 @@ from companion.guidance.braking import (
     brake,
     brake_upwind,
     braking_time,
-    drift,
+    handover_drift,
     mean_deceleration,
 )
 
@@ -43,16 +43,16 @@ def test_it_is_smooth_and_ends_where_the_vehicle_is_at_rest(velocity, duration):
 @given(
     speed=st.floats(0.1, 15.0),
     acceleration=st.floats(1.0, 10.0),
-    reaction=st.floats(0.0, 2.0),
+    reaction_time=st.floats(0.0, 2.0),
     deceleration=st.floats(0.5, 10.0),
 )
 def test_it_stops_within_what_the_monitor_of_the_fence_assumes(
-    speed, acceleration, reaction, deceleration
+    speed, acceleration, reaction_time, deceleration
 ):
-    duration = braking_time(speed, acceleration, AssumedBraking(reaction, deceleration))
+    duration = braking_time(speed, acceleration, AssumedBraking(reaction_time, deceleration))
     braking = Braking(BEGUN, VehicleMotion(HERE, (0.0, speed, 0.0)), HEADING, duration)
     mean = mean_deceleration(deceleration, acceleration)
-    assumed = speed * max(0.0, reaction - 0.1) + speed**2 / (2.0 * mean)
+    assumed = speed * max(0.0, reaction_time - 0.1) + speed**2 / (2.0 * mean)
     assert 0.0 < braking.stopping_point[1] - HERE[1] <= assumed + 1e-9
 
 
@@ -114,7 +114,7 @@ def test_a_move_upwind_is_smooth_and_the_drift_takes_it_back(velocity, wind, lat
     ends = moving.at(moving.end_time + 5.0)
     assert (ends.position_ned, ends.heading) == (pytest.approx(moving.stopping_point), HEADING)
     assert (*ends.velocity_ned, *ends.acceleration_ned) == pytest.approx((0.0,) * 6)
-    back = np.add(moving.stopping_point[:2], drift(wind))
+    back = np.add(moving.stopping_point[:2], handover_drift(wind))
     assert back == pytest.approx(braking.stopping_point[:2])
     for time in np.linspace(begun + 0.01, moving.end_time + 0.5, 7):
         before, now, after = (moving.at(time + k * h) for k in (-1.0, 0.0, 1.0))

@@ -15,7 +15,7 @@ DOUBLETS = Doublets(
     yaw_step_time=1.2,
     climb_acceleration=2.0,
     climb_step_time=0.3,
-    settle=1.5,
+    settle_time=1.5,
 )
 STEP = 1e-3
 TIMES = np.arange(0.0, DOUBLETS.duration, STEP)
@@ -63,7 +63,7 @@ def test_each_doublet_turns_back_and_ends_with_a_rest(rates):
 
 def test_position_is_held_before_each_doublet_and_at_the_end(rates, references):
     parts = open_loop_parts(rates)
-    assert TIMES[parts[0][0]] == pytest.approx(DOUBLETS.settle, abs=2 * STEP)
+    assert TIMES[parts[0][0]] == pytest.approx(DOUBLETS.settle_time, abs=2 * STEP)
     for before, after in pairwise(parts):
         assert TIMES[after[0]] - TIMES[before[-1]] == pytest.approx(1.5, abs=2 * STEP)
     last = [r.acceleration_ned[2] != 0.0 for r in references]

@@ -11,7 +11,7 @@ from companion.attitude import BodyRates
 from companion.guidance import GRAVITY, HoverThrust, ThrustSettings
 
 SETTINGS = ThrustSettings(
-    hover=0.5, correction_limit=0.8, correction_time=1.5, lowest=0.1, highest=0.9
+    hover=0.5, correction_limit=0.8, correction_time=1.5, min_thrust=0.1, max_thrust=0.9
 )
 LEVEL, STILL = (1.0, 0.0, 0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
 STEP = 0.004
@@ -116,7 +116,7 @@ def test_neither_free_fall_nor_garbage_is_ever_learned_from():
 
 @pytest.mark.parametrize(("sent", "bound"), [(0.95, 0.9), (0.25, 0.5 / 1.8)])
 def test_a_thrust_that_was_never_flown_by_leads_no_further_than_the_limit(sent, bound):
-    thrust = HoverThrust(replace(SETTINGS, highest=1.0))
+    thrust = HoverThrust(replace(SETTINGS, max_thrust=1.0))
     for k in range(500):
         thrust.note_thrust(sent, LEVEL)
         thrust.observe(0.02 * k, 0.0)

@@ -36,7 +36,7 @@ SETTINGS = LinearSettings(
     height=HeightGains(1.5, 3.5, 2.0, 1.0),
     tilt=TILT,
     heading=InnerResponse(2.0, 0.3, 0.1, follows_model=True),
-    max_horizontal=9.0,
+    max_horizontal_acceleration=9.0,
     thrust_lag=0.05,
 )
 DT = 0.002
@@ -144,7 +144,7 @@ def test_every_command_can_be_flown(position, velocity, thrust, disturbance):
     situation = GuidanceInput(motion, motion, thrust, disturbance, DRAG, THRUST)
     target, _, down = LinearGuidance(SETTINGS).command(lambda _: Reference(REST), 0.0, situation)
     a = acceleration(target, down)
-    assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal * (1 + 1e-9)
+    assert np.hypot(a[0], a[1]) <= SETTINGS.max_horizontal_acceleration * (1 + 1e-9)
     assert abs(down) <= 0.5 * GRAVITY
     assert math.hypot(GRAVITY - down, *a[:2]) <= 18.0 * (1 + 1e-9)
     assert math.hypot(target.north, target.east) < 1.0

@@ -126,7 +126,7 @@ def test_sequence_plays_its_parts_in_order(time):
     assert sequence.duration == pytest.approx(sum(p.duration for p in parts))
     edges = np.cumsum([p.duration for p in parts])
     expected = min(int(np.searchsorted(edges, time, side="right")), 2)
-    part, within = sequence.part_at(time)
+    part, within = sequence.maneuver_at(time)
     assert part is parts[expected]
     assert within == pytest.approx(time - (edges[expected - 1] if expected else 0.0))
     assert sequence.at(time, START) == part.at(within, START)

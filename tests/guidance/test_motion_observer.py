@@ -7,7 +7,7 @@ from companion.guidance.motion_observer import MotionObserver, ObserverSettings
 from companion.guidance.reference import VehicleMotion
 
 SETTINGS = ObserverSettings(
-    bandwidth=4.0, position_time=0.1, position_pull=4.0, largest_disturbance=6.0
+    bandwidth=4.0, position_time=0.1, position_coupling=4.0, largest_disturbance=6.0
 )
 
 
@@ -92,14 +92,14 @@ def test_after_a_gap_the_motion_is_the_measured_one():
 
 @pytest.mark.parametrize("hz", [2.0, 5.0, 8.0])
 def test_with_rare_positions_a_strong_pull_is_still_stable(hz):
-    quick = ObserverSettings(9.0, 0.1, position_pull=13.0, largest_disturbance=6.0)
+    quick = ObserverSettings(9.0, 0.1, position_coupling=13.0, largest_disturbance=6.0)
     rows = flown(lambda _: (1.0, 0.0), seconds=20.0, dt=1.0 / hz, settings=quick)
     assert np.abs(rows[len(rows) // 2 :, :2] - (1.0, 0.0)).max() <= 0.5
     assert np.abs(rows[len(rows) // 2 :, 2:]).max() <= 0.5
 
 
 def test_a_gap_in_the_positions_makes_no_false_wind():
-    quick, found = ObserverSettings(9.0, 0.1, position_pull=13.0, largest_disturbance=6.0), []
+    quick, found = ObserverSettings(9.0, 0.1, position_coupling=13.0, largest_disturbance=6.0), []
     for gap in (0.02, 0.3):
         observer = MotionObserver(quick)
         observer.observe(0.0, VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), (0.0, 0.0))

@@ -22,7 +22,7 @@ def flown(velocity=NOTHING, thrust=LEVEL, turn=NOTHING):
 def test_a_vehicle_that_hovers_is_carried_no_farther_than_feedback_had_turned_it():
     there = reach(flown(), PX4._replace(hold_time=0.0))
     assert there.largest_distance < 0.1
-    assert max(there.up, there.down) < 0.1
+    assert max(there.max_climb, there.max_fall) < 0.1
     assert hypot(*there.place) == 0.0
     assert reach(flown(), PX4).largest_distance < 2.0
 
@@ -33,22 +33,22 @@ def test_level_at_a_speed_it_goes_on_for_the_time_and_then_brakes_as_the_fence_r
     assert there.place == pytest.approx(
         (5.0 * 1.1 + FENCE.stopping_point(NOTHING, (5.0, 0.0, 0.0))[0], 0.0)
     )
-    assert there.largest_distance == pytest.approx(there.place[0] + there.spread)
-    assert 0.0 < there.spread < 5.0
+    assert there.largest_distance == pytest.approx(there.place[0] + there.stop_radius)
+    assert 0.0 < there.stop_radius < 5.0
 
 
 def test_without_feedback_height_and_drift_are_what_one_reckons_by_hand():
     """The failsafe begins 0.1 s after the rates were held, and levels a level vehicle in 0.1 s."""
     steady = PX4._replace(max_tilt_rate=0.0)
     climbing = reach(flown(velocity=(0.0, 0.0, -3.0)), steady)
-    assert climbing.up == pytest.approx(3.0 * 1.1 + 3.0 * 0.1 + 3.0**2 / 8.0)
-    assert climbing.down == 0.0
+    assert climbing.max_climb == pytest.approx(3.0 * 1.1 + 3.0 * 0.1 + 3.0**2 / 8.0)
+    assert climbing.max_fall == 0.0
     falling = reach(flown(velocity=(0.0, 0.0, 3.0)), steady)
-    assert falling.down == pytest.approx(3.0 * 1.1 + 3.0 * 0.1 + 3.0**2 / 8.0)
-    assert falling.up == 0.0
+    assert falling.max_fall == pytest.approx(3.0 * 1.1 + 3.0 * 0.1 + 3.0**2 / 8.0)
+    assert falling.max_climb == 0.0
     drifting = reach(flown(velocity=(-5.0, 0.0, 0.0)), steady._replace(brakes=False))
     assert drifting.place == pytest.approx((-5.0 * 1.1 - 5.0 * 0.1 - 5.0 / 0.2, 0.0))
-    assert drifting.spread == pytest.approx(0.0, abs=1e-9)
+    assert drifting.stop_radius == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_tilted_vehicle_falls_by_the_thrust_it_lacks_until_it_is_level():
@@ -60,8 +60,8 @@ def test_a_tilted_vehicle_falls_by_the_thrust_it_lacks_until_it_is_level():
     speed = lacking * 0.1
     fall = 0.5 * lacking * 0.1**2 + speed * until_level + 0.5 * levelling * until_level**2
     braking = (speed + levelling * until_level) ** 2 / 8.0
-    assert there.down == pytest.approx(fall + braking, rel=0.01)
-    assert there.up == 0.0
+    assert there.max_fall == pytest.approx(fall + braking, rel=0.01)
+    assert there.max_climb == 0.0
 
 
 def test_the_spread_is_that_of_a_thrust_axis_that_feedback_turns_all_the_time():
@@ -69,7 +69,7 @@ def test_the_spread_is_that_of_a_thrust_axis_that_feedback_turns_all_the_time():
     there = reach(flown(), PX4)
     time = 1.1
     moved, speed = GRAVITY * 0.15 * time**3 / 6.0, GRAVITY * 0.15 * time**2 / 2.0
-    assert there.up == pytest.approx(moved + speed * 0.1 + speed**2 / 8.0, rel=0.06)
+    assert there.max_climb == pytest.approx(moved + speed * 0.1 + speed**2 / 8.0, rel=0.06)
 
 
 def test_an_autopilot_that_does_not_hold_lets_it_drift_until_drag_has_stopped_it():
@@ -85,10 +85,10 @@ def test_rates_that_are_held_turn_the_thrust_and_the_longer_the_worse():
     rolling = flown(turn=(0.5 * GRAVITY, 0.0, 0.0))  # 0.5 rad/s northwards from level
     short, long = (reach(rolling, PX4._replace(hold_time=held)) for held in (0.5, 1.5))
     assert 0.0 < short.place[0] < long.place[0] / 5.0
-    assert short.down < long.down
+    assert short.max_fall < long.max_fall
     slower = reach(rolling, PX4._replace(hold_time=1.5, max_tilt_rate=0.2))
     assert slower.place[0] < 0.5 * long.place[0]
-    assert slower.down < long.down
+    assert slower.max_fall < long.max_fall
 
 
 def test_a_tilted_vehicle_that_turns_through_level_climbs_by_its_surplus_of_thrust():
@@ -96,16 +96,16 @@ def test_a_tilted_vehicle_that_turns_through_level_climbs_by_its_surplus_of_thru
     back = (-5.0, 0.0, 0.0)
     surplus = hypot(5.0, GRAVITY) - GRAVITY
     there = reach(flown(thrust=tilted, turn=back), PX4)
-    assert 0.1 < there.up < 2.0 * surplus  # which it has for some of a second
-    assert there.up > reach(flown(), PX4).up
+    assert 0.1 < there.max_climb < 2.0 * surplus  # which it has for some of a second
+    assert there.max_climb > reach(flown(), PX4).max_climb
 
 
 def test_upside_down_it_falls_for_as_long_as_it_takes_to_level():
     fast = flown(turn=(3.0 * GRAVITY, 0.0, 0.0))
     there = reach(fast, PX4)
     fallen = 0.5 * GRAVITY * (1.0 - cos(1.5)) * 1.0
-    assert there.down > fallen
-    assert reach(fast, PX4._replace(max_tilt_rate=1.5)).down < 0.5 * there.down
+    assert there.max_fall > fallen
+    assert reach(fast, PX4._replace(max_tilt_rate=1.5)).max_fall < 0.5 * there.max_fall
 
 
 def test_drag_is_part_of_the_thrust_that_a_path_takes():

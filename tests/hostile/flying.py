@@ -22,7 +22,7 @@ from tests.hostile.autopilot import HostileAutopilot
 from tests.hostile.body import HOVER_THRUST
 from tests.hostile.wire import MemoryWorld, SocketThread, Wire
 
-lockstep._SPIN_S = 0.0  # the cores are busy with other flights
+lockstep._BUSY_WAIT_S = 0.0  # the cores are busy with other flights
 
 CONFIG = {
     "link": {

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from companion.identification import delayed_model, fit_rate_response
-from companion.identification.record import most_excited_windows, stretches
+from companion.identification.record import most_excited_windows, segments
 
 from .vehicles import RATE_NOISE, Doublets, lag_with_dead_time, regular
 
@@ -65,7 +65,7 @@ def test_noisy_commands_behind_a_slew_limit_are_little_work(work):
 
 def test_of_a_long_record_what_moved_most_is_kept_with_the_commands_before_it():
     times, commanded, _, rates = record(calm=300.0, noise=0.0, lag=0.03, dead_time=0.04)
-    whole = stretches(times, commanded, times, rates)
+    whole = segments(times, commanded, times, rates)
     kept = most_excited_windows(whole)
     assert sum(part.time.size + part.measured_time.size for part in kept) <= 16_000
     doublets = times[np.abs(commanded) > 0.4]
@@ -78,5 +78,5 @@ def test_of_a_long_record_what_moved_most_is_kept_with_the_commands_before_it():
 
 def test_a_record_that_is_short_is_kept_whole():
     times, commanded, _, rates = record(calm=10.0, noise=0.0, lag=0.03, dead_time=0.04)
-    whole = stretches(times, commanded, times, rates)
+    whole = segments(times, commanded, times, rates)
     assert most_excited_windows(whole) is whole

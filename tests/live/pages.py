@@ -40,7 +40,7 @@ def status(time):
         time=time,
         airborne_time=time,
         phase="maneuvers",
-        detail="",
+        waiting_for="",
         elapsed=time,
         timeout=60.0,
         maneuver="circle",

@@ -16,7 +16,7 @@ def _after(start, *values):
     checks = ChangeChecks(start, flies_maneuvers=False)
     for each in values:
         checks.check(each, "a test")
-        checks.current = changed(checks.current, each, "a test")
+        checks.current_config = changed(checks.current_config, each, "a test")
     return checks
 
 
@@ -29,7 +29,7 @@ def test_margins_are_kept():
         ChangeChecks(px4, flies_maneuvers=False).check(gain, "a test")
     checks = ChangeChecks(px4, flies_maneuvers=False)
     stiff, stiffer = ({"guidance": {"position_weight_per_s4": w}} for w in (4000.0, 10000.0))
-    checks.current = changed(px4, stiff, "a test")
+    checks.current_config = changed(px4, stiff, "a test")
     with pytest.raises(ConfigError, match="the control loop is unstable"):
         checks.check(stiffer, "a test")
     with pytest.raises(ConfigError, match=r"position_weight_per_s4 .* more than a factor of 3"):
@@ -37,7 +37,7 @@ def test_margins_are_kept():
             {"guidance": {"position_weight_per_s4": 10000.0}}, "a test"
         )
     small = {"planner": {"gain_per_s": 4.5}}, {"planner": {"gain_per_s": 3.5}}
-    assert _after(px4, *small).current.planner.gain_per_s == 3.5
+    assert _after(px4, *small).current_config.planner.gain_per_s == 3.5
 
 
 def test_a_loop_that_began_with_less_keeps_what_it_had():

@@ -80,7 +80,7 @@ def test_messages_of_the_flight_reach_the_checks_and_the_listeners():
         flight.end.send({"kind": "config", "config": now, "can_undo": True})
         flight.end.send({"kind": "drag", "drag": [0.3, 0.0], "source": "learned-aa.json"})
         assert [(await heard.get())["kind"] for _ in range(2)] == ["config", "drag"]
-        assert connection.checks.current.planner.gain_per_s == 4.0
+        assert connection.checks.current_config.planner.gain_per_s == 4.0
         assert connection.checks._drag.drag.linear == 0.3
 
     used(use)
@@ -201,7 +201,7 @@ def test_a_page_stays_while_it_is_open_and_some_seconds_more(monkeypatch):
     asyncio.run(until_unused(0, lambda: len(slept) < 5))
     assert len(slept) == 5 + 2
     slept.clear()
-    monkeypatch.setattr(after_flight, "_LONGEST_STAY", 20.0)
+    monkeypatch.setattr(after_flight, "_LONGEST_TIME_AFTER_FLIGHT", 20.0)
     asyncio.run(until_unused(0, lambda: True))
     assert len(slept) == 20
 

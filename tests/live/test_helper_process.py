@@ -137,7 +137,7 @@ def test_requests_of_the_process_are_answered():
     helper = Helper(HelperTasks(None, Config(), None, None, False, None), Config())
     sent = []
     helper._send = lambda kind, **content: sent.append((kind, content))
-    helper.changes.on_change, helper.changes.on_drag = helper._tell_change, helper._tell_drag
+    helper.changes.on_change, helper.changes.on_known_drag = helper._send_change, helper._send_drag
     requests = (
         {"kind": "change", "id": 1, "values": CLIMB, "by": "a test"},
         {"kind": "undo", "id": 2, "by": "a test"},
@@ -151,8 +151,8 @@ def test_requests_of_the_process_are_answered():
             helper._handle(message)
 
     asyncio.run(handle())
-    helper._tell_drag(KnownDrag(Drag(0.2, 0.1), Path("learned-aa.json")))
-    helper._tell_drag(KnownDrag(None, None))
+    helper._send_drag(KnownDrag(Drag(0.2, 0.1), Path("learned-aa.json")))
+    helper._send_drag(KnownDrag(None, None))
     assert sent[-2:] == [
         ("drag", {"drag": [0.2, 0.1], "source": "learned-aa.json"}),
         ("drag", {"drag": None, "source": None}),

@@ -73,8 +73,8 @@ def test_changed_values_are_yaml_by_section_with_their_former_values(page_data):
     assert comment.startswith("# Changed in flight")
     assert lines == [
         "planner:",
-        f"  gain_per_s: 4.0  # was {page_data.start.planner.gain_per_s}",
+        f"  gain_per_s: 4.0  # was {page_data.start_config.planner.gain_per_s}",
         "limits:",
-        f"  max_climb_m_s: 1.5  # was {page_data.start.limits.max_climb_m_s}",
-        f"  fence_radius_m: 40.0  # was {page_data.start.limits.fence_radius_m}",
+        f"  max_climb_m_s: 1.5  # was {page_data.start_config.limits.max_climb_m_s}",
+        f"  fence_radius_m: 40.0  # was {page_data.start_config.limits.fence_radius_m}",
     ]

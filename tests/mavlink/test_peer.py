@@ -127,7 +127,7 @@ def test_a_claim_lapses_on_the_ground_and_not_in_control():
     ):
         at.update(now=now, setpoint=setpoint)
         assert rule.may_replace_peer() is lapsed
-    rule.renew()
+    rule.renew_claim()
     assert not rule.may_replace_peer()
 
 

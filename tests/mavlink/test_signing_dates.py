@@ -95,7 +95,7 @@ def test_with_the_clock_set_back_old_recordings_are_refused_and_our_stamps_go_on
 def test_without_a_past_a_recording_is_not_taken_for_the_date():
     """The first run of all, the clock 90 days back: the recording is 80 days in its future."""
     ours = signing(NOW - 90 * DAY)
-    assert ours.check(frame(NOW - 10 * DAY)) is SignatureResult.AHEAD
+    assert ours.check(frame(NOW - 10 * DAY)) is SignatureResult.DATED_TOO_FAR_AHEAD
     [remark] = ours.remarks
     assert "dated 80 days ahead of this computer's date, and refused until" in remark
 
@@ -104,16 +104,16 @@ def test_a_vehicle_that_answers_is_the_better_clock():
     """No recording answers a question of this run."""
     ours = signing(NOW - 90 * DAY)
     old_answer = question(signing(NOW - 10 * DAY), ts1=55)
-    assert ours.check(frame(NOW)) is SignatureResult.AHEAD
+    assert ours.check(frame(NOW)) is SignatureResult.DATED_TOO_FAR_AHEAD
     assert stamp_of(ours) > NOW  # or the vehicle would not hear our question
     asked = question(ours)
-    assert ours.check(frame(NOW - 10 * DAY, old_answer)) is SignatureResult.AHEAD
+    assert ours.check(frame(NOW - 10 * DAY, old_answer)) is SignatureResult.DATED_TOO_FAR_AHEAD
     not_an_answer = dialect.MAVLink_timesync_message(0, asked.ts1)
-    assert ours.check(frame(NOW, not_an_answer)) is SignatureResult.AHEAD
+    assert ours.check(frame(NOW, not_an_answer)) is SignatureResult.DATED_TOO_FAR_AHEAD
     our_answer = build_frame(TIMESYNC, bytes([9] * 16), sequence=0, system=1, component=191)
     ours.sign(our_answer)
     repeats_it = dialect.MAVLink_timesync_message(1, int.from_bytes(bytes([9] * 8), "little"))
-    assert ours.check(frame(NOW, repeats_it)) is SignatureResult.AHEAD
+    assert ours.check(frame(NOW, repeats_it)) is SignatureResult.DATED_TOO_FAR_AHEAD
     assert ours.check(frame(NOW + 1, asked)) is SignatureResult.GOOD
     assert ours.check(frame(NOW + 2)) is SignatureResult.GOOD
     assert "90 days behind the vehicle, which has the right key and answers" in ours.remarks[-1]
@@ -137,7 +137,7 @@ def test_what_was_heard_with_a_wrong_clock_is_refused_after_the_next_start_too()
 @pytest.mark.parametrize("years", [6, 10, 70])
 def test_a_stamp_of_the_far_future_moves_nothing(years):
     verdicts, ours = run_once(NOW, frame(NOW + years * YEAR), frame(NOW))
-    assert verdicts == [SignatureResult.AHEAD, SignatureResult.GOOD]
+    assert verdicts == [SignatureResult.DATED_TOO_FAR_AHEAD, SignatureResult.GOOD]
     assert stamp_of(ours) < NOW + 1
     assert f"dated {365 * years} days ahead of this computer's date, and refused" in ours.remarks[0]
     assert run_once(NOW + 1, frame(NOW + 1))[0] == [SignatureResult.GOOD]

@@ -140,7 +140,7 @@ def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path,
             changes.change({"planner": {"gain_per_s": 4.8}}, "a test")
         (folder,) = tmp_path.iterdir()
         assert "gain_per_s: 4.9" in (folder / "config.yaml").read_text()
-        (change,) = changes.made_in_flight
+        (change,) = changes.changes_in_flight
         assert change.keys[0].after == 4.8
         assert changes.config_at_flight_start.planner.gain_per_s == 4.9
 

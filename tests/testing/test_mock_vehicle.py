@@ -205,7 +205,7 @@ class Interrupts(SilentObserver):
     def __init__(self):
         self.session = None
 
-    def waiting(self, name, detail, elapsed, timeout):
+    def waiting(self, name, waiting_for, elapsed, timeout):
         if name == "maneuvers":
             self.session.interrupt("enough")
 

@@ -62,14 +62,14 @@ def test_the_tilt_of_a_circle_is_that_of_the_books(speed, drag):
 
 def test_a_violation_says_when_what_and_how_much():
     (broken,) = violations(EIGHT, Envelope(max_tilt=radians(35.0), drag=Drag(1.0)))
-    assert broken.begins < broken.time
+    assert broken.begin_time < broken.time
     motion = sampled_motion(EIGHT, evenly(EIGHT, 0.005))
     tilt = demand(motion, Drag(1.0), G).tilt
     first = motion.times[np.argmax(tilt > radians(35.0))]
-    assert broken.begins == pytest.approx(first, abs=0.01)
+    assert broken.begin_time == pytest.approx(first, abs=0.01)
     assert broken.text == (
         f"at {broken.time:.2f} s it needs {degrees(tilt.max()):.4g}° of tilt, "
-        f"limits.max_tilt_deg allows 35 (broken from {broken.begins:.2f} s on)"
+        f"limits.max_tilt_deg allows 35 (broken from {broken.begin_time:.2f} s on)"
     )
     assert str(broken) == broken.text
 
@@ -120,7 +120,7 @@ def test_all_broken_limits_are_told_in_the_order_of_time():
         "limits.max_tilt_deg",
         "limits.max_tilt_rate_deg_s",
     }
-    assert [one.begins for one in broken] == sorted(one.begins for one in broken)
+    assert [one.begin_time for one in broken] == sorted(one.begin_time for one in broken)
 
 
 def test_free_fall_demands_no_thrust_and_no_turning():

@@ -11,7 +11,7 @@ from companion.guidance.trajectory import (
     Table,
     TrajectoryError,
     from_samples,
-    judge,
+    motion_violations,
 )
 
 TIMES = np.linspace(0.0, 10.0, 201)
@@ -79,10 +79,12 @@ def test_options_out_of_range_are_refused(options, words):
 
 def test_a_motion_that_is_not_finite_or_too_short_breaks_no_limit_and_is_refused():
     turn, limits = np.zeros_like(TIMES), Envelope(max_tilt=0.5)
-    assert judge(Motion(TIMES, PLACES, STILL, STILL, STILL, turn), limits) == ()
+    assert motion_violations(Motion(TIMES, PLACES, STILL, STILL, STILL, turn), limits) == ()
     with pytest.raises(TrajectoryError, match="cannot be computed"):
-        judge(Motion(TIMES, PLACES, STILL, STILL * np.nan, STILL, turn), limits)
+        motion_violations(Motion(TIMES, PLACES, STILL, STILL * np.nan, STILL, turn), limits)
     with pytest.raises(TrajectoryError, match="cannot be computed"):
-        judge(Motion(TIMES, PLACES, STILL, STILL, STILL, turn * np.nan), limits)
+        motion_violations(Motion(TIMES, PLACES, STILL, STILL, STILL, turn * np.nan), limits)
     with pytest.raises(TrajectoryError, match="201 times has vectors of the shape"):
-        judge(Motion(TIMES, PLACES[:5], STILL[:5], STILL[:5], STILL[:5], turn[:5]), limits)
+        motion_violations(
+            Motion(TIMES, PLACES[:5], STILL[:5], STILL[:5], STILL[:5], turn[:5]), limits
+        )

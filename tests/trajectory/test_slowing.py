@@ -148,7 +148,7 @@ def test_the_path_and_its_heading_are_the_same_and_the_derivatives_right(name):
 
 def test_two_corners_are_slowed_down_and_the_legs_are_not():
     found = slow_down(ANGULAR, ENVELOPE)
-    assert not found.even
+    assert not found.is_even
     even = evenly_slowed(ANGULAR, max(part.factor for part in found.parts))
     assert found.trajectory.duration < 0.9 * even.duration
     as_before = [
@@ -158,7 +158,7 @@ def test_two_corners_are_slowed_down_and_the_legs_are_not():
     ]
     assert len(as_before) > 100
     for t in as_before:
-        assert found.trajectory.law.at(t).first > 0.97
+        assert found.trajectory.law.at(t).first_derivative > 0.97
     notes = slow_down_notes(ANGULAR, found, 0.5)
     assert notes[0].startswith("angular is slowed down to keep its limits: from ")
     assert ", because of limits.max_tilt_rate_deg_s at" in notes[0]  # without the reserve
@@ -216,7 +216,7 @@ def test_what_can_be_flown_is_not_slowed():
 def test_what_is_too_long_is_slowed_evenly_and_says_so():
     laps = gerono_eight(3.0, Laps(5.0, 150.0))
     found = slow_down(laps, ENVELOPE)
-    assert found.even
+    assert found.is_even
     assert violations(found.trajectory, ENVELOPE) == ()
     note, _ = slow_down_notes(laps, found, 0.5)
     assert "it is too long to be slowed down in parts; its tightest limit is limits." in note
@@ -244,11 +244,17 @@ def test_a_slower_time_has_right_derivatives_and_is_found_again():
     h = 1e-4
     for time in np.linspace(0.01, law.duration - 0.01, 97):
         before, here, after = (law.at(time + k * h) for k in (-1, 0, 1))
-        assert here.first == pytest.approx((after.phase - before.phase) / (2 * h), rel=1e-6)
-        assert here.second == pytest.approx((after.first - before.first) / (2 * h), abs=1e-6)
-        assert here.third == pytest.approx((after.second - before.second) / (2 * h), abs=2e-4)
-        assert 1 / 2.5 <= here.first <= 1.0
-        times, _ = law.stretched(np.array([here.phase]))
+        assert here.first_derivative == pytest.approx(
+            (after.phase - before.phase) / (2 * h), rel=1e-6
+        )
+        assert here.second_derivative == pytest.approx(
+            (after.first_derivative - before.first_derivative) / (2 * h), abs=1e-6
+        )
+        assert here.third_derivative == pytest.approx(
+            (after.second_derivative - before.second_derivative) / (2 * h), abs=2e-4
+        )
+        assert 1 / 2.5 <= here.first_derivative <= 1.0
+        times, _ = law.stretched_times(np.array([here.phase]))
         assert times[0] == pytest.approx(time, abs=1e-12)
     assert law.at(-1.0).phase == 0.0
     assert law.at(law.duration + 1.0).phase == pytest.approx(6.0)

@@ -45,7 +45,7 @@ Checked
     evenly_slowed    slows the whole trajectory down by one factor
     Violation        a broken limit, when it is broken, and what to do
     Slowed           a trajectory flown more slowly; SlowerTime: its time law
-    judge            like `violations`, for a `Motion`, which is given as arrays
+    motion_violations  like `violations`, for a `Motion`, which is given as arrays
     Motion
     turned_first     a turn on the spot before a trajectory that begins with a heading
     computable       turns numerical errors into a `TrajectoryError`
@@ -63,7 +63,7 @@ from companion.guidance.trajectory.derived import evenly_slowed as evenly_slowed
 from companion.guidance.trajectory.derived import turned_first as turned_first
 from companion.guidance.trajectory.feasibility import Envelope as Envelope
 from companion.guidance.trajectory.feasibility import Violation as Violation
-from companion.guidance.trajectory.feasibility import judge as judge
+from companion.guidance.trajectory.feasibility import motion_violations as motion_violations
 from companion.guidance.trajectory.feasibility import violations as violations
 from companion.guidance.trajectory.figures import Hover as Hover
 from companion.guidance.trajectory.figures import Laps as Laps

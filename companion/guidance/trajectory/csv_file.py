@@ -105,33 +105,33 @@ def parse_csv(lines: Iterable[str], name: str) -> Table:
     """
     frames: list[str] = []
     rows = list(itertools.islice(rows_of(csv.reader(lines), frames, name), _MOST_SAMPLES + 2))
-    too_few = f"{name}: needs a header and at least {FEWEST_SAMPLES} samples"
+    too_few_text = f"{name}: needs a header and at least {FEWEST_SAMPLES} samples"
     if not rows:
-        raise TrajectoryError(too_few)
+        raise TrajectoryError(too_few_text)
     if len(rows) > _MOST_SAMPLES + 1:
         raise TrajectoryError(f"{name}: has more than {_MOST_SAMPLES} samples; leave some out")
-    with_units = [column.strip().lower() for column in rows[0][1]]
-    header = [without_unit(column) for column in with_units]
-    groups = columns_of(header, with_units, name)
+    columns_with_units = [column.strip().lower() for column in rows[0][1]]
+    header = [without_unit(column) for column in columns_with_units]
+    groups = columns_of(header, columns_with_units, name)
     if len(rows) <= FEWEST_SAMPLES:
-        raise TrajectoryError(too_few)
+        raise TrajectoryError(too_few_text)
     _require_no_more_values(rows, name)
     data = {group: _numbers(rows[1:], header, names, name) for group, names in groups.items()}
     times = data["time"][:, 0]
     line_numbers = [line for line, _ in rows[1:]]
     _require_steps(times, line_numbers, name)
     for group, values in data.items():
-        checked = values - values[0] if group == "position" else values
-        _require_range(group, checked, groups[group], line_numbers, name)
+        checked_values = values - values[0] if group == "position" else values
+        _require_range(group, checked_values, groups[group], line_numbers, name)
     derivatives = [data[group] for group in ("velocity", "acceleration") if group in data]
-    used = {column for names in groups.values() for column in names}
+    used_columns = {column for names in groups.values() for column in names}
     return Table(
         times - times[0],
         data["position"],
         tuple(derivatives),
         yaw_of(data, name),
         frames[0] if frames else None,
-        tuple(column for column in header if column and column not in used),
+        tuple(column for column in header if column and column not in used_columns),
     )
 
 
@@ -145,13 +145,13 @@ def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str
         TrajectoryError: a row has too many values; the message names its line.
     """
     columns = len(rows[0][1])
-    long_row = next(((line, len(row)) for line, row in rows[1:] if any(row[columns:])), None)
-    if long_row is None:
+    longer_row = next(((line, len(row)) for line, row in rows[1:] if any(row[columns:])), None)
+    if longer_row is None:
         return
-    equally_long = len({len(row) for _, row in rows[1:]}) == 1
-    if equally_long and any("." in cell for _, row in rows[1:] for cell in row):
+    has_equal_lengths = len({len(row) for _, row in rows[1:]}) == 1
+    if has_equal_lengths and any("." in cell for _, row in rows[1:] for cell in row):
         return
-    line, values = long_row
+    line, values = longer_row
     raise TrajectoryError(
         f"{name}, line {line}: {values} values for {columns} columns; "
         "write decimals with a point, and as many values as the header has names"
@@ -186,9 +186,11 @@ def _numbers(
 def _require_steps(times: Floats, line_numbers: Sequence[int], name: str) -> None:
     """Check each step in time (`_SHORTEST_PERIOD` to `_LONGEST_PERIOD`) and the duration."""
     steps = np.diff(times)
-    wrong = np.flatnonzero(~((steps >= 0.999 * _SHORTEST_PERIOD) & (steps <= _LONGEST_PERIOD)))
-    if wrong.size:
-        step, line = float(steps[wrong[0]]), line_numbers[int(wrong[0]) + 1]
+    wrong_steps = np.flatnonzero(
+        ~((steps >= 0.999 * _SHORTEST_PERIOD) & (steps <= _LONGEST_PERIOD))
+    )
+    if wrong_steps.size:
+        step, line = float(steps[wrong_steps[0]]), line_numbers[int(wrong_steps[0]) + 1]
         if step <= 0.0:
             raise TrajectoryError(
                 f"{name}, line {line}: time does not increase; leave this sample out"

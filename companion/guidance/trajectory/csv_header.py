@@ -10,15 +10,15 @@ from companion.guidance.trajectory.sample import TrajectoryError
 _Spellings = tuple[tuple[str, ...], ...]
 
 
-def _of_axes(*patterns: str) -> _Spellings:
+def _axis_columns(*patterns: str) -> _Spellings:
     return tuple(tuple(pattern.format(axis) for axis in "xyz") for pattern in patterns)
 
 
 _SPELLINGS: dict[str, _Spellings] = {
     "time": (("t",), ("time",), ("timestamp",)),
-    "position": _of_axes("p_{}", "{}", "p{}", "pos_{}"),
-    "velocity": _of_axes("v_{}", "v{}", "vel_{}", "d{}"),
-    "acceleration": _of_axes("a_lin_{}", "a_{}", "a{}", "acc_{}", "dd{}"),
+    "position": _axis_columns("p_{}", "{}", "p{}", "pos_{}"),
+    "velocity": _axis_columns("v_{}", "v{}", "vel_{}", "d{}"),
+    "acceleration": _axis_columns("a_lin_{}", "a_{}", "a{}", "acc_{}", "dd{}"),
     "yaw": (("yaw",), ("psi",), ("heading",)),
     "quaternion": (("q_w", "q_x", "q_y", "q_z"), ("qw", "qx", "qy", "qz")),
 }
@@ -64,23 +64,25 @@ def rows_of(reader: Any, frames: list[str], name: str) -> Iterator[tuple[int, li
 
 def without_unit(column: str) -> str:
     """The name of a column without its unit."""
-    found = _UNIT.fullmatch(column)
-    return found[1] if found else column
+    match = _UNIT.fullmatch(column)
+    return match[1] if match else column
 
 
-def columns_of(header: list[str], with_units: list[str], name: str) -> dict[str, tuple[str, ...]]:
+def columns_of(
+    header: list[str], columns_with_units: list[str], name: str
+) -> dict[str, tuple[str, ...]]:
     """The columns of the file for each quantity.
 
     Args:
         header: names of the columns, without their units.
-        with_units: names of the columns with their units, in lower case.
+        columns_with_units: names of the columns with their units, in lower case.
         name: the file's name, for error messages.
 
     Raises:
         TrajectoryError: time or position is missing, a column is named twice, or the first line is
             not a header, is not separated by commas, or names a unit that is not read.
     """
-    _require_header(with_units, name)
+    _require_header(columns_with_units, name)
     groups = {}
     for group, spellings in _SPELLINGS.items():
         found = [names for names in spellings if all(column in header for column in names)]
@@ -98,22 +100,24 @@ def columns_of(header: list[str], with_units: list[str], name: str) -> dict[str,
     return groups
 
 
-def _require_header(with_units: list[str], name: str) -> None:
+def _require_header(columns_with_units: list[str], name: str) -> None:
     """Check that the first line names columns, separated by commas, in units that are read."""
-    columns = excerpt(",".join(with_units))
-    if len(with_units) == 1 and (found := re.search("[;\t]", with_units[0])):
+    columns = excerpt(",".join(columns_with_units))
+    if len(columns_with_units) == 1 and (found := re.search("[;\t]", columns_with_units[0])):
         separator = "semicolons" if found[0] == ";" else "tabs"
         raise TrajectoryError(
             f"{name}: its columns are separated by {separator}; use commas, and points for decimals"
         )
-    if all(_is_number(column) for column in with_units):
+    if all(_is_number(column) for column in columns_with_units):
         raise TrajectoryError(
             f"{name}: its first line must name the columns, such as t,x,y,z; found {columns}"
         )
-    known = {column for spellings in _SPELLINGS.values() for names in spellings for column in names}
-    for column in with_units:
+    known_columns = {
+        column for spellings in _SPELLINGS.values() for names in spellings for column in names
+    }
+    for column in columns_with_units:
         found = _OTHER_UNIT.fullmatch(column)
-        if found and found[1] in known:
+        if found and found[1] in known_columns:
             raise TrajectoryError(
                 f"{name}: the column {column} is in {found[2]}; give {found[1]} in s, m or rad"
             )
@@ -134,11 +138,11 @@ def _missing(group: str, header: list[str]) -> str:
     nearest = max(spellings, key=lambda names: sum(column in header for column in names))
     missing = [column for column in nearest if column not in header]
     if len(missing) < len(nearest):
-        fault = f"the column {' and '.join(missing)} of the {group} is missing"
+        missing_text = f"the column {' and '.join(missing)} of the {group} is missing"
     else:
-        fault = f"the header names no {group}"
+        missing_text = f"the header names no {group}"
     frame = ", in NED below a line `# frame: ned`" if group == "position" else ""
-    return f"{fault}; expected {expected}{frame}, found {excerpt(','.join(header))}"
+    return f"{missing_text}; expected {expected}{frame}, found {excerpt(','.join(header))}"
 
 
 def excerpt(text: str) -> str:

@@ -15,9 +15,9 @@ class CurvePoint(NamedTuple):
     """A point of a curve, m, and its first three derivatives by the phase."""
 
     position: Vector
-    first: Vector
-    second: Vector
-    third: Vector
+    first_derivative: Vector
+    second_derivative: Vector
+    third_derivative: Vector
 
 
 class PhaseSampling(NamedTuple):
@@ -202,11 +202,13 @@ class RotatedFigure(Figure):
         return CurvePoint(*((c * n - s * e, s * n + c * e, d) for n, e, d in self.figure.at(phase)))
 
 
-_Jet = tuple[float, float, float, float]
+_ValueAndDerivatives = tuple[float, float, float, float]
 """A value and its first three derivatives."""
 
 
-def _quotient(numerator: _Jet, denominator: _Jet) -> _Jet:
+def _quotient(
+    numerator: _ValueAndDerivatives, denominator: _ValueAndDerivatives
+) -> _ValueAndDerivatives:
     """Value and derivatives of a quotient q, by Leibniz' rule for numerator = q·denominator."""
     n0, n1, n2, n3 = numerator
     d0, d1, d2, d3 = denominator

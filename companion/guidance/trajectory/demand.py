@@ -39,7 +39,7 @@ class Motion:
             np.stack(velocity, axis=1),
             np.stack(acceleration, axis=1),
             np.stack(jerk, axis=1),
-            self.heading_rate * progress.first,
+            self.heading_rate * progress.first_derivative,
         )
 
     def slowed(self, factor: "float | Floats") -> "Motion":
@@ -83,9 +83,9 @@ def require_finite(motion: Motion) -> None:
     _require_all_finite(*vectors, motion.heading_rate)
 
 
-def _require_all_finite(*columns: Floats) -> None:
-    for column in columns:
-        if not np.isfinite(column).all():
+def _require_all_finite(*arrays: Floats) -> None:
+    for array in arrays:
+        if not np.isfinite(array).all():
             raise FloatingPointError("not a finite number")
 
 

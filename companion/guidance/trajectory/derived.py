@@ -18,13 +18,13 @@ class Slowed:
     Attributes:
         trajectory: the original trajectory.
         law: the time of the original trajectory as a function of the time of the slowed one.
-        moments: times of the original trajectory at which to check the slowed one, s. Empty: the
-            check times of `trajectory`, which are enough if it is slowed down evenly.
+        original_times: times of the original trajectory at which to check the slowed one, s. Empty:
+            the check times of `trajectory`, which are enough if it is slowed down evenly.
     """
 
     trajectory: Trajectory
     law: SlowerTime
-    moments: tuple[float, ...] = ()
+    original_times: tuple[float, ...] = ()
 
     @property
     def name(self) -> str:
@@ -43,7 +43,9 @@ class Slowed:
 
     def check_times(self) -> list[float]:
         """Times at which to check the slowed trajectory, s; see `Trajectory.check_times`."""
-        times, _ = self.law.stretched(np.array(self.moments or self.trajectory.check_times()))
+        times, _ = self.law.stretched_times(
+            np.array(self.original_times or self.trajectory.check_times())
+        )
         require_duration(float(times[-1]))
         return [float(time) for time in times]
 
@@ -54,7 +56,7 @@ class Slowed:
         velocity, acceleration, jerk = derivatives(
             progress, sample.velocity, sample.acceleration, sample.jerk
         )
-        heading_rate = sample.heading_rate * progress.first
+        heading_rate = sample.heading_rate * progress.first_derivative
         return Sample(sample.position, velocity, acceleration, jerk, sample.heading, heading_rate)
 
 

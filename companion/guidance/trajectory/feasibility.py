@@ -31,7 +31,7 @@ class Violation(NamedTuple):
 
     Attributes:
         limit: configuration key of the limit.
-        begins: time when the limit is first broken, s.
+        begin_time: time when the limit is first broken, s.
         time: time when the limit is exceeded most, s.
         text: the message for the user.
         remedy: what the user should do, as the end of a sentence.
@@ -39,7 +39,7 @@ class Violation(NamedTuple):
     """
 
     limit: str
-    begins: float
+    begin_time: float
     time: float
     text: str
     remedy: str = SLOWER_REMEDY
@@ -109,23 +109,23 @@ class Envelope:
                 raise ValueError(f"{name} must be 0 or more, or None for no limit, not {limit:g}")
 
 
-class _Need(NamedTuple):
+class _LimitedQuantity(NamedTuple):
     """A limited quantity over a motion, and its limit.
 
     Attributes:
         limit: key of the limit in the configuration.
-        allowed: the limit in SI units; None: no limit.
-        needed: (m,), the quantity at each time, in the unit of `allowed`.
+        limit_value: the limit in SI units; None: no limit.
+        values: (m,), the quantity at each time, in the unit of `limit_value`.
         unit_text: unit and quantity as messages show them after the number, such as "° of tilt".
-        message_scale: factor from the unit of `allowed` to the unit in messages.
-        is_lower_limit: whether `allowed` is a lower limit.
-        key_scale: `allowed` divided by the value of the configuration key, which messages then show
-            too; None: messages show only `allowed`.
+        message_scale: factor from the unit of `limit_value` to the unit in messages.
+        is_lower_limit: whether `limit_value` is a lower limit.
+        key_scale: `limit_value` divided by the value of the configuration key, which messages then
+            show too; None: messages show only `limit_value`.
     """
 
     limit: str
-    allowed: float | None
-    needed: Floats
+    limit_value: float | None
+    values: Floats
     unit_text: str
     message_scale: float = 1.0
     is_lower_limit: bool = False
@@ -148,13 +148,13 @@ def excess(motion: Motion, envelope: Envelope) -> dict[str, Floats]:
     The fence is not included, because it is checked for a whole motion.
     """
     return {
-        need.limit: _excess(need) / max(abs(need.allowed), _ROUNDING) - _ROUNDING
-        for need in _needs(motion, envelope)
-        if need.allowed is not None
+        quantity.limit: _excess(quantity) / max(abs(quantity.limit_value), _ROUNDING) - _ROUNDING
+        for quantity in _limited_quantities(motion, envelope)
+        if quantity.limit_value is not None
     }
 
 
-def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
+def motion_violations(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
     """All limits that a motion breaks, in order of time.
 
     Raises:
@@ -166,72 +166,76 @@ def judge(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
 
 
 def broken_limits(motion: Motion, envelope: Envelope) -> tuple[Violation, ...]:
-    """Like `judge`, for a caller that is already within `computable`."""
-    found = [_violation(motion.times, need) for need in _needs(motion, envelope)]
+    """Like `motion_violations`, for a caller that is already within `computable`."""
+    violations_or_none = [
+        _violation(motion.times, quantity) for quantity in _limited_quantities(motion, envelope)
+    ]
     if envelope.fence is not None:
-        found.append(envelope.fence(motion))
-    return tuple(sorted((one for one in found if one), key=lambda one: one.begins))
+        violations_or_none.append(envelope.fence(motion))
+    return tuple(sorted((one for one in violations_or_none if one), key=lambda one: one.begin_time))
 
 
-def _needs(motion: Motion, envelope: Envelope) -> Iterator[_Need]:
+def _limited_quantities(motion: Motion, envelope: Envelope) -> Iterator[_LimitedQuantity]:
     """All quantities that an envelope can limit, except the fence, over this motion."""
     limits, climb = envelope, -motion.velocity[:, 2]
-    needed = demand(motion, limits.drag, limits.gravity)
+    demanded = demand(motion, limits.drag, limits.gravity)
     yaw_rate = np.abs(motion.heading_rate)
     speed = np.linalg.norm(motion.velocity, axis=1)
-    yield _Need(TILT_LIMIT, limits.max_tilt, needed.tilt, "° of tilt", _TO_DEGREES)
-    yield _Need(
+    yield _LimitedQuantity(TILT_LIMIT, limits.max_tilt, demanded.tilt, "° of tilt", _TO_DEGREES)
+    yield _LimitedQuantity(
         "limits.max_tilt_rate_deg_s",
         limits.max_tilt_rate,
-        needed.tilt_rate,
+        demanded.tilt_rate,
         "°/s of roll and pitch",
         _TO_DEGREES,
     )
-    yield _Need(
+    yield _LimitedQuantity(
         "limits.max_yaw_rate_deg_s", limits.max_yaw_rate, yaw_rate, "°/s of yaw", _TO_DEGREES
     )
-    yield _Need(
+    yield _LimitedQuantity(
         "limits.min_thrust",
         limits.min_thrust,
-        needed.thrust,
+        demanded.thrust,
         " m/s² of thrust",
         is_lower_limit=True,
         key_scale=limits.full_thrust,
     )
-    yield _Need(
+    yield _LimitedQuantity(
         "limits.max_thrust",
         limits.max_thrust,
-        needed.thrust,
+        demanded.thrust,
         " m/s² of thrust",
         key_scale=limits.full_thrust,
     )
-    yield _Need("limits.max_climb_m_s", limits.max_climb, climb, " m/s of climb")
-    yield _Need("limits.max_descent_m_s", limits.max_descent, -climb, " m/s of descent")
-    yield _Need("safety.max_speed_m_s", limits.max_speed, speed, " m/s of speed")
+    yield _LimitedQuantity("limits.max_climb_m_s", limits.max_climb, climb, " m/s of climb")
+    yield _LimitedQuantity("limits.max_descent_m_s", limits.max_descent, -climb, " m/s of descent")
+    yield _LimitedQuantity("safety.max_speed_m_s", limits.max_speed, speed, " m/s of speed")
 
 
-def _excess(need: _Need) -> Floats:
+def _excess(quantity: _LimitedQuantity) -> Floats:
     """(m,), excess over the limit in the limit's unit; negative if the limit is kept."""
-    allowed = need.allowed or 0.0
-    return allowed - need.needed if need.is_lower_limit else need.needed - allowed
-
-
-def _violation(times: Floats, need: _Need) -> Violation | None:
-    if need.allowed is None:
-        return None
-    over = _excess(need)
-    broken = over > _ROUNDING * max(abs(need.allowed), 1.0)
-    if not broken.any():
-        return None
-    begins, time = float(times[np.argmax(broken)]), float(times[np.argmax(over)])
-    needed = float(need.needed[np.argmax(over)]) * need.message_scale
-    allowed, limit, unit = need.allowed * need.message_scale, need.limit, ""
-    if need.key_scale is not None:
-        limit, unit = f"{limit} = {need.allowed / need.key_scale:.4g}", " m/s²"
-    text = (
-        f"at {time:.2f} s it needs {needed:.4g}{need.unit_text}, {limit} allows "
-        f"{'no less than ' if need.is_lower_limit else ''}{allowed:.4g}{unit}"
+    limit_value = quantity.limit_value or 0.0
+    return (
+        limit_value - quantity.values if quantity.is_lower_limit else quantity.values - limit_value
     )
-    if begins < time:
-        text += f" (broken from {begins:.2f} s on)"
-    return Violation(need.limit, begins, time, text)
+
+
+def _violation(times: Floats, quantity: _LimitedQuantity) -> Violation | None:
+    if quantity.limit_value is None:
+        return None
+    quantity_excess = _excess(quantity)
+    is_broken = quantity_excess > _ROUNDING * max(abs(quantity.limit_value), 1.0)
+    if not is_broken.any():
+        return None
+    begin_time, time = float(times[np.argmax(is_broken)]), float(times[np.argmax(quantity_excess)])
+    worst_value = float(quantity.values[np.argmax(quantity_excess)]) * quantity.message_scale
+    limit_value, limit, unit = quantity.limit_value * quantity.message_scale, quantity.limit, ""
+    if quantity.key_scale is not None:
+        limit, unit = f"{limit} = {quantity.limit_value / quantity.key_scale:.4g}", " m/s²"
+    text = (
+        f"at {time:.2f} s it needs {worst_value:.4g}{quantity.unit_text}, {limit} allows "
+        f"{'no less than ' if quantity.is_lower_limit else ''}{limit_value:.4g}{unit}"
+    )
+    if begin_time < time:
+        text += f" (broken from {begin_time:.2f} s on)"
+    return Violation(quantity.limit, begin_time, time, text)

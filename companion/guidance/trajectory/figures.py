@@ -20,7 +20,7 @@ from companion.guidance.trajectory.time_laws import (
 )
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
-_LONGEST_RAMP_SHARE = 0.5
+_LONGEST_RAMP_FRACTION = 0.5
 """Longest ramp (time in which the phase rate rises or falls), as a share of the time for all laps
 at the steady phase rate. So a ramp covers at most a quarter of the path, and the fastest place of
 each figure lies between the ramps.
@@ -67,12 +67,12 @@ class Hover:
 
 
 def line(
-    to: Vector, speed: float, acceleration: float, jerk: float, face_path: bool = False
+    displacement: Vector, speed: float, acceleration: float, jerk: float, face_path: bool = False
 ) -> TimedCurve:
     """A straight line from rest to rest, as fast as three limits allow.
 
     Args:
-        to: end point, (north, east, down) from the start, m.
+        displacement: end point, (north, east, down) from the start, m.
         speed: largest speed, m/s.
         acceleration: largest acceleration, m/s².
         jerk: largest jerk, m/s³.
@@ -82,14 +82,14 @@ def line(
         TrajectoryError: the line has no finite length, a limit is not positive, or the line is
             vertical and `face_path` is set.
     """
-    length = sqrt(sum(x * x for x in to))
+    length = sqrt(sum(x * x for x in displacement))
     if not isfinite(length):
         raise TrajectoryError("the end point of a line must be finite")
     if length < SMALLEST_DISTANCE:
         raise TrajectoryError("a line must end at another point than its start")
-    if face_path and hypot(to[0], to[1]) == 0.0:
+    if face_path and hypot(displacement[0], displacement[1]) == 0.0:
         raise TrajectoryError("a vertical line has no heading to face along")
-    north, east, down = (x / length for x in to)
+    north, east, down = (x / length for x in displacement)
     law = LimitedJerk(length, speed, acceleration, jerk)
     heading = TangentHeading(atan2(east, north)) if face_path else HeldHeading()
     return TimedCurve("line", Straight((north, east, down)), law, heading)
@@ -124,7 +124,7 @@ def circle(radius: float, laps: Laps) -> TimedCurve:
     return _flown_laps("circle", radius, Helix(radius), laps, TangentHeading(pi / 2.0, -1.0))
 
 
-def steady_circle(radius: float, speed: float, laps: float, longest: float) -> TimedCurve:
+def steady_circle(radius: float, speed: float, laps: float, longest_duration: float) -> TimedCurve:
     """Laps of a circle north of the start; the vehicle leaves eastwards and holds its heading.
 
     The speed rises and falls as a raised cosine, with a mean acceleration of 1 m/s², or more if the
@@ -134,12 +134,12 @@ def steady_circle(radius: float, speed: float, laps: float, longest: float) -> T
         radius: radius, m.
         speed: speed between the ramps, m/s.
         laps: number of laps; both ramps are part of them.
-        longest: longest duration that the checks permit, s.
+        longest_duration: longest duration that the checks permit, s.
     """
     length = tau * radius * laps
     ramp = min(speed / _RAMP_ACCELERATION, length / speed)
     law = Cruise(tau * laps, speed / radius, ramp, ramp, cosine_ramp)
-    return TimedCurve("circle", Helix(radius), law, HeldHeading(), longest)
+    return TimedCurve("circle", Helix(radius), law, HeldHeading(), longest_duration)
 
 
 def helix(radius: float, rise: float, laps: Laps) -> TimedCurve:
@@ -188,7 +188,9 @@ def _flown_laps(
     if not all(0.0 < value < inf for value in (size, laps.speed, laps.laps, laps.acceleration)):
         raise TrajectoryError(f"size, speed, laps and acceleration of a {name} must be positive")
     length, rate = tau * laps.laps, laps.speed / curve.path_per_phase
-    ramp = min(SEPTIC_SLOPE * laps.speed / laps.acceleration, _LONGEST_RAMP_SHARE * length / rate)
+    ramp = min(
+        SEPTIC_SLOPE * laps.speed / laps.acceleration, _LONGEST_RAMP_FRACTION * length / rate
+    )
     if laps.direction:
         curve = RotatedFigure(curve, laps.direction)
         tangent = replace(tangent, middle=tangent.middle + laps.direction)

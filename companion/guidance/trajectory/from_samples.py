@@ -34,27 +34,27 @@ _CHECKS_PER_PIECE = 16
 _MOST_PIECES = 4500
 """Largest number of pieces of the spline; the fit then takes a second."""
 
-_LONGEST_RAMP_SHARE = 0.5
+_LONGEST_RAMP_FRACTION = 0.5
 """Longest ramp from or to rest, as a share of the duration of the samples."""
 
 
 class _Quantity(NamedTuple):
     """A derivative in a file, and the RMS by which it may differ from the spline's derivative.
 
-    The tolerance is floor + share · RMS of the derivative. It is needed because published
-    accelerations may jump, and the acceleration of a spline cannot.
+    This is absolute_tolerance + relative_tolerance · RMS of the derivative. The tolerance is needed
+    because published accelerations may jump, and the acceleration of a spline cannot.
 
     Attributes:
         name: name of the derivative in messages.
-        unit: unit of the derivative and of `floor`.
-        share: error allowed for each unit of the derivative's RMS.
-        floor: error that is always allowed.
+        unit: unit of the derivative and of `absolute_tolerance`.
+        relative_tolerance: error allowed for each unit of the derivative's RMS.
+        absolute_tolerance: error that is always allowed.
     """
 
     name: str
     unit: str
-    share: float
-    floor: float
+    relative_tolerance: float
+    absolute_tolerance: float
 
 
 _DERIVATIVE_QUANTITIES = (
@@ -144,7 +144,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
     rise_time, fall_time = [
         0.0
         if is_resting
-        else min(SEPTIC_SLOPE * speed / options.acceleration, _LONGEST_RAMP_SHARE * spline.end)
+        else min(SEPTIC_SLOPE * speed / options.acceleration, _LONGEST_RAMP_FRACTION * spline.end)
         for is_resting, speed in zip(resting, speeds, strict=True)
     ]
     law = Cruise(spline.end, 1.0, rise_time, fall_time)
@@ -191,13 +191,15 @@ def _require_derivatives(
     spline: SepticSpline, times: Floats, derivatives: tuple[Floats, ...]
 ) -> None:
     """Check that velocity and acceleration are the derivatives of the position."""
-    motion = spline.along(times)
-    for order, (given, quantity) in enumerate(
+    motion = spline.sampled(times)
+    for order, (file_derivative, quantity) in enumerate(
         zip(derivatives, _DERIVATIVE_QUANTITIES, strict=False), 1
     ):
-        errors = np.linalg.norm(motion[:, :, order] - given, axis=1)
-        sizes = np.linalg.norm(given, axis=1)
-        tolerance = quantity.share * _root_mean_square(sizes) + quantity.floor
+        errors = np.linalg.norm(motion[:, :, order] - file_derivative, axis=1)
+        sizes = np.linalg.norm(file_derivative, axis=1)
+        tolerance = (
+            quantity.relative_tolerance * _root_mean_square(sizes) + quantity.absolute_tolerance
+        )
         if _root_mean_square(errors) > tolerance:
             worst = int(np.argmax(errors))
             raise TrajectoryError(

@@ -101,8 +101,8 @@ def _smoothness_equations(spans: Floats, stiffness: float, series: int) -> _Equa
     # Snap of uᵏ is k!/(k−4)!·uᵏ⁻⁴, and ∫ uᵐ over a piece is 1/(m + 1).
     snap = np.array([24.0, 120.0, 360.0, 840.0])
     energy = np.outer(snap, snap) / (powers[:, None] + powers + 1.0)
-    high = COEFFICIENTS_FROM_ENDS[STATE_SIZE:]  # coefficients of u⁴ to u⁷
-    block = high.T @ energy @ high
+    high_coefficients = COEFFICIENTS_FROM_ENDS[STATE_SIZE:]  # coefficients of u⁴ to u⁷
+    block = high_coefficients.T @ energy @ high_coefficients
     ends = spans[:, None] ** np.tile(powers, 2)
     blocks = stiffness * block * ends[:, :, None] * ends[:, None, :] / spans[:, None, None] ** 7
     diagonal = np.zeros((spans.size + 1, STATE_SIZE, STATE_SIZE))
@@ -143,11 +143,11 @@ def _optimal_states(equations: _Equations, states: Floats, mask: NDArray[np.bool
     right[:-1] -= upper @ fixed[1:]
     right[1:] -= upper.transpose(0, 2, 1) @ fixed[:-1]
     right[mask] = fixed[mask]
-    free = ~mask
-    diagonal = diagonal * (free[:, :, None] & free[:, None, :]) + mask[:, :, None] * np.eye(
+    is_free = ~mask
+    diagonal = diagonal * (is_free[:, :, None] & is_free[:, None, :]) + mask[:, :, None] * np.eye(
         STATE_SIZE
     )
-    upper = upper * (free[:-1, :, None] & free[1:, None, :])
+    upper = upper * (is_free[:-1, :, None] & is_free[1:, None, :])
     return _solve_block_tridiagonal(diagonal, upper, right)
 
 
@@ -161,17 +161,17 @@ def _solve_block_tridiagonal(diagonal: Floats, upper: Floats, right: Floats) -> 
     diagonal = diagonal * scale[:, :, None] * scale[:, None, :]
     upper = upper * scale[:-1, :, None] * scale[1:, None, :]
     right = right * scale[:, :, None]
-    reduced = np.empty_like(upper)
+    reduced_upper = np.empty_like(upper)
     pivot = diagonal[0]
     for k in range(len(upper)):
         solved = np.linalg.solve(pivot, np.concatenate((upper[k], right[k]), axis=1))
-        reduced[k], right[k] = solved[:, :STATE_SIZE], solved[:, STATE_SIZE:]
-        pivot = diagonal[k + 1] - upper[k].T @ reduced[k]
+        reduced_upper[k], right[k] = solved[:, :STATE_SIZE], solved[:, STATE_SIZE:]
+        pivot = diagonal[k + 1] - upper[k].T @ reduced_upper[k]
         right[k + 1] -= upper[k].T @ right[k]
     if np.linalg.eigvalsh(pivot)[0] < _SMALLEST_EIGENVALUE:
         raise np.linalg.LinAlgError("too few values are fixed or observed to determine the spline")
     right[-1] = np.linalg.solve(pivot, right[-1])
     for k in range(len(upper) - 1, -1, -1):
-        right[k] -= reduced[k] @ right[k + 1]
+        right[k] -= reduced_upper[k] @ right[k + 1]
     states: Floats = right * scale[:, :, None]
     return states

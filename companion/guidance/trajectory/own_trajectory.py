@@ -9,7 +9,7 @@ import numpy as np
 from companion.guidance.trajectory.sample import Sample, Trajectory, TrajectoryError, Vector
 from companion.user_code import naming_user_code
 
-_MEMBERS = ("name", "duration", "holds_heading", "at", "check_times")
+_REQUIRED_MEMBERS = ("name", "duration", "holds_heading", "at", "check_times")
 _ROLE = "trajectory"
 _SMALLEST_OFFSET = 1e-3  # m
 _SMALLEST_SPEED = 0.01  # m/s
@@ -20,8 +20,8 @@ _GOLDEN_RATIO = 0.6180339887498949
 """Multiples of this modulo 1 are spread evenly, and miss the round times at which pieces join."""
 _DIFFERENCE_STEP = 1e-3
 """Half the span of a difference quotient, s."""
-_ALLOWED_ERROR, _ALLOWED_SHARE = 0.1, 0.02
-"""Largest error of a derivative d: `_ALLOWED_ERROR` (m/s or m/s²) + `_ALLOWED_SHARE`·d."""
+_ABSOLUTE_TOLERANCE, _RELATIVE_TOLERANCE = 0.1, 0.02
+"""A derivative d may be wrong by `_ABSOLUTE_TOLERANCE` (m/s, m/s²) + `_RELATIVE_TOLERANCE`·d."""
 
 
 def require_trajectory(trajectory: Trajectory) -> None:
@@ -36,7 +36,7 @@ def require_trajectory(trajectory: Trajectory) -> None:
             has a number that is not finite, a negative duration, check times that do not ascend
             from 0 to the duration, or a derivative that does not fit.
     """
-    for member in _MEMBERS:
+    for member in _REQUIRED_MEMBERS:
         if not hasattr(trajectory, member):
             raise TypeError(
                 f"{type(trajectory).__name__} is no trajectory: it has no `{member}`; see "
@@ -61,12 +61,12 @@ def _sample(trajectory: Trajectory, time: float) -> Sample:
     """
     sample = trajectory.at(time)
     try:
-        plain = _as_floats(sample)
+        float_sample = _as_floats(sample)
     except (TypeError, ValueError):
         raise TypeError(f"at({time:g}) returned {sample!r}, which is no Sample") from None
-    if not _is_finite(plain):
-        raise TrajectoryError(f"at {time:.2f} s a number is not finite: {plain}")
-    return plain
+    if not _is_finite(float_sample):
+        raise TrajectoryError(f"at {time:.2f} s a number is not finite: {float_sample}")
+    return float_sample
 
 
 def _as_floats(sample: Sample) -> Sample:
@@ -110,10 +110,10 @@ def _require_rest(begin: Sample, end: Sample) -> None:
 
 def _require_times(times: Sequence[float], duration: float) -> None:
     tolerance = 1e-6 * max(1.0, duration)
-    ascend = all(a <= b for a, b in pairwise(times))
+    is_ascending = all(a <= b for a, b in pairwise(times))
     if not (
         len(times) > 0
-        and ascend
+        and is_ascending
         and abs(times[0]) <= tolerance
         and abs(times[-1] - duration) <= tolerance
     ):
@@ -134,7 +134,7 @@ def _require_derivatives(trajectory: Trajectory, quantity: str, derivative: str,
         )
         reported = np.asarray(getattr(now, derivative), dtype=float)
         size = float(np.linalg.norm(change))
-        if np.linalg.norm(change - reported) > _ALLOWED_ERROR + _ALLOWED_SHARE * size:
+        if np.linalg.norm(change - reported) > _ABSOLUTE_TOLERANCE + _RELATIVE_TOLERANCE * size:
             raise TrajectoryError(
                 f"at {time:.2f} s its {quantity} changes by {size:.2f} {unit}, but its {derivative}"
                 f" is {np.linalg.norm(reported):.2f} {unit}: they must agree in size and direction"

@@ -71,7 +71,7 @@ class SepticSpline:
         u = time - self._knots[index]
         return [_horner(piece, u) for piece in self._pieces[index]]
 
-    def along(self, times: Floats) -> Floats:
+    def sampled(self, times: Floats) -> Floats:
         """Like `at`, for many `times` (m,) at once; returns (m, n, 4)."""
         knots, pieces = self._arrays
         index = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(pieces) - 1)

@@ -116,13 +116,13 @@ class SlowerTime:
                 break
         return self._progress(piece, u, index)
 
-    def stretched(self, moments: Floats) -> tuple[Floats, Progress]:
-        """Stretched times and progress (m,) at the original times `moments` (m,), s."""
+    def stretched_times(self, original_times: Floats) -> tuple[Floats, Progress]:
+        """Stretched times and progress (m,) at `original_times` (m,), s."""
         count = len(self.coefficients) - 3
-        index = np.clip((moments / self._piece_duration).astype(int), 0, count - 1)
+        index = np.clip((original_times / self._piece_duration).astype(int), 0, count - 1)
         c = np.array(self.coefficients)
         piece = _spline_piece(c[index], c[index + 1], c[index + 2], c[index + 3])
-        u = moments / self._piece_duration - index
+        u = original_times / self._piece_duration - index
         times = np.array(self._ends)[index] + self._piece_duration * np.asarray(piece.integral(u))
         return times, self._progress(piece, u, index)
 
@@ -131,13 +131,13 @@ class SlowerTime:
 
         With r = 1/w: ṙ = −w'/w³ and r̈ = −w''/w⁴ + 3w'²/w⁵.
         """
-        width = self._piece_duration
-        w, slope = piece.factor(u), piece.slope(u) / width
-        curvature = piece.curvature(u) / (width * width)
+        piece_duration = self._piece_duration
+        w, slope = piece.factor(u), piece.slope(u) / piece_duration
+        curvature = piece.curvature(u) / (piece_duration * piece_duration)
         rate = 1.0 / w
         cube = rate * rate * rate
         return Progress(
-            width * (index + u),
+            piece_duration * (index + u),
             rate,
             -slope * cube,
             cube * rate * (3.0 * slope * slope * rate - curvature),

@@ -1,9 +1,9 @@
 """Slows a trajectory down where it breaks limits.
 
-The path stays the same; only its timing changes. Limits are checked at times called moments.
+The path stays the same; only its timing changes. Limits are checked at many times.
 
-1. For each moment, find the needed factor: if the whole trajectory were slowed down by it, this
-   moment would keep all limits except the fence.
+1. For each time, find the needed factor: if the whole trajectory were slowed down by it, this
+   time would keep all limits except the fence.
 2. Find a smooth function of time, the stretch factor (`SlowerTime`), that is nowhere below the
    needed factor. With it the vehicle brakes before a slow part and speeds up after it.
 3. Braking needs acceleration: check limits again; where one is broken, raise the stretch factor.
@@ -33,31 +33,32 @@ _LARGEST_FACTOR = 64.0
 _FACTOR_PRECISION = 1e-3
 """Relative precision of a factor."""
 _BISECTIONS = 16
-"""Number of bisection steps in the search for the factor of one moment."""
+"""Number of bisection steps in the search for the factor of one check time."""
 _PIECE_DURATIONS, _FEWEST_PIECES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2), 4
 """Durations of one piece of the stretch factor to try, s, and the smallest number of pieces."""
-_MOST_ROUNDS = 60
+_MAX_ITERATIONS = 60
 """Largest number of times that the stretch factor is raised before the search gives up."""
 _LEAST_RAISE, _LARGEST_RAISE = 0.004, 0.1
 """Smallest and largest relative increase of the stretch factor in one round."""
-_MOST_MOMENTS = 20_000
-"""Largest number of moments for slowing down in parts. The search then takes some seconds."""
-_EVEN_MOMENTS = 8000
-"""Largest number of evenly spaced moments."""
-_SHORTEST_STEP = 0.006
-"""Shortest step between evenly spaced moments, s."""
-_MOMENTS_PER_PIECE = 8.0
-"""Smallest number of moments in each piece of the stretch factor; fewer could miss an extreme."""
+_MAX_CHECK_TIMES = 20_000
+"""Largest number of check times for slowing down in parts. The search then takes some seconds."""
+_MAX_EVEN_CHECK_TIMES = 8000
+"""Largest number of evenly spaced check times."""
+_SHORTEST_CHECK_STEP = 0.006
+"""Shortest step between evenly spaced check times, s."""
+_CHECK_TIMES_PER_PIECE = 8.0
+"""Smallest number of check times in each piece of the stretch factor; with fewer, an extreme could
+be missed."""
 _LONG_GAP_FACTOR = 3.0
 """A gap between check times is filled if it is this many times as long as the median gap."""
-_WORTHWHILE_SHARE = 0.98
+_WORTHWHILE_FRACTION = 0.98
 """Slowing down in parts is used if it takes less than this share of the time of slowing evenly."""
 _NOTICEABLE_FACTOR = 1.02
 """Smallest factor that counts as slowing down."""
 _NEAR_SLOWEST = 0.9
-"""Moments with at least this share of the largest (factor − 1) count as near the slowest moment."""
-_FILL_STEP_GAPS = 2.0
-"""Time between the moments that fill a gap, as a multiple of the median gap."""
+"""Times with at least this share of the largest (factor − 1) count as near the slowest time."""
+_FILL_STEP_FACTOR = 2.0
+"""Time between the check times that fill a gap, as a multiple of the median gap."""
 
 
 class SlowedPart(NamedTuple):
@@ -83,13 +84,13 @@ class SlowDown(NamedTuple):
     Attributes:
         trajectory: the trajectory that keeps the limits.
         parts: the parts that were slowed down, in order; empty if none was.
-        even: whether the whole trajectory was slowed down by one factor.
+        is_even: whether the whole trajectory was slowed down by one factor.
         reason: why the whole trajectory was slowed down, as the end of a sentence.
     """
 
     trajectory: Trajectory
     parts: tuple[SlowedPart, ...] = ()
-    even: bool = False
+    is_even: bool = False
     reason: str = ""
 
 
@@ -106,17 +107,17 @@ def slow_down(trajectory: Trajectory, envelope: Envelope) -> SlowDown:
         if not broken:
             return SlowDown(trajectory)
         part = _slowed_evenly(trajectory, motion, broken, envelope)
-        even = SlowDown(evenly_slowed(trajectory, part.factor), (part,), even=True)
-        moments = _denser_times(motion.times)
-        if moments.size > _MOST_MOMENTS:
-            return even._replace(reason="it is too long to be slowed down in parts")
-        dense_motion = sampled_motion(trajectory, moments.tolist())
+        uniform = SlowDown(evenly_slowed(trajectory, part.factor), (part,), is_even=True)
+        times = _denser_times(motion.times)
+        if times.size > _MAX_CHECK_TIMES:
+            return uniform._replace(reason="it is too long to be slowed down in parts")
+        dense_motion = sampled_motion(trajectory, times.tolist())
         if broken_limits(dense_motion.slowed(part.factor), envelope):
-            return even._replace(reason="a finer check found more limits exceeded")
+            return uniform._replace(reason="a finer check found more limits exceeded")
         law = _best_law(dense_motion, trajectory.duration, envelope)
-        if law is None or law.duration > _WORTHWHILE_SHARE * even.trajectory.duration:
-            return even._replace(reason="slowing down in parts would not be quicker")
-        slowed = Slowed(trajectory, law, tuple(moments.tolist()))
+        if law is None or law.duration > _WORTHWHILE_FRACTION * uniform.trajectory.duration:
+            return uniform._replace(reason="slowing down in parts would not be quicker")
+        slowed = Slowed(trajectory, law, tuple(times.tolist()))
         return SlowDown(slowed, tuple(_slowed_parts(dense_motion, law, envelope)))
 
 
@@ -149,40 +150,40 @@ def _denser_times(times: Floats) -> Floats:
     gaps = np.diff(times)
     median_gap = float(np.median(gaps[gaps > 0.0])) if gaps.size else 1.0
     duration = float(times[-1])
-    parts = [times, np.linspace(0.0, duration, int(duration / _moment_step(duration)) + 2)]
+    time_arrays = [times, np.linspace(0.0, duration, int(duration / _check_step(duration)) + 2)]
     for k in np.flatnonzero(gaps > _LONG_GAP_FACTOR * median_gap):
-        count = min(int(gaps[k] / (_FILL_STEP_GAPS * median_gap)), _MOST_MOMENTS)
-        parts.append(np.linspace(times[k], times[k + 1], count + 1))
-    return np.unique(np.concatenate(parts))
+        count = min(int(gaps[k] / (_FILL_STEP_FACTOR * median_gap)), _MAX_CHECK_TIMES)
+        time_arrays.append(np.linspace(times[k], times[k + 1], count + 1))
+    return np.unique(np.concatenate(time_arrays))
 
 
-def _moment_step(duration: float) -> float:
+def _check_step(duration: float) -> float:
     """Largest step between the times at which a trajectory of `duration` s is checked, s."""
-    return max(_SHORTEST_STEP, duration / _EVEN_MOMENTS)
+    return max(_SHORTEST_CHECK_STEP, duration / _MAX_EVEN_CHECK_TIMES)
 
 
 def _best_law(motion: Motion, duration: float, envelope: Envelope) -> SlowerTime | None:
     """The time law by which the flight is shortest; None: none was found that keeps the limits."""
     needed = _needed_factors(motion, envelope)
-    shortest, longest = _MOMENTS_PER_PIECE * _moment_step(duration), duration / _FEWEST_PIECES
-    pieces = [piece for piece in _PIECE_DURATIONS if shortest <= piece <= longest]
-    laws = [_law_with_pieces(motion, needed, duration, piece, envelope) for piece in pieces]
+    shortest, longest = _CHECK_TIMES_PER_PIECE * _check_step(duration), duration / _FEWEST_PIECES
+    durations = [each for each in _PIECE_DURATIONS if shortest <= each <= longest]
+    laws = [_law_with_pieces(motion, needed, duration, each, envelope) for each in durations]
     return min((law for law in laws if law), key=lambda law: law.duration, default=None)
 
 
 def _needed_factors(motion: Motion, envelope: Envelope) -> Floats:
-    """The needed factor of each moment, (m,); see step 1 in the module's docstring."""
+    """The needed factor at each time, (m,); see step 1 in the module's docstring."""
     low, high = np.zeros_like(motion.times), np.full_like(motion.times, np.log(_LARGEST_FACTOR))
     high[_largest_excess(motion, envelope) <= 0.0] = 0.0
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        over = _largest_excess(motion.slowed(np.exp(middle)), envelope) > 0.0
-        low, high = np.where(over, middle, low), np.where(over, high, middle)
+        is_broken = _largest_excess(motion.slowed(np.exp(middle)), envelope) > 0.0
+        low, high = np.where(is_broken, middle, low), np.where(is_broken, high, middle)
     return np.exp(high)
 
 
 def _largest_excess(motion: Motion, envelope: Envelope) -> Floats:
-    """The largest relative excess over any limit but the fence at each moment, (m,)."""
+    """The largest relative excess over any limit but the fence at each time, (m,)."""
     without_limits = np.full_like(motion.times, -1.0)
     return np.asarray(np.max([without_limits, *excess(motion, envelope).values()], axis=0))
 
@@ -192,40 +193,40 @@ def _law_with_pieces(
 ) -> SlowerTime | None:
     """A stretch factor of at least `needed` (m,); pieces of `piece_duration` s. None: not found."""
     count = int(np.ceil(duration / piece_duration))
-    piece = np.clip((motion.times * (count / duration)).astype(int), 0, count - 1)
+    index = np.clip((motion.times * (count / duration)).astype(int), 0, count - 1)
     needed_by_piece = np.ones(count)
-    np.maximum.at(needed_by_piece, piece, needed)
+    np.maximum.at(needed_by_piece, index, needed)
     coefficients = _largest_of_four(needed_by_piece, 1.0)
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(_MAX_ITERATIONS):
         law = SlowerTime(duration, tuple(coefficients.tolist()))
         if law.duration > LONGEST_DURATION or coefficients.max() > _LARGEST_FACTOR:
             return None
-        slower = motion.retimed(*law.stretched(motion.times))
+        slower = motion.retimed(*law.stretched_times(motion.times))
         over = _largest_excess(slower, envelope)
-        if envelope.fence is not None and (found := envelope.fence(slower)) is not None:
-            outside = (slower.times >= found.begins) & (slower.times <= found.time)
-            over = np.where(outside, np.maximum(over, _LARGEST_RAISE), over)
+        if envelope.fence is not None and (breach := envelope.fence(slower)) is not None:
+            is_outside = (slower.times >= breach.begin_time) & (slower.times <= breach.time)
+            over = np.where(is_outside, np.maximum(over, _LARGEST_RAISE), over)
         if not (over > 0.0).any():
             return law
         raises = np.zeros(count)
-        np.maximum.at(raises, piece, np.where(over > 0.0, over, 0.0))
+        np.maximum.at(raises, index, np.where(over > 0.0, over, 0.0))
         raises = np.where(raises > 0.0, np.clip(0.5 * raises, _LEAST_RAISE, _LARGEST_RAISE), 0.0)
         coefficients *= 1.0 + _largest_of_four(raises, 0.0)
     return None
 
 
-def _largest_of_four(values: Floats, outside: float) -> Floats:
-    """(n + 3,), largest of 4 `values` (n,) for each B-spline coefficient; padded with `outside`."""
-    padded = np.pad(values, 3, constant_values=outside)
+def _largest_of_four(values: Floats, padding: float) -> Floats:
+    """(n + 3,), largest of 4 `values` (n,) for each B-spline coefficient; padded with `padding`."""
+    padded = np.pad(values, 3, constant_values=padding)
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 4).max(axis=1))
 
 
 def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterator[SlowedPart]:
     """The parts that a stretch factor slows down, each with the limit that requires it."""
-    times, progress = law.stretched(motion.times)
-    factors = 1.0 / np.asarray(progress.first)
-    slow = np.concatenate(([False], factors > _NOTICEABLE_FACTOR, [False]))
-    edges = np.flatnonzero(np.diff(slow.astype(int)))
+    times, progress = law.stretched_times(motion.times)
+    factors = 1.0 / np.asarray(progress.first_derivative)
+    is_slow = np.concatenate(([False], factors > _NOTICEABLE_FACTOR, [False]))
+    edges = np.flatnonzero(np.diff(is_slow.astype(int)))
     for begin, end in zip(edges[::2], edges[1::2], strict=True):
         slowest = begin + int(factors[begin:end].argmax())
         near = np.flatnonzero(factors[begin:end] - 1.0 >= _NEAR_SLOWEST * (factors[slowest] - 1.0))
@@ -239,11 +240,11 @@ def _slowed_parts(motion: Motion, law: SlowerTime, envelope: Envelope) -> Iterat
         )
 
 
-def _most_exceeded_limit(motion: Motion, envelope: Envelope, moments: Any) -> str:
-    """Key of the limit exceeded most at `moments`, else of the breached fence limit, else ""."""
-    most = {name: float(over[moments].max()) for name, over in excess(motion, envelope).items()}
-    limit = max(most, key=most.__getitem__, default="")
-    if limit and most[limit] > 0.0:
+def _most_exceeded_limit(motion: Motion, envelope: Envelope, indices: Any) -> str:
+    """Key of the limit exceeded most at `indices`, else of the breached fence limit, else ""."""
+    excesses = {name: float(over[indices].max()) for name, over in excess(motion, envelope).items()}
+    limit = max(excesses, key=excesses.__getitem__, default="")
+    if limit and excesses[limit] > 0.0:
         return limit
-    found = None if envelope.fence is None else envelope.fence(motion)
-    return "" if found is None else found.limit
+    breach = None if envelope.fence is None else envelope.fence(motion)
+    return "" if breach is None else breach.limit

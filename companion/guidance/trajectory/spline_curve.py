@@ -23,7 +23,7 @@ HEADING_CHECK_STEP = 1.0 / (32.0 * _HEADING_CUTOFF)
 _HEADING_STEP = 0.01
 """Sample period of the direction of flight, s."""
 
-_SLOW_SHARE = 0.1
+_SLOW_FRACTION = 0.1
 """Share of the largest horizontal speed below which the direction of flight is not used."""
 
 _STANDING_SPEED = 0.01
@@ -55,16 +55,18 @@ class SplineCurve:
         spans = np.diff(knots)
         fractions = np.linspace(0.0, 1.0, 17)
         times = (knots[:-1, None] + spans[:, None] * fractions).ravel()
-        velocity = self.spline.along(times)[:, :, 1]
+        velocity = self.spline.sampled(times)[:, :, 1]
         speeds = np.linalg.norm(velocity, axis=1).reshape(spans.size, -1).max(axis=1)
         counts = np.ceil(np.maximum(spans * speeds * 1.05 / PATH_STEP, spans / self.longest_step))
         counts = np.maximum(counts, self.checks_per_piece)
         require_checkable(float(counts.sum()))
-        grids = [
+        phase_arrays = [
             np.linspace(begin, end, int(count), endpoint=False)
             for begin, end, count in zip(knots[:-1], knots[1:], counts, strict=True)
         ]
-        return PhaseSampling(None, phases=tuple(np.concatenate((*grids, knots[-1:])).tolist()))
+        return PhaseSampling(
+            None, phases=tuple(np.concatenate((*phase_arrays, knots[-1:])).tolist())
+        )
 
     def at(self, phase: float) -> CurvePoint:
         """The point at the spline's time `phase`."""
@@ -142,10 +144,10 @@ def tangent_heading(spline: SepticSpline, resting: tuple[bool, bool]) -> SplineH
     """
     count = int(np.ceil((spline.end - spline.begin) / _HEADING_STEP)) + 1
     times = np.linspace(spline.begin, spline.end, count)
-    velocity = spline.along(times)[:, :2, 1]
+    velocity = spline.sampled(times)[:, :2, 1]
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    moving = speed > max(_SLOW_SHARE * speed.max(), _STANDING_SPEED)
-    if not moving.any():
+    is_moving = speed > max(_SLOW_FRACTION * speed.max(), _STANDING_SPEED)
+    if not is_moving.any():
         raise TrajectoryError("it never moves horizontally, so there is no heading along it")
-    headings = np.unwrap(np.arctan2(velocity[moving, 1], velocity[moving, 0]))
-    return heading_spline(times, np.interp(times, times[moving], headings), resting)
+    headings = np.unwrap(np.arctan2(velocity[is_moving, 1], velocity[is_moving, 0]))
+    return heading_spline(times, np.interp(times, times[is_moving], headings), resting)

@@ -12,7 +12,7 @@ from companion.guidance.trajectory.sample import Vector
 from companion.guidance.trajectory.septic_spline import Floats
 from companion.guidance.trajectory.time_laws import LimitedJerk, Piece, Progress
 from companion.guidance.trajectory.timed_curve import TimedCurve
-from companion.guidance.trajectory.waypoints import heading_through, places_of
+from companion.guidance.trajectory.waypoints import heading_through, positions_and_distances
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Legs:
     def pieces(self) -> list[Piece]:
         """The pieces of all legs."""
         return [
-            Piece(begin + piece.begin, begin + piece.end, piece.steady)
+            Piece(begin + piece.begin, begin + piece.end, piece.is_steady)
             for begin, leg in zip(self._begins, self._legs, strict=True)
             for piece in leg.pieces()
         ]
@@ -87,12 +87,12 @@ def straight_legs(
         TrajectoryError: there are no points, two consecutive points are equal, a limit is not
             positive, or the number of headings is wrong.
     """
-    places, lengths = places_of(points, headings)
+    positions, lengths = positions_and_distances(points, headings)
     phases = np.concatenate(([0.0], np.cumsum(lengths)))
     legs = [LimitedJerk(length, speed, acceleration, jerk) for length in lengths.tolist()]
     begins = tuple(phases[:-1].tolist())
-    directions = _vectors(np.diff(places, axis=0) / lengths[:, None])
-    curve = Polyline(begins, _vectors(places[:-1]), tuple(map(Straight, directions)))
+    directions = _vectors(np.diff(positions, axis=0) / lengths[:, None])
+    curve = Polyline(begins, _vectors(positions[:-1]), tuple(map(Straight, directions)))
     heading = heading_through(phases, headings)
     return TimedCurve("straight legs", curve, Legs(legs, begins), heading)
 

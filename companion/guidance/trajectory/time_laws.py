@@ -17,13 +17,14 @@ class Progress(NamedTuple):
 
     Attributes:
         phase: phase in the curve's unit (rad, m or s).
-        first, second, third: derivatives of the phase by time, in its unit per s, s², s³.
+        first_derivative, second_derivative, third_derivative: of the phase by time, in its unit
+            per s, s², s³.
     """
 
     phase: float
-    first: float = 0.0
-    second: float = 0.0
-    third: float = 0.0
+    first_derivative: float = 0.0
+    second_derivative: float = 0.0
+    third_derivative: float = 0.0
 
 
 Triple = tuple[Any, Any, Any]
@@ -59,12 +60,12 @@ class Piece(NamedTuple):
 
     Attributes:
         begin, end: times, s.
-        steady: whether the rate of the phase is constant.
+        is_steady: whether the rate of the phase is constant.
     """
 
     begin: float
     end: float
-    steady: bool
+    is_steady: bool
 
 
 class TimeLaw(Protocol):
@@ -197,14 +198,16 @@ class LimitedJerk:
         rise = ((jerk_time, jerk), (steady_time, 0.0), (jerk_time, -jerk))
         fall = ((jerk_time, -jerk), (steady_time, 0.0), (jerk_time, jerk))
         self._pieces = _joined_pieces((*rise, (cruise_time, 0.0), *fall))
-        self._ends = [start for start, _, _ in self._pieces[1:]]
+        self._piece_ends = [start for start, _, _ in self._pieces[1:]]
         self.duration = 2.0 * ramp + cruise_time
 
     def pieces(self) -> list[Piece]:
         """The seven pieces of constant jerk."""
         begins = [start for start, _, _ in self._pieces]
-        spans = zip(begins, [*begins[1:], self.duration], strict=True)
-        return [Piece(begin, end, k == _CRUISING_PIECE) for k, (begin, end) in enumerate(spans)]
+        time_spans = zip(begins, [*begins[1:], self.duration], strict=True)
+        return [
+            Piece(begin, end, k == _CRUISING_PIECE) for k, (begin, end) in enumerate(time_spans)
+        ]
 
     def at(self, time: float) -> Progress:
         """Progress at `time`."""
@@ -212,7 +215,7 @@ class LimitedJerk:
             return Progress(0.0)
         if time >= self.duration:
             return Progress(self._length)
-        index = bisect_right(self._ends, time)
+        index = bisect_right(self._piece_ends, time)
         start, state, jerk = self._pieces[index]
         return _after_constant_jerk(state, jerk, time - start)
 

@@ -31,25 +31,35 @@ _ROWS_PER_PHASE = 8
 
 
 def check_times(
-    sampling: PhaseSampling, law: TimeLaw, longest: float = LONGEST_DURATION
+    sampling: PhaseSampling, law: TimeLaw, longest_duration: float = LONGEST_DURATION
 ) -> list[float]:
     """Times at which to check a curve with a time law, ascending, s.
 
     Raises:
-        TrajectoryError: the trajectory lasts longer than `longest` seconds, or needs more than
+        TrajectoryError: the trajectory lasts longer than `longest_duration`, or needs more than
             MOST_CHECKS check times.
     """
-    require_duration(law.duration, longest)
-    parts = [
+    require_duration(law.duration, longest_duration)
+    checked_pieces = [
         part
         for piece in law.pieces()
         if piece.end > piece.begin
-        for part in _checked_parts(piece, sampling, law)
+        for part in _checked_pieces(piece, sampling, law)
     ]
-    spans = [(part, (law.at(part.begin).phase, law.at(part.end).phase)) for part in parts]
-    require_checkable(sum(_check_count(part, sampling, *span) for part, span in spans))
-    grids = [_check_times_in(part, sampling, law, span) for part, span in spans]
-    times: list[float] = np.unique(np.concatenate(([0.0, law.duration], *grids))).tolist()
+    pieces_with_phases = [
+        (part, (law.at(part.begin).phase, law.at(part.end).phase)) for part in checked_pieces
+    ]
+    require_checkable(
+        sum(
+            _check_count(part, sampling, *phases_at_ends)
+            for part, phases_at_ends in pieces_with_phases
+        )
+    )
+    time_arrays = [
+        _check_times_in(part, sampling, law, phases_at_ends)
+        for part, phases_at_ends in pieces_with_phases
+    ]
+    times: list[float] = np.unique(np.concatenate(([0.0, law.duration], *time_arrays))).tolist()
     return times
 
 
@@ -65,13 +75,13 @@ def require_duration(seconds: float, longest: float = LONGEST_DURATION) -> None:
         )
 
 
-def _checked_parts(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
+def _checked_pieces(piece: Piece, sampling: PhaseSampling, law: TimeLaw) -> Iterator[Piece]:
     """The parts to check: the first and last lap of a long steady piece, else the whole piece."""
-    if piece.steady and sampling.period is not None:
-        lap = sampling.period / law.at(piece.begin).first
-        if piece.end - piece.begin > 2.0 * lap:
-            yield Piece(piece.begin, piece.begin + lap, True)
-            yield Piece(piece.end - lap, piece.end, True)
+    if piece.is_steady and sampling.period is not None:
+        lap_duration = sampling.period / law.at(piece.begin).first_derivative
+        if piece.end - piece.begin > 2.0 * lap_duration:
+            yield Piece(piece.begin, piece.begin + lap_duration, True)
+            yield Piece(piece.end - lap_duration, piece.end, True)
             return
     yield piece
 
@@ -83,27 +93,27 @@ def _check_count(piece: Piece, sampling: PhaseSampling, begin: float, end: float
 
 
 def _fewest_checks(piece: Piece) -> int:
-    if piece.steady:
+    if piece.is_steady:
         return 1
     return int(np.clip(ceil((piece.end - piece.begin) / _CHECK_PERIOD), *_FEWEST_CHECKS))
 
 
 def _check_times_in(
-    piece: Piece, sampling: PhaseSampling, law: TimeLaw, span: tuple[float, float]
+    piece: Piece, sampling: PhaseSampling, law: TimeLaw, phases_at_ends: tuple[float, float]
 ) -> Floats:
     """The check times in a piece, both ends included."""
-    begin, end = span
+    begin, end = phases_at_ends
     if sampling.phase_step is None:
         phases = np.array(sampling.phases)
         phases = phases[(phases >= begin) & (phases <= end)]
     else:
         phases = np.linspace(begin, end, int(np.ceil((end - begin) / sampling.phase_step)) + 1)
-    if piece.steady:
-        rate = law.at(piece.begin).first
+    if piece.is_steady:
+        rate = law.at(piece.begin).first_derivative
         ends = np.array([piece.begin, piece.end])
         return np.concatenate((ends, piece.begin + (phases - begin) / rate))
-    rows = int(np.clip(_ROWS_PER_PHASE * len(phases), *_TABLE_ROWS))
-    table_times = np.linspace(piece.begin, piece.end, rows)
+    row_count = int(np.clip(_ROWS_PER_PHASE * len(phases), *_TABLE_ROWS))
+    table_times = np.linspace(piece.begin, piece.end, row_count)
     table_phases = np.array([law.at(time).phase for time in table_times.tolist()])
     even_times = np.linspace(piece.begin, piece.end, _fewest_checks(piece) + 1)
     # The jerk may jump at the end, and belongs to the next part there.
@@ -157,7 +167,7 @@ class TangentHeading:
 
     def at(self, phase: float, point: CurvePoint) -> tuple[float, float]:
         """Heading of the tangent, and its derivative by the phase."""
-        (north, east, _), (north2, east2, _) = point.first, point.second
+        (north, east, _), (north2, east2, _) = point.first_derivative, point.second_derivative
         slope = (north * east2 - east * north2) / (north * north + east * east)
         middle = self.middle + self.winding * phase
         return middle + remainder(atan2(east, north) - middle, tau), slope
@@ -172,14 +182,14 @@ class TimedCurve:
         curve: the path.
         law: progress along the path over time.
         heading: heading along the path.
-        longest: longest duration that `check_times` allows, s.
+        longest_duration: longest duration that `check_times` allows, s.
     """
 
     name: str
     curve: Curve
     law: TimeLaw
     heading: Heading
-    longest: float = LONGEST_DURATION
+    longest_duration: float = LONGEST_DURATION
 
     @property
     def duration(self) -> float:
@@ -193,7 +203,7 @@ class TimedCurve:
 
     def check_times(self) -> list[float]:
         """Times at which to check the trajectory, s; see `Trajectory.check_times`."""
-        return check_times(self.curve.sampling(), self.law, self.longest)
+        return check_times(self.curve.sampling(), self.law, self.longest_duration)
 
     def at(self, time: float) -> Sample:
         """The sample `time` seconds after the beginning."""
@@ -201,4 +211,6 @@ class TimedCurve:
         point = self.curve.at(progress.phase)
         velocity, acceleration, jerk = derivatives(progress, *point[1:])
         heading, slope = self.heading.at(progress.phase, point)
-        return Sample(point.position, velocity, acceleration, jerk, heading, slope * progress.first)
+        return Sample(
+            point.position, velocity, acceleration, jerk, heading, slope * progress.first_derivative
+        )

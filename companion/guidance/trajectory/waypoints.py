@@ -28,7 +28,7 @@ _SAMPLES_PER_SEGMENT = 200
 """Number of samples of a segment from which its largest speed and acceleration are found."""
 _DETOUR_SAMPLES = 20
 """Number of samples of a segment from which its distance from a straight line is found."""
-_SMALLEST_SQUARE = 1e-12
+_SMALLEST_SQUARED_LENGTH = 1e-12
 """Lower bound of the squared length of a segment, m², so that equal points cause no 0/0."""
 
 
@@ -62,11 +62,11 @@ def waypoints(
         raise TrajectoryError("speed and acceleration of waypoints must be positive")
     if face_path and headings:
         raise TrajectoryError("waypoints have either their own headings or one along the path")
-    places, distances = places_of(points, headings)
+    positions, distances = positions_and_distances(points, headings)
     knots = np.concatenate(([0.0], np.cumsum(_trapezoid_durations(distances, speed, acceleration))))
-    knots *= _stretch_factor(_spline_through(knots, places), knots, speed, acceleration)
+    knots *= _stretch_factor(_spline_through(knots, positions), knots, speed, acceleration)
     require_duration(float(knots[-1]))
-    spline = _spline_through(knots, places)
+    spline = _spline_through(knots, positions)
     curve, heading = SplineCurve(spline), heading_through(knots, headings)
     if face_path:
         curve = SplineCurve(spline, longest_step=HEADING_CHECK_STEP)
@@ -74,7 +74,9 @@ def waypoints(
     return TimedCurve("waypoints", curve, Cruise(spline.end, 1.0), heading)
 
 
-def places_of(points: Sequence[Vector], headings: Sequence[float | None]) -> tuple[Floats, Floats]:
+def positions_and_distances(
+    points: Sequence[Vector], headings: Sequence[float | None]
+) -> tuple[Floats, Floats]:
     """The start and the points, (k + 1, 3), and the distances between them, (k,), m.
 
     Raises:
@@ -85,14 +87,14 @@ def places_of(points: Sequence[Vector], headings: Sequence[float | None]) -> tup
         raise TrajectoryError(
             f"there are {len(headings)} headings for {len(points)} waypoints; give one for each"
         )
-    places = np.array([(0.0, 0.0, 0.0), *map(_place, points)])
-    distances = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    positions = np.array([(0.0, 0.0, 0.0), *map(_finite_point, points)])
+    distances = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     if not distances.size or distances.min() < SMALLEST_DISTANCE:
         raise TrajectoryError(_distance_fault(distances))
-    return places, distances
+    return positions, distances
 
 
-def _place(point: Vector) -> Vector:
+def _finite_point(point: Vector) -> Vector:
     """A waypoint as three finite numbers.
 
     Raises:
@@ -108,8 +110,8 @@ def _distance_fault(distances: Floats) -> str:
     if not distances.size:
         return "there are no waypoints"
     index = int(np.flatnonzero(distances < SMALLEST_DISTANCE)[0])
-    before = f"waypoint {index}" if index else "the start"
-    return f"waypoint {index + 1} is the same as {before}; leave it out"
+    earlier_point = f"waypoint {index}" if index else "the start"
+    return f"waypoint {index + 1} is the same as {earlier_point}; leave it out"
 
 
 def _trapezoid_durations(distances: Floats, speed: float, acceleration: float) -> Floats:
@@ -119,10 +121,10 @@ def _trapezoid_durations(distances: Floats, speed: float, acceleration: float) -
     return np.where(distances < speed**2 / acceleration, without_cruise, with_cruise)
 
 
-def _spline_through(knots: Floats, places: Floats) -> SepticSpline:
+def _spline_through(knots: Floats, positions: Floats) -> SepticSpline:
     """A spline through the places (k, n) at the knots, from rest to rest."""
-    states = np.zeros((knots.size, STATE_SIZE, places.shape[1]))
-    states[:, 0] = places
+    states = np.zeros((knots.size, STATE_SIZE, positions.shape[1]))
+    states[:, 0] = positions
     return minimum_snap(
         knots, FixedStates(states, _rest_to_rest_mask(np.ones(knots.size, dtype=bool)))
     )
@@ -151,7 +153,7 @@ def _stretch_factor(
 def _sampled(spline: SepticSpline, knots: Floats, count: int = _SAMPLES_PER_SEGMENT) -> Floats:
     """The spline along `count` evenly spaced times of each segment, and at the end."""
     fine = np.linspace(0.0, knots.size - 1.0, count * (knots.size - 1) + 1)
-    return spline.along(np.interp(fine, np.arange(knots.size), knots))
+    return spline.sampled(np.interp(fine, np.arange(knots.size), knots))
 
 
 def heading_through(knots: Floats, headings: Sequence[float | None]) -> Heading:
@@ -163,10 +165,10 @@ def heading_through(knots: Floats, headings: Sequence[float | None]) -> Heading:
     """
     if all(angle is None for angle in headings):
         return HeldHeading()
-    given = np.array([angle is not None for angle in (None, *headings)])
+    is_given = np.array([angle is not None for angle in (None, *headings)])
     states = np.zeros((knots.size, STATE_SIZE, 1))
-    states[given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
-    return SplineHeading(minimum_snap(knots, FixedStates(states, _rest_to_rest_mask(given))))
+    states[is_given, 0, 0] = np.unwrap([angle for angle in headings if angle is not None])
+    return SplineHeading(minimum_snap(knots, FixedStates(states, _rest_to_rest_mask(is_given))))
 
 
 def largest_detour(spline: SepticSpline, times: Floats | None = None) -> float:
@@ -181,6 +183,6 @@ def largest_detour(spline: SepticSpline, times: Floats | None = None) -> float:
     lines = np.diff(path[::_DETOUR_SAMPLES], axis=0)[:, None]  # (k, 1, 3)
     offsets = path[:-1].reshape(len(lines), _DETOUR_SAMPLES, 3)
     offsets = offsets - offsets[:, :1]
-    squares = np.maximum((lines * lines).sum(axis=2), _SMALLEST_SQUARE)
-    shares = np.clip((offsets * lines).sum(axis=2) / squares, 0.0, 1.0)
-    return float(np.linalg.norm(offsets - shares[..., None] * lines, axis=2).max())
+    squared_lengths = np.maximum((lines * lines).sum(axis=2), _SMALLEST_SQUARED_LENGTH)
+    fractions = np.clip((offsets * lines).sum(axis=2) / squared_lengths, 0.0, 1.0)
+    return float(np.linalg.norm(offsets - fractions[..., None] * lines, axis=2).max())

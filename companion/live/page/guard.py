@@ -74,13 +74,13 @@ class Guard:
         """Wrap `send`: the response gets a cookie that allows this browser to watch."""
         cookie = f"{_COOKIE}={self._cookie}; HttpOnly; SameSite=Strict; Path=/"
 
-        async def sending(message: MutableMapping[str, Any]) -> None:
+        async def send_with_cookie(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
                 headers = [*message.get("headers", ()), (b"set-cookie", cookie.encode())]
                 message = {**message, "headers": headers}
             await send(message)
 
-        return sending
+        return send_with_cookie
 
 
 def _host_in(origin: str) -> str:

@@ -47,29 +47,29 @@ def add_page(connection: FlightConnection, page_data: PageData, guard: Guard) ->
     def page(client: Client, token: str = "") -> None:
         _add_drawings()
         Panel(connection, page_data, guard, unlocked=guard.is_token(token))
-        state = {
+        page_state = {
             "fence": page_data.fence(),
             "frames": page_data.states_since(0),
             "events": page_data.events_since(0),
         }
         sent_counts[client.id] = page_data.state_count, page_data.event_count
-        client.run_javascript(f"live.begin({json.dumps(state)})")
+        client.run_javascript(f"live.begin({json.dumps(page_state)})")
 
     async def push() -> None:
         for client in list(Client.instances.values()):
             counts = sent_counts.get(client.id)
             if counts is None or not client.has_socket_connection:
                 continue
-            new = {
+            new_data = {
                 "frames": page_data.states_since(counts[0]),
                 "events": page_data.events_since(counts[1]),
                 "fence": page_data.fence(),
                 "over": page_data.end_text,
             }
             sent_counts[client.id] = page_data.state_count, page_data.event_count
-            client.run_javascript(f"live.push({json.dumps(new)})")
-        for gone in sent_counts.keys() - Client.instances.keys():
-            del sent_counts[gone]
+            client.run_javascript(f"live.push({json.dumps(new_data)})")
+        for closed_client_id in sent_counts.keys() - Client.instances.keys():
+            del sent_counts[closed_client_id]
 
     app.timer(_PUSH_PERIOD, push)
 

@@ -23,7 +23,7 @@ class PageData:
         events: the newest events, newest last, each {"time_s", "text"}.
         event_count: number of events since the page began.
         config: the configuration after the newest change.
-        start: the configuration with which the flight began.
+        start_config: the configuration with which the flight began.
         can_undo: whether a change can be undone.
         end_text: how the flight ended; None: it has not ended.
     """
@@ -33,7 +33,7 @@ class PageData:
         self.state_count = 0
         self.events: deque[dict[str, Any]] = deque(maxlen=_MOST_EVENTS)
         self.event_count = 0
-        self.config = self.start = config
+        self.config = self.start_config = config
         self.can_undo = False
         self.end_text: str | None = None
 
@@ -82,7 +82,7 @@ class PageData:
         """The values that differ from those at the start, as YAML."""
         lines = ["# Changed in flight; include this file, or copy its keys."]
         section = ""
-        for each in differences(self.start, self.config):
+        for each in differences(self.start_config, self.config):
             if each.section != section:
                 section = each.section
                 lines.append(f"{section}:")
@@ -103,6 +103,6 @@ class PageData:
         self.event_count += 1
 
 
-def _newest(kept: deque[dict[str, Any]], count: int) -> list[dict[str, Any]]:
+def _newest(entries: deque[dict[str, Any]], count: int) -> list[dict[str, Any]]:
     """The newest `count` entries, or all if fewer are kept."""
-    return list(kept)[max(0, len(kept) - count) :]
+    return list(entries)[max(0, len(entries) - count) :]

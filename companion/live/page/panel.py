@@ -33,15 +33,15 @@ class Panel:
         self._connection, self._page_data, self._guard = connection, page_data, guard
         self._unlocked = unlocked
         self._inputs: dict[tuple[str, str], ui.input] = {}
-        self._shown: dict[tuple[str, str], str] = {}
+        self._shown_texts: dict[tuple[str, str], str] = {}
         with ui.expansion("Change values in flight").classes("live-wide").props("id=live-panel"):
             self._add_unlock_row()
             with ui.element("div").classes("live-values"):
                 for key in page_data.values():
                     name = key.section, key.name
-                    self._shown[name] = value_text(key.value)
+                    self._shown_texts[name] = value_text(key.value)
                     self._inputs[name] = ui.input(
-                        f"{key.section}.{key.name}", value=self._shown[name]
+                        f"{key.section}.{key.name}", value=self._shown_texts[name]
                     ).props(f'dense suffix="{key.unit}" hint="{_range_text(key.allowed_values)}"')
             with ui.row():
                 ui.button("Apply", on_click=self._apply).props("id=live-apply")
@@ -70,7 +70,7 @@ class Panel:
         values: dict[str, dict[str, Any]] = {}
         for (section, key), field in self._inputs.items():
             text = str(field.value or "").strip()
-            if text != self._shown[section, key]:
+            if text != self._shown_texts[section, key]:
                 values.setdefault(section, {})[key] = _parsed_value(text)
         if not values:
             self._show_message("nothing to apply: no value was changed")
@@ -88,8 +88,8 @@ class Panel:
         try:
             self._show_message(await request)
             self._refresh()  # otherwise the next request would send these values again
-        except (ConfigError, ChangeRefusedError) as refused:
-            self._show_message(f"refused: {refused}")
+        except (ConfigError, ChangeRefusedError) as error:
+            self._show_message(f"refused: {error}")
         except NoAnswerError as error:
             self._show_message(str(error))
 
@@ -114,10 +114,10 @@ class Panel:
         for key in self._page_data.values():
             name, value = (key.section, key.name), value_text(key.value)
             field = self._inputs[name]
-            if value != self._shown[name]:
-                if str(field.value or "").strip() == self._shown[name] or field.value is None:
+            if value != self._shown_texts[name]:
+                if str(field.value or "").strip() == self._shown_texts[name] or field.value is None:
                     field.value = value
-                self._shown[name] = value
+                self._shown_texts[name] = value
         self._undo.set_enabled(self._page_data.can_undo and self._page_data.end_text is None)
 
     def _show_message(self, text: str) -> None:

@@ -37,18 +37,18 @@ async def _serve(connection: FlightConnection, page_socket: socket.socket) -> No
     )
     config = uvicorn.Config(guard, log_level="warning", timeout_graceful_shutdown=1)
     server = uvicorn.Server(config)
-    serving = asyncio.create_task(server.serve(sockets=[page_socket]))
-    ended = asyncio.create_task(connection.flight_ended.wait())
-    await asyncio.wait({serving, ended}, return_when=asyncio.FIRST_COMPLETED)
+    server_task = asyncio.create_task(server.serve(sockets=[page_socket]))
+    end_task = asyncio.create_task(connection.flight_ended.wait())
+    await asyncio.wait({server_task, end_task}, return_when=asyncio.FIRST_COMPLETED)
     page_data.end()
 
     def is_open() -> bool:
         return any(client.has_socket_connection for client in Client.instances.values())
 
-    unused = asyncio.create_task(until_unused(int(connection.first_message["port"]), is_open))
-    await asyncio.wait({unused, serving}, return_when=asyncio.FIRST_COMPLETED)
-    unused.cancel()
+    unused_task = asyncio.create_task(until_unused(int(connection.first_message["port"]), is_open))
+    await asyncio.wait({unused_task, server_task}, return_when=asyncio.FIRST_COMPLETED)
+    unused_task.cancel()
     server.should_exit = True
     for each in server.servers:
         each.close()  # the next flight's page waits for the port
-    await asyncio.wait({serving, ended}, timeout=3.0)
+    await asyncio.wait({server_task, end_task}, timeout=3.0)

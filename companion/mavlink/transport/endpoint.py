@@ -105,8 +105,8 @@ def parse_endpoint(text: str) -> Endpoint:
     match = _NETWORK_PATTERN.fullmatch(rest.rstrip("/"))
     if match is None:
         raise EndpointError(f"endpoint {text!r} needs HOST:PORT after {scheme}://: {_HELP}")
-    listens = endpoint_class in (UdpIn, TcpServer)
-    host, port = match[1].strip("[]") or ("0.0.0.0" if listens else ""), int(match[2])
+    is_listening = endpoint_class in (UdpIn, TcpServer)
+    host, port = match[1].strip("[]") or ("0.0.0.0" if is_listening else ""), int(match[2])
     if not host:
         raise EndpointError(f"endpoint {text!r} names no host to connect to: {_HELP}")
     if scheme == "udp" and host not in _LISTENING_HOSTS:
@@ -116,7 +116,7 @@ def parse_endpoint(text: str) -> Endpoint:
         )
     if not is_host(host):
         raise EndpointError(f"endpoint {text!r}: {host!r} is no host name or address")
-    if not (0 if listens else 1) <= port <= 65535:
+    if not (0 if is_listening else 1) <= port <= 65535:
         raise EndpointError(f"endpoint {text!r}: port {port} is outside 1..65535")
     if not question:
         return endpoint_class(host, port)
@@ -187,8 +187,8 @@ def _remedy(text: str) -> str:
         scheme, host, port = address[1], address[2], address[3]
         endpoint_class = _NETWORK_CLASSES.get(scheme or "")
         if endpoint_class is not None and (scheme != "udp" or host in _LISTENING_HOSTS):
-            our_scheme = "udpin" if scheme == "udp" else scheme
-            return f"write {our_scheme}://{host or '0.0.0.0'}:{port}"
+            equivalent_scheme = "udpin" if scheme == "udp" else scheme
+            return f"write {equivalent_scheme}://{host or '0.0.0.0'}:{port}"
         if scheme in (None, "udp"):
             is_host_named = host and host not in _NETWORK_CLASSES
             udpout_hint = (

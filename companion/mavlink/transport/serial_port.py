@@ -18,7 +18,7 @@ _READ_BYTES = 4096
 _NO_PERMISSION = "not permitted; add yourself to its group: sudo adduser $USER dialout"
 _IN_USE = "in use by another program (a ground station?); end that program first"
 _NO_HARDWARE = "no hardware answers under this name; is it plugged in and enabled?"
-_OPEN_FAULTS: dict[int | None, str] = {
+_OPEN_ERROR_TEXTS: dict[int | None, str] = {
     errno.ENOENT: (
         "there is no such device; is it plugged in? `ls /dev/serial/by-id` lists USB devices; a "
         "port of the computer's own (ttyAMA0, ttyTHS1) must be enabled first"
@@ -126,15 +126,15 @@ class SerialTransport:
 
 
 def _open_error(endpoint: SerialPort, error: Exception) -> str:
-    number = _error_number(error)
-    if number in _OPEN_FAULTS:
-        return f"serial {endpoint.device}: {_OPEN_FAULTS[number]}"
-    if number == errno.EINVAL or isinstance(error, ValueError):
+    error_number = _error_number(error)
+    if error_number in _OPEN_ERROR_TEXTS:
+        return f"serial {endpoint.device}: {_OPEN_ERROR_TEXTS[error_number]}"
+    if error_number == errno.EINVAL or isinstance(error, ValueError):
         return (
             f"serial {endpoint.device}: the device does not take {endpoint.baud} baud; write the "
             "baud rate of the autopilot's port in link.endpoint, such as 57600 or 921600"
         )
-    reason = "" if number is None else f": {os.strerror(number)}"
+    reason = "" if error_number is None else f": {os.strerror(error_number)}"
     return f"serial {endpoint.device} at {endpoint.baud} baud cannot be opened{reason}"
 
 

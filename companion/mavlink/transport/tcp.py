@@ -22,7 +22,7 @@ async def open_tcp_client(
         EndpointError: nobody listens there, the host is unknown, or no answer came within 5 s.
     """
     transport = TcpTransport(receiver, lost)
-    where = f"TCP {endpoint.host}:{endpoint.port}"
+    endpoint_text = f"TCP {endpoint.host}:{endpoint.port}"
     try:
         async with asyncio.timeout(OPEN_TIMEOUT_S):
             await asyncio.get_running_loop().create_connection(
@@ -30,16 +30,17 @@ async def open_tcp_client(
             )
     except TimeoutError as error:
         raise EndpointError(
-            f"{where}: no answer within {OPEN_TIMEOUT_S:g} s; check address and network"
+            f"{endpoint_text}: no answer within {OPEN_TIMEOUT_S:g} s; check address and network"
         ) from error
     except socket.gaierror as error:
         raise EndpointError(
-            f"{where}: host unknown ({error.strerror}); check the name or use its IP address"
+            f"{endpoint_text}: host unknown ({error.strerror}); check the name or use its IP "
+            "address"
         ) from error
     except OSError as error:
         raise EndpointError(
-            f"{where}: cannot connect ({error.strerror or error}); is the vehicle or router "
-            "running and listening there?"
+            f"{endpoint_text}: cannot connect ({error.strerror or error}); is the vehicle or "
+            "router running and listening there?"
         ) from error
     return transport
 
@@ -55,13 +56,13 @@ async def open_tcp_server(
     """
     named_peers = await resolve_peers(endpoint.peers, socket.SOCK_STREAM)
     transport = TcpTransport(receiver, lost, named_peers)
-    where = f"TCP {endpoint.host}:{endpoint.port}"
+    endpoint_text = f"TCP {endpoint.host}:{endpoint.port}"
     try:
         server = await asyncio.get_running_loop().create_server(
             lambda: _Connection(transport), endpoint.host, endpoint.port
         )
     except OSError as error:
-        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
+        raise EndpointError(f"{endpoint_text}: {why_not_opened(error)}") from error
     transport.listen(server)
     return transport
 
@@ -86,7 +87,7 @@ class TcpTransport:
         self._server: asyncio.Server | None = None
         self._connection: asyncio.Transport | None = None
         self._connected_at = 0.0
-        self._is_peer = False
+        self._has_peer = False
         self._closed = False
         self.local: tuple[str, int] | None = None
 
@@ -111,20 +112,20 @@ class TcpTransport:
         if self._connection is not None:
             if not self._may_be_replaced():
                 return False
-            connection_before = self._connection
+            old_connection = self._connection
             self.connection_dropped(
-                connection_before,
+                old_connection,
                 "this client sends no valid heartbeat, and another client replaced it",
             )
-            connection_before.abort()
+            old_connection.abort()
         sock = connection.get_extra_info("socket")
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connection, self._connected_at = connection, self._loop.time()
-        self._is_peer = False
+        self._has_peer = False
         return True
 
     def _may_be_replaced(self) -> bool:
-        if self._is_peer:
+        if self._has_peer:
             return self._receiver.may_replace_peer()
         return self._loop.time() - self._connected_at > CLAIM_DURATION_S
 
@@ -133,11 +134,11 @@ class TcpTransport:
         if connection is not self._connection:
             return  # from a connection that was replaced and is not closed yet
         received = time.perf_counter_ns()
-        if self._is_peer or self._server is None:
+        if self._has_peer or self._server is None:
             self._receiver.receive(data, received)
         else:
             sender = host_and_port(connection.get_extra_info("peername"))
-            self._is_peer = self._receiver.claim(data, received, sender)
+            self._has_peer = self._receiver.claim(data, received, sender)
 
     def connection_dropped(self, connection: asyncio.Transport | None, reason: str) -> None:
         """Note that a connection is closed, for `reason`."""
@@ -146,7 +147,7 @@ class TcpTransport:
         self._connection = None
         if self._closed:
             return
-        if self._server is not None and not self._is_peer:
+        if self._server is not None and not self._has_peer:
             self._receiver.start_connection(streaming=True)  # not the peer, so the link is not lost
             return
         self._lost(reason)

@@ -92,10 +92,10 @@ class UdpTransport:
         self._connected = False
         self._peer: Any = None
         self._socket = self._open()
-        bound = self._socket.getsockname()
-        self.local: tuple[str, int] = bound[:2]
+        bound_address = self._socket.getsockname()
+        self.local: tuple[str, int] = bound_address[:2]
         if isinstance(endpoint, UdpIn):
-            self._address = bound  # a new socket takes the port that the kernel chose
+            self._address = bound_address  # a new socket takes the port that the kernel chose
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
 
     def _open(self) -> socket.socket:
@@ -110,8 +110,8 @@ class UdpTransport:
                 sock.connect(self._address)
         except OSError as error:
             sock.close()
-            where = f"UDP {self._endpoint.host}:{self._endpoint.port}"
-            raise EndpointError(f"{where}: {why_not_opened(error)}") from error
+            endpoint_text = f"UDP {self._endpoint.host}:{self._endpoint.port}"
+            raise EndpointError(f"{endpoint_text}: {why_not_opened(error)}") from error
         self._connected = isinstance(self._endpoint, UdpOut)
         if self._connected:
             self._peer = sock.getpeername()
@@ -160,10 +160,10 @@ class UdpTransport:
 
     def _check_peer(self) -> None:
         self._timer = self._loop.call_later(PEER_SILENCE_S, self._check_peer)
-        silent, self._heard_in_period = not self._heard_in_period, False
+        is_silent, self._heard_in_period = not self._heard_in_period, False
         if not self._connected or isinstance(self._endpoint, UdpOut):
             return
-        if silent or self._receiver.may_replace_peer():
+        if is_silent or self._receiver.may_replace_peer():
             # Python cannot disconnect a UDP socket, so a new one is bound.
             self._release()
             try:

@@ -147,4 +147,4 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
 
     lowest, highest = np.log(_TIME_CONSTANT_RANGE)
     found = minimise(residuals, np.log([start]), np.array([lowest]), np.array([highest]))
-    return float(np.exp(found.unknown[0]))
+    return float(np.exp(found.unknowns[0]))

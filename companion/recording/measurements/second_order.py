@@ -182,7 +182,7 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
     ]
     start = min(grid, key=lambda point: float(np.sum(residuals(point)[1] ** 2)))
     lowest, highest = np.array([np.log(_LAG_RANGE), np.log(_DAMPING_RANGE), _DEAD_TIME_RANGE]).T
-    return _second_order_model(minimise(residuals, start, lowest, highest).unknown)
+    return _second_order_model(minimise(residuals, start, lowest, highest).unknowns)
 
 
 def _second_order_model(parameters: Floats) -> SecondOrderModel:
