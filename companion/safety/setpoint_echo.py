@@ -7,7 +7,7 @@ from companion.attitude import BodyRates
 from companion.mavlink.messages import Message
 from companion.vehicle.autopilot import Autopilot
 
-_COUNTING_TIME = 5.0
+_COUNTING_WINDOW = 5.0
 _KEPT_REPORTS = 256
 _THRUST_ROUNDING, _RATE_ROUNDING = 1e-7, 1e-6
 """Largest difference of a reported thrust (0..1) and body rate (rad/s) from our setpoint, because
@@ -56,7 +56,7 @@ class SetpointEcho:
         The number remains 0 until a report has matched one of our setpoints, because an autopilot
         may report changed setpoints.
         """
-        return sum(now - at <= _COUNTING_TIME for at in self._foreign_times)
+        return sum(now - at <= _COUNTING_WINDOW for at in self._foreign_times)
 
     def _is_ours(self, rates: BodyRates, thrust: float) -> bool:
         newest_first = reversed(self._sent)
