@@ -14,7 +14,7 @@ from companion.flight.observer import Observer
 from companion.flight.opening import make_link, realtime_settings
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
-from companion.recording.closing_words import LEFT_BY_USER
+from companion.recording.closing_words import STOPPED_BY_USER
 from companion.recording.measurements.summary import Summary
 
 
@@ -125,4 +125,4 @@ class Session:
             return await self._flight_task
         except asyncio.CancelledError:
             flight.failed_in = flight.failed_in or flight.phase
-            return LEFT_BY_USER
+            return STOPPED_BY_USER

@@ -16,7 +16,7 @@ from companion.recording.mcap_file.fields import Channel
 from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
 from companion.recording.mcap_file.writer import McapWriter
 
-_MOST_WAITING = 50_000
+_MAX_WAITING_ENTRIES = 50_000
 """Largest number of entries that wait to be written."""
 _INFORMATION, _WARNING = 2, 3
 
@@ -53,7 +53,7 @@ class FlightRecorder(BackgroundFile[Entry]):
     ) -> None:
         self._epoch, self._clock = epoch, clock
         self._on_bad_entry, self._stream = on_bad_entry, stream
-        super().__init__(path, _MOST_WAITING, on_failure)
+        super().__init__(path, _MAX_WAITING_ENTRIES, on_failure)
 
     def _create(self) -> None:
         self._writer = McapWriter(self.path, self._stream)
@@ -72,7 +72,7 @@ class FlightRecorder(BackgroundFile[Entry]):
     def _sync(self) -> None:
         self._writer.flush()
 
-    def _end(self, *, complete: bool) -> None:
+    def _finish_file(self, *, complete: bool) -> None:
         self._writer.close(complete=complete)
 
     def _count_dropped(self, error: Exception) -> None:

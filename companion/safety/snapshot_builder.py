@@ -60,7 +60,7 @@ class SnapshotBuilder:
         self._heading_frame_at_start = HeadingFrame()
         self._shift_at_start: Vector = (0.0, 0.0, 0.0)
         self._initial_estimator_flags = 0
-        self._clock_changes = 0
+        self._clock_change_count = 0
 
     def begin(self, now: float, centre: FenceCentre | None = None) -> None:
         """Note that control begins at `now`; earlier resets do not count.
@@ -80,7 +80,7 @@ class SnapshotBuilder:
         self._heading_frame_at_start, self._shift_at_start = resets.frame, resets.position_shift
         resets.largest_tilt_jump = 0.0
         self._initial_estimator_flags = 0 if state.estimator is None else state.estimator.flags
-        self._clock_changes = self._link.clock.change_count
+        self._clock_change_count = self._link.clock.change_count
         self.counters.clear()
         self.echo.begin(self._link.autopilot)
         self._frozen_telemetry.begin(now)
@@ -141,7 +141,7 @@ class SnapshotBuilder:
                 self._guidance_loop.command_not_finite,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
-                None if clock.change_count == self._clock_changes else clock.last_change,
+                None if clock.change_count == self._clock_change_count else clock.last_change,
                 self.counters.stall_time(since=record.last_answered_arrival),
             ),
             self._health(now),

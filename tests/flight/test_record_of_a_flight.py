@@ -193,7 +193,7 @@ def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypat
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("companion.recording.recorder.FlightRecorder._end", full)
+    monkeypatch.setattr("companion.recording.recorder.FlightRecorder._finish_file", full)
     config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
     summary = fly(config, QuickVehicle(), tmp_path)
     written = json.loads((tmp_path / "summary.json").read_text())

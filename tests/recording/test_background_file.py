@@ -60,7 +60,7 @@ class Slices(BackgroundFile):
     def _sync(self):
         pass
 
-    def _end(self, *, complete):
+    def _finish_file(self, *, complete):
         pass
 
 
@@ -112,7 +112,7 @@ class Refusing(Slices):
     def _write(self, items):
         raise ValueError("no such item")
 
-    def _end(self, *, complete):
+    def _finish_file(self, *, complete):
         self.complete = complete
 
 
