@@ -100,7 +100,7 @@ def replay(options: argparse.Namespace) -> int:
     whole = _is_whole(record)
     if not samples:
         raise ConfigError(f"{options.folder}: no attitude sample is recorded there to replay")
-    for line in result_lines(samples, record.began, follows_record=replayed.follows_record):
+    for line in result_lines(samples, record.start_time, follows_record=replayed.follows_record):
         print(line)
     if options.csv is not None:
         try:

@@ -78,9 +78,9 @@ def facts_of(
     end = None if state.battery is None else state.battery.remaining
     takeoff = None if reporter.takeoff is None else reporter.takeoff - began
     return FlightFacts(
-        began=began,
+        start_time=began,
         phases=tuple((at - began, name) for at, name in assembled.recorder.phases),
-        takeoff=takeoff,
+        takeoff_time=takeoff,
         early_end=_early_end(assembled, takeoff, result, now),
         vehicle_uid=context.replacement_detector.uid,
         armed=state.armed,
@@ -118,7 +118,7 @@ def _early_end(
 ) -> EarlyEnd | None:
     """When and where a flight ended early; None if the flight did not end early.
 
-    `takeoff` is in s since the flight began, `now` in s on our clock.
+    `takeoff_time` is in s since the flight began, `now` in s on our clock.
     """
     flight, began = assembled.flight, assembled.flight.began
     if flight.failed_in is None or result == "ok":

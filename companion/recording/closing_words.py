@@ -15,7 +15,7 @@ from companion.recording.measurements.verdict import (
     Check,
     Figures,
     checks,
-    cut_steps,
+    cut_step_checks,
     is_good,
 )
 from companion.recording.what_to_do import what_to_do
@@ -142,7 +142,7 @@ def _early_end_text(figures: Figures) -> tuple[str, list[str]]:
         f"  {_vehicle_state_text(figures)}",
         f"  what to do: {remedy}",
         *(f"! {text}" for text in (*figures["advice"], *_gain_warning(figures))),
-        *_failed_check_lines(cut_steps(figures)),
+        *_failed_check_lines(cut_step_checks(figures)),
     ]
 
 

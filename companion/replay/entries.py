@@ -80,7 +80,7 @@ class _Messages:
         self._rows: dict[str, Iterator[Any]] = {_CHANGE_TOPIC: iter(record.changes)}
         for each in _CHANNELS:
             self._rows[each.topic] = iter(record.rows(each.name).tolist())
-        self._order = deque(topic for topic in record.content.order if topic in self._rows)
+        self._order = deque(topic for topic in record.content.topic_order if topic in self._rows)
 
     def next_topic(self) -> str | None:
         """Topic of the next message; None at the end."""

@@ -11,7 +11,7 @@ from companion.control.step_rows import StepFlags, StepInput
 from companion.drag import Drag
 from companion.guidance import Reference
 from companion.guidance.reference import VerticalMode
-from companion.recording.mcap_file.loop_channels import ACTIONS, UNANSWERED_CODES
+from companion.recording.mcap_file.loop_channels import ACTION_NAMES, UNANSWERED_CODES
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import (
     AttitudeSample,
@@ -66,7 +66,7 @@ class RecordedAction(NamedTuple):
     time: float
     """Time of the call, s on our clock."""
     name: str
-    """Name of the call, one of `ACTIONS`."""
+    """Name of the call, one of `ACTION_NAMES`."""
     clock_offset: float | None
     """Vehicle time minus our time, s; None: unknown."""
     drag: Drag | None
@@ -193,7 +193,7 @@ def recorded_action(row: Row) -> RecordedAction:
     """The action in a row of `ACTION`."""
     linear = row["drag_per_s"]
     drag = None if isnan(linear) else Drag(linear, row["quadratic_drag_per_m"])
-    name = ACTIONS[row["action"]]
+    name = ACTION_NAMES[row["action"]]
     return RecordedAction(row["time_s"], name, _none_if_nan(row["clock_offset_s"]), drag)
 
 

@@ -136,8 +136,10 @@ def spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
 
 def _maneuvers(record: FlightRecord, phases: tuple[Span, ...]) -> tuple[Span, ...]:
     """The maneuvers; each ends at the latest with the phase in which it began."""
-    marks = [(mark.time - record.began, mark.name or "") for mark in record.maneuvers]
-    maneuvers = [span for span in spans(marks, record.duration) if span.name]
+    maneuver_starts = [
+        (change.time - record.start_time, change.name or "") for change in record.maneuvers
+    ]
+    maneuvers = [span for span in spans(maneuver_starts, record.duration) if span.name]
     phase_ends = [phase.end for phase in phases]
     return tuple(
         span._replace(end=min([span.end, *(end for end in phase_ends if end > span.begin)]))

@@ -5,7 +5,7 @@ from math import exp, log
 import numpy as np
 
 from companion.least_squares import minimise
-from companion.recording.measurements.second_order import RunData, SecondOrderModel
+from companion.recording.measurements.second_order import RunForModel, SecondOrderModel
 from companion.study.step import Floats, Response, Step
 
 _FIT_STRIDE = 10
@@ -94,7 +94,7 @@ def fit_cells(fit: SecondOrderModel) -> dict[str, float]:
 def second_order_path(step: Step, fit: SecondOrderModel, time: Floats) -> Floats:
     """(n, 2) coefficients of the fitted model, from rest, at (n,) times after the step, s."""
     at_rest = np.array([step.start, (0.0, 0.0)])
-    return fit.path_at_rows(RunData(time, at_rest, np.zeros(1), np.array([step.target])))
+    return fit.path_at_rows(RunForModel(time, at_rest, np.zeros(1), np.array([step.target])))
 
 
 def fit_second_order(step: Step, path: Floats) -> SecondOrderModel:

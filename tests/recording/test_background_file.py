@@ -99,7 +99,7 @@ def test_figures_do_not_wait_for_such_a_disk_either(tmp_path, monkeypatch):
     for number in range(1500):
         rows.add([float(number)])
     assert rows.rows()[:, 0].tolist() == [float(number) for number in range(1024, 1500)]
-    assert rows.lost == 1024
+    assert rows.lost_count == 1024
     assert "did not answer" in spool.failure
     answers.set()
 

@@ -100,7 +100,7 @@ def test_so_does_a_replay_of_steps(steps):
 def test_so_does_a_replay_of_a_record_that_ends_between_a_sample_and_its_setpoint(steps):
     folder, _ = steps("ardupilot")
     record = read_flight(folder)
-    order = record.content.order
+    order = record.content.topic_order
     del order[len(order) - 1 - order[::-1].index("/setpoint") :]
     assert order[-1] == "/sample"
     samples = Replay(record, load(folder / "config.yaml")).run()
