@@ -108,5 +108,5 @@ def replay(options: argparse.Namespace) -> int:
         except OSError as error:
             raise ConfigError(f"{options.csv}: cannot write it: {error.strerror}") from error
         print(options.csv)
-    same = not own_config or all(each.same for each in samples)
-    return EXIT_OK if whole and same else EXIT_FAILURE
+    all_same = not own_config or all(each.is_same for each in samples)
+    return EXIT_OK if whole and all_same else EXIT_FAILURE

@@ -136,11 +136,11 @@ class FlightFiles:
         self,
         assembled: AssembledFlight,
         result: str,
-        grants: tuple[realtime.SettingResult, ...],
+        realtime_results: tuple[realtime.SettingResult, ...],
     ) -> Summary:
         """Make the summary of a finished flight before the log is closed; save the learned drag.
 
-        `result`: "ok", or the reason why the flight ended early. `grants`: which requested
+        `result`: "ok", or the reason why the flight ended early. `realtime_results`: which
         real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
@@ -168,7 +168,7 @@ class FlightFiles:
             log=self.folder,
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
-            realtime={grant.name: grant.refusal or "granted" for grant in grants},
+            realtime={result.name: result.refusal or "granted" for result in realtime_results},
             facts=facts_of(assembled, result, advice_texts, drag_kept=drag_kept),
         )
 

@@ -97,7 +97,7 @@ class Session:
             config, self._folder, environment, self.note, flies_maneuvers=self._plan is None
         )
         settings = realtime_settings(self._config, environment)
-        with realtime.request_settings(settings) as grants, record:
+        with realtime.request_settings(settings) as realtime_results, record:
             recorder, opener = record.recorder(self._observer), environment.open_transport
             async with make_link(self._config, record.tap, self.note, opener) as link:
                 self._assembled = assemble(
@@ -110,11 +110,11 @@ class Session:
                     environment,
                     self.changes,
                 )
-                for text in (*self._early_notes, *map(str, grants)):
+                for text in (*self._early_notes, *map(str, realtime_results)):
                     self._assembled.flight.note(text)
                 async with connected(self._assembled):
                     result = await self._run(self._assembled.flight)
-            summary = record.summary(self._assembled, result, grants)
+            summary = record.summary(self._assembled, result, realtime_results)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         return record.save(summary)
 

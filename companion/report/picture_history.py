@@ -21,7 +21,7 @@ _MANEUVER_COLOURS = ("#f0e6c8", "#d5e8f0")
 """Colours of the maneuvers, used in turn."""
 _LONGEST_REASON = 110
 """Largest number of characters of the reason that are drawn."""
-_JOINED_BELOW = 0.022
+_MIN_PHASE_DISTANCE_SHARE = 0.022
 """Names of phases that begin closer together than this share of the flight are joined."""
 _PANELS = (
     ("tracking error, m", "error", 0),
@@ -95,7 +95,7 @@ def _name_phases(axes: "Axes", phases: Sequence[Span], length: float) -> None:
     """Write the phases in the last panel; phases that begin close together share a line."""
     groups: list[tuple[float, list[str]]] = []
     for phase in phases:
-        if groups and phase.begin - groups[-1][0] < _JOINED_BELOW * length:
+        if groups and phase.begin - groups[-1][0] < _MIN_PHASE_DISTANCE_SHARE * length:
             groups[-1][1].append(phase.name)
         else:
             groups.append((phase.begin, [phase.name]))

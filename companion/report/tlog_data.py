@@ -34,7 +34,7 @@ def logged_flight(path: Path) -> FlightData:
     reader = _TelemetryReader()
     damage: list[str] = []
     for frame, message in messages(path, _MESSAGE_NAMES, damage.append):
-        reader.take((frame.system, frame.component), message)
+        reader.add_message((frame.system, frame.component), message)
     if reader.vehicle is None or reader.start_time is None:
         raise LogError(f"{path}: has no telemetry of PX4 or ArduPilot")
     curves = {**reader.curves(), **_rates_and_thrust(path, reader.start_time)}
@@ -66,23 +66,23 @@ class _TelemetryReader:
         self._tilts: list[tuple[float, float]] = []
         self._modes: list[tuple[float, str]] = []
 
-    def take(self, source: tuple[int, int], message: Message) -> None:
+    def add_message(self, source: tuple[int, int], message: Message) -> None:
         """Take one message from `source` (system, component)."""
-        kind = message.get_type()
-        if kind == "HEARTBEAT":
+        message_type = message.get_type()
+        if message_type == "HEARTBEAT":
             self._note_heartbeat(source, message)
         elif source != self.vehicle:
             return
-        elif kind == "STATUSTEXT":
+        elif message_type == "STATUSTEXT":
             self._note_text(message)
-        elif kind == "LOCAL_POSITION_NED":
+        elif message_type == "LOCAL_POSITION_NED":
             self._update_time(message)
             speed = np.linalg.norm((message.vx, message.vy, message.vz))
             position = message.x, message.y, -message.z
             self._positions.append((self._now, *position, float(speed)))
         else:
             self._update_time(message)
-            self._note_attitude(kind, message)
+            self._note_attitude(message_type, message)
 
     def _note_heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
         autopilot = AUTOPILOTS_BY_NUMBER.get(heartbeat.autopilot)
@@ -99,8 +99,8 @@ class _TelemetryReader:
             self.start_time = time
         self._now = time - self.start_time
 
-    def _note_attitude(self, kind: str, message: Message) -> None:
-        if kind == "ATTITUDE":
+    def _note_attitude(self, message_type: str, message: Message) -> None:
+        if message_type == "ATTITUDE":
             tilt = np.arccos(np.cos(message.roll) * np.cos(message.pitch))
         else:
             q = message.q1, message.q2, message.q3, message.q4

@@ -86,7 +86,7 @@ class SnapshotBuilder:
         self._frozen_telemetry.begin(now)
         self._heading_drift.begin()
 
-    def flown_fence_centre(self) -> FenceCentre | None:
+    def fence_centre_without_resets(self) -> FenceCentre | None:
         """Centre of the fence in the frame without resets; None: no position, or no control yet."""
         if self.fence_centre_ned is None:
             return None

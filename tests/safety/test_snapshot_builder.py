@@ -132,7 +132,7 @@ def test_motion_is_seen_from_where_control_began(flight):
 
 def test_the_fence_may_have_another_centre_than_where_control_began(flight):
     flight.builder.begin(10.0, FenceCentre((4.0, 5.0, -6.0), Place(46.0, 7.0)))
-    assert flight.builder.flown_fence_centre().place == Place(46.0, 7.0)
+    assert flight.builder.fence_centre_without_resets().place == Place(46.0, 7.0)
     flight.listen(10.0)
     assert flight.snapshot().motion.origin == Place(46.0, 7.0)
 

@@ -108,7 +108,7 @@ def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():
 
     network = object.__new__(Network)
     network.routing = SimpleNamespace(forward_from_client=forward_from_client)
-    network._faults, network._note_event = set(), notes.append
+    network._noted_faults, network._note_event = set(), notes.append
     network._flush_later, network.setpoint_ids = lambda: None, frozenset()
     frames = [SimpleNamespace(message_id=0, text=text) for text in ("bad", "good", "bad", "good")]
     network.receive_frames(SimpleNamespace(name="script"), frames)

@@ -38,17 +38,19 @@ def decode_attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
         raise RefusedSetpoint("thrust is missing: clear THROTTLE_IGNORE")
     if not 0.0 <= thrust <= 1.0:
         raise RefusedSetpoint(f"thrust is outside 0..1: {thrust:g}")
-    ignored = mask & _ALL_RATES
+    ignored_rates = mask & _ALL_RATES
     if mask & _NO_ATTITUDE:
-        if ignored:
+        if ignored_rates:
             raise RefusedSetpoint("body rates are incomplete: give roll, pitch and yaw rate")
         return RatesRequest(_rates(message), thrust)
-    if ignored & (_NO_ROLL_RATE | _NO_PITCH_RATE) != _NO_ROLL_RATE | _NO_PITCH_RATE:
+    if ignored_rates & (_NO_ROLL_RATE | _NO_PITCH_RATE) != _NO_ROLL_RATE | _NO_PITCH_RATE:
         raise RefusedSetpoint(
             "attitude and body rates contradict each other: set the ignore bits of one"
         )
     return AttitudeRequest(
-        _attitude(message), 0.0 if ignored & _NO_YAW_RATE else _rate(message.body_yaw_rate), thrust
+        _attitude(message),
+        0.0 if ignored_rates & _NO_YAW_RATE else _rate(message.body_yaw_rate),
+        thrust,
     )
 
 
