@@ -59,17 +59,16 @@ def run(tick: Tick) -> Outcome:
 
 
 def _finding(largest_deviations: dict[tuple[Method, float], float]) -> Finding:
-    lowest_rate_hz, highest_rate_hz = min(RATES_HZ), max(RATES_HZ)
+    lowest_hz, highest_hz = min(RATES_HZ), max(RATES_HZ)
     largest = max(largest_deviations[EXACT, hz] for hz in RATES_HZ)
     return Finding(
         "paper",
         "The deviation of the proposed method comes from discretisation.",
-        largest_deviations[PROPOSED, lowest_rate_hz]
-        > 10.0 * largest_deviations[PROPOSED, highest_rate_hz]
+        largest_deviations[PROPOSED, lowest_hz] > 10.0 * largest_deviations[PROPOSED, highest_hz]
         and largest <= _ROUNDING,
-        f"It grows from {largest_deviations[PROPOSED, highest_rate_hz]:.2g} at"
-        f" {highest_rate_hz:.0f} Hz to"
-        f" {largest_deviations[PROPOSED, lowest_rate_hz]:.2g} at {lowest_rate_hz:.0f} Hz. With"
+        f"It grows from {largest_deviations[PROPOSED, highest_hz]:.2g} at"
+        f" {highest_hz:.0f} Hz to"
+        f" {largest_deviations[PROPOSED, lowest_hz]:.2g} at {lowest_hz:.0f} Hz. With"
         " exact, which"
         f" solves each sample in closed form, it is at most {largest:.1g} at every rate.",
     )
@@ -95,16 +94,12 @@ def _figure(
     )
     rate_panel.minorticks_off()
     rate_panel.legend(loc="center right")
-    lowest_rate_hz = min(RATES_HZ)
+    lowest_hz = min(RATES_HZ)
     for method in (PROPOSED, EXACT):
-        error = deviation(responses[method, lowest_rate_hz], steps[lowest_rate_hz].reference())[
-            :, 0
-        ]
-        draw_line(
-            time_panel, steps[lowest_rate_hz].time[1:], error[1:], method.line_style, method.label
-        )
+        error = deviation(responses[method, lowest_hz], steps[lowest_hz].reference())[:, 0]
+        draw_line(time_panel, steps[lowest_hz].time[1:], error[1:], method.line_style, method.label)
     time_panel.set(
-        title=f"Deviation at {lowest_rate_hz:.0f} Hz",
+        title=f"Deviation at {lowest_hz:.0f} Hz",
         xlabel="time, s",
         ylabel="|c − reference|",
         yscale="log",
@@ -114,13 +109,13 @@ def _figure(
         c = responses[PROPOSED, hz].at_heading(0)
         line_style = {**PROPOSED.line_style, "alpha": alpha}
         draw_line(plane, _distance_from_line(c), c[:, 0], line_style, f"proposed, {hz:.0f} Hz")
-    exact = responses[EXACT, lowest_rate_hz].at_heading(0)
+    exact = responses[EXACT, lowest_hz].at_heading(0)
     draw_line(
         plane,
         _distance_from_line(exact),
         exact[:, 0],
         EXACT.line_style,
-        f"exact, {lowest_rate_hz:.0f} Hz",
+        f"exact, {lowest_hz:.0f} Hz",
     )
     plane.set(title="Paths, enlarged across", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
     plane.set_xlim(right=5.2)
