@@ -29,7 +29,7 @@ _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
 _LARGEST_VALID = 1e9
 """Numbers above this, such as times in s and distances in m, are invalid."""
-_ROOM_FOR_LEGEND = 0.2
+_LEGEND_MARGIN_SHARE = 0.2
 """Room above the curves, as a share of their height."""
 
 
@@ -125,7 +125,7 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
         title="Response to the first doublet", xlabel="time, s", ylabel="acceleration / thrust"
     )
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + _ROOM_FOR_LEGEND * (high - low))
+    axes.set_ylim(low, high + _LEGEND_MARGIN_SHARE * (high - low))
     axes.legend(loc="upper center", fontsize="small", ncols=2, handlelength=1.4, columnspacing=1.0)
     axes.grid(alpha=0.3)
 

@@ -67,17 +67,14 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
     Only the flags of attitude, velocity and horizontal position count.
     """
-    estimator, initial_flags = snapshot.autopilot.estimator, snapshot.initial_estimator_flags
+    estimator, start_flags = snapshot.autopilot.estimator, snapshot.initial_estimator_flags
     if estimator is None:
         return None
     if is_outdated(estimator.received, snapshot.now):
         return "the estimator's state is not reported any more"
     quantities = ("attitude", ATTITUDE_FLAG), ("velocity", VELOCITY_FLAGS)
-    lost = [name for name, bits in quantities if initial_flags & bits & ~estimator.flags]
-    if (
-        initial_flags & HORIZONTAL_POSITION_FLAGS
-        and not estimator.flags & HORIZONTAL_POSITION_FLAGS
-    ):
+    lost = [name for name, bits in quantities if start_flags & bits & ~estimator.flags]
+    if start_flags & HORIZONTAL_POSITION_FLAGS and not estimator.flags & HORIZONTAL_POSITION_FLAGS:
         lost.append("position")
     return f"the estimator reports no valid {', '.join(lost)} any more" if lost else None
 

@@ -4,14 +4,14 @@ from collections import deque
 
 from companion.control.estimator_resets import EstimatorResets
 
-_WINDOW = 20.0
+_DRIFT_WINDOW = 20.0
 """Time over which the drift is counted, s: a constant error of the gyro must not add up."""
 _SCALE_ERROR = 0.05
 """Assumed largest scale error of a gyro. In a turn it looks like a drift of the heading."""
 
 
 class HeadingDrift:
-    """Sums the estimator's gradual heading corrections over the last `_WINDOW`."""
+    """Sums the estimator's gradual heading corrections over the last `_DRIFT_WINDOW`."""
 
     def __init__(self, resets: EstimatorResets) -> None:
         self._resets = resets
@@ -28,7 +28,7 @@ class HeadingDrift:
         """
         history, resets = self._history, self._resets
         history.append((now, resets.heading_corrections, resets.turned))
-        while now - history[0][0] > _WINDOW:
+        while now - history[0][0] > _DRIFT_WINDOW:
             history.popleft()
         _, corrections_before, turned_before = history[0]
         unexplained = abs(resets.heading_corrections - corrections_before)

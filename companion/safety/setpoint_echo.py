@@ -41,8 +41,8 @@ class SetpointEcho:
         self._matched_once = self.any_foreign = False
         self._foreign_times.clear()
 
-    def take(self, message: Message, now: float) -> None:
-        """Take an ATTITUDE_TARGET that arrived at `now`, s of event-loop time."""
+    def add_report(self, message: Message, now: float) -> None:
+        """Add an ATTITUDE_TARGET that arrived at `now`, s of event-loop time."""
         rates = BodyRates(message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
         if self._is_ours(rates, message.thrust):
             self._matched_once = True

@@ -35,7 +35,7 @@ class SnapshotBuilder:
     """Collects the data that the monitors judge.
 
     Attributes:
-        echo: takes each ATTITUDE_TARGET.
+        echo: gets each ATTITUDE_TARGET.
         counters: the counters of the last second, and our own stalls.
         fence_centre_ned: centre of the fence in the frame without estimator resets, m NED; None:
             not known. The centre is where control began, unless `begin` got another one.

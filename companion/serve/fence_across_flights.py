@@ -43,7 +43,7 @@ class FenceAcrossFlights:
         position = minus(self._first_centre.position_ned, negative_shift)
         return self._first_centre._replace(position_ned=position)
 
-    def keep(self, centre: FenceCentre | None) -> None:
+    def set_first_centre(self, centre: FenceCentre | None) -> None:
         """Keep the centre of a flight that has ended; an earlier flight's centre takes precedence.
 
         Nothing is kept if the vehicle is disarmed.

@@ -28,7 +28,7 @@ _BRAKING_SHARE = 0.8
 """Deceleration assumed for a client's motions, as a share of their acceleration limit."""
 _LOOKAHEAD = 10.0
 """Time over which a commanded velocity is extrapolated to a destination, s."""
-_STEP = 0.1
+_STEP_LENGTH = 0.1
 """Length of the step towards the destination that shows whether a request leads outward, m."""
 _REPORT_PAUSE = 3.0
 """Time without a stop after which the next stop is reported, s."""
@@ -205,7 +205,7 @@ def _worsened_breach(
 ) -> Breach | None:
     """The breach after a step towards the destination, if the step makes a breach worse."""
     offset = minus(destination, position)
-    step_share = _STEP / max(hypot(*offset), _STEP)
+    step_share = _STEP_LENGTH / max(hypot(*offset), _STEP_LENGTH)
     north, east, down = (a + step_share * b for a, b in zip(position, offset, strict=True))
     breach_here = frame.breach(fence, position, _MARGIN)
     breach_after_step = frame.breach(fence, (north, east, down), _MARGIN)

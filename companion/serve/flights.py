@@ -82,7 +82,7 @@ class ServedFlights:
             has_begun = await flight.run(command)
         finally:
             self.ownership.release()
-            self.fence.keep(flight.fence_centre)
+            self.fence.set_first_centre(flight.fence_centre)
             self.current_flight = self._task = None
             self._controlled_since_arming |= has_begun
             if not has_begun:

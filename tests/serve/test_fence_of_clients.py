@@ -135,8 +135,8 @@ def test_outside_the_fence_of_the_first_flight_control_is_refused_until_the_vehi
     fence = FenceAcrossFlights(config, link)
     link.at(100.0, 0.0, -5.0)
     assert fence.refusal() is None, "nobody was in control yet"
-    fence.keep(FenceCentre((100.0, 0.0, -5.0), None))
-    fence.keep(FenceCentre((108.0, 0.0, -5.0), None))
+    fence.set_first_centre(FenceCentre((100.0, 0.0, -5.0), None))
+    fence.set_first_centre(FenceCentre((108.0, 0.0, -5.0), None))
     link.at(108.0, 0.0, -5.0)
     assert fence.refusal() is None
     link.at(110.0, 0.0, -5.0)
@@ -155,7 +155,7 @@ def test_a_reset_of_the_estimator_between_flights_leaves_the_fence_over_the_same
     link.at(92.0, 0.0, -5.0)
     link.jumps_to(90.0, 0.0, -5.0)  # before the fence is kept: its centre has it already
     link.at(100.0, 0.0, -5.0)
-    fence.keep(FenceCentre((100.0, 0.0, -5.0), None))
+    fence.set_first_centre(FenceCentre((100.0, 0.0, -5.0), None))
     link.at(108.0, 0.0, -5.0)
     assert fence.refusal() is None
     link.jumps_to(111.0, -1.0, -5.0)  # the vehicle is still 8 m north of the centre

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 
 from companion.recording.mcap_file.channels import TOPICS
 
-_HEADER = struct.Struct("<BQI")
+_MESSAGE_HEADER = struct.Struct("<BQI")
 _TOPIC_NUMBERS = {topic: number for number, topic in enumerate(TOPICS)}
 _FULL_BATCH_BYTES = 32_000
 """Length above which a batch is sent, bytes; well below the buffer of a socket."""
@@ -28,7 +28,7 @@ class Batch:
 
     def add(self, topic: str, time_ns: int, data: bytes) -> None:
         """Add a message; send the batch if it is full."""
-        self._collected_bytes += _HEADER.pack(_TOPIC_NUMBERS[topic], time_ns, len(data))
+        self._collected_bytes += _MESSAGE_HEADER.pack(_TOPIC_NUMBERS[topic], time_ns, len(data))
         self._collected_bytes += data
         if len(self._collected_bytes) > _FULL_BATCH_BYTES:
             self.send()
@@ -44,6 +44,6 @@ def messages_of(datagram: bytes) -> Iterator[tuple[int, int, bytes]]:
     """Index of the channel, time and bytes of each message of a datagram, in order."""
     offset = 0
     while offset < len(datagram):
-        topic_number, time_ns, length = _HEADER.unpack_from(datagram, offset)
-        offset += _HEADER.size + length
+        topic_number, time_ns, length = _MESSAGE_HEADER.unpack_from(datagram, offset)
+        offset += _MESSAGE_HEADER.size + length
         yield topic_number, time_ns, datagram[offset - length : offset]

@@ -23,7 +23,7 @@ from companion.serve.setpoints.request import (
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS = (1, 2, 4), (8, 16, 32), (64, 128, 256)
 _FORCE_BIT, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
 _NO_ACCELERATION = 64 | 128 | 256
-_KNOWN_BITS = 4095
+_DEFINED_BITS = 4095
 _HORIZONTAL_AXES, _VERTICAL_AXES = (0, 1), (2,)
 
 _MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 100.0, 20.0
@@ -118,7 +118,7 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
     mask = message.type_mask
     if mask & _FORCE_BIT and mask & _NO_ACCELERATION != _NO_ACCELERATION:
         raise RefusedSetpoint("forces are not supported: clear FORCE_SET")
-    if mask & ~_KNOWN_BITS:
+    if mask & ~_DEFINED_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
     return (
         _used_values(mask, _POSITION_BITS, position, _MAX_POSITION, "position"),
