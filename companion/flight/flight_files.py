@@ -168,7 +168,7 @@ class FlightFiles:
             log=self.folder,
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
-            realtime={result.name: result.refusal or "granted" for result in realtime_results},
+            realtime={each.name: each.refusal or "granted" for each in realtime_results},
             facts=facts_of(assembled, result, advice_texts, drag_kept=drag_kept),
         )
 

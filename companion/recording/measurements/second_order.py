@@ -135,9 +135,11 @@ class SecondOrderModel:
         omega_d = np.sqrt(complex(square * (1.0 - self.damping * self.damping)))
         slower = np.exp((-1j * omega_d - decay) * seconds)  # of the two: nothing overflows
         cosine = (0.5 * slower * (1.0 + np.exp(2j * omega_d * seconds))).real
-        sine = cosine * seconds
-        if omega_d:
-            sine = (slower * np.expm1(2j * omega_d * seconds) / (2j * omega_d)).real
+        sine = (
+            (slower * np.expm1(2j * omega_d * seconds) / (2j * omega_d)).real
+            if omega_d
+            else cosine * seconds
+        )
         matrix_rows = (cosine + decay * sine, sine), (-square * sine, cosine - decay * sine)
         return np.moveaxis(np.array(matrix_rows), -1, 0)
 
