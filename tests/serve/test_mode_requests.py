@@ -190,7 +190,7 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_
 
     flights = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
-        fence=SimpleNamespace(keep=lambda centre: None),
+        fence=SimpleNamespace(set_first_centre=lambda centre: None),
         _controlled_since_arming=False,
         _vehicle=SimpleNamespace(
             config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test")
