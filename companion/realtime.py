@@ -47,13 +47,13 @@ class _FrozenState:
     """State of `frozen_objects` in this process.
 
     Attributes:
-        blocks: number of `frozen_objects` blocks that are running.
-        by_caller: whether objects were frozen before the first block. Once true it is not checked
-            again, because counting frozen objects takes 10 ms for each 100 000.
+        running_blocks: number of `frozen_objects` blocks that are running.
+        frozen_by_caller: whether objects were frozen before the first block. Once true it is not
+            checked again, because counting frozen objects takes 10 ms for each 100 000.
     """
 
-    blocks = 0
-    by_caller = False
+    running_blocks = 0
+    frozen_by_caller = False
 
 
 @contextmanager
@@ -63,17 +63,17 @@ def frozen_objects() -> Iterator[None]:
     These objects are mostly modules and live as long as the program. If some objects were frozen
     before the block, all stay frozen after it, because Python cannot unfreeze only some.
     """
-    is_outermost = not _FrozenState.blocks
-    if is_outermost and not _FrozenState.by_caller:
-        _FrozenState.by_caller = gc.get_freeze_count() > 0
+    is_outermost = not _FrozenState.running_blocks
+    if is_outermost and not _FrozenState.frozen_by_caller:
+        _FrozenState.frozen_by_caller = gc.get_freeze_count() > 0
     gc.collect()
     gc.freeze()
-    _FrozenState.blocks += 1
+    _FrozenState.running_blocks += 1
     try:
         yield
     finally:
-        _FrozenState.blocks -= 1
-        if is_outermost and not _FrozenState.by_caller:
+        _FrozenState.running_blocks -= 1
+        if is_outermost and not _FrozenState.frozen_by_caller:
             gc.unfreeze()
 
 
@@ -126,23 +126,23 @@ def request_settings(settings: RealtimeSettings) -> Iterator[tuple[SettingResult
     """
     results: list[SettingResult] = []
     with ExitStack() as undo:
-        for name, setting, apply in _setting_requests(settings):
+        for name, description, apply_setting in _setting_requests(settings):
             try:
-                undo.callback(apply())
-                results.append(SettingResult(name, setting))
+                undo.callback(apply_setting())
+                results.append(SettingResult(name, description))
             except SettingRefused as refused:
-                results.append(SettingResult(name, setting, str(refused)))
+                results.append(SettingResult(name, description, str(refused)))
         refusals = [str(result) for result in results if result.refusal is not None]
         if refusals and settings.required:
             raise RealtimeError(f"{'; '.join(refusals)} (realtime.required is true)")
         yield tuple(results)
 
 
-_Undo = Callable[[], object]
-_Apply = Callable[[], _Undo]
+_UndoSetting = Callable[[], object]
+_ApplySetting = Callable[[], _UndoSetting]
 
 
-def _setting_requests(settings: RealtimeSettings) -> Iterator[tuple[str, str, _Apply]]:
+def _setting_requests(settings: RealtimeSettings) -> Iterator[tuple[str, str, _ApplySetting]]:
     """For each requested setting: its key, the setting in words, and a function that applies it."""
     priority, processors = settings.fifo_priority, settings.processors
     if processors:
@@ -160,7 +160,7 @@ def _setting_requests(settings: RealtimeSettings) -> Iterator[tuple[str, str, _A
         )
 
 
-def _set_fifo_priority(priority: int) -> _Undo:
+def _set_fifo_priority(priority: int) -> _UndoSetting:
     scheduler_before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     # Threads that start later (recording, MAVSDK) must inherit the priority: a preempted thread
     # that holds the interpreter lock would block the control loop.
@@ -173,12 +173,12 @@ def _set_fifo_priority(priority: int) -> _Undo:
     return lambda: os.sched_setscheduler(0, scheduler_before, parameters)
 
 
-def _set_processors(processors: tuple[int, ...]) -> _Undo:
+def _set_processors(processors: tuple[int, ...]) -> _UndoSetting:
     processors_before = os.sched_getaffinity(0)
-    missing = [number for number in processors if number not in processors_before]
-    if missing:
+    unavailable = [number for number in processors if number not in processors_before]
+    if unavailable:
         raise SettingRefused(
-            f"processor {', '.join(map(str, missing))} is not available to this program; "
+            f"processor {', '.join(map(str, unavailable))} is not available to this program; "
             f"available are {', '.join(map(str, sorted(processors_before)))}"
         )
     try:
@@ -188,21 +188,21 @@ def _set_processors(processors: tuple[int, ...]) -> _Undo:
     return lambda: os.sched_setaffinity(0, processors_before)
 
 
-def _lock_memory() -> _Undo:
+def _lock_memory() -> _UndoSetting:
     libc = ctypes.CDLL(None, use_errno=True)
     limit, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
     if limit != resource.RLIM_INFINITY and os.geteuid() != 0:
         # Even if the limit suffices now, an allocation in flight could fail.
         raise SettingRefused(f"this user may lock only {limit // 1024} KiB; {_MEMORY_REMEDY}")
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
-        number = ctypes.get_errno()
-        if number in (errno.EPERM, errno.ENOMEM):
-            raise SettingRefused(f"{os.strerror(number)}; {_MEMORY_REMEDY}")
-        raise SettingRefused(os.strerror(number))
+        error_number = ctypes.get_errno()
+        if error_number in (errno.EPERM, errno.ENOMEM):
+            raise SettingRefused(f"{os.strerror(error_number)}; {_MEMORY_REMEDY}")
+        raise SettingRefused(os.strerror(error_number))
     return libc.munlockall
 
 
-def _stop_collecting() -> _Undo:
+def _stop_collecting() -> _UndoSetting:
     undo = ExitStack()
     undo.enter_context(frozen_objects())
     undo.enter_context(no_garbage_collection())

@@ -231,15 +231,15 @@ def texts(node: ast.AST | None) -> Iterator[str]:
         yield "".join(part if isinstance(part, str) else "…" for part in parts)
 
 
-def raised_and_judged() -> Iterator[str]:
-    """What ends a flight: texts of its exceptions, and what the judges of monitors return."""
+def raised_and_checked() -> Iterator[str]:
+    """What ends a flight: texts of its exceptions, and what the checks of monitors return."""
     for file, nodes in nodes_of_the_program().items():
-        judge = file.name.endswith("_judges.py")
+        is_check = file.name.endswith("_breaches.py")
         for node in nodes:
             if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call):
                 if getattr(node.exc.func, "id", "") in ENDINGS and node.exc.args:
                     yield from texts(node.exc.args[0])
-            elif judge and isinstance(node, ast.Return):
+            elif is_check and isinstance(node, ast.Return):
                 value = node.value
                 for one in (value.body, value.orelse) if isinstance(value, ast.IfExp) else (value,):
                     yield from texts(one)
@@ -248,7 +248,7 @@ def raised_and_judged() -> Iterator[str]:
 def test_whatever_ends_a_flight_is_in_troubleshooting() -> None:
     quoted = re.findall(r"^(?:### |\| )`(.+?)`(?: \||$)", TROUBLESHOOTING, re.MULTILINE)
     patterns = [re.compile(pattern(message)) for message in quoted]
-    messages = {text for text in raised_and_judged() if text.strip("… :")}
+    messages = {text for text in raised_and_checked() if text.strip("… :")}
     assert len(messages) > 40
     missing = [
         message
@@ -273,14 +273,14 @@ def test_the_monitors_of_the_safety_page_are_those_of_the_table() -> None:
         r"^\| ([a-z ]+?) \| .+ \| (at once|[\d.]+ s) \| ([a-z_]+)", SAFETY, re.MULTILINE
     )
     shown = {
-        name: (0.0 if lasts == "at once" else float(lasts[:-2]), action)
-        for name, lasts, action in rows
+        name: (0.0 if raise_after == "at once" else float(raise_after[:-2]), action)
+        for name, raise_after, action in rows
     }
     assert (shown.pop("takeover"), shown.pop("mode unknown")) == (
         (0.0, "release"),
         (0.0, "listen"),
     )
-    assert shown == {one.name: (one.lasts, one.action.value) for one in monitors(Config())}
+    assert shown == {one.name: (one.raise_after, one.action.value) for one in monitors(Config())}
 
 
 def test_the_tests_that_pages_name_exist() -> None:

@@ -45,9 +45,9 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     registry = registry.replace(begin, f"{begin}\n{line}", 1)
     registry = registry.replace(types, imported + types, 1)
     (attitude / "planner.py").write_text(registry, "utf-8")
-    judges = tree / "companion/safety/motion_judges.py"
-    judges.write_text(
-        judges.read_text("utf-8") + "\n\n" + block("companion/safety/motion_judges.py")
+    module = tree / "companion/safety/motion_breaches.py"
+    module.write_text(
+        module.read_text("utf-8") + "\n\n" + block("companion/safety/motion_breaches.py")
     )
     table = tree / "companion/safety/table.py"
     rows = '        Monitor("tilt", tilt,'

@@ -45,17 +45,17 @@ def unfrozen(monkeypatch):
     """Called with the number of frozen objects; returns the calls that unfreeze and that count."""
     calls, counted = [], []
 
-    def told(by_caller):
-        monkeypatch.setattr(gc, "get_freeze_count", lambda: counted.append(1) or by_caller)
+    def told(frozen_by_caller):
+        monkeypatch.setattr(gc, "get_freeze_count", lambda: counted.append(1) or frozen_by_caller)
         return calls, counted
 
     monkeypatch.setattr(gc, "unfreeze", lambda: calls.append("unfrozen"))
-    monkeypatch.setattr(realtime._FrozenState, "by_caller", False)
+    monkeypatch.setattr(realtime._FrozenState, "frozen_by_caller", False)
     return told
 
 
 def test_what_was_frozen_for_a_flight_is_unfrozen_at_the_end_of_the_outermost_block(unfrozen):
-    calls, _ = unfrozen(by_caller=0)
+    calls, _ = unfrozen(frozen_by_caller=0)
     for flights in (1, 2):
         with realtime.frozen_objects():
             with realtime.frozen_objects():
@@ -65,7 +65,7 @@ def test_what_was_frozen_for_a_flight_is_unfrozen_at_the_end_of_the_outermost_bl
 
 
 def test_what_the_caller_froze_stays_frozen_and_is_counted_once(unfrozen):
-    calls, counted = unfrozen(by_caller=100)
+    calls, counted = unfrozen(frozen_by_caller=100)
     for _ in range(2):
         with realtime.frozen_objects(), realtime.frozen_objects():
             pass

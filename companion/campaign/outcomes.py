@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from companion.campaign.swept import Value
 from companion.config import Config
-from companion.recording.measurements.maneuver_figures import settled_parts
+from companion.recording.measurements.maneuver_figures import settled_maneuver_rows
 from companion.recording.measurements.summary import Summary, tracking_errors
 from companion.testing import ReceivedSetpoint, Truth
 from companion.testing.truth import true_positions
@@ -57,7 +57,7 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
         value by name of the outcome; empty without a closed-loop maneuver or without `truth`.
     """
     rows = summary.trace.tracking.rows()
-    parts = settled_parts(rows, summary.trace.maneuvers)
+    parts = settled_maneuver_rows(rows, summary.trace.maneuvers)
     figures: dict[str, float] = {}
     if len(truth) and parts:
         settled_rows = np.concatenate(parts)
@@ -112,11 +112,11 @@ def control_effort(
 
     `thrust_rms` is the standard deviation of the thrust. Empty if there were no maneuvers.
     """
-    marks = summary.trace.maneuvers
-    if not marks:
+    maneuver_changes = summary.trace.maneuvers
+    if not maneuver_changes:
         return {}
-    begin = marks[0].vehicle_time
-    end = next((mark.vehicle_time for mark in marks if mark.name is None), np.inf)
+    begin = maneuver_changes[0].vehicle_time
+    end = next((change.vehicle_time for change in maneuver_changes if change.name is None), np.inf)
     rows = np.array(
         [
             (*setpoint.rates, setpoint.thrust)

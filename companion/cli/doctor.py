@@ -32,13 +32,13 @@ from companion.preflight.finding import Finding, Key
 from companion.preflight.parameter_fixes import (
     Answer,
     ChangeOutcome,
-    Undo,
+    UndoContents,
     UndoFile,
     apply_fixes,
     require_disarmed,
     restore,
 )
-from companion.preflight.parameter_survey import survey
+from companion.preflight.parameter_survey import survey_parameters
 from companion.preflight.report import as_dict, findings_lists, outcome_as_dict, outcome_line
 from companion.preflight.session import PreflightSession, open_session, request_identity
 from companion.vehicle.parameter_rules import CheckResult
@@ -55,7 +55,7 @@ def doctor(options: argparse.Namespace) -> int:
         raise ConfigError(
             "--fix asks before each change, and standard input is no terminal; add --yes"
         )
-    undo = None if options.undo is None else load_yaml(options.undo, Undo)
+    undo = None if options.undo is None else load_yaml(options.undo, UndoContents)
     doctor_run = _DoctorRun(config, Console(stderr=options.json, highlight=False, markup=False))
     try:
         if undo is None:
@@ -143,14 +143,14 @@ class _DoctorRun:
         self.result |= {"result": "interrupted", "changes": changes}
         return EXIT_FAILURE
 
-    async def restore(self, undo: Undo, path: Path) -> int:
+    async def restore(self, undo: UndoContents, path: Path) -> int:
         """Restore the parameters that an undo file lists."""
         async with open_session(self._config, self._make_link) as vehicle:
             findings = await vehicle.wait_for_vehicle()
             if findings:
                 return self._report(findings)
             link = vehicle.link
-            if not undo.meant_for(link, await request_identity(link)):
+            if not undo.matches_vehicle(link, await request_identity(link)):
                 raise ConfigError(
                     f"{path} was written for another vehicle ({undo.autopilot}, system "
                     f"{undo.system}, hardware id {undo.uid or 'unknown'}); nothing was set; "
@@ -186,7 +186,9 @@ class _DoctorRun:
             if undo.path.exists():
                 path = shlex.quote(str(undo.path))
                 self.say(f"Undo with: companion doctor --config FILE --undo {path}")
-        evidence = replace(evidence, survey=await survey(link, link.autopilot.parameters))
+        evidence = replace(
+            evidence, survey=await survey_parameters(link, link.autopilot.parameters)
+        )
         _, refused = _maneuvers(config, evidence.known_drag)
         code = self._report([*refused, *run_checks(config, evidence), *_response_findings(config)])
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]

@@ -100,7 +100,7 @@ def replay(options: argparse.Namespace) -> int:
     whole = _is_whole(record)
     if not samples:
         raise ConfigError(f"{options.folder}: no attitude sample is recorded there to replay")
-    for line in result_lines(samples, record.began, follows_record=replayed.follows_record):
+    for line in result_lines(samples, record.start_time, follows_record=replayed.follows_record):
         print(line)
     if options.csv is not None:
         try:
@@ -108,5 +108,5 @@ def replay(options: argparse.Namespace) -> int:
         except OSError as error:
             raise ConfigError(f"{options.csv}: cannot write it: {error.strerror}") from error
         print(options.csv)
-    same = not own_config or all(each.same for each in samples)
-    return EXIT_OK if whole and same else EXIT_FAILURE
+    all_same = not own_config or all(each.is_same for each in samples)
+    return EXIT_OK if whole and all_same else EXIT_FAILURE

@@ -83,7 +83,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
 
     def stop() -> None:
         session.stop()
-        loop.call_later(_REPORT_TIMEOUT, pages.leave)
+        loop.call_later(_REPORT_TIMEOUT, pages.stop)
 
     def interrupt() -> None:
         nonlocal stopped_at
@@ -92,7 +92,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
             stop()
         elif loop.time() - stopped_at >= SECOND_CTRL_C_AFTER:
             session.leave()
-            pages.leave()
+            pages.stop()
 
     loop.add_signal_handler(signal.SIGINT, interrupt)
     for number in (signal.SIGTERM, *hangup_signals()):

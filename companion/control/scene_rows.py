@@ -59,7 +59,7 @@ _ROTORS = tuple(
 _BODY_ENTITY = Entity(
     "body",
     "vehicle",
-    follows=True,
+    follows_frame=True,
     cubes=(Cube((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0), (0.3, 0.16, 0.08), _GREY_COLOR),),
     cylinders=_ROTORS,
 )
@@ -90,7 +90,7 @@ class SceneRows:
             position: position of the vehicle, m ENU.
             reference: position of the reference, m ENU.
         """
-        thrust = Entity("thrust", "vehicle", follows=True, arrows=self._arrows(q))
+        thrust = Entity("thrust", "vehicle", follows_frame=True, arrows=self._arrows(q))
         scene = (thrust,) if self._count % _BODY_EVERY else (_BODY_ENTITY, thrust)
         writer.message("/scene", time_ns, scene_message(time_ns, scene))
         if time_ns - self._newest_ns > _GAP_NS:

@@ -11,7 +11,7 @@ from companion.config.vehicle import AxisKeys
 from companion.identification import dead_time_by_correlation
 from companion.recording.mcap_file.loop_channels import rate_names
 from companion.recording.measurements.dead_time import AxisDeadTime, DeadTimes, SampleAge
-from companion.recording.trace import RATES, FlightTrace
+from companion.recording.trace import RATE_COLUMNS, FlightTrace
 from companion.safety.actions import fault_message
 
 _MEASURING_PERIOD = 2.0
@@ -24,7 +24,7 @@ _MIN_ROW_AGE = 1.5
 _MAX_ROWS = 75_000
 """Largest number of records for the measurement after the flight: 5 min at 250 Hz."""
 _AXES = ("roll", "pitch", "yaw")
-_TIME_COLUMN, _AGE_COLUMN = RATES.index("vehicle_time_s"), RATES.index("age_s")
+_TIME_COLUMN, _AGE_COLUMN = RATE_COLUMNS.index("vehicle_time_s"), RATE_COLUMNS.index("age_s")
 
 
 class DeadTimeWatch:
@@ -100,7 +100,8 @@ class DeadTimeWatch:
         if axis.lag is not None:
             axis_number = _AXES.index(name)
             commanded, measured = (
-                RATES.index(rate_names(which)[axis_number]) for which in ("commanded", "measured")
+                RATE_COLUMNS.index(rate_names(which)[axis_number])
+                for which in ("commanded", "measured")
             )
             time, commanded_rates, measured_rates = rows[:, [_TIME_COLUMN, commanded, measured]].T
             is_old_enough = time < time[-1:] - _MIN_ROW_AGE

@@ -78,11 +78,11 @@ def facts_of(
     battery_at_end = None if state.battery is None else state.battery.remaining
     takeoff = None if reporter.takeoff_time is None else reporter.takeoff_time - began
     return FlightFacts(
-        began=began,
+        start_time=began,
         phases=tuple(
             (phase_began - began, name) for phase_began, name in assembled.recorder.phases
         ),
-        takeoff=takeoff,
+        takeoff_time=takeoff,
         early_end=_early_end(assembled, takeoff, result, now),
         vehicle_uid=context.replacement_detector.uid,
         armed=state.armed,

@@ -139,11 +139,11 @@ class FlightFiles:
         self,
         assembled: AssembledFlight,
         result: str,
-        setting_results: tuple[realtime.SettingResult, ...],
+        realtime_results: tuple[realtime.SettingResult, ...],
     ) -> Summary:
         """Make the summary of a finished flight before the log is closed; save the learned drag.
 
-        `result`: "ok", or the reason why the flight ended early. `setting_results`: which requested
+        `result`: "ok", or the reason why the flight ended early. `realtime_results`: which
         real-time settings were granted.
         """
         flight, trace = assembled.flight, assembled.trace
@@ -171,7 +171,7 @@ class FlightFiles:
             log=self.folder,
             dead_times=dead_times,
             predictive=predictive_figures(assembled.context),
-            realtime={each.name: each.refusal or "granted" for each in setting_results},
+            realtime={each.name: each.refusal or "granted" for each in realtime_results},
             facts=facts_of(assembled, result, advice_texts, is_drag_saved=is_drag_saved),
         )
 

@@ -18,7 +18,10 @@ def brake_inside_fence(context: FlightContext) -> None:
     """
     guidance = context.guidance_loop
     guidance.give_up()
-    centre, pose = context.snapshot_builder.flown_fence_centre(), guidance.flown_source.pose
+    centre, pose = (
+        context.snapshot_builder.fence_centre_without_resets(),
+        guidance.flown_source.pose,
+    )
     if not context.link.autopilot.modes_begin_level or centre is None or pose is None:
         return
     stopping_point, wind = (

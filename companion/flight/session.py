@@ -14,7 +14,7 @@ from companion.flight.observer import Observer
 from companion.flight.opening import make_link, realtime_settings
 from companion.flight.plan import ConfiguredPlan, Plan
 from companion.flight.wiring import connected
-from companion.recording.closing_words import LEFT_BY_USER
+from companion.recording.closing_words import STOPPED_BY_USER
 from companion.recording.measurements.summary import Summary
 
 
@@ -97,7 +97,7 @@ class Session:
             config, self._folder, environment, self.note, flies_maneuvers=self._plan is None
         )
         settings = realtime_settings(self._config, environment)
-        with realtime.request_settings(settings) as setting_results, files:
+        with realtime.request_settings(settings) as realtime_results, files:
             recorder, opener = files.recorder(self._observer), environment.open_transport
             async with make_link(self._config, files.tap, self.note, opener) as link:
                 self._assembled = assemble(
@@ -110,11 +110,11 @@ class Session:
                     environment,
                     self.changes,
                 )
-                for text in (*self._early_notes, *map(str, setting_results)):
+                for text in (*self._early_notes, *map(str, realtime_results)):
                     self._assembled.flight.note(text)
                 async with connected(self._assembled):
                     result = await self._run(self._assembled.flight)
-            summary = files.summary(self._assembled, result, setting_results)
+            summary = files.summary(self._assembled, result, realtime_results)
         await asyncio.sleep(0)  # lets a failure of the writing thread arrive
         return files.save(summary)
 
@@ -125,4 +125,4 @@ class Session:
             return await self._flight_task
         except asyncio.CancelledError:
             flight.failed_phase = flight.failed_phase or flight.phase
-            return LEFT_BY_USER
+            return STOPPED_BY_USER

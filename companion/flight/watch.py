@@ -132,9 +132,9 @@ class Watch:
         if verdict.action is Action.HOLD:
             brake_inside_fence(self._context)
             return
-        if verdict.stream is StreamEffect.STOPS:
+        if verdict.stream is StreamEffect.STOPS_AT_ONCE:
             self._context.release()
-        elif verdict.stream is StreamEffect.ENDS:
+        elif verdict.stream is StreamEffect.ENDS_WITH_ZERO_RATES:
             self._context.end_stream()
         self._was_stopped_in_control |= verdict.stream is not StreamEffect.CONTINUES
         raise FlightEnded(verdict.reason, EXIT_OF_ACTION[verdict.action])

@@ -73,7 +73,7 @@ def _callbacks(assembled: AssembledFlight) -> Iterator[None]:
 
     def on_attitude_target(message: Message) -> None:
         if loop.offboard_active:
-            context.snapshot_builder.echo.take(message, clock())
+            context.snapshot_builder.echo.add_report(message, clock())
 
     link.on_attitude = on_attitude
     link.on_error = flight.fail

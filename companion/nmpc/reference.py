@@ -7,7 +7,7 @@ from companion.attitude import wrap_angle
 from companion.drag import AxisDrag, Drag
 from companion.guidance.trajectory.sample import Sample, Vector
 
-_LEAST_LIFT = 0.2
+_MIN_UPWARD_THRUST_SHARE = 0.2
 """Smallest upward part of the reference thrust, as a share of gravity."""
 
 
@@ -76,7 +76,7 @@ def node_of(
     heading_rate = sample.heading_rate
     axis_d_rate = *axes.deceleration_rate(velocity[:2], acceleration[:2], heading_rate), 0.0
     f_n, f_e, f_d = (acceleration[i] + d[i] + axis_d[i] - disturbance[i] for i in range(3))
-    f_d = min(f_d - gravity, -_LEAST_LIFT * gravity)
+    f_d = min(f_d - gravity, -_MIN_UPWARD_THRUST_SHARE * gravity)
     rate_n, rate_e, rate_d = (jerk[i] + d_rate[i] + axis_d_rate[i] for i in range(3))
     thrust = sqrt(f_n * f_n + f_e * f_e + f_d * f_d)
     thrust_rate = (f_n * rate_n + f_e * rate_e + f_d * rate_d) / thrust

@@ -75,7 +75,7 @@ class Worker:
 
     def answer(self, request: Request) -> Answer:
         """Solve a request; guidance uses the answer `Settings.lead` after the request's time."""
-        began = perf_counter()
+        start_time = perf_counter()
         use_time = request.vehicle.time + self._settings.lead
         try:
             control = self._solve(request)
@@ -93,25 +93,25 @@ class Worker:
             control.east,
             wrap_angle(control.heading),
             control.thrust,
-            perf_counter() - began,
+            perf_counter() - start_time,
             control.solver_seconds,
             control.iterations,
         )
 
     def _solve(self, request: Request) -> FirstControl | None:
         vehicle = request.vehicle
-        until = vehicle.time + self._effect_delay
-        motion = self._predictor.predict(vehicle, request.inputs, until)
+        effect_time = vehicle.time + self._effect_delay
+        motion = self._predictor.predict(vehicle, request.inputs, effect_time)
         conditions = conditions_of(vehicle)
         nodes = self._nodes(request, motion.heading)
-        return self._horizon.solve(until, motion, nodes, conditions)
+        return self._horizon.solve(effect_time, motion, nodes, conditions)
 
     def _nodes(self, request: Request, heading: float) -> list[Node]:
         """The reference over the horizon; its headings are unwrapped, beginning near `heading`."""
         settings, nodes = self._settings, list[Node]()
         for k in range(settings.steps + 1):
-            time = request.trajectory_time + self._effect_delay + k * settings.step_duration
-            sample = self._trajectory.at(time)
+            node_time = request.trajectory_time + self._effect_delay + k * settings.step_duration
+            sample = self._trajectory.at(node_time)
             node = node_of(
                 sample,
                 request.start,

@@ -107,19 +107,19 @@ def _clock_rate(config: Config, evidence: Evidence, rate: float, source: str) ->
     lag_per_s = 1.0 - rate - MAX_DRIFT
     stale_after = config.deadman.telemetry_stale / lag_per_s if lag_per_s > 0.0 else inf
     uncertainty = evidence.samples.longest_pause / max(evidence.counting_time, 1e-3)
-    too_slow = lag_per_s > uncertainty
-    differs = abs(rate - 1.0) > MAX_DRIFT
-    because = "time limits, such as those of `deadman`, are longer or shorter than configured"
-    if too_slow:
-        because = (
+    is_too_slow = lag_per_s > uncertainty
+    rate_differs = abs(rate - 1.0) > MAX_DRIFT
+    consequence = "time limits, such as those of `deadman`, are longer or shorter than configured"
+    if is_too_slow:
+        consequence = (
             f"within {stale_after:.0f} s the vehicle's samples would count as older than "
             "deadman.telemetry_stale_ms"
         )
     return Finding(
         Key.CLOCK,
-        UNSAFE if too_slow else INEFFECTIVE,
+        UNSAFE if is_too_slow else INEFFECTIVE,
         f"the vehicle's clock runs {rate:.3f} times as fast as ours",
-        because,
+        consequence,
         "run a simulation at the speed of real time, or in lockstep",
         source,
-    ).safe_unless(differs)
+    ).safe_unless(rate_differs)

@@ -39,7 +39,7 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """
     if not config.vehicle.response_known:
         return
-    folder, measured = _newest_dead_times(config, evidence.identity.uid)
+    folder, measured_dead_times = _newest_dead_times(config, evidence.identity.uid)
     if folder is None:
         yield Finding(
             Key.DEAD_TIME,
@@ -50,18 +50,21 @@ def dead_time(config: Config, evidence: Evidence) -> Iterator[Finding]:
             source="summary.json",
         )
         return
-    configured = {name: axis.dead_time for name, axis in config.vehicle.axes.items()}
-    axes = {name: AxisDeadTime(measured.get(name), value) for name, value in configured.items()}
+    configured_dead_times = {name: axis.dead_time for name, axis in config.vehicle.axes.items()}
+    axes = {
+        name: AxisDeadTime(measured_dead_times.get(name), value)
+        for name, value in configured_dead_times.items()
+    }
     warning = DeadTimes(axes).warning()
     if warning is None:
-        found = f"in {folder.name} the dead time was as configured"
-        yield Finding(Key.DEAD_TIME, SAFE, found, source=str(folder))
+        fact = f"in {folder.name} the dead time was as configured"
+        yield Finding(Key.DEAD_TIME, SAFE, fact, source=str(folder))
         return
-    found, _semicolon, fix = warning.partition("; ")
+    fact, _semicolon, fix = warning.partition("; ")
     yield Finding(
         Key.DEAD_TIME,
         INEFFECTIVE,
-        f"in {folder.name} the {found}",
+        f"in {folder.name} the {fact}",
         "the planner predicts the wrong attitude",
         fix,
         str(folder),
@@ -77,12 +80,13 @@ def doubtful_values(config: Config, _: Evidence) -> Iterator[Finding]:
 
 def identified_autopilot(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the response in `vehicle` was identified on a vehicle with this autopilot."""
-    known, flown = config.vehicle.autopilot, evidence.autopilot.name
-    if known is not None and known != flown:
+    identified_on, connected_autopilot = config.vehicle.autopilot, evidence.autopilot.name
+    if identified_on is not None and identified_on != connected_autopilot:
         yield Finding(
             Key.IDENTIFIED_ON,
             INEFFECTIVE,
-            f"`vehicle` was identified on {known}, and this vehicle flies {flown}",
+            f"`vehicle` was identified on {identified_on}, and this vehicle flies "
+            f"{connected_autopilot}",
             "the planner predicts another vehicle's response: steps bend, and the hold may swing",
             "run `companion identify` on this vehicle, and include the file that it writes",
             "vehicle.autopilot",
@@ -106,13 +110,13 @@ def tilt_compensation(config: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def unknown_accept_entries(config: Config, _: Evidence) -> Iterator[Finding]:
     """Whether each entry of `flight.accept` names a check that exists."""
-    streams = {
+    stream_keys = {
         f"{Key.STREAMS}.{name}" for autopilot in AUTOPILOTS for name in autopilot.wanted_rates
     }
-    limits = {"link.min_attitude_rate_hz", "link.min_position_rate_hz"}
-    parameters = {rule.name for autopilot in AUTOPILOTS for rule in autopilot.parameters}
+    limit_keys = {"link.min_attitude_rate_hz", "link.min_position_rate_hz"}
+    parameter_names = {rule.name for autopilot in AUTOPILOTS for rule in autopilot.parameters}
     for name in config.flight.accept:
-        if name not in {*Key, *streams, *limits, *parameters}:
+        if name not in {*Key, *stream_keys, *limit_keys, *parameter_names}:
             yield Finding(
                 Key.ACCEPT,
                 INEFFECTIVE,
@@ -129,24 +133,24 @@ def _newest_dead_times(config: Config, uid: str | None) -> tuple[Path | None, di
     A flight is comparable if vehicle (hardware id), planner and gain are the same; all vehicles
     without an id count as the same. None and no dead times: there is no comparable flight.
     """
-    wanted_flight = uid, config.planner_name, config.planner.gain_per_s
+    comparable_flight = uid, config.planner_name, config.planner.gain_per_s
     for summary in sorted(config.recording.directory.glob("*/summary.json"), reverse=True):
         try:
-            flight = json.loads(summary.read_text(encoding="utf-8"))
+            flight_summary = json.loads(summary.read_text(encoding="utf-8"))
             if (
-                flight.get("vehicle_uid"),
-                flight["planner"],
-                flight["gain_per_s"],
-            ) != wanted_flight:
+                flight_summary.get("vehicle_uid"),
+                flight_summary["planner"],
+                flight_summary["gain_per_s"],
+            ) != comparable_flight:
                 continue
-            axes = {name: flight["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
+            axes = {name: flight_summary["dead_time_s"][name] for name in ("roll", "pitch", "yaw")}
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             continue  # written by another program, or cut off
-        known = {
+        dead_times = {
             name: float(value)
             for name, value in axes.items()
             if isinstance(value, int | float) and isfinite(value)
         }
-        if known:
-            return summary.parent, known
+        if dead_times:
+            return summary.parent, dead_times
     return None, {}

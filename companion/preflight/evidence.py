@@ -101,7 +101,7 @@ class OtherNodes:
     autopilots: set[tuple[int, int]] = field(default_factory=set)
     """Nodes whose heartbeat shows an autopilot that this program supports."""
     setpoint_senders: set[tuple[int, int]] = field(default_factory=set)
-    target_is_foreign: bool = False
+    has_foreign_attitude_target: bool = False
     """Whether ATTITUDE_TARGET shows rates or thrust while the vehicle is disarmed, so that another
     node must have sent setpoints."""
 

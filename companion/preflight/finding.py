@@ -85,9 +85,9 @@ class Finding:
     key: str
     """A `Key`, the newest name of a parameter, or the key of a message rate."""
     result: CheckResult
-    found: str
+    fact: str
     """The fact, as a clause."""
-    because: str = ""
+    consequence: str = ""
     """The consequence, or the effect of the parameter; may be empty."""
     fix: str = ""
     """What the user should do; empty if there is nothing to do."""
@@ -98,10 +98,10 @@ class Finding:
 
     def safe_unless(self, problem: bool) -> "Finding":
         """This finding if there is a problem; else a safe finding with the same fact and source."""
-        return self if problem else replace(self, result=SAFE, because="", fix="")
+        return self if problem else replace(self, result=SAFE, consequence="", fix="")
 
     def sentence(self) -> str:
         """The finding without its source, for the user."""
-        because = f": {self.because}" if self.because else ""
+        consequence = f": {self.consequence}" if self.consequence else ""
         fix = f"; {self.fix}" if self.fix else ""
-        return f"{self.found}{because}{fix}"
+        return f"{self.fact}{consequence}{fix}"

@@ -17,15 +17,15 @@ _MAX_DAMAGED_SHARE = 0.01
 def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Check the link for lost messages, damaged messages and reconnects."""
     link = evidence.link
-    share = link.loss
+    lost_share = link.loss
     yield Finding(
         Key.LOSS,
-        UNSAFE if share > _UNSAFE_LOSS_SHARE else INEFFECTIVE,
-        f"{100.0 * share:.1f} % of the vehicle's messages are lost",
+        UNSAFE if lost_share > _UNSAFE_LOSS_SHARE else INEFFECTIVE,
+        f"{100.0 * lost_share:.1f} % of the vehicle's messages are lost",
         "our setpoints are lost, too, and we see the pilot's mode changes late",
         "lower link.attitude_rate_hz and link.position_rate_hz, or use a better link",
         "gaps in MAVLink sequence numbers",
-    ).safe_unless(share > TOLERABLE_LOSS)
+    ).safe_unless(lost_share > TOLERABLE_LOSS)
     if link.damaged_count > _MAX_DAMAGED_SHARE * max(1, link.frame_count):
         yield Finding(
             Key.DAMAGE,
@@ -57,7 +57,7 @@ def losses(_: Config, evidence: Evidence) -> Iterator[Finding]:
 
 def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Round trip, its jitter, and pauses between samples."""
-    stale = config.deadman.telemetry_stale
+    stale_after = config.deadman.telemetry_stale
     round_trip, jitter = evidence.link.round_trip, evidence.link.jitter
     if round_trip is None or jitter is None:
         yield Finding(
@@ -68,12 +68,12 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "check whether a router on the way blocks TIMESYNC",
             "TIMESYNC",
         )
-    elif round_trip > stale:
+    elif round_trip > stale_after:
         yield Finding(
             Key.ROUND_TRIP,
             UNSAFE,
             f"the link's round trip takes {1e3 * round_trip:.0f} ms, longer than "
-            f"deadman.telemetry_stale_ms = {1e3 * stale:g}",
+            f"deadman.telemetry_stale_ms = {1e3 * stale_after:g}",
             fix="use a faster link",
             source="TIMESYNC",
         )
@@ -86,14 +86,14 @@ def delays(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "the planner assumes a constant dead time",
             "find what delays the messages: a router, Wi-Fi, a busy computer",
             "TIMESYNC",
-        ).safe_unless(jitter > 0.5 * stale)
+        ).safe_unless(jitter > 0.5 * stale_after)
     samples = evidence.samples
-    if samples.longest_pause > stale:
+    if samples.longest_pause > stale_after:
         yield Finding(
             Key.PAUSES,
             INEFFECTIVE,
             f"attitude paused for {1e3 * samples.longest_pause:.0f} ms, longer than "
-            f"deadman.telemetry_stale_ms = {1e3 * stale:g}",
+            f"deadman.telemetry_stale_ms = {1e3 * stale_after:g}",
             "setpoints pause with it",
             "find what delays the messages: a router, Wi-Fi, a busy computer",
             "ATTITUDE_QUATERNION",
@@ -110,18 +110,18 @@ def signing_findings(
 ) -> Iterator[Finding]:
     """Convert notices of the link about signatures and the peer to findings with this `result`."""
     for notice in notices:
-        of_peer = notice.startswith(PEER_NOTICE)
-        found, _semicolon, fix = notice.removeprefix(PEER_NOTICE).partition("; ")
-        key = Key.ENDPOINT if of_peer else Key.SIGNING
-        source = "senders' addresses" if of_peer else "MAVLink 2 signatures"
-        yield Finding(key, result, found, fix=fix, source=source)
+        is_about_peer = notice.startswith(PEER_NOTICE)
+        fact, _semicolon, fix = notice.removeprefix(PEER_NOTICE).partition("; ")
+        key = Key.ENDPOINT if is_about_peer else Key.SIGNING
+        source = "senders' addresses" if is_about_peer else "MAVLink 2 signatures"
+        yield Finding(key, result, fact, fix=fix, source=source)
 
 
 def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether other nodes use our ids, are companion computers or vehicles, or send setpoints."""
-    link, others = config.link, evidence.other_nodes
+    link, nodes = config.link, evidence.other_nodes
     our_ids = link.source_system, link.source_component
-    if our_ids in others.sources:
+    if our_ids in nodes.sources:
         yield Finding(
             Key.OUR_IDS,
             UNSAFE,
@@ -131,7 +131,7 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "a forwarder on the link may send our own frames back to us",
             "frames heard",
         )
-    for system, component in sorted(others.companions - {our_ids}):
+    for system, component in sorted(nodes.companions - {our_ids}):
         yield Finding(
             Key.SECOND_COMPANION,
             INEFFECTIVE,
@@ -140,7 +140,7 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "make sure that it only listens",
             "HEARTBEAT of type onboard controller",
         )
-    for system, component in sorted(others.autopilots):
+    for system, component in sorted(nodes.autopilots):
         if system == link.target_system:
             continue  # a device of our vehicle
         yield Finding(
@@ -151,8 +151,8 @@ def other_nodes(config: Config, evidence: Evidence) -> Iterator[Finding]:
             "make sure that link.target_system is the vehicle that shall fly",
             "HEARTBEAT of an autopilot",
         )
-    senders = sorted(others.setpoint_senders)
-    if senders or others.target_is_foreign:
+    senders = sorted(nodes.setpoint_senders)
+    if senders or nodes.has_foreign_attitude_target:
         sender_names = ", ".join(f"{system}/{component}" for system, component in senders)
         yield Finding(
             Key.OTHER_SETPOINTS,

@@ -44,54 +44,61 @@ class LinkListener:
     def __init__(self, link: Link, clock: Callable[[], float]) -> None:
         self._link, self._clock = link, clock
         # Arrival by our clock, and time stamp of the vehicle, s.
-        self._stamps: list[tuple[float, float]] = []
-        self._ages: list[float] = []
-        self._clock_changes = link.clock.change_count
+        self._sample_times: list[tuple[float, float]] = []
+        self._sample_ages: list[float] = []
+        self._clock_change_count = link.clock.change_count
         self._unusable_count = 0
         self.other_nodes = OtherNodes()
-        self._resets_before: int | None = None
+        self._newest_reset_counter: int | None = None
         self.reset_count = 0
 
     def __enter__(self) -> "LinkListener":
-        self._on_foreign_before, self._link.on_foreign_frame = (
+        self._previous_on_foreign, self._link.on_foreign_frame = (
             self._link.on_foreign_frame,
-            self._on_foreign,
+            self._on_foreign_frame,
         )
         self._unsubscribe = [
             self._link.subscribe("ATTITUDE_QUATERNION", self._on_attitude),
-            self._link.subscribe("ATTITUDE_TARGET", self._on_target),
+            self._link.subscribe("ATTITUDE_TARGET", self._on_attitude_target),
             self._link.subscribe("ODOMETRY", self._on_odometry),
         ]
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._link.on_foreign_frame = self._on_foreign_before
+        self._link.on_foreign_frame = self._previous_on_foreign
         for unsubscribe in self._unsubscribe:
             unsubscribe()
 
     @property
     def samples(self) -> SampleTimes:
         """The attitude samples so far."""
-        pairs = list(pairwise(self._stamps))
-        if not pairs:
-            return SampleTimes(len(self._stamps), unusable_count=self._unusable_count)
-        (first, first_stamp), (last, last_stamp) = self._stamps[0], self._stamps[-1]
-        enough = len(self._stamps) >= _MIN_SAMPLES and last > first
-        arrivals, clock = IntervalSums(), self._link.clock
-        for earlier, later in pairs:
-            arrivals.add(later[0] - earlier[0])
+        sample_pairs = list(pairwise(self._sample_times))
+        if not sample_pairs:
+            return SampleTimes(len(self._sample_times), unusable_count=self._unusable_count)
+        (first_arrival, first_stamp), (last_arrival, last_stamp) = (
+            self._sample_times[0],
+            self._sample_times[-1],
+        )
+        enough_samples = len(self._sample_times) >= _MIN_SAMPLES and last_arrival > first_arrival
+        arrival_intervals, clock = IntervalSums(), self._link.clock
+        for earlier, later in sample_pairs:
+            arrival_intervals.add(later[0] - earlier[0])
         return SampleTimes(
-            sample_count=len(self._stamps),
-            longest_pause=max(later[0] - earlier[0] for earlier, later in pairs),
-            not_newer_count=sum(later[1] <= earlier[1] for earlier, later in pairs),
+            sample_count=len(self._sample_times),
+            longest_pause=max(later[0] - earlier[0] for earlier, later in sample_pairs),
+            not_newer_count=sum(later[1] <= earlier[1] for earlier, later in sample_pairs),
             unusable_count=self._unusable_count,
-            clock_rate=(last_stamp - first_stamp) / (last - first) if enough else None,
-            age=median(self._ages) if self._ages and clock.age_known else None,
-            clock_change=clock.last_change if clock.change_count != self._clock_changes else "",
-            rate=arrivals.rate_since(IntervalSums()) if enough else None,
+            clock_rate=(last_stamp - first_stamp) / (last_arrival - first_arrival)
+            if enough_samples
+            else None,
+            age=median(self._sample_ages) if self._sample_ages and clock.age_known else None,
+            clock_change=clock.last_change
+            if clock.change_count != self._clock_change_count
+            else "",
+            rate=arrival_intervals.rate_since(IntervalSums()) if enough_samples else None,
         )
 
-    def _on_foreign(self, frame: Frame) -> None:
+    def _on_foreign_frame(self, frame: Frame) -> None:
         source = frame.system, frame.component
         self.other_nodes.sources.add(source)
         if frame.message_id in _SETPOINT_IDS:
@@ -106,20 +113,25 @@ class LinkListener:
 
     def _on_attitude(self, message: Message) -> None:
         now, clock = self._clock(), self._link.clock
-        self._stamps.append((now, message.time_boot_ms / 1000.0))
+        self._sample_times.append((now, message.time_boot_ms / 1000.0))
         age = clock.age(clock.vehicle_time(message.time_boot_ms), now)
         if age is not None:
-            self._ages.append(age)
+            self._sample_ages.append(age)
         rates = message.rollspeed, message.pitchspeed, message.yawspeed
-        usable = is_unit((message.q1, message.q2, message.q3, message.q4))
-        self._unusable_count += not (usable and all(map(isfinite, rates)))
+        is_unit_quaternion = is_unit((message.q1, message.q2, message.q3, message.q4))
+        self._unusable_count += not (is_unit_quaternion and all(map(isfinite, rates)))
 
-    def _on_target(self, message: Message) -> None:
+    def _on_attitude_target(self, message: Message) -> None:
         rates = message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate
-        moving = any(abs(value) > _MAX_IDLE_TARGET for value in (*rates, message.thrust))
-        self.other_nodes.target_is_foreign |= moving and self._link.state.armed is False
+        is_active = any(abs(value) > _MAX_IDLE_TARGET for value in (*rates, message.thrust))
+        self.other_nodes.has_foreign_attitude_target |= (
+            is_active and self._link.state.armed is False
+        )
 
     def _on_odometry(self, message: Message) -> None:
-        before, self._resets_before = self._resets_before, message.reset_counter
-        if before is not None:
-            self.reset_count += (message.reset_counter - before) & 0xFF
+        counter_before, self._newest_reset_counter = (
+            self._newest_reset_counter,
+            message.reset_counter,
+        )
+        if counter_before is not None:
+            self.reset_count += (message.reset_counter - counter_before) & 0xFF

@@ -42,14 +42,14 @@ class WorstReach(NamedTuple):
         largest_distance, climb, fall: largest horizontal distance, climb and fall after the
             setpoints stop, m.
         breach: the first breach of the fence, as the end of a sentence; `None`: no breach.
-        time: when setpoints must stop to cause `breach`, s after control begins.
+        breach_time: when setpoints must stop to cause `breach`, s after control begins.
     """
 
     largest_distance: float = 0.0
     climb: float = 0.0
     fall: float = 0.0
     breach: str | None = None
-    time: float = 0.0
+    breach_time: float = 0.0
 
 
 def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
@@ -69,14 +69,16 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     if worst.breach is None:
         yield Finding(Key.OFFBOARD_LOSS, CheckResult.SAFE, reach_text, source=source)
         return
-    shortest = min_rate_hold_time(config.deadman.silence_limit)
-    shorter_hold = f"set {failsafe.parameter} to {shortest:g}, " if hold_time > shortest else ""
+    shortest_hold = min_rate_hold_time(config.deadman.silence_limit)
+    shorter_hold = (
+        f"set {failsafe.parameter} to {shortest_hold:g}, " if hold_time > shortest_hold else ""
+    )
     yield Finding(
         Key.OFFBOARD_LOSS,
         CheckResult.INEFFECTIVE,
         reach_text,
-        f"if the setpoints stop {worst.time:.1f} s after control begins, the vehicle can end "
-        f"{worst.breach}",
+        f"if the setpoints stop {worst.breach_time:.1f} s after control begins, the vehicle can "
+        f"end {worst.breach}",
         f"{shorter_hold}fly more slowly or with a lower limits.max_tilt_rate_deg_s, or farther "
         "from the fence and the ground",
         source,
@@ -93,14 +95,14 @@ def worst_reach(
     """
     fence = replace(config.fence, places=())
     max_tilt_rate = config.limits.max_tilt_rate
-    loss, worst = LossFailsafe(hold_time, brakes, drag, max_tilt_rate, fence), WorstReach()
+    loss_failsafe, worst = LossFailsafe(hold_time, brakes, drag, max_tilt_rate, fence), WorstReach()
     motion_before: MotionAtLoss | None = None
-    for time, motion in _motions(config, maneuvers, drag):
+    for time, motion in _motions_in_maneuvers(config, maneuvers, drag):
         if motion != motion_before:  # in a hover the motion stays the same
-            motion_before, reached = motion, reach(motion, loss)
-        breach, breach_time = worst.breach, worst.time
+            motion_before, reached = motion, reach(motion, loss_failsafe)
+        breach, breach_time = worst.breach, worst.breach_time
         if breach is None:
-            breach, breach_time = _breach(config, motion.offset, reached, loss.fence), time
+            breach, breach_time = _breach(config, motion.offset, reached, loss_failsafe.fence), time
         worst = WorstReach(
             max(worst.largest_distance, reached.largest_distance),
             max(worst.climb, reached.max_climb),
@@ -119,23 +121,23 @@ def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str
     """
     north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
     distance = hypot(north, east)
-    outward = 1.0 + reached.stop_radius / distance if distance > 0.0 else 1.0
-    farthest: Vector = (north * outward, east * outward, offset[2])
+    outward_factor = 1.0 + reached.stop_radius / distance if distance > 0.0 else 1.0
+    farthest: Vector = (north * outward_factor, east * outward_factor, offset[2])
     if distance == 0.0:
         farthest = (reached.stop_radius, 0.0, offset[2])
     height = config.flight.takeoff_height_m - offset[2]
-    for place, height_there in (
+    for position, position_height in (
         (farthest, height),
         ((north, east, offset[2] - reached.max_climb), height),
         ((north, east, offset[2]), height - reached.max_fall),
     ):
-        breach = fence.breach(place, height_there, None)
+        breach = fence.breach(position, position_height, None)
         if breach is not None:
             return str(breach)
     return None
 
 
-def _motions(
+def _motions_in_maneuvers(
     config: Config, maneuvers: ManeuverSequence, drag: Drag
 ) -> Iterator[tuple[float, MotionAtLoss]]:
     """Time (s after control begins) and motion at each checked point of the maneuvers.

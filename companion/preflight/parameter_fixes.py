@@ -23,7 +23,7 @@ LARGEST_FLOAT32 = 3.4028234e38
 """Largest finite 32-bit float, the type of the value in PARAM_SET."""
 
 
-class Undo(Section):
+class UndoContents(Section):
     """Contents of an undo file: the old values and their vehicle."""
 
     autopilot: ShortText
@@ -37,7 +37,7 @@ class Undo(Section):
     parameters: dict[ShortText, Annotated[float, Field(ge=-LARGEST_FLOAT32, le=LARGEST_FLOAT32)]]
     """Old value of each parameter, in the order in which they were set."""
 
-    def meant_for(self, link: Link, identity: Identity) -> bool:
+    def matches_vehicle(self, link: Link, identity: Identity) -> bool:
         """Whether the vehicle on the link is the one whose parameters were changed.
 
         Hardware ids are compared only if the undo file and the vehicle both have one.
@@ -58,24 +58,24 @@ class UndoFile:
     """
 
     def __init__(self, directory: Path, link: Link, identity: Identity) -> None:
-        began = datetime.now(UTC)
-        self.path = _unused_path(directory, f"doctor-undo-{began:%Y-%m-%dT%H-%M-%SZ}")
-        self._undo = Undo(
+        start_time = datetime.now(UTC)
+        self.path = _unused_path(directory, f"doctor-undo-{start_time:%Y-%m-%dT%H-%M-%SZ}")
+        self._undo = UndoContents(
             autopilot=link.autopilot.name,
             system=link.settings.target_system,
             uid=identity.uid,
-            time=began.isoformat(timespec="seconds"),
+            time=start_time.isoformat(timespec="seconds"),
             parameters={},
         )
 
-    def add(self, parameter: str, old: float) -> None:
+    def add(self, parameter: str, old_value: float) -> None:
         """Write a parameter's old value to the file, unless the file already holds one for it.
 
         Raises:
             ConfigError: the file cannot be written, so no parameter must be set.
         """
         old_values = dict(self._undo.parameters)
-        old_values.setdefault(parameter, old)
+        old_values.setdefault(parameter, old_value)
         self._undo = self._undo.model_copy(update={"parameters": old_values})
         text = bounded_yaml.dump(self._undo.model_dump())
         try:
@@ -112,7 +112,7 @@ class Answer(Enum):
     QUIT = "quit"
 
 
-Ask = Callable[[Finding], Awaitable[Answer]]
+AskUser = Callable[[Finding], Awaitable[Answer]]
 
 
 class ChangeOutcome(NamedTuple):
@@ -130,7 +130,7 @@ class VehicleArmedError(LinkError):
 async def apply_fixes(
     link: Link,
     findings: Iterable[Finding],
-    ask: Ask,
+    ask: AskUser,
     undo: UndoFile,
     report: Callable[[ChangeOutcome], None],
 ) -> None:
@@ -164,7 +164,7 @@ async def apply_fixes(
         report(await _set_and_read_back(link, change))
 
 
-async def restore(link: Link, undo: Undo, report: Callable[[ChangeOutcome], None]) -> None:
+async def restore(link: Link, undo: UndoContents, report: Callable[[ChangeOutcome], None]) -> None:
     """Restore the values of the undo file, the last change first.
 
     `report`: called with the outcome of each parameter.
@@ -173,15 +173,21 @@ async def restore(link: Link, undo: Undo, report: Callable[[ChangeOutcome], None
         VehicleArmedError: the vehicle is armed or may be armed; nothing more was set.
         LinkLost: the connection was lost.
     """
-    for parameter, old in reversed(undo.parameters.items()):
+    for parameter, old_value in reversed(undo.parameters.items()):
         require_disarmed(link)
         try:
-            present = float(await link.read_parameter(parameter))
+            present_value = float(await link.read_parameter(parameter))
         except ParameterError as error:
-            report(ChangeOutcome(ParameterChange(parameter, old, old, reboot=False), str(error)))
+            report(
+                ChangeOutcome(
+                    ParameterChange(parameter, old_value, old_value, reboot=False), str(error)
+                )
+            )
             continue
         report(
-            await _set_and_read_back(link, ParameterChange(parameter, present, old, reboot=False))
+            await _set_and_read_back(
+                link, ParameterChange(parameter, present_value, old_value, reboot=False)
+            )
         )
 
 

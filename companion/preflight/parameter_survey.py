@@ -44,11 +44,11 @@ class Survey(NamedTuple):
     unread_names: frozenset[str] = frozenset()
     """Newest names of the parameters that were not read, although the autopilot may have them: it
     did not report them as unknown."""
-    lossy: bool = False
+    link_loses_frames: bool = False
     """Whether the link lost frames during the survey, in either direction."""
 
 
-async def survey(
+async def survey_parameters(
     link: Link,
     rules: Iterable[ParameterRule],
     *,
@@ -67,25 +67,25 @@ async def survey(
         LinkLost: the connection was lost.
     """
     rules, requests = tuple(rules), _Requests(link)
-    unread: frozenset[str] = frozenset()
+    unread_names: frozenset[str] = frozenset()
     if earlier_survey is not None:
-        unread = earlier_survey.unread_names
+        unread_names = earlier_survey.unread_names
         rules = tuple(rule for rule in rules if rule.name in earlier_survey.values)
-        requests.leave_out(
+        requests.skip_names(
             name
             for rule in rules
             for name in rule.names
             if name != earlier_survey.present_names[rule.name]
         )
-    await requests.ask(rules, _FIRST_ROUND)
+    await requests.request(rules, _FIRST_ROUND)
     # An autopilot that answered nothing at all is a finding of its own.
-    if requests.values and requests.lossy:
-        await requests.ask(requests.unread_rules(rules), _SECOND_ROUND)
+    if requests.values and requests.link_loses_frames:
+        await requests.request(requests.unread_rules(rules), _SECOND_ROUND)
     return Survey(
         requests.values,
         requests.present_names,
-        unread.union(rule.name for rule in requests.unread_rules(rules)),
-        requests.lossy,
+        unread_names.union(rule.name for rule in requests.unread_rules(rules)),
+        requests.link_loses_frames,
     )
 
 
@@ -100,23 +100,25 @@ class _Requests:
         self.values: dict[str, float] = {}
         self.present_names: dict[str, str] = {}
         self._link = link
-        self._frames, self._lost = link.stats.frames, link.stats.lost
+        self._frames_before, self._lost_frames_before = link.stats.frames, link.stats.lost
         self._request_slots = asyncio.Semaphore(_MAX_OPEN_REQUESTS)
         self._skipped_names: set[str] = set()
-        self._repeated = False
+        self._request_was_repeated = False
 
     @property
-    def lossy(self) -> bool:
+    def link_loses_frames(self) -> bool:
         """Whether more than `TOLERABLE_LOSS` of the frames were lost, or a request was repeated.
 
         Gaps in sequence numbers show lost frames of the vehicle. An answer to a repeated request
         shows that the earlier request or its answer was lost.
         """
         stats = self._link.stats
-        lost = share_lost(stats.frames - self._frames, stats.lost - self._lost)
-        return self._repeated or lost > TOLERABLE_LOSS
+        lost_share = share_lost(
+            stats.frames - self._frames_before, stats.lost - self._lost_frames_before
+        )
+        return self._request_was_repeated or lost_share > TOLERABLE_LOSS
 
-    def leave_out(self, names: Iterable[str]) -> None:
+    def skip_names(self, names: Iterable[str]) -> None:
         """Do not request these names, because this autopilot uses other names."""
         self._skipped_names.update(names)
 
@@ -128,11 +130,11 @@ class _Requests:
             if rule.name not in self.values and not self._skipped_names.issuperset(rule.names)
         ]
 
-    async def ask(self, rules: Iterable[ParameterRule], policy: RetryPolicy) -> None:
+    async def request(self, rules: Iterable[ParameterRule], policy: RetryPolicy) -> None:
         """Request all of these parameters. Raises `LinkLost`."""
-        await asyncio.gather(*(self._ask_under_each_name(rule, policy) for rule in rules))
+        await asyncio.gather(*(self._request_under_each_name(rule, policy) for rule in rules))
 
-    async def _ask_under_each_name(self, rule: ParameterRule, policy: RetryPolicy) -> None:
+    async def _request_under_each_name(self, rule: ParameterRule, policy: RetryPolicy) -> None:
         async with self._request_slots:
             for name in rule.names:
                 value = (
@@ -153,6 +155,6 @@ class _Requests:
                 return None
             except ParameterRefused:
                 return None
-            self._repeated = self._repeated or attempt > 0
+            self._request_was_repeated = self._request_was_repeated or attempt > 0
             return float(value)
         return None

@@ -59,9 +59,9 @@ def parameters(config: Config, evidence: Evidence) -> Iterator[Finding]:
         yield _finding(result, survey.present_names[result.rule.name])
 
 
-def _unknown_value_finding(rule: ParameterRule, found: str, fix: str) -> Finding:
-    because = f"it is unknown {rule.meaning}"
-    return Finding(rule.name, CheckResult.UNSAFE, found, because, fix, rule.source)
+def _unknown_value_finding(rule: ParameterRule, fact: str, fix: str) -> Finding:
+    consequence = f"it is unknown {rule.meaning}"
+    return Finding(rule.name, CheckResult.UNSAFE, fact, consequence, fix, rule.source)
 
 
 def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
@@ -71,18 +71,18 @@ def _missing_parameters(evidence: Evidence) -> Iterator[Finding]:
     One finding names all other missing parameters.
     """
     survey = evidence.survey
-    lossy = survey.lossy or evidence.link.loss > TOLERABLE_LOSS
+    link_loses_frames = survey.link_loses_frames or evidence.link.loss > TOLERABLE_LOSS
     rules = [rule for rule in evidence.autopilot.parameters if not rule.vital]
     unread_rules = [
         rule for rule in rules if rule.in_all_versions and _may_exist_unread(rule, survey)
     ]
     missing_names = [rule.name for rule in unread_rules]
-    if lossy:
+    if link_loses_frames:
         for rule in unread_rules:
-            found = f"{rule.name} was not received, and the link loses frames"
-            yield _unknown_value_finding(rule, found, "fix the link")
-        others = (rule.name for rule in rules if rule.name in survey.unread_names)
-        missing_names = [name for name in others if name not in missing_names]
+            fact = f"{rule.name} was not received, and the link loses frames"
+            yield _unknown_value_finding(rule, fact, "fix the link")
+        unread_names = (rule.name for rule in rules if rule.name in survey.unread_names)
+        missing_names = [name for name in unread_names if name not in missing_names]
     if missing_names:
         yield Finding(
             Key.PARAMETERS,

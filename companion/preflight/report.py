@@ -48,8 +48,8 @@ def _entries(findings: Iterable[Finding], accepted: Sequence[str]) -> Renderable
     table.add_column()
     table.add_column()
     for finding in findings:
-        because = f": {finding.because}" if finding.because else ""
-        entry = Text(f"{finding.found}{because}")
+        consequence = f": {finding.consequence}" if finding.consequence else ""
+        entry = Text(f"{finding.fact}{consequence}")
         if finding.result is not CheckResult.SAFE:
             if finding.fix:
                 entry.append(f"\nWhat to do: {finding.fix}", style="bold")
@@ -61,14 +61,16 @@ def _entries(findings: Iterable[Finding], accepted: Sequence[str]) -> Renderable
 
 
 def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
-    refused, unsafe_count = unaccepted_findings(config, findings), len(unsafe_findings(findings))
+    unaccepted, unsafe_count = unaccepted_findings(config, findings), len(unsafe_findings(findings))
     result = overall_result(config, findings)
     if result is CheckResult.NOT_CONNECTED:
         return Text("not connected: nothing was checked", style="bold red")
-    if refused:
-        fixable = sum(finding.change is not None for finding in refused)
-        fix = f"; `companion doctor --fix` fixes {fixable} of them" if fixable else ""
-        return Text(f"{len(refused)} unsafe: `companion fly` refuses to fly{fix}", style="bold red")
+    if unaccepted:
+        fixable_count = sum(finding.change is not None for finding in unaccepted)
+        fix = f"; `companion doctor --fix` fixes {fixable_count} of them" if fixable_count else ""
+        return Text(
+            f"{len(unaccepted)} unsafe: `companion fly` refuses to fly{fix}", style="bold red"
+        )
     if result is CheckResult.NOT_READY:
         return Text(
             "not ready: run again when the vehicle is ready; some checks could not be made",
@@ -76,10 +78,10 @@ def _last_line(config: Config, findings: Sequence[Finding]) -> Text:
         )
     if unsafe_count:
         return Text(f"{unsafe_count} unsafe, each excepted by flight.accept", style="bold yellow")
-    ineffective = sum(finding.result is CheckResult.INEFFECTIVE for finding in findings)
+    ineffective_count = sum(finding.result is CheckResult.INEFFECTIVE for finding in findings)
     ending = (
-        f"; {ineffective} ineffective, see above"
-        if ineffective
+        f"; {ineffective_count} ineffective, see above"
+        if ineffective_count
         else ": `companion fly` flies this vehicle"
     )
     return Text(f"nothing unsafe was found{ending}", style="bold green")
@@ -117,8 +119,8 @@ def _finding_as_dict(config: Config, finding: Finding) -> dict[str, Any]:
         "key": str(finding.key),
         "result": finding.result.value,
         "accepted": finding.key in config.flight.accept,
-        "found": finding.found,
-        "because": finding.because,
+        "found": finding.fact,
+        "because": finding.consequence,
         "fix": finding.fix,
         "source": finding.source,
         "change": None if finding.change is None else finding.change._asdict(),

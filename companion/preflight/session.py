@@ -19,7 +19,7 @@ from companion.preflight.evidence import Evidence, Identity, LinkQuality, Stage
 from companion.preflight.finding import Finding, Key
 from companion.preflight.link_checks import signing_findings
 from companion.preflight.link_listener import LinkListener
-from companion.preflight.parameter_survey import Survey, survey
+from companion.preflight.parameter_survey import Survey, survey_parameters
 from companion.vehicle.clock_estimates import DelayUnknown
 from companion.vehicle.link import Link
 from companion.vehicle.parameter_rules import CheckResult
@@ -69,10 +69,10 @@ async def gather(
         LinkLost: the connection was lost.
     """
     loop = asyncio.get_running_loop()
-    before, began = replace(link.stats), loop.time()
+    stats_before, start_time = replace(link.stats), loop.time()
     with LinkListener(link, loop.time) as listener:
-        parameters_read, achieved, identity = await asyncio.gather(
-            survey(link, link.autopilot.parameters, earlier_survey=earlier_survey),
+        parameter_survey, achieved, identity = await asyncio.gather(
+            survey_parameters(link, link.autopilot.parameters, earlier_survey=earlier_survey),
             link.measure_rates(granted, seconds),
             _identity_and_texts(link) if prearm_checks else request_identity(link),
         )
@@ -80,17 +80,17 @@ async def gather(
     return Evidence(
         autopilot=link.autopilot,
         state=link.state,
-        survey=parameters_read,
+        survey=parameter_survey,
         streams={name: rate._replace(achieved=achieved[name]) for name, rate in granted.items()},
         received_counts={name: counts.get(message_id(name), 0) for name in granted},
         counting_time=seconds,
-        link=_link_quality(link, before, tuple(notices)),
+        link=_link_quality(link, stats_before, tuple(notices)),
         samples=listener.samples,
         other_nodes=listener.other_nodes,
         reset_count=listener.reset_count,
         identity=identity,
         stage=stage,
-        warnings=_warnings(link, began),
+        warnings=_warnings(link, start_time),
     )
 
 
@@ -110,10 +110,10 @@ async def request_identity(link: Link) -> Identity:
         received = await link.request_message("AUTOPILOT_VERSION")
     except (CommandRefused, LinkTimeout):
         return Identity()
-    number, uid, uid2 = received.flight_sw_version, received.uid, received.uid2
-    version = ".".join(str(number >> shift & 0xFF) for shift in (24, 16, 8))
+    version_number, uid, uid2 = received.flight_sw_version, received.uid, received.uid2
+    version = ".".join(str(version_number >> shift & 0xFF) for shift in (24, 16, 8))
     return Identity(
-        version=version + _RELEASE_SUFFIXES.get(number & 0xFF, ""),
+        version=version + _RELEASE_SUFFIXES.get(version_number & 0xFF, ""),
         capabilities=received.capabilities,
         uid=bytes(uid2).hex() if any(uid2) else f"{uid:016x}" if uid else None,
     )
@@ -128,14 +128,14 @@ async def _identity_and_texts(link: Link) -> Identity:
     return await request_identity(link)
 
 
-def _link_quality(link: Link, before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:
-    now = link.stats
+def _link_quality(link: Link, stats_before: LinkStats, notices: tuple[str, ...]) -> LinkQuality:
+    stats_now = link.stats
     return LinkQuality(
-        frame_count=now.frames - before.frames,
-        lost_count=now.lost - before.lost,
-        damaged_count=now.bad_crc - before.bad_crc,
-        not_finite_count=now.non_finite - before.non_finite,
-        reconnect_count=now.reconnects - before.reconnects,
+        frame_count=stats_now.frames - stats_before.frames,
+        lost_count=stats_now.lost - stats_before.lost,
+        damaged_count=stats_now.bad_crc - stats_before.bad_crc,
+        not_finite_count=stats_now.non_finite - stats_before.non_finite,
+        reconnect_count=stats_now.reconnects - stats_before.reconnects,
         round_trip=link.timesync.round_trip_s,
         jitter=link.timesync.jitter_s,
         notices=notices,
@@ -161,7 +161,7 @@ class PreflightSession:
         except LinkTimeout as error:
             return self.unanswered_findings(error)
         except UnsupportedAutopilot as error:
-            return [_from_error(Key.SUPPORTED, CheckResult.UNSAFE, error)]
+            return [_finding_from_error(Key.SUPPORTED, CheckResult.UNSAFE, error)]
         return []
 
     def unanswered_findings(self, error: LinkError) -> list[Finding]:
@@ -169,8 +169,8 @@ class PreflightSession:
         hints = signing_findings(self._notices, CheckResult.NOT_CONNECTED)
         state = self.link.state
         if state.heartbeat is None:
-            return [*hints, _from_error(Key.HEARTBEAT, CheckResult.NOT_CONNECTED, error)]
-        silence = Finding(
+            return [*hints, _finding_from_error(Key.HEARTBEAT, CheckResult.NOT_CONNECTED, error)]
+        no_answer = Finding(
             Key.ANSWERS,
             CheckResult.NOT_CONNECTED,
             f"the vehicle is heard but does not answer: {error}",
@@ -180,10 +180,10 @@ class PreflightSession:
         )
         alarms = (vehicle_checks.armed(state), *vehicle_checks.failsafe(state))
         unsafe = (finding for finding in alarms if finding.result is CheckResult.UNSAFE)
-        return [*hints, silence, *unsafe]
+        return [*hints, no_answer, *unsafe]
 
-    async def gather(self, ready_within: float) -> Evidence:
-        """Request telemetry, wait up to `ready_within` s for readiness, and listen.
+    async def gather(self, ready_timeout: float) -> Evidence:
+        """Request telemetry, wait up to `ready_timeout` s for readiness, and listen.
 
         Raises:
             CommandTimeout: the vehicle does not answer commands; see `unanswered_findings`.
@@ -192,7 +192,7 @@ class PreflightSession:
         link = self.link
         granted = await link.set_rates(wanted_rates(self._config, link), window_s=0.1)
         with suppress(TimeoutError):
-            async with asyncio.timeout(ready_within):
+            async with asyncio.timeout(ready_timeout):
                 while self._is_waiting():  # noqa: ASYNC110 - telemetry sets no events
                     await asyncio.sleep(_POLL_PERIOD)
         return await gather(
@@ -222,6 +222,6 @@ async def open_session(
         yield PreflightSession(config, link, notices)
 
 
-def _from_error(key: Key, result: CheckResult, error: LinkError) -> Finding:
-    found, _semicolon, fix = str(error).partition("; ")
-    return Finding(key, result, found, fix=fix, source="HEARTBEAT")
+def _finding_from_error(key: Key, result: CheckResult, error: LinkError) -> Finding:
+    fact, _semicolon, fix = str(error).partition("; ")
+    return Finding(key, result, fact, fix=fix, source="HEARTBEAT")

@@ -33,41 +33,41 @@ def minimum_rates(link: LinkConfig) -> dict[str, tuple[str, float]]:
 
 def streams(config: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the requested telemetry arrives at the requested rates."""
-    smallest_rates = minimum_rates(config.link)
+    min_rates = minimum_rates(config.link)
     good_rates = []
     for name, rate in evidence.streams.items():
         fault = _rate_fault(name, rate, evidence)
         if name in evidence.awaited_messages and rate.granted >= _MIN_RATE_SHARE * rate.requested:
             continue  # `readiness` reports it
-        effective = _effective_rate(name, rate, evidence)
-        if name in smallest_rates and effective < smallest_rates[name][1]:
-            key, limit = smallest_rates[name]
-            uneven = effective < _MIN_RATE_SHARE * rate.achieved
-            arrives = f"arrives at {effective:.0f} Hz"
-            if uneven:
-                arrives = (
+        effective_rate = _effective_rate(name, rate, evidence)
+        if name in min_rates and effective_rate < min_rates[name][1]:
+            key, limit = min_rates[name]
+            is_uneven = effective_rate < _MIN_RATE_SHARE * rate.achieved
+            arrival_text = f"arrives at {effective_rate:.0f} Hz"
+            if is_uneven:
+                arrival_text = (
                     f"arrives in bursts: {rate.achieved:.0f} Hz on average, but its gaps are as "
-                    f"long as at {effective:.0f} Hz"
+                    f"long as at {effective_rate:.0f} Hz"
                 )
             yield Finding(
                 f"link.{key}",
                 UNSAFE,
-                f"{name} {arrives}, less than link.{key} = {limit:g}",
+                f"{name} {arrival_text}, less than link.{key} = {limit:g}",
                 "the flight would be controlled with data that is too old",
                 fault[1] if fault else "raise the link's speed",
                 source="counted",
             )
         elif fault is not None:
-            found, fix = fault
-            because = "what depends on this message is delayed or does not work"
+            fact, fix = fault
+            consequence = "what depends on this message is delayed or does not work"
             yield Finding(
-                f"{Key.STREAMS}.{name}", INEFFECTIVE, found, because, fix, source="counted"
+                f"{Key.STREAMS}.{name}", INEFFECTIVE, fact, consequence, fix, source="counted"
             )
         else:
             good_rates.append(_good_rate(name, rate, evidence))
     if good_rates:
-        found = f"telemetry arrives, Hz: {', '.join(good_rates)}"
-        yield Finding(Key.STREAMS, SAFE, found, source="counted")
+        fact = f"telemetry arrives, Hz: {', '.join(good_rates)}"
+        yield Finding(Key.STREAMS, SAFE, fact, source="counted")
 
 
 def _effective_rate(name: str, rate: StreamRate, evidence: Evidence) -> float:
@@ -89,9 +89,13 @@ def _rate_fault(name: str, rate: StreamRate, evidence: Evidence) -> tuple[str, s
             f"{name}: asked for {expected:g} Hz, granted {rate.granted:g} Hz",
             f"lower {key}, or {faster_loop}" if key else faster_loop,
         )
-    countable = _is_countable(name, rate, evidence)
+    is_countable = _is_countable(name, rate, evidence)
     expected = _expected_rate(name, rate)
-    if achieved >= _MIN_RATE_SHARE * expected if countable else evidence.received_counts[name] > 0:
+    if (
+        achieved >= _MIN_RATE_SHARE * expected
+        if is_countable
+        else evidence.received_counts[name] > 0
+    ):
         return None
     return (
         f"{name} arrives at {achieved:.0f} Hz, asked for {expected:g} Hz",
@@ -116,7 +120,7 @@ def _good_rate(name: str, rate: StreamRate, evidence: Evidence) -> str:
         return f"{name} on change, otherwise at {_SENT_ON_CHANGE[name]:g} Hz"
     if not _is_countable(name, rate, evidence):
         return f"{name} (asked for {rate.requested:g}, too seldom to be counted here)"
-    share = f"{name} {rate.achieved:.0f} of {rate.requested:g}"
+    rate_text = f"{name} {rate.achieved:.0f} of {rate.requested:g}"
     if rate.achieved >= _FULL_RATE_SHARE * rate.requested:
-        return share
-    return f"{share} ({100.0 * _MIN_RATE_SHARE:.0f} % suffices)"
+        return rate_text
+    return f"{rate_text} ({100.0 * _MIN_RATE_SHARE:.0f} % suffices)"

@@ -29,7 +29,7 @@ def armed(state: VehicleState) -> Finding:
 def battery(config: Config, state: VehicleState) -> Finding:
     """Whether the battery has enough charge, as far as the vehicle reports it."""
     remaining = None if state.battery is None else state.battery.remaining
-    least = config.limits.min_battery_percent
+    min_percent = config.limits.min_battery_percent
     source = "BATTERY_STATUS, SYS_STATUS"
     if state.battery_silent:
         return Finding(
@@ -49,11 +49,12 @@ def battery(config: Config, state: VehicleState) -> Finding:
             "set the battery's capacity or number of cells in the autopilot",
             source,
         )
-    if remaining < least / 100.0:
+    if remaining < min_percent / 100.0:
         return Finding(
             Key.BATTERY,
             UNSAFE,
-            f"battery at {100 * remaining:.0f} %, below limits.min_battery_percent = {least:g}",
+            f"battery at {100 * remaining:.0f} %, below "
+            f"limits.min_battery_percent = {min_percent:g}",
             fix="charge it",
             source=source,
         )
@@ -93,26 +94,26 @@ def readiness(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether the autopilot is ready; if not, its own reasons."""
     state, stage = evidence.state, evidence.stage
     yield from failsafe(state)
-    ready = state.readiness
+    ready_state = state.readiness
     if stage is Stage.AIRBORNE:  # the pre-arm checks no longer apply
-        ready = ready._replace(prearm_passed=True)
-    missing = evidence.autopilot.why_not_ready(ready)
+        ready_state = ready_state._replace(prearm_passed=True)
+    missing_condition = evidence.autopilot.why_not_ready(ready_state)
     texts = "; ".join(dict.fromkeys(evidence.warnings))
-    if missing is not None:
+    if missing_condition is not None:
         awaited = evidence.awaited_messages
         unsent = f", and does not send {', '.join(awaited)} yet" if awaited else ""
         yield Finding(
             Key.READY,
             NOT_READY,
-            f"not ready {stage.value}, it lacks {missing}{unsent}",
+            f"not ready {stage.value}, it lacks {missing_condition}{unsent}",
             f"the autopilot says: {texts}" if texts else "",
             "wait, or correct what the autopilot reports, and try again",
             "SYS_STATUS, estimator flags",
         )
         return
     flags = state.estimator.flags if state.estimator else 0
-    found = f"ready {stage.value}, estimator flags 0x{flags:x}"
-    yield Finding(Key.READY, SAFE, found, source="SYS_STATUS, estimator flags")
+    fact = f"ready {stage.value}, estimator flags 0x{flags:x}"
+    yield Finding(Key.READY, SAFE, fact, source="SYS_STATUS, estimator flags")
     if texts:
         yield Finding(
             Key.AUTOPILOT_TEXTS, SAFE, f"the autopilot says: {texts}", source="STATUSTEXT, EVENT"
@@ -123,11 +124,13 @@ def gps(_: Config, evidence: Evidence) -> Iterator[Finding]:
     """Whether a GPS that had a fix still has it."""
     fault, newest, source = evidence.state.gps_fault, evidence.state.gps, "GPS_RAW_INT"
     if fault is not None:
-        seen = None if newest is None else newest.satellites
+        satellites = None if newest is None else newest.satellites
         yield Finding(
             Key.GPS,
             UNSAFE,
-            fault if seen is None else f"{fault}; satellites in its last message: {seen}",
+            fault
+            if satellites is None
+            else f"{fault}; satellites in its last message: {satellites}",
             "the vehicle does not know where it is",
             "wait for a GPS fix, with a clear view of the sky",
             source,
@@ -205,14 +208,14 @@ def fence(config: Config, evidence: Evidence) -> Iterator[Finding]:
             source,
         )
         return
-    here = Place(position.latitude_deg, position.longitude_deg)
-    if inside(0.0, 0.0, local_polygon(corners, here)):
+    vehicle_place = Place(position.latitude_deg, position.longitude_deg)
+    if inside(0.0, 0.0, local_polygon(corners, vehicle_place)):
         yield Finding(Key.FENCE, SAFE, "the vehicle stands inside its fence", source=source)
         return
     yield Finding(
         Key.FENCE,
         UNSAFE,
-        f"the vehicle is at {here.latitude:.5f}, {here.longitude:.5f}, outside "
+        f"the vehicle is at {vehicle_place.latitude:.5f}, {vehicle_place.longitude:.5f}, outside "
         "safety.fence_polygon_deg",
         "the flight would end as soon as it began",
         "bring it inside, or correct the corners: each is [latitude, longitude]",
@@ -242,5 +245,5 @@ def version(_: Config, evidence: Evidence) -> Iterator[Finding]:
             "AUTOPILOT_VERSION capabilities",
         )
     else:
-        found = f"{name} {identity.version}"
-        yield Finding(Key.VERSION, SAFE, found, source="AUTOPILOT_VERSION")
+        fact = f"{name} {identity.version}"
+        yield Finding(Key.VERSION, SAFE, fact, source="AUTOPILOT_VERSION")

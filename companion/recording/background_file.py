@@ -21,9 +21,9 @@ T = TypeVar("T")
 
 _CHECK_PERIOD = 0.05
 """Time between two checks for new items, s."""
-_SMALLEST_SLICE = 20
+_MIN_SLICE_LENGTH = 20
 """Smallest number of items in a slice, unless fewer are waiting."""
-_MOST_SLICES = 50
+_MAX_SLICES = 50
 """Largest number of slices in which a backlog is written."""
 _SLICE_PAUSE = 0.001
 """Pause after a slice, s."""
@@ -35,7 +35,7 @@ class BackgroundFile(ABC, Generic[T]):
     """Writes items to a file in its own thread; it never delays or ends a flight.
 
     Items that `put` takes before `open` are written once the file is open. A subclass defines the
-    format of the file; only the thread calls the subclass's `_write`, `_sync` and `_end`.
+    format of the file; only the thread calls the subclass's `_write`, `_sync` and `_finish_file`.
 
     Attributes:
         path: path of the file.
@@ -45,20 +45,20 @@ class BackgroundFile(ABC, Generic[T]):
 
     Args:
         path: path of the file.
-        most_waiting: largest number of waiting items; further ones are dropped.
+        max_waiting: largest number of waiting items; further ones are dropped.
         on_failure: called once, with `failure`, when the file cannot be written any more: from the
             writing thread, or from `close` if the disk does not answer.
     """
 
     def __init__(
-        self, path: Path, most_waiting: int, on_failure: Callable[[str], None] | None = None
+        self, path: Path, max_waiting: int, on_failure: Callable[[str], None] | None = None
     ) -> None:
         self.path = path
         self.dropped = 0
         self.failure: str | None = None
         self._on_failure = on_failure
-        self._most_waiting = most_waiting
-        self._waiting: deque[T] = deque()
+        self._max_waiting = max_waiting
+        self._waiting_items: deque[T] = deque()
         self._closing = threading.Event()
         self._thread: threading.Thread | None = None
         self._synced_at = -inf  # so that the first items are synced at once
@@ -76,7 +76,7 @@ class BackgroundFile(ABC, Generic[T]):
         """Wait until all items are on the disk. Raises OSError like `_write`."""
 
     @abstractmethod
-    def _end(self, *, complete: bool) -> None:
+    def _finish_file(self, *, complete: bool) -> None:
         """Close the file; if `complete`, first write its end, such as an index. Raises OSError."""
 
     def open(self) -> None:
@@ -86,18 +86,20 @@ class BackgroundFile(ABC, Generic[T]):
             OSError: the file cannot be created.
         """
         self._create()
-        self._thread = threading.Thread(target=self._run, name=self.path.name, daemon=True)
+        self._thread = threading.Thread(
+            target=self._write_until_closed, name=self.path.name, daemon=True
+        )
         self._thread.start()
 
     @property
     def waiting(self) -> int:
         """Number of items that wait to be written."""
-        return len(self._waiting)
+        return len(self._waiting_items)
 
     def put(self, item: T) -> None:
         """Take one item, or drop it if too many wait."""
-        if len(self._waiting) < self._most_waiting:
-            self._waiting.append(item)
+        if len(self._waiting_items) < self._max_waiting:
+            self._waiting_items.append(item)
         else:
             self.dropped += 1
 
@@ -117,22 +119,22 @@ class BackgroundFile(ABC, Generic[T]):
         if self._thread is not None:
             self._thread.join(DISK_TIMEOUT)
             if self._thread.is_alive():
-                self.dropped += len(self._waiting)
-                self._fail(DISK_HANGS)
+                self.dropped += len(self._waiting_items)
+                self._note_failure(DISK_HANGS)
 
-    def _run(self) -> None:
+    def _write_until_closed(self) -> None:
         while not self._closing.wait(_CHECK_PERIOD):
-            self._write_waiting()
+            self._write_waiting_items()
             self._sync_when_due()
-        self._write_waiting()
-        self._catch_failure(lambda: self._end(complete=self.failure is None))
+        self._write_waiting_items()
+        self._catch_failure(lambda: self._finish_file(complete=self.failure is None))
 
-    def _write_waiting(self) -> None:
+    def _write_waiting_items(self) -> None:
         """Write the items that are waiting now; items that arrive later wait for the next call."""
-        remaining = len(self._waiting)
-        size = max(_SMALLEST_SLICE, -(-remaining // _MOST_SLICES))
+        remaining = len(self._waiting_items)
+        size = max(_MIN_SLICE_LENGTH, -(-remaining // _MAX_SLICES))
         while remaining > 0:
-            items = [self._waiting.popleft() for _ in range(min(size, remaining))]
+            items = [self._waiting_items.popleft() for _ in range(min(size, remaining))]
             remaining -= len(items)
             self._write_slice(items)
             self._sync_when_due()
@@ -150,15 +152,15 @@ class BackgroundFile(ABC, Generic[T]):
             self._catch_failure(self._sync)
             self._synced_at = monotonic()
 
-    def _catch_failure(self, work: Callable[[], None]) -> None:
+    def _catch_failure(self, file_operation: Callable[[], None]) -> None:
         try:
-            work()
+            file_operation()
         except OSError as error:
-            self._fail(reason_of(error))
+            self._note_failure(reason_of(error))
         except Exception as error:  # an item that cannot be written must not end the flight
-            self._fail(f"internal error: {error!r}")
+            self._note_failure(f"internal error: {error!r}")
 
-    def _fail(self, reason: str) -> None:
+    def _note_failure(self, reason: str) -> None:
         if self.failure is None:
             self.failure = f"{self.path}: recording stopped: {reason}; the flight goes on"
             if self._on_failure is not None:

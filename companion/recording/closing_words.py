@@ -15,7 +15,7 @@ from companion.recording.measurements.verdict import (
     Check,
     Figures,
     checks,
-    cut_steps,
+    cut_step_checks,
     is_good,
 )
 from companion.recording.what_to_do import what_to_do
@@ -23,9 +23,9 @@ from companion.recording.what_to_do import what_to_do
 _PHASES_BEFORE_TAKEOFF = ("connect", "checks", "stream", "arm", "hand over")
 _SHARED_OPTIONS = ("--endpoint", "--set")
 _SLOW_COMPUTER_MONITORS = ("deadlines", "starvation")
-LEFT_BY_USER = "stopped at once by the user"
+STOPPED_BY_USER = "stopped at once by the user"
 """Result of a flight that was cancelled, for example by Ctrl-C in a user's program."""
-_INTERRUPTED = ("interrupted by ", LEFT_BY_USER)
+_INTERRUPTED = ("interrupted by ", STOPPED_BY_USER)
 
 
 class Invocation(NamedTuple):
@@ -62,7 +62,7 @@ def closing_words(figures: Figures, invocation: Invocation | None) -> ClosingWor
         invocation: see `Invocation`; None: no next command is suggested.
     """
     completed, good = figures["result"] == "ok", is_good(figures)
-    headline, lines = _headline_and_reasons(figures) if completed else _ended_early(figures)
+    headline, lines = _headline_and_reasons(figures) if completed else _early_end_text(figures)
     return ClosingWords(
         headline,
         tuple(lines),
@@ -87,18 +87,18 @@ def _headline_and_reasons(figures: Figures) -> tuple[str, list[str]]:
         headline = f"The flight was good, as far as it could be recorded: {names}."
     else:
         headline = f"The flight was good, but the configuration does not fit the vehicle: {names}."
-    lines = _beyond_limit(failed_checks)
+    lines = _failed_check_lines(failed_checks)
     lines += [f"! {text}" for text in (*advice, *_gain_warning(figures))]
-    lines += _by_subject([check for check in flight_checks if check.good])
+    lines += _passed_check_lines([check for check in flight_checks if check.good])
     lines += [] if figures.get("drag_learned") is None else [f"  {figures['drag_learned']}"]
     return headline, [*lines, _extent_line(figures)]
 
 
-def _beyond_limit(failed_checks: list[Check]) -> list[str]:
+def _failed_check_lines(failed_checks: list[Check]) -> list[str]:
     return [f"! {check.what}: {check.found}; {check.remedy}" for check in failed_checks]
 
 
-def _by_subject(passed_checks: Sequence[Check]) -> list[str]:
+def _passed_check_lines(passed_checks: Sequence[Check]) -> list[str]:
     """One line for each `Check.what` of the passed checks, with the figures of these checks."""
     figures_by_subject: dict[str, list[str]] = {}
     for check in passed_checks:
@@ -122,13 +122,13 @@ def _extent_line(figures: Figures) -> str:
     return f"  {', '.join(parts)}"
 
 
-def _ended_early(figures: Figures) -> tuple[str, list[str]]:
-    end = figures["early_end"]
+def _early_end_text(figures: Figures) -> tuple[str, list[str]]:
+    early_end = figures["early_end"]
     interrupted = figures["result"].startswith(_INTERRUPTED)
-    advice = what_to_do(end["monitor"], end["phase"], figures["result"])
+    advice = what_to_do(early_end["monitor"], early_end["phase"], figures["result"])
     remedy = "nothing needs fixing" if interrupted else advice
     if figures["at_the_end"]["armed"]:
-        on_ground = end["since_takeoff_s"] is None  # or no lift-off was reported
+        on_ground = early_end["since_takeoff_s"] is None  # or no lift-off was reported
         first_step = (
             "disarm it, or take it over if it flies" if on_ground else "take it over or land it"
         )
@@ -138,11 +138,11 @@ def _ended_early(figures: Figures) -> tuple[str, list[str]]:
         remedy = f"the vehicle {armed}: {first_step}{next_step}"
     result = figures["result"].rstrip(".")
     return f"The flight ended early: {result}{'' if result.endswith('?') else '.'}", [
-        f"  when: {_when_ended(end)}",
-        f"  {_vehicle_state(figures)}",
+        f"  when: {_end_time_text(early_end)}",
+        f"  {_vehicle_state_text(figures)}",
         f"  what to do: {remedy}",
         *(f"! {text}" for text in (*figures["advice"], *_gain_warning(figures))),
-        *_beyond_limit(cut_steps(figures)),
+        *_failed_check_lines(cut_step_checks(figures)),
     ]
 
 
@@ -152,51 +152,51 @@ def _gain_warning(figures: Figures) -> list[str]:
     return [] if warning is None else [warning]
 
 
-def _when_ended(end: dict[str, Any]) -> str:
-    words = f"at {end['time_s']:.1f} s, in phase `{end['phase']}`"
-    if end["since_takeoff_s"] is None:
+def _end_time_text(early_end: dict[str, Any]) -> str:
+    words = f"at {early_end['time_s']:.1f} s, in phase `{early_end['phase']}`"
+    if early_end["since_takeoff_s"] is None:
         # In later phases the vehicle may fly although no lift-off was reported.
-        is_on_ground = end["phase"] in _PHASES_BEFORE_TAKEOFF
+        is_on_ground = early_end["phase"] in _PHASES_BEFORE_TAKEOFF
         words += ", before take-off" if is_on_ground else ", before any report of lift-off"
-    if end["maneuver"] is not None:
-        words += f", {end['into_maneuver_s']:.1f} s into {end['maneuver']}"
+    if early_end["maneuver"] is not None:
+        words += f", {early_end['into_maneuver_s']:.1f} s into {early_end['maneuver']}"
     return words
 
 
-def _vehicle_state(figures: Figures) -> str:
+def _vehicle_state_text(figures: Figures) -> str:
     state = figures["at_the_end"]
     silence = state.get("unheard_s")  # s; None: the vehicle was heard
-    heard = "now" if silence is None else f"when last heard, {silence:.1f} s before the end"
+    when_text = "now" if silence is None else f"when last heard, {silence:.1f} s before the end"
     armed = {True: "ARMED", False: "disarmed", None: "not known whether armed"}[state["armed"]]
     mode = "" if state["mode"] is None else f", in mode {state['mode']}"
-    return f"vehicle {heard}: {armed}{mode}"
+    return f"vehicle {when_text}: {armed}{mode}"
 
 
 def _next_command(figures: Figures, invocation: Invocation) -> str | None:
     def command(*words: str) -> str:
         return f"{invocation.program} {shlex.join(words)}"
 
-    again = invocation.arguments
+    arguments = invocation.arguments
     config_options = (
         None
         if invocation.config is None
-        else ["--config", invocation.config, *_shared_options(again)]
+        else ["--config", invocation.config, *_shared_options(arguments)]
     )
     if figures["result"].startswith(_INTERRUPTED) or _repetition_is_better(figures):
-        return command(*again)
-    end = figures["early_end"]
+        return command(*arguments)
+    early_end = figures["early_end"]
     if (
-        end is not None
-        and end["phase"] in _PHASES_BEFORE_TAKEOFF
-        and end["since_takeoff_s"] is None
+        early_end is not None
+        and early_end["phase"] in _PHASES_BEFORE_TAKEOFF
+        and early_end["since_takeoff_s"] is None
     ):
         return None if config_options is None else command("doctor", *config_options)
-    if again[:1] == ["demo"] and _computer_was_slow(figures):
-        return command(*again, "--lockstep")
-    if end is None and figures["settings"]:
+    if arguments[:1] == ["demo"] and _computer_was_slow(figures):
+        return command(*arguments, "--lockstep")
+    if early_end is None and figures["settings"]:
         changes = [f"{key}={value}" for key, value in figures["settings"].items()]
-        return command(*again, *(word for change in changes for word in ("--set", change)))
-    if end is None and config_options is not None and figures["planner"] == "first-order":
+        return command(*arguments, *(word for change in changes for word in ("--set", change)))
+    if early_end is None and config_options is not None and figures["planner"] == "first-order":
         return command("identify", *config_options)
     return command("plot", figures["log"]) if figures["log"] is not None else None
 
@@ -212,21 +212,21 @@ def _computer_was_slow(figures: Figures) -> bool:
     """Whether the computer was too slow for a flight in real time; never in lockstep."""
     if figures["lockstep"]:
         return False
-    end = figures["early_end"]
-    if end is not None and end["monitor"] is not None:
-        return end["monitor"] in _SLOW_COMPUTER_MONITORS
+    early_end = figures["early_end"]
+    if early_end is not None and early_end["monitor"] is not None:
+        return early_end["monitor"] in _SLOW_COMPUTER_MONITORS
     return any(check.what == LATENCY and not check.good for check in checks(figures))
 
 
 def _shared_options(arguments: Sequence[str]) -> list[str]:
     """The options that changed the configuration and that other commands take as well."""
-    shared: list[str] = []
-    for word, value in zip(arguments, (*arguments[1:], ""), strict=True):
-        if word in _SHARED_OPTIONS:
-            shared += (word, value)
-        elif word.partition("=")[0] in _SHARED_OPTIONS:
-            shared.append(word)
-    return shared
+    shared_options: list[str] = []
+    for argument, next_argument in zip(arguments, (*arguments[1:], ""), strict=True):
+        if argument in _SHARED_OPTIONS:
+            shared_options += (argument, next_argument)
+        elif argument.partition("=")[0] in _SHARED_OPTIONS:
+            shared_options.append(argument)
+    return shared_options
 
 
 def _joined_by_and(names: Sequence[str]) -> str:

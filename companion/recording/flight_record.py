@@ -8,9 +8,9 @@ The columns of each channel are in `companion.recording.mcap_file` (`loop_channe
 with their units. A channel without messages has 0 rows. NaN: not known, or does not apply.
 
 There are three kinds of time. "Our clock" is event-loop time; the flight began when our clock read
-`began`. `vehicle_time_s` is the vehicle's clock. Phases, events, alarms and the channel `motion`
-have the time since the flight began; `since_start` converts our clock to this time. In lockstep or
-on a virtual clock, our clock is the vehicle's, and `epoch` is 0.
+`start_time`. `vehicle_time_s` is the vehicle's clock. Phases, events, alarms and the channel
+`motion` have the time since the flight began; `since_start` converts our clock to this time. In
+lockstep or on a virtual clock, our clock is the vehicle's, and `epoch` is 0.
 """
 
 import json
@@ -28,7 +28,7 @@ from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.mcap_file.fields import Rows
 from companion.recording.mcap_file.flight_events import AlarmChange, Event, Phase, ValuesChange
 from companion.recording.mcap_file.reader import McapContent, changed_topic, read_mcap
-from companion.recording.trace import ManeuverMark
+from companion.recording.trace import ManeuverChange
 
 RECORD_FILE = "flight.mcap"
 _CHANNEL_BY_NAME = {channel.name: channel for channel in CHANNELS}
@@ -59,7 +59,7 @@ class FlightRecord:
 
     folder: Path
     content: McapContent
-    began: float
+    start_time: float
     """Time when the flight began, s on our clock."""
     epoch: float
     """Unix time at which our clock read 0, s; 0 if our clock is the vehicle's."""
@@ -89,7 +89,7 @@ class FlightRecord:
 
     def since_start(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Convert times on our clock (s) to s since the flight began."""
-        return times - self.began
+        return times - self.start_time
 
     @property
     def fault(self) -> str | None:
@@ -102,7 +102,7 @@ class FlightRecord:
                 f"{self.folder}: the recording is damaged, and only the part before was read: "
                 f"{self.content.damage}"
             )
-        if not self.content.order:
+        if not self.content.topic_order:
             path = self.folder / RECORD_FILE
             return f"{path} is missing or empty: no sample and no event was recorded"
         if not self.content.complete and (self.folder / "summary.json").is_file():
@@ -116,20 +116,20 @@ class FlightRecord:
     def duration(self) -> float:
         """Time from the beginning of the flight to the last row or event, s."""
         last_times = [messages[-1][0] for messages in self.content.messages.values() if messages]
-        return max(last_times) * 1e-9 - self.epoch - self.began if last_times else 0.0
+        return max(last_times) * 1e-9 - self.epoch - self.start_time if last_times else 0.0
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
         """The phases of the flight, in order."""
         messages = self._decoded("/phase", 1, 2)
-        return tuple(Phase(time - self.began, *words) for (time,), words in messages)
+        return tuple(Phase(time - self.start_time, *words) for (time,), words in messages)
 
     @cached_property
-    def maneuvers(self) -> tuple[ManeuverMark, ...]:
+    def maneuvers(self) -> tuple[ManeuverChange, ...]:
         """Beginning of each maneuver and end of the last one (name None); `time` on our clock."""
         messages = self._decoded("/maneuver", 2, 1)
         return tuple(
-            ManeuverMark(time, vehicle_time, name or None)
+            ManeuverChange(time, vehicle_time, name or None)
             for (time, vehicle_time), (name,) in messages
         )
 
@@ -140,7 +140,7 @@ class FlightRecord:
         for time_ns, data in self.content.messages["/log"]:
             with record_errors(self.folder):
                 level, text, source = cdr.log_of(data)
-            events.append(Event(time_ns * 1e-9 - self.epoch - self.began, text, level, source))
+            events.append(Event(time_ns * 1e-9 - self.epoch - self.start_time, text, level, source))
         return tuple(events)
 
     @cached_property
@@ -148,7 +148,7 @@ class FlightRecord:
         """The alarms of the safety monitors, in order."""
         messages = self._decoded("/alarm", 2, 3)
         return tuple(
-            AlarmChange(time - self.began, raised != 0.0, *words)
+            AlarmChange(time - self.start_time, raised != 0.0, *words)
             for (time, raised), words in messages
         )
 
@@ -163,11 +163,11 @@ class FlightRecord:
             )
 
     def _decoded(
-        self, topic: str, numbers: int, texts: int
+        self, topic: str, number_count: int, text_count: int
     ) -> list[tuple[tuple[float, ...], list[str]]]:
         messages = self.content.messages[topic]
         with record_errors(self.folder):
-            return [cdr.fields_of(data, numbers, texts) for _, data in messages]
+            return [cdr.fields_of(data, number_count, text_count) for _, data in messages]
 
 
 def read_flight(folder: Path | str) -> FlightRecord:
@@ -183,31 +183,32 @@ def read_flight(folder: Path | str) -> FlightRecord:
     if folder.is_file():
         raise RecordError(f"{folder} is a file; name the folder of the flight: {folder.parent}")
     path = folder / RECORD_FILE
-    killed_at_start = (folder / "config.yaml").is_file()
+    has_config = (folder / "config.yaml").is_file()
     try:
         content = read_mcap(path)
     except OSError as error:
-        if not (killed_at_start and isinstance(error, FileNotFoundError)):
-            raise RecordError(_why_not_a_flight(path, error)) from error
+        if not (has_config and isinstance(error, FileNotFoundError)):
+            raise RecordError(_not_a_flight_reason(path, error)) from error
         content = McapContent()
-    flight = content.metadata.setdefault("flight", {})
-    if not flight and killed_at_start and content.damage is None:
-        flight.update(began_s="0.0", epoch_s="0.0")
+    flight_metadata = content.metadata.setdefault("flight", {})
+    if not flight_metadata and has_config and content.damage is None:
+        flight_metadata.update(began_s="0.0", epoch_s="0.0")
     try:
-        began, epoch = float(flight["began_s"]), float(flight["epoch_s"])
+        start_time, epoch = float(flight_metadata["began_s"]), float(flight_metadata["epoch_s"])
     except (KeyError, ValueError) as error:
-        why = content.damage or "it does not say when the flight began"
-        raise RecordError(f"{path}: not the record of a flight: {why}") from error
+        reason = content.damage or "it does not say when the flight began"
+        raise RecordError(f"{path}: not the record of a flight: {reason}") from error
     topic = changed_topic(content)
     if topic is not None:
         raise RecordError(
             f"{path}: the messages of {topic} have other columns than this version's; read the "
-            f"record with the version that wrote it: companion {flight.get('companion', 'unknown')}"
+            "record with the version that wrote it: companion "
+            f"{flight_metadata.get('companion', 'unknown')}"
         )
-    return FlightRecord(folder, content, began, epoch, content.metadata)
+    return FlightRecord(folder, content, start_time, epoch, content.metadata)
 
 
-def _why_not_a_flight(path: Path, error: OSError) -> str:
+def _not_a_flight_reason(path: Path, error: OSError) -> str:
     """Why the record at `path` cannot be opened, and which folder was probably meant."""
     flights = sorted(path.parent.glob(f"*/{RECORD_FILE}"))
     if isinstance(error, FileNotFoundError) and flights:

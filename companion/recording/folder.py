@@ -9,7 +9,7 @@ from companion.recording.tlog import TLOG_FILE
 
 _BYTES_PER_S = 160_000
 """Measured size of the recording of 1 s with 250 attitude samples, bytes."""
-_SHORTEST_RECORDING = 600.0
+_MIN_RECORDING_TIME = 600.0
 """Duration of a recording, s; `space_warning` warns if the disk has room for less."""
 
 
@@ -58,14 +58,14 @@ def space_warning(folder: Path) -> str | None:
     None also if the file system does not say how much room it has.
     """
     try:
-        free = shutil.disk_usage(folder).free
+        free_bytes = shutil.disk_usage(folder).free
     except OSError:
         return None
-    duration = free / _BYTES_PER_S
-    if duration >= _SHORTEST_RECORDING:
+    duration = free_bytes / _BYTES_PER_S
+    if duration >= _MIN_RECORDING_TIME:
         return None
     return (
-        f"{folder}: the disk has {free / 1e6:.0f} MB left, enough to record about "
+        f"{folder}: the disk has {free_bytes / 1e6:.0f} MB left, enough to record about "
         f"{duration:.0f} s; then the recording stops, and the flight goes on. Make room there "
         "before take-off, or set recording.directory to another disk"
     )

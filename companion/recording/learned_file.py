@@ -8,13 +8,13 @@ from companion.drag import Drag
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.write_whole import write_whole
 
-_MOST_BYTES = 10_000
+_MAX_BYTES = 10_000
 """Largest file that is read, bytes."""
-_MOST_FILES = 1000
+_MAX_FILES = 1000
 """Largest number of vehicle files in a folder; with more, none is read."""
-_MOST_LINEAR, _MOST_QUADRATIC = 10.0, 1.0
+_MAX_LINEAR_DRAG, _MAX_QUADRATIC_DRAG = 10.0, 1.0
 """Upper bounds of `guidance.drag_per_s` and `guidance.quadratic_drag_per_m`, 1/s and 1/m."""
-_MOST_SPEED = 1000.0
+_MAX_SPEED = 1000.0
 """Upper bound of a learned top speed, m/s."""
 
 
@@ -50,7 +50,7 @@ class LearnedFile:
     def load(self) -> tuple[LearnedDrag | None, str | None]:
         """The learned values, and a warning if the file cannot be read. Never raises."""
         try:
-            return _parsed(self.path), None
+            return _read_drag(self.path), None
         except (FileRefusedError, ValueError, TypeError, KeyError, RecursionError) as error:
             if isinstance(error.__cause__, FileNotFoundError):
                 return None, None
@@ -79,28 +79,28 @@ class LearnedFile:
 def newest_learned(directory: Path) -> LearnedDrag | None:
     """Learned drag of the vehicle whose file in `directory` was saved last. Never raises.
 
-    None: there is no file, the newest is damaged, or there are more than `_MOST_FILES` files.
+    None: there is no file, the newest is damaged, or there are more than `_MAX_FILES` files.
     """
     try:
         paths = sorted(directory.glob("learned-*.json"), key=lambda path: -path.stat().st_mtime)
-        return _parsed(paths[0]) if 0 < len(paths) <= _MOST_FILES else None
+        return _read_drag(paths[0]) if 0 < len(paths) <= _MAX_FILES else None
     except (OSError, FileRefusedError, ValueError, TypeError, KeyError, RecursionError):
         return None
 
 
-def _parsed(path: Path) -> LearnedDrag:
-    values = json.loads(read_text(path, _MOST_BYTES))
+def _read_drag(path: Path) -> LearnedDrag:
+    values = json.loads(read_text(path, _MAX_BYTES))
     return LearnedDrag(
         Drag(
-            _number(values["drag_per_s"], _MOST_LINEAR),
-            _number(values["quadratic_drag_per_m"], _MOST_QUADRATIC),
+            _checked_number(values["drag_per_s"], _MAX_LINEAR_DRAG),
+            _checked_number(values["quadratic_drag_per_m"], _MAX_QUADRATIC_DRAG),
         ),
-        _number(values["top_speed_m_s"], _MOST_SPEED),
+        _checked_number(values["top_speed_m_s"], _MAX_SPEED),
         path,
     )
 
 
-def _number(value: Any, most: float) -> float:
-    if type(value) not in (int, float) or not 0.0 <= value <= most:
+def _checked_number(value: Any, max_value: float) -> float:
+    if type(value) not in (int, float) or not 0.0 <= value <= max_value:
         raise ValueError(value)
     return float(value)

@@ -13,10 +13,10 @@ from companion.recording.background_file import BackgroundFile
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.batch import SendBatch
 from companion.recording.mcap_file.fields import Channel
-from companion.recording.mcap_file.loop_channels import ACTION, ACTIONS
+from companion.recording.mcap_file.loop_channels import ACTION, ACTION_NAMES
 from companion.recording.mcap_file.writer import McapWriter
 
-_MOST_WAITING = 50_000
+_MAX_WAITING_ENTRIES = 50_000
 """Largest number of entries that wait to be written."""
 _INFORMATION, _WARNING = 2, 3
 
@@ -53,7 +53,7 @@ class FlightRecorder(BackgroundFile[Entry]):
     ) -> None:
         self._epoch, self._clock = epoch, clock
         self._on_bad_entry, self._stream = on_bad_entry, stream
-        super().__init__(path, _MOST_WAITING, on_failure)
+        super().__init__(path, _MAX_WAITING_ENTRIES, on_failure)
 
     def _create(self) -> None:
         self._writer = McapWriter(self.path, self._stream)
@@ -66,16 +66,16 @@ class FlightRecorder(BackgroundFile[Entry]):
             except OSError:
                 raise
             except Exception as error:  # one bad entry must not end the record of the flight
-                self._count_dropped(error)
+                self._drop_bad_entry(error)
         writer.stream()
 
     def _sync(self) -> None:
         self._writer.flush()
 
-    def _end(self, *, complete: bool) -> None:
+    def _finish_file(self, *, complete: bool) -> None:
         self._writer.close(complete=complete)
 
-    def _count_dropped(self, error: Exception) -> None:
+    def _drop_bad_entry(self, error: Exception) -> None:
         """Count an entry that cannot be recorded; report the first one."""
         self.dropped += 1
         report, self._on_bad_entry = self._on_bad_entry, None
@@ -90,9 +90,9 @@ class FlightRecorder(BackgroundFile[Entry]):
         """Record metadata."""
         self.add(self._clock(), _metadata, (name, values))
 
-    def begin(self, began: float, values: Mapping[str, str]) -> None:
+    def begin(self, start_time: float, values: Mapping[str, str]) -> None:
         """Record the beginning of the flight (s on our clock), and further values as metadata."""
-        times = {"began_s": repr(began), "epoch_s": repr(self._epoch)}
+        times = {"began_s": repr(start_time), "epoch_s": repr(self._epoch)}
         self.metadata("flight", {**times, **values})
 
     def phase(self, name: str, waits_for: str) -> None:
@@ -101,7 +101,7 @@ class FlightRecorder(BackgroundFile[Entry]):
         self.add(now, _write_fields, ("/phase", (now,), (name, waits_for)))
 
     def maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
-        """Record the beginning of a maneuver (None: end of the last one); see `ManeuverMark`."""
+        """Record the beginning of a maneuver (None: end of the last one); see `ManeuverChange`."""
         self.add(time, _write_fields, ("/maneuver", (time, vehicle_time), (name or "",)))
 
     def alarm(self, raised: bool, monitor: str, reason: str, action: str) -> None:
@@ -120,13 +120,13 @@ class FlightRecorder(BackgroundFile[Entry]):
 
         Args:
             time: when, s on our clock.
-            name: one of `ACTIONS`.
+            name: one of `ACTION_NAMES`.
             clock_offset: vehicle time minus our time, s; None: not known.
             drag: linear (1/s) and quadratic (1/m) drag of an earlier flight, for `drag_prior`; NaN:
                 none.
         """
         offset = nan if clock_offset is None else clock_offset
-        self.row(time, ACTION, (time, offset, *drag, ACTIONS.index(name)))
+        self.row(time, ACTION, (time, offset, *drag, ACTION_NAMES.index(name)))
 
     def change(self, values: Mapping[str, Mapping[str, Any]], *, at_once: bool) -> None:
         """Record that values of the configuration, by section and key, begin to change now.

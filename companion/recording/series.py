@@ -23,7 +23,7 @@ from companion.files.write_whole import DISK_HANGS, DISK_TIMEOUT, reason_of
 
 _CHUNK_ROWS = 1024
 """Number of rows that are written at a time."""
-_MOST_WAITING = 64
+_MAX_WAITING_CHUNKS = 64
 """Largest number of chunks that wait for a slow disk; further ones are lost and counted."""
 
 
@@ -55,7 +55,7 @@ class SpooledFile:
         return np.frombuffer(data, count=len(data) // (8 * width) * width)
 
 
-_Work = tuple[SpooledFile, bytes] | threading.Event | None
+_SpoolItem = tuple[SpooledFile, bytes] | threading.Event | None
 
 
 class Spool:
@@ -63,9 +63,9 @@ class Spool:
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder
-        self._queue: SimpleQueue[_Work] = SimpleQueue()
+        self._queue: SimpleQueue[_SpoolItem] = SimpleQueue()
         self._failures: list[str] = []
-        self._begun = self._stuck = False
+        self._has_started = self._disk_hangs = False
 
     @property
     def failure(self) -> str | None:
@@ -74,33 +74,38 @@ class Spool:
 
     def put(self, file: SpooledFile, chunk: bytes) -> bool:
         """Take a chunk; return false if it cannot be kept."""
-        if self._failures or self._queue.qsize() >= _MOST_WAITING:
+        if self._failures or self._queue.qsize() >= _MAX_WAITING_CHUNKS:
             return False
-        if not self._begun:
-            self._begun = True
-            work = (self._queue, self._failures)  # not self, which the thread would keep alive
-            threading.Thread(target=_append_chunks, args=work, name="spool", daemon=True).start()
+        if not self._has_started:
+            self._has_started = True
+            thread_arguments = (
+                self._queue,
+                self._failures,
+            )  # not self, which the thread would keep alive
+            threading.Thread(
+                target=_append_chunks, args=thread_arguments, name="spool", daemon=True
+            ).start()
             weakref.finalize(self, self._queue.put, None)
         self._queue.put((file, chunk))
         return True
 
     def flush(self) -> bool:
         """Wait until all chunks are written; return false if the disk does not answer for 5 s."""
-        if self._begun and not self._stuck:
-            written = threading.Event()
-            self._queue.put(written)
-            if not written.wait(DISK_TIMEOUT):
-                self._stuck = True
+        if self._has_started and not self._disk_hangs:
+            all_written = threading.Event()
+            self._queue.put(all_written)
+            if not all_written.wait(DISK_TIMEOUT):
+                self._disk_hangs = True
                 self._failures.append(DISK_HANGS)
-        return not self._stuck
+        return not self._disk_hangs
 
 
-def _append_chunks(queue: "SimpleQueue[_Work]", failures: list[str]) -> None:
-    while (work := queue.get()) is not None:
-        if isinstance(work, threading.Event):
-            work.set()
+def _append_chunks(queue: "SimpleQueue[_SpoolItem]", failures: list[str]) -> None:
+    while (item := queue.get()) is not None:
+        if isinstance(item, threading.Event):
+            item.set()
         elif not failures:
-            file, chunk = work
+            file, chunk = item
             try:
                 file.append(chunk)
             except OSError as error:
@@ -116,12 +121,12 @@ class Series:
 
     Attributes:
         columns: names of the columns.
-        lost: rows that were lost because the disk was full or too slow.
+        lost_count: rows that were lost because the disk was full or too slow.
     """
 
     def __init__(self, columns: tuple[str, ...], spool: Spool, rows_in_memory: int = 0) -> None:
         self.columns = columns
-        self.lost = 0
+        self.lost_count = 0
         self._spool = spool
         # Without a folder all rows stay in memory.
         self._file = None if spool.folder is None else SpooledFile(spool.folder)
@@ -129,11 +134,11 @@ class Series:
         self._chunk = array("d")
         max_chunks = None if self._file is None else -(-rows_in_memory // _CHUNK_ROWS)
         self._recent_chunks: deque[array[float]] = deque(maxlen=max_chunks)
-        self._put_count = 0
+        self._spooled_row_count = 0
 
     def __len__(self) -> int:
         """Number of rows recorded so far."""
-        return self._put_count + len(self._chunk) // len(self.columns)
+        return self._spooled_row_count + len(self._chunk) // len(self.columns)
 
     def add(self, row: list[float]) -> None:
         """Record one row; its length is not checked."""
@@ -152,24 +157,26 @@ class Series:
         In flight, request only rows that are still in memory; for older rows this call waits for
         the disk.
         """
-        wanted = max(0, len(self) - since) * len(self.columns)
-        parts: list[array[float]] = [self._chunk]
-        available = len(self._chunk)
+        wanted_count = max(0, len(self) - since) * len(self.columns)
+        chunks: list[array[float]] = [self._chunk]
+        count_in_memory = len(self._chunk)
         for chunk in reversed(self._recent_chunks):
-            if available >= wanted:
+            if count_in_memory >= wanted_count:
                 break
-            parts.insert(0, chunk)
-            available += len(chunk)
-        if self._file is not None and available < wanted and self._spool.flush():
-            numbers = np.concatenate([self._file.read(len(self.columns)), self._chunk])
+            chunks.insert(0, chunk)
+            count_in_memory += len(chunk)
+        if self._file is not None and count_in_memory < wanted_count and self._spool.flush():
+            values = np.concatenate([self._file.read(len(self.columns)), self._chunk])
         else:  # in memory, or all that there is while the disk does not answer
-            self.lost = max(self.lost, (wanted - available) // len(self.columns))
-            numbers = np.concatenate(parts)
-        return numbers[max(0, len(numbers) - wanted) :].reshape(-1, len(self.columns))
+            self.lost_count = max(
+                self.lost_count, (wanted_count - count_in_memory) // len(self.columns)
+            )
+            values = np.concatenate(chunks)
+        return values[max(0, len(values) - wanted_count) :].reshape(-1, len(self.columns))
 
     def _spool_chunk(self) -> None:
         chunk, self._chunk = self._chunk, array("d")
-        self._put_count += _CHUNK_ROWS
+        self._spooled_row_count += _CHUNK_ROWS
         self._recent_chunks.append(chunk)
         if self._file is not None and not self._spool.put(self._file, chunk.tobytes()):
-            self.lost += _CHUNK_ROWS
+            self.lost_count += _CHUNK_ROWS

@@ -28,15 +28,15 @@ def flight_table(summary: Summary) -> RenderableType:
     return Group(*parts)
 
 
-def styled_text(words: ClosingWords) -> Text:
+def styled_text(closing_words: ClosingWords) -> Text:
     """The closing words as coloured text."""
-    style = "green" if words.good else "yellow" if words.completed else "red"
-    text = Text(words.headline, style=f"bold {style}")
-    for line in words.lines:
+    style = "green" if closing_words.good else "yellow" if closing_words.completed else "red"
+    text = Text(closing_words.headline, style=f"bold {style}")
+    for line in closing_words.lines:
         text.append(f"\n{line}", style="yellow" if line.startswith("!") else "not bold default")
-    if words.next_command is not None:
+    if closing_words.next_command is not None:
         text.append("\nNext: ", style="not bold default")
-        text.append(words.next_command, style="bold default")
+        text.append(closing_words.next_command, style="bold default")
     return text
 
 
@@ -58,8 +58,8 @@ def _response(summary: Summary) -> RenderableType:
         ("north", response.time_constant_north_s),
         ("east", response.time_constant_east_s),
     ):
-        found = "not flown" if isnan(value) else f"{value:.3f} s"
-        table.add_row(f"time constant {axis}", found, f"{ideal:.3f} s")
+        time_text = "not flown" if isnan(value) else f"{value:.3f} s"
+        table.add_row(f"time constant {axis}", time_text, f"{ideal:.3f} s")
     table.add_row(
         "largest deviation from ċ = p(c_d − c)", f"{response.model_deviation_max:.4f}", "0"
     )
@@ -81,15 +81,19 @@ def _dead_times(summary: Summary) -> RenderableType:
     """Measured and configured dead times."""
     dead_times = summary.dead_times
     if not dead_times.lag_known:
-        words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
-        return Text(words, style="dim")
+        closing_words = (
+            "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
+        )
+        return Text(closing_words, style="dim")
     table = _empty_table(
         "Dead time, from a sample to the effect of its setpoint", "measured", "configured"
     )
     for name, axis in dead_times.axes.items():
-        too_little = axis.measured is None
-        found = "not enough rotation to measure" if too_little else _milliseconds(axis.measured)
-        table.add_row(name, found, _milliseconds(axis.configured))
+        is_unmeasured = axis.measured is None
+        time_text = (
+            "not enough rotation to measure" if is_unmeasured else _milliseconds(axis.measured)
+        )
+        table.add_row(name, time_text, _milliseconds(axis.configured))
     age = dead_times.sample_age
     if not isnan(age.p50):
         table.add_row(
@@ -127,10 +131,11 @@ def _predictive_words(figures: PredictiveFigures) -> Text:
     words = f"predictive control: {figures.used_answers} answers flown"
     if figures.used_answers:
         words += f", computed in {times['p50']:.1f} ms (p99 {times['p99']:.1f} ms)"
-    replaced = ", ".join(f"{count} {name}" for name, count in figures.unused_answers.items())
-    if replaced:
+    unused_text = ", ".join(f"{count} {name}" for name, count in figures.unused_answers.items())
+    if unused_text:
         words += (
-            f"; linear guidance replaced {sum(figures.unused_answers.values())} others: {replaced}"
+            f"; linear guidance replaced {sum(figures.unused_answers.values())} others: "
+            f"{unused_text}"
         )
     return Text(words)
 
@@ -151,10 +156,10 @@ def _loop_words(summary: Summary) -> Text:
         f"{count} {name.replace('_', ' ')}" for name, count in counts.unanswered.items() if count
     ]
     unanswered = f"\nunanswered samples: {', '.join(reasons)}" if reasons else ""
-    missed = "" if summary.facts.lockstep else f"{counts.missed_deadlines} missed deadlines, "
-    rate = f", {counts.rate_hz:.0f} Hz in the maneuvers" if counts.rate_hz else ""
+    missed_text = "" if summary.facts.lockstep else f"{counts.missed_deadlines} missed deadlines, "
+    rate_text = f", {counts.rate_hz:.0f} Hz in the maneuvers" if counts.rate_hz else ""
     return Text(
-        f"{counts.setpoints} setpoints for {counts.samples} samples{rate}\n{missed}"
+        f"{counts.setpoints} setpoints for {counts.samples} samples{rate_text}\n{missed_text}"
         f"{counts.stale} stale, {counts.refused} refused; link: {link.get('lost', 0)} lost, "
         f"{link.get('bad_crc', 0)} damaged, {link.get('non_finite', 0)} not finite{unanswered}"
     )

@@ -13,7 +13,7 @@ from companion.recording.background_file import BackgroundFile
 
 TLOG_FILE = "flight.tlog"
 """Name of the log in the folder of a flight."""
-_MOST_WAITING = 20_000
+_MAX_WAITING_FRAMES = 20_000
 """Largest number of frames that wait to be written."""
 _STAMP = struct.Struct(">Q")
 
@@ -33,7 +33,7 @@ class TlogWriter(BackgroundFile[TimedFrame]):
     def __init__(
         self, path: Path, epoch: float, on_failure: Callable[[str], None] | None = None
     ) -> None:
-        super().__init__(path, _MOST_WAITING, on_failure)
+        super().__init__(path, _MAX_WAITING_FRAMES, on_failure)
         self._epoch = epoch
 
     def __call__(self, time: float, frame: bytes) -> None:
@@ -52,5 +52,5 @@ class TlogWriter(BackgroundFile[TimedFrame]):
     def _sync(self) -> None:
         os.fsync(self._file.fileno())
 
-    def _end(self, *, complete: bool) -> None:
+    def _finish_file(self, *, complete: bool) -> None:
         self._file.close()

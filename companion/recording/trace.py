@@ -14,20 +14,24 @@ from companion.recording.measurements.verdict import LOST_ROWS
 from companion.recording.recorder import FlightRecorder
 from companion.recording.series import Series, Spool
 
-_KEPT_RATES = 10_240
+_RATE_ROWS_IN_MEMORY = 10_240
 """Number of rows of `FlightTrace.rates` kept in memory for reading in flight: 10 s at 1000 Hz."""
 
-SENT = ("vehicle_time_s", "received_s", *rate_names("commanded"), "thrust")
+SENT_COLUMNS = ("vehicle_time_s", "received_s", *rate_names("commanded"), "thrust")
 """Columns of SETPOINT, with which a row of `FlightTrace.rates` begins."""
-ANSWERED = (*rate_names("measured"), "age_s")
+ANSWERED_COLUMNS = (*rate_names("measured"), "age_s")
 """Columns of SAMPLE, with which a row of `FlightTrace.rates` ends."""
-RATES = SENT + ANSWERED
-RESPONSE = ("vehicle_time_s", *QUATERNION, "target_north", "target_east")
+RATE_COLUMNS = SENT_COLUMNS + ANSWERED_COLUMNS
+RESPONSE_COLUMNS = ("vehicle_time_s", *QUATERNION, "target_north", "target_east")
 """Columns of SETPOINT, which form a row of `FlightTrace.response`."""
-TRACKING = ("vehicle_time_s", *vector_names("reference", "m"), *vector_names("measured", "m"))
+TRACKING_COLUMNS = (
+    "vehicle_time_s",
+    *vector_names("reference", "m"),
+    *vector_names("measured", "m"),
+)
 
 
-class ManeuverMark(NamedTuple):
+class ManeuverChange(NamedTuple):
     """The beginning of a maneuver, or the end of the last one."""
 
     time: float
@@ -48,11 +52,11 @@ class FlightTrace:
 
     Attributes:
         recorder: writes `flight.mcap`; None: the flight is not recorded.
-        response: rows of RESPONSE, only during steps.
+        response: rows of RESPONSE_COLUMNS, only during steps.
         tracking: (vehicle time s, reference north, east, down, estimated north, east, down m) while
             offboard control is active; NaN: there is no reference along this axis.
-        rates: rows of RATES while the vehicle's heartbeats show offboard control; `age_s` is NaN
-            unless the age is absolute (`AttitudeSample.age_known`).
+        rates: rows of RATE_COLUMNS while the vehicle's heartbeats show offboard control; `age_s` is
+            NaN unless the age is absolute (`AttitudeSample.age_known`).
         latencies_ns: latencies from sample to setpoint inside this process, ns.
         motion: rows of MOTION, ten times a second in all phases.
         maneuvers: beginning of each maneuver, and end of the last one.
@@ -61,12 +65,12 @@ class FlightTrace:
     def __init__(self, folder: Path | None = None, recorder: FlightRecorder | None = None) -> None:
         self.recorder = recorder
         self._spool = Spool(folder)
-        self.response = Series(RESPONSE, self._spool)
-        self.tracking = Series(TRACKING, self._spool)
-        self.rates = Series(RATES, self._spool, rows_in_memory=_KEPT_RATES)
+        self.response = Series(RESPONSE_COLUMNS, self._spool)
+        self.tracking = Series(TRACKING_COLUMNS, self._spool)
+        self.rates = Series(RATE_COLUMNS, self._spool, rows_in_memory=_RATE_ROWS_IN_MEMORY)
         self.latencies_ns = Series(("latency_ns",), self._spool)
         self.motion = Series(MOTION.columns, self._spool)
-        self.maneuvers: list[ManeuverMark] = []
+        self.maneuvers: list[ManeuverChange] = []
 
     def add_motion(self, time: float, row: Iterable[float]) -> None:
         """Record a row of `motion` at `time`, s on our clock."""
@@ -76,16 +80,16 @@ class FlightTrace:
             self.recorder.row(time, MOTION, numbers)
 
     def begin_maneuver(self, time: float, vehicle_time: float, name: str | None) -> None:
-        """Record the beginning of a maneuver (None: end of the last one); see `ManeuverMark`."""
-        self.maneuvers.append(ManeuverMark(time, vehicle_time, name))
+        """Record the beginning of a maneuver (None: end of the last one); see `ManeuverChange`."""
+        self.maneuvers.append(ManeuverChange(time, vehicle_time, name))
         if self.recorder is not None:
             self.recorder.maneuver(time, vehicle_time, name)
 
     def lost_rows_warning(self) -> str | None:
         """A warning for the user if rows were lost, else None."""
         all_series = self.response, self.tracking, self.rates, self.latencies_ns, self.motion
-        lost = sum(series.lost for series in all_series)
-        if lost == 0:
+        lost_count = sum(series.lost_count for series in all_series)
+        if lost_count == 0:
             return None
-        why = self._spool.failure or "the disk was too slow"
-        return f"{lost} {LOST_ROWS}: {why}"
+        reason = self._spool.failure or "the disk was too slow"
+        return f"{lost_count} {LOST_ROWS}: {reason}"

@@ -80,15 +80,17 @@ class _Messages:
         self._rows: dict[str, Iterator[Any]] = {_CHANGE_TOPIC: iter(record.changes)}
         for each in _CHANNELS:
             self._rows[each.topic] = iter(record.rows(each.name).tolist())
-        self._order = deque(topic for topic in record.content.order if topic in self._rows)
+        self._topic_order = deque(
+            topic for topic in record.content.topic_order if topic in self._rows
+        )
 
     def next_topic(self) -> str | None:
         """Topic of the next message; None at the end."""
-        return self._order[0] if self._order else None
+        return self._topic_order[0] if self._topic_order else None
 
     def take_next(self) -> Any:
         """Take the next message: the values of its columns, or a change."""
-        return next(self._rows[self._order.popleft()])
+        return next(self._rows[self._topic_order.popleft()])
 
     def take(self, channel: Channel) -> Row:
         """Take the next message if it is of `channel`; else take none and return NaN values."""

@@ -11,7 +11,7 @@ from companion.control.step_rows import StepFlags, StepInput
 from companion.drag import Drag
 from companion.guidance import Reference
 from companion.guidance.reference import VerticalMode
-from companion.recording.mcap_file.loop_channels import ACTIONS, UNANSWERED_CODES
+from companion.recording.mcap_file.loop_channels import ACTION_NAMES, UNANSWERED_CODES
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import (
     AttitudeSample,
@@ -66,7 +66,7 @@ class RecordedAction(NamedTuple):
     time: float
     """Time of the call, s on our clock."""
     name: str
-    """Name of the call, one of `ACTIONS`."""
+    """Name of the call, one of `ACTION_NAMES`."""
     clock_offset: float | None
     """Vehicle time minus our time, s; None: unknown."""
     drag: Drag | None
@@ -109,8 +109,8 @@ class ReplayedVehicle:
         return None
 
 
-def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
-    """The sample in a row of `SAMPLE`; `sent` is the row of its `SETPOINT`, None: none was sent."""
+def recorded_sample(row: Row, setpoint_row: Row | None) -> RecordedSample:
+    """The sample in a row of `SAMPLE`; `setpoint_row`: that of its `SETPOINT`; None: not sent."""
     sample = AttitudeSample(
         int(row["time_boot_ms"]),
         row["vehicle_time_s"],
@@ -122,7 +122,11 @@ def recorded_sample(row: Row, sent: Row | None) -> RecordedSample:
         _MISFIT_BY_CODE[row["misfit"]],
         bool(row["age_known"]),
     )
-    setpoint = None if sent is None else Setpoint(_rates(sent, "commanded"), sent["thrust"])
+    setpoint = (
+        None
+        if setpoint_row is None
+        else Setpoint(_rates(setpoint_row, "commanded"), setpoint_row["thrust"])
+    )
     flags = LoopFlags(*(bool(row[name]) for name in LoopFlags._fields))
     return RecordedSample(
         sample, flags, row["checked_s"], UNANSWERED_CODES[row["unanswered"]], setpoint
@@ -142,17 +146,17 @@ def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> Recorde
             _vector(row, "position", "m"),
             _vector(row, "velocity", "m_s"),
         )
-    battery = thrust = None
+    battery = autopilot_thrust = None
     if not isnan(row["battery_received_s"]):
         battery = Battery(row["battery_received_s"], _none_if_nan(row["battery_v"]), None)
-    if not isnan(received := row["autopilot_thrust_received_s"]):
-        thrust = AttitudeTargetThrust(received, row["autopilot_thrust"])
+    if not isnan(thrust_arrival := row["autopilot_thrust_received_s"]):
+        autopilot_thrust = AttitudeTargetThrust(thrust_arrival, row["autopilot_thrust"])
     inputs = StepInput(
         row["time_s"],
         position,
         _none_if_nan(row["clock_offset_s"]),
         battery,
-        thrust,
+        autopilot_thrust,
         _none_if_nan(row["height_m"]),
         bool(row["armed"]),
         StepFlags(*(bool(row[name]) for name in StepFlags._fields)),
@@ -171,9 +175,9 @@ def recorded_step(row: Row, target: Row | None, guidance: Row | None) -> Recorde
 
 
 def _command(row: Row) -> GuidanceCommand:
-    later = None
+    later_target = None
     if not isnan(row["later_north"]):
-        later = Target(*(row[f"later_{name}"] for name in _TARGET_COLUMNS))
+        later_target = Target(*(row[f"later_{name}"] for name in _TARGET_COLUMNS))
     no_body_rates = isnan(row["body_roll_rad_s"])
     return GuidanceCommand(
         Target(*(row[name] for name in _TARGET_COLUMNS)),
@@ -184,16 +188,16 @@ def _command(row: Row) -> GuidanceCommand:
         None if no_body_rates else _rates(row, "body"),
         _none_if_nan(row["thrust"]),
         HeadingFrame(row["turn_rad"]),
-        later,
+        later_target,
         row["period_s"],
     )
 
 
 def recorded_action(row: Row) -> RecordedAction:
     """The action in a row of `ACTION`."""
-    linear = row["drag_per_s"]
-    drag = None if isnan(linear) else Drag(linear, row["quadratic_drag_per_m"])
-    name = ACTIONS[row["action"]]
+    linear_drag = row["drag_per_s"]
+    drag = None if isnan(linear_drag) else Drag(linear_drag, row["quadratic_drag_per_m"])
+    name = ACTION_NAMES[row["action"]]
     return RecordedAction(row["time_s"], name, _none_if_nan(row["clock_offset_s"]), drag)
 
 

@@ -58,7 +58,7 @@ class ReplayedSample(NamedTuple):
     """"answered", or why the replay sent no setpoint; one of `UNANSWERED_CODES`."""
 
     @property
-    def same(self) -> bool:
+    def is_same(self) -> bool:
         """Whether flight and replay answered the sample in the same way.
 
         Either both sent bit-identical setpoints, or neither sent a setpoint, for the same reason.
@@ -81,8 +81,8 @@ class Replay:
     """
 
     def __init__(self, record: FlightRecord, config: Config) -> None:
-        by_program = record.metadata["flight"].get("plan") == "program"
-        self.follows_record = by_program or config.guidance.kind == "nmpc"
+        commanded_by_program = record.metadata["flight"].get("plan") == "program"
+        self.follows_record = commanded_by_program or config.guidance.kind == "nmpc"
         self._record = record
         self._now = 0.0
         self._vehicle = vehicle = ReplayedVehicle()
@@ -96,11 +96,11 @@ class Replay:
         )
         self._loop.is_same_vehicle = lambda: self._same_vehicle
         self._loop.planner.attitude_target = lambda: vehicle.attitude_target
-        self._wanted, self._slew = config, Slew(config)
+        self._wanted_config, self._slew = config, Slew(config)
         self._retuning = Retuning(self._loop, self._guidance)
         self._guidance.before_step = self._apply_slew
         self._same_vehicle = self._accepts_setpoint = True
-        self._sent: Setpoint | None = None
+        self._sent_setpoint: Setpoint | None = None
         self._encoder = SetpointEncoder(1, 1, 1, 1, signed=False)
         self._recorded_source = _RecordedSource()
         self._source: Source = self._recorded_source
@@ -139,15 +139,22 @@ class Replay:
             loop.resume()
         self._accepts_setpoint = entry.reason != "not_sent"
         self._now = sample.received if isnan(entry.checked_at) else entry.checked_at
-        self._sent = None
+        self._sent_setpoint = None
         loop.on_sample(sample)
         self._guidance.note_attitude(sample)
         reason = loop.record.reason
         answered, control_off, *_ = UNANSWERED_CODES
-        name = control_off if not flags.on else answered if reason is None else reason.value
-        sent = self._sent if name == answered else None
+        replayed_reason = (
+            control_off if not flags.on else answered if reason is None else reason.value
+        )
+        replayed_setpoint = self._sent_setpoint if replayed_reason == answered else None
         return ReplayedSample(
-            sample.received, sample.vehicle_time, entry.setpoint, sent, entry.reason, name
+            sample.received,
+            sample.vehicle_time,
+            entry.setpoint,
+            replayed_setpoint,
+            entry.reason,
+            replayed_reason,
         )
 
     def _replay_step(self, entry: RecordedStep) -> None:
@@ -156,10 +163,10 @@ class Replay:
         self._now = inputs.time
         self._loop.offboard_active = inputs.flags.offboard_active
         self._recorded_source.step_reference = entry.reference
-        before = self._loop.command
+        command_before = self._loop.command
         self._guidance.step()
         if self.follows_record:
-            self._loop.command = before if entry.command is None else entry.command
+            self._loop.command = command_before if entry.command is None else entry.command
 
     def _replay_action(self, entry: RecordedAction) -> None:
         guidance = self._guidance
@@ -182,14 +189,14 @@ class Replay:
 
     def _replay_change(self, entry: ValuesChange) -> None:
         """Begin a change of values, if the loops can change values in flight."""
-        if reason_against_changes(self._wanted) is not None:
+        if reason_against_changes(self._wanted_config) is not None:
             return
-        self._wanted = changed(self._wanted, entry.values, "the record")
+        self._wanted_config = changed(self._wanted_config, entry.values, "the record")
         if entry.at_once:
-            self._slew.jump(self._wanted)
-            self._retuning.apply(loop_settings(self._wanted))
+            self._slew.jump(self._wanted_config)
+            self._retuning.apply(loop_settings(self._wanted_config))
         else:
-            self._slew.begin(self._wanted, entry.time)
+            self._slew.begin(self._wanted_config, entry.time)
 
     def _apply_slew(self, now: float) -> None:
         values = self._slew.step(now)
@@ -198,7 +205,7 @@ class Replay:
 
     def _send(self, time_boot_ms: int, rates: BodyRates, thrust: float) -> bool:
         self._encoder.frame(0, time_boot_ms, rates, thrust)  # raises for an invalid setpoint
-        self._sent = Setpoint(rates, thrust)
+        self._sent_setpoint = Setpoint(rates, thrust)
         return self._accepts_setpoint
 
 
@@ -234,8 +241,8 @@ class _RecordedSource:
 
     def reference(self, now: float, motion: VehicleMotion) -> ReferenceAt:
         """The recorded reference of this step."""
-        recorded = self.step_reference
-        reference = Reference(motion.position_ned) if recorded is None else recorded
+        step_reference = self.step_reference
+        reference = Reference(motion.position_ned) if step_reference is None else step_reference
         return lambda _: reference
 
     def finished(self, now: float) -> bool:

@@ -22,40 +22,40 @@ _COLUMNS = (
 
 
 def result_lines(
-    samples: Sequence[ReplayedSample], began: float, *, follows_record: bool
+    samples: Sequence[ReplayedSample], start_time: float, *, follows_record: bool
 ) -> list[str]:
     """Sentences on what is equal and what differs between flight and replay.
 
-    The flight began at the time `began` on our clock, s. `follows_record`: see `Replay`.
+    The flight began at the time `start_time` on our clock, s. `follows_record`: see `Replay`.
     """
-    recorded = sum(each.recorded_setpoint is not None for each in samples)
-    different = [each for each in samples if not each.same]
+    recorded_count = sum(each.recorded_setpoint is not None for each in samples)
+    differing = [each for each in samples if not each.is_same]
     lines = []
     if follows_record:
         lines.append(
             "Only the control loop is replayed, with the recorded commands of guidance, because"
             " another program or predictive control commanded the flight."
         )
-    if not different:
+    if not differing:
         lines.append(
-            f"identical: all {recorded} setpoints are equal to the bit, and all"
-            f" {len(samples) - recorded} unanswered samples have the same reasons"
+            f"identical: all {recorded_count} setpoints are equal to the bit, and all"
+            f" {len(samples) - recorded_count} unanswered samples have the same reasons"
         )
         return lines
     lines.append(
-        f"The answers to {len(different)} of {len(samples)} samples differ from those in the"
-        f" flight, the first {different[0].received - began:.2f} s after the flight began."
+        f"The answers to {len(differing)} of {len(samples)} samples differ from those in the"
+        f" flight, the first {differing[0].received - start_time:.2f} s after the flight began."
     )
     both_answered = [
-        each for each in different if each.recorded_setpoint and each.replayed_setpoint
+        each for each in differing if each.recorded_setpoint and each.replayed_setpoint
     ]
     if both_answered:
-        lines.append(_largest_differences(both_answered, began))
-    return lines + _reason_changes(different)
+        lines.append(_largest_differences(both_answered, start_time))
+    return lines + _reason_changes(differing)
 
 
-def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) -> str:
-    answers = np.array(  # (N, 2, 4)
+def _largest_differences(both_answered: Sequence[ReplayedSample], start_time: float) -> str:
+    setpoints = np.array(  # (N, 2, 4)
         [
             [
                 (*each.rates, each.thrust)
@@ -65,17 +65,19 @@ def _largest_differences(both_answered: Sequence[ReplayedSample], began: float) 
             for sample in both_answered
         ]
     )
-    distances = np.abs(answers[:, 1] - answers[:, 0])
+    absolute_differences = np.abs(setpoints[:, 1] - setpoints[:, 0])
     differences = []
     for index, name in enumerate(("roll", "pitch", "yaw", "thrust")):
-        worst = int(distances[:, index].argmax())
-        value = distances[worst, index]
-        number = f"{value:.4f}" if name == "thrust" else f"{degrees(value):.2f} °/s"
-        differences.append(f"{name} {number} at {both_answered[worst].received - began:.2f} s")
+        worst_index = int(absolute_differences[:, index].argmax())
+        value = absolute_differences[worst_index, index]
+        value_text = f"{value:.4f}" if name == "thrust" else f"{degrees(value):.2f} °/s"
+        differences.append(
+            f"{name} {value_text} at {both_answered[worst_index].received - start_time:.2f} s"
+        )
     return f"{len(both_answered)} setpoints differ, at most by: {', '.join(differences)}."
 
 
-def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
+def _reason_changes(differing: Sequence[ReplayedSample]) -> list[str]:
     """Sentences on samples for which flight and replay differ in more than the setpoint's values.
 
     Only the flight or only the replay sent a setpoint for the sample, or neither sent one, for
@@ -83,13 +85,13 @@ def _reason_changes(different: Sequence[ReplayedSample]) -> list[str]:
     """
     changes = Counter(
         (each.recorded_reason, each.replayed_reason)
-        for each in different
+        for each in differing
         if each.recorded_reason != each.replayed_reason
     )
     return [
-        f"{count} samples: {before.replace('_', ' ')} in the flight,"
-        f" {after.replace('_', ' ')} in the replay."
-        for (before, after), count in changes.most_common()
+        f"{count} samples: {recorded_reason.replace('_', ' ')} in the flight,"
+        f" {replayed_reason.replace('_', ' ')} in the replay."
+        for (recorded_reason, replayed_reason), count in changes.most_common()
     ]
 
 

@@ -37,13 +37,17 @@ def compared_steps(flights: Sequence[FlightData]) -> Iterator[Plot]:
     for number, flight in enumerate(flights):
         if flight.step_runs:
             run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)
-            time, along = run.time - run.time[0], run.direction
+            time, direction = run.time - run.time[0], run.direction
             colour = FLIGHT_COLOURS[number % len(FLIGHT_COLOURS)]
-            traces.append(line(f"{flight.name}: measured", time, run.measured @ along, colour))
-            nearest = f"{flight.name}: nearest model, {1e3 * model.dead_time:.0f} ms dead time"
-            traces.append(line(nearest, time, model.path(run) @ along, colour, dash="dash"))
+            traces.append(line(f"{flight.name}: measured", time, run.measured @ direction, colour))
+            nearest_label = (
+                f"{flight.name}: nearest model, {1e3 * model.dead_time:.0f} ms dead time"
+            )
             traces.append(
-                line(f"{flight.name}: target", time, run.target @ along, colour, dash="dot")
+                line(nearest_label, time, model.path(run) @ direction, colour, dash="dash")
+            )
+            traces.append(
+                line(f"{flight.name}: target", time, run.target @ direction, colour, dash="dot")
             )
     note = "The first doublet of each flight along its direction. Dashed: the nearest linear model."
     if traces:
@@ -55,17 +59,17 @@ def _step_response(flight: FlightData) -> Plot:
     if not flight.step_runs:
         return Plot("", "", [])
     run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)
-    along, time = run.direction, run.time - run.time[0]
-    nearest = f"nearest model: {1e3 * model.dead_time:.0f} ms dead time, second order"
+    direction, time = run.direction, run.time - run.time[0]
+    nearest_label = f"nearest model: {1e3 * model.dead_time:.0f} ms dead time, second order"
     traces = [
-        line("target", time, run.target @ along, REFERENCE_COLOUR, dash="dot"),
-        line("measured", time, run.measured @ along, MEASURED_COLOUR),
-        line(nearest, time, model.path(run) @ along, NEAREST_COLOUR, dash="dash"),
+        line("target", time, run.target @ direction, REFERENCE_COLOUR, dash="dot"),
+        line("measured", time, run.measured @ direction, MEASURED_COLOUR),
+        line(nearest_label, time, model.path(run) @ direction, NEAREST_COLOUR, dash="dash"),
     ]
     if np.isfinite(flight.gain):
-        ideal = f"ideal: first order, {1.0 / flight.gain:.2g} s"
-        response = first_order(run.steps(), 1.0 / flight.gain) @ along
-        traces.append(line(ideal, time, response, IDEAL_COLOUR))
+        ideal_label = f"ideal: first order, {1.0 / flight.gain:.2g} s"
+        response = first_order(run.steps(), 1.0 / flight.gain) @ direction
+        traces.append(line(ideal_label, time, response, IDEAL_COLOUR))
     note = (
         "The first doublet along its direction. The response is linear if it follows the nearest "
         "model. The vehicle's own rate loop makes that model slower than the ideal."
@@ -124,8 +128,10 @@ def _thrust(flight: FlightData) -> Plot:
         return Plot("", "", [])
     traces = [line_over_time("sent", flight.curves["thrust"], 0, MEASURED_COLOUR)]
     if "hover_thrust" in flight.curves:
-        learned = flight.curves["hover_thrust"]
-        traces.append(line_over_time("learned at hover", learned, 0, NEAREST_COLOUR, dash="dash"))
+        learned_curve = flight.curves["hover_thrust"]
+        traces.append(
+            line_over_time("learned at hover", learned_curve, 0, NEAREST_COLOUR, dash="dash")
+        )
     traces += limit_lines([flight], "thrust")
     layout = time_axis([flight], y="thrust, 0..1")
     return Plot("Thrust", "Normalised collective thrust.", traces, layout, 280)

@@ -33,7 +33,7 @@ class CrossedLimit:
 
 
 @dataclass(frozen=True)
-class EndMark:
+class EarlyEndMark:
     """The early end of a flight, as the plots mark it."""
 
     time: float
@@ -49,31 +49,38 @@ class EndMark:
 
 def early_end(
     figures: Mapping[str, Any], record: FlightRecord, config: Config | None
-) -> EndMark | None:
+) -> EarlyEndMark | None:
     """The early end of a flight; None if it was flown to its end.
 
     `figures` are the content of `summary.json`. The configuration is None if it is unknown.
     """
-    end = figures["early_end"]
-    if end is None:
+    early_end_figures = figures["early_end"]
+    if early_end_figures is None:
         return None
     reason, limit = figures["result"], None
     if config is not None:
         limit = (
             _fence_side(config, reason, record)
-            if end["monitor"] in ("fence", "braking")
-            else _constant_limits(config).get(end["monitor"])
+            if early_end_figures["monitor"] in ("fence", "braking")
+            else _constant_limits(config).get(early_end_figures["monitor"])
         )
-    return EndMark(end["time_s"], reason, limit)
+    return EarlyEndMark(early_end_figures["time_s"], reason, limit)
 
 
 def _constant_limits(config: Config) -> dict[str, CrossedLimit]:
     """The limits that are constant over the flight, by the monitor's name."""
     limits, safety = config.limits, config.safety
-    tilt, rate = limits.max_tilt_deg + safety.tilt_margin_deg, safety.max_body_rate_deg_s
+    max_tilt_deg, max_rate_deg_s = (
+        limits.max_tilt_deg + safety.tilt_margin_deg,
+        safety.max_body_rate_deg_s,
+    )
     return {
-        "tilt": CrossedLimit("tilt", "limits.max_tilt_deg + safety.tilt_margin_deg", (tilt,)),
-        "body rate": CrossedLimit("rate", "safety.max_body_rate_deg_s", (-rate, rate)),
+        "tilt": CrossedLimit(
+            "tilt", "limits.max_tilt_deg + safety.tilt_margin_deg", (max_tilt_deg,)
+        ),
+        "body rate": CrossedLimit(
+            "rate", "safety.max_body_rate_deg_s", (-max_rate_deg_s, max_rate_deg_s)
+        ),
         "speed": CrossedLimit("speed", "safety.max_speed_m_s", (safety.max_speed_m_s,)),
         "tracking": CrossedLimit(
             "error", "safety.max_tracking_error_m", (safety.max_tracking_error_m,)
@@ -92,22 +99,22 @@ def _fence_side(config: Config, reason: str, record: FlightRecord) -> CrossedLim
     relative to home. None: control never began, or the polygon is in latitude and longitude.
     """
     guidance, limits = record.rows("guidance"), config.limits
-    controlled = guidance[guidance["offboard_active"] == 1]
-    if len(controlled) == 0:
+    controlled_rows = guidance[guidance["offboard_active"] == 1]
+    if len(controlled_rows) == 0:
         return None
     north, east = (
-        float(controlled["estimated_north_m"][0]),
-        float(controlled["estimated_east_m"][0]),
+        float(controlled_rows["estimated_north_m"][0]),
+        float(controlled_rows["estimated_east_m"][0]),
     )
     if "fence_ceiling_m" in reason or "fence_floor_m" in reason:
         motion = record.rows("motion")
-        start_time = record.since_start(controlled["time_s"][:1])
+        start_time = record.since_start(controlled_rows["time_s"][:1])
         start_height = float(np.interp(start_time, motion["time_s"], motion["height_m"])[0])
-        ceiling = "fence_ceiling_m" in reason
+        is_ceiling = "fence_ceiling_m" in reason
         return CrossedLimit(
             "height",
-            f"limits.fence_{'ceiling' if ceiling else 'floor'}_m",
-            (start_height + limits.fence_ceiling_m if ceiling else limits.fence_floor_m,),
+            f"limits.fence_{'ceiling' if is_ceiling else 'floor'}_m",
+            (start_height + limits.fence_ceiling_m if is_ceiling else limits.fence_floor_m,),
         )
     if "fence_radius_m" in reason:
         key = "limits.fence_radius_m"

@@ -24,7 +24,7 @@ from companion.recording.measurements.recorded_summary import (
     trace_of,
 )
 from companion.recording.measurements.second_order import StepRun, step_runs
-from companion.report.early_end import EndMark, early_end
+from companion.report.early_end import EarlyEndMark, early_end
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ class FlightData:
     """The doublets in open loop, in vehicle time."""
     gain: float = float("nan")
     """Gain p of the planner, 1/s; NaN: unknown."""
-    early_end: EndMark | None = None
+    early_end: EarlyEndMark | None = None
     """The early end of the flight; None: none, or unknown."""
 
     @property
@@ -128,16 +128,18 @@ def recorded_flight(folder: Path) -> FlightData:
     )
 
 
-def spans(begins: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
+def spans(starts: list[tuple[float, str]], end: float) -> tuple[Span, ...]:
     """Consecutive spans; the last one ends at `end`."""
-    bounds = [*begins, (end, "")]
-    return tuple(Span(time, until, name) for (time, name), (until, _) in pairwise(bounds))
+    bounds = [*starts, (end, "")]
+    return tuple(Span(time, span_end, name) for (time, name), (span_end, _) in pairwise(bounds))
 
 
 def _maneuvers(record: FlightRecord, phases: tuple[Span, ...]) -> tuple[Span, ...]:
     """The maneuvers; each ends at the latest with the phase in which it began."""
-    marks = [(mark.time - record.began, mark.name or "") for mark in record.maneuvers]
-    maneuvers = [span for span in spans(marks, record.duration) if span.name]
+    maneuver_starts = [
+        (change.time - record.start_time, change.name or "") for change in record.maneuvers
+    ]
+    maneuvers = [span for span in spans(maneuver_starts, record.duration) if span.name]
     phase_ends = [phase.end for phase in phases]
     return tuple(
         span._replace(end=min([span.end, *(end for end in phase_ends if end > span.begin)]))

@@ -27,7 +27,7 @@ def require_extra() -> None:
 
 
 def rendered_page(
-    package: str, template: str, title: str, plots: Sequence[Plot], **shown: Any
+    package: str, template: str, title: str, plots: Sequence[Plot], **variables: Any
 ) -> str:
     """The text of a page.
 
@@ -37,7 +37,7 @@ def rendered_page(
         template: name of the template's file.
         title: title of the page.
         plots: plots that the template shows.
-        shown: further values for the template.
+        variables: further values for the template.
     """
     import jinja2  # noqa: PLC0415  an extra
 
@@ -59,7 +59,7 @@ def rendered_page(
         # Browsers since 2023 can unpack gzip.
         plotly=b64encode(compress(plotly.read_bytes(), mtime=0)).decode("ascii"),
         version=version("mavlink-companion"),
-        **shown,
+        **variables,
     )
 
 

@@ -111,16 +111,18 @@ def _track_in_space(flights: Sequence[FlightData]) -> Plot:
 
 def _cube_ranges(traces: Sequence[Mapping[str, Any]]) -> dict[str, tuple[float, float]]:
     """Range of each axis around the tracks, m; each at least half as long as the longest range."""
-    shown = {
+    values_by_axis = {
         axis: [value for trace in traces for value in trace[axis] if value is not None]
         for axis in "xyz"
     }
-    extents = {axis: (min(values), max(values)) for axis, values in shown.items() if values}
+    extents = {
+        axis: (min(values), max(values)) for axis, values in values_by_axis.items() if values
+    }
     longest = max((high - low for low, high in extents.values()), default=0.0) or 1.0
     ranges = {}
     for axis, (low, high) in extents.items():
-        middle, half = 0.5 * (low + high), 0.52 * max(high - low, 0.5 * longest)
-        ranges[axis] = (middle - half, middle + half)
+        middle, half_length = 0.5 * (low + high), 0.52 * max(high - low, 0.5 * longest)
+        ranges[axis] = (middle - half_length, middle + half_length)
     return ranges
 
 
@@ -154,9 +156,9 @@ def _error_plot(flights: Sequence[FlightData]) -> Plot:
         "Distance from the reference by the autopilot's estimate. Where the line has a gap, there "
         "is no reference."
     )
-    largest = _largest_error(flights)
-    if largest is not None:
-        layout["yaxis"]["range"] = [0.0, 1.2 * largest]
+    largest_error = _largest_error(flights)
+    if largest_error is not None:
+        layout["yaxis"]["range"] = [0.0, 1.2 * largest_error]
         note += (
             " Outside of the tracked maneuvers, such as on the way back from steps, the error is "
             "larger: double-click to see all errors."
@@ -175,10 +177,10 @@ def _largest_error(flights: Sequence[FlightData]) -> float | None:
         return None
     time, error = flight.curves["error"].time, flight.curves["error"].values[:, 0]
     errors = [error[(time >= span.begin) & (time < span.end)] for span in flight.maneuvers]
-    largest = [each.max() for each in errors if len(each) and not np.isnan(each).any()]
-    if not largest or max(largest) >= np.nanmax(error):
+    largest_errors = [each.max() for each in errors if len(each) and not np.isnan(each).any()]
+    if not largest_errors or max(largest_errors) >= np.nanmax(error):
         return None
-    return float(max(largest))
+    return float(max(largest_errors))
 
 
 def _lines(flights: Sequence[FlightData], curve: str, label: str) -> list[dict[str, Any]]:

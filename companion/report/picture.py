@@ -29,7 +29,7 @@ _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
 _LARGEST_VALID = 1e9
 """Numbers above this, such as times in s and distances in m, are invalid."""
-_ROOM_FOR_LEGEND = 0.2
+_LEGEND_MARGIN_SHARE = 0.2
 """Room above the curves, as a share of their height."""
 
 
@@ -54,19 +54,21 @@ def draw_flight(folder: Path, out: Path) -> str | None:
     with explain_other_version(folder):
         flight = recorded_flight(folder)
         _check_numbers(flight, folder)
-        panels, history = _panels(flight), "motion" in flight.curves
-    if not panels and not history:
+        panels, has_history = _panels(flight), "motion" in flight.curves
+    if not panels and not has_history:
         raise PictureError(f"{folder}: no flight with anything to draw is recorded there")
-    heights = [_HEIGHT] * bool(panels) + [_HISTORY_HEIGHT] * history
+    heights = [_HEIGHT] * bool(panels) + [_HISTORY_HEIGHT] * has_history
     figure = plt.figure(figsize=(_WIDTH, sum(heights)), layout="constrained")
     try:
-        parts = iter(figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
+        subfigures = iter(
+            figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
+        )
         if panels:
-            grid = next(parts).subplots(1, len(panels), squeeze=False)
+            grid = next(subfigures).subplots(1, len(panels), squeeze=False)
             for axes, draw in zip(grid[0], panels, strict=True):
                 draw(axes)
-        if history:
-            grid = next(parts).subplots(
+        if has_history:
+            grid = next(subfigures).subplots(
                 len(PANEL_HEIGHTS), 1, sharex=True, height_ratios=PANEL_HEIGHTS
             )
             draw_history(grid, flight)
@@ -110,18 +112,20 @@ def _draw_steps(axes: "Axes", flight: FlightData, ideal: float) -> None:
     `ideal` is the time constant of the ideal model, s.
     """
     run, model = flight.step_runs[0], nearest_second_order(flight.step_runs)
-    along, time = run.direction, run.time - run.time[0]
-    nearest = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
-    axes.plot(time, run.target @ along, color=_TARGET_COLOUR, label="target")
-    exact = first_order(run.steps(), ideal) @ along
-    axes.plot(time, exact, "--", color=_IDEAL_COLOUR, label=f"ideal, 1/p = {ideal:.2g} s")
-    axes.plot(time, run.measured @ along, color=_MEASURED_COLOUR, label="measured")
-    axes.plot(time, model.path(run) @ along, ":", color=_NEAREST_COLOUR, label=nearest)
+    direction, time = run.direction, run.time - run.time[0]
+    nearest_label = f"second order, {1e3 * model.dead_time:.0f} ms dead time"
+    axes.plot(time, run.target @ direction, color=_TARGET_COLOUR, label="target")
+    first_order_response = first_order(run.steps(), ideal) @ direction
+    axes.plot(
+        time, first_order_response, "--", color=_IDEAL_COLOUR, label=f"ideal, 1/p = {ideal:.2g} s"
+    )
+    axes.plot(time, run.measured @ direction, color=_MEASURED_COLOUR, label="measured")
+    axes.plot(time, model.path(run) @ direction, ":", color=_NEAREST_COLOUR, label=nearest_label)
     axes.set(
         title="Response to the first doublet", xlabel="time, s", ylabel="acceleration / thrust"
     )
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + _ROOM_FOR_LEGEND * (high - low))
+    axes.set_ylim(low, high + _LEGEND_MARGIN_SHARE * (high - low))
     axes.legend(loc="upper center", fontsize="small", ncols=2, handlelength=1.4, columnspacing=1.0)
     axes.grid(alpha=0.3)
 

@@ -14,14 +14,14 @@ PANEL_HEIGHTS = (1.0, 1.0, 1.0, 1.4)
 """Relative heights of the panels, from top to bottom."""
 _MARGIN_AFTER_END = 0.02
 """Space on the time axis after the end of the flight, as a share of its duration."""
-_ROOM_FOR_NAMES = 1.5
+_NAME_MARGIN_FACTOR = 1.5
 """Factor on the height axis, which leaves space for the names of the phases."""
 _LINE_COLOUR, _PHASE_COLOUR, _END_COLOUR = "#0072b2", "#666666", "#cc0000"
 _MANEUVER_COLOURS = ("#f0e6c8", "#d5e8f0")
 """Colours of the maneuvers, used in turn."""
 _LONGEST_REASON = 110
 """Largest number of characters of the reason that are drawn."""
-_JOINED_BELOW = 0.022
+_MIN_PHASE_DISTANCE_SHARE = 0.022
 """Names of phases that begin closer together than this share of the flight are joined."""
 _PANELS = (
     ("tracking error, m", "error", 0),
@@ -50,7 +50,7 @@ def draw_history(panels: Sequence["Axes"], flight: FlightData) -> None:
         axes.grid(alpha=0.3)
         axes.set_xlim(begin, begin + (1.0 + _MARGIN_AFTER_END) * length)
         low, high = axes.get_ylim()
-        axes.set_ylim(min(low, 0.0), high * (_ROOM_FOR_NAMES if axes is panels[-1] else 1.0))
+        axes.set_ylim(min(low, 0.0), high * (_NAME_MARGIN_FACTOR if axes is panels[-1] else 1.0))
     panels[-1].set_xlabel("time since the flight began, s")
     for axes in panels[:-1]:
         axes.tick_params(labelbottom=False)
@@ -95,7 +95,7 @@ def _name_phases(axes: "Axes", phases: Sequence[Span], length: float) -> None:
     """Write the phases in the last panel; phases that begin close together share a line."""
     groups: list[tuple[float, list[str]]] = []
     for phase in phases:
-        if groups and phase.begin - groups[-1][0] < _JOINED_BELOW * length:
+        if groups and phase.begin - groups[-1][0] < _MIN_PHASE_DISTANCE_SHARE * length:
             groups[-1][1].append(phase.name)
         else:
             groups.append((phase.begin, [phase.name]))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from companion.report.early_end import EndMark
+from companion.report.early_end import EarlyEndMark
 from companion.report.flight_data import Curve, FlightData, Floats, Span
 
 MEASURED_COLOUR, REFERENCE_COLOUR = "#0072b2", "#d55e00"
@@ -40,9 +40,9 @@ class Plot:
     """Height, px."""
 
 
-def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str, Any]:
+def line(name: str, x: Floats, y: Floats, colour: str, **options: Any) -> dict[str, Any]:
     """A line through all points; for many points use `line_over_time`, which thins them."""
-    dash = more.pop("dash", "solid")
+    dash = options.pop("dash", "solid")
     return {
         "type": "scatter",
         "mode": "lines",
@@ -50,16 +50,16 @@ def line(name: str, x: Floats, y: Floats, colour: str, **more: Any) -> dict[str,
         "x": numbers(x),
         "y": numbers(y),
         "line": {"color": colour, "width": 1.6, "dash": dash},
-        **more,
+        **options,
     }
 
 
 def line_over_time(
-    name: str, curve: Curve, column: int, colour: str, **more: Any
+    name: str, curve: Curve, column: int, colour: str, **options: Any
 ) -> dict[str, Any]:
     """A column of a curve over time, thinned so that extremes are kept."""
     indices = drawn_indices(curve.values[:, column])
-    return line(name, curve.time[indices], curve.values[indices, column], colour, **more)
+    return line(name, curve.time[indices], curve.values[indices, column], colour, **options)
 
 
 def drawn_indices(values: Floats) -> Any:
@@ -67,20 +67,20 @@ def drawn_indices(values: Floats) -> Any:
     count = len(values)
     if count <= _MAX_POINTS:
         return np.arange(count)
-    parts = np.array_split(np.arange(count), _MAX_POINTS // 2)
-    kept = {0, count - 1}
-    for part in parts:
-        valid = part[~np.isnan(values[part])]
-        if len(valid) < len(part):  # A gap stays a gap.
-            kept.add(int(part[np.isnan(values[part])][0]))
+    slices = np.array_split(np.arange(count), _MAX_POINTS // 2)
+    kept_indices = {0, count - 1}
+    for indices in slices:
+        valid = indices[~np.isnan(values[indices])]
+        if len(valid) < len(indices):  # A gap stays a gap.
+            kept_indices.add(int(indices[np.isnan(values[indices])][0]))
         if len(valid):
-            kept |= {int(valid[values[valid].argmin()]), int(valid[values[valid].argmax()])}
-    return np.array(sorted(kept))
+            kept_indices |= {int(valid[values[valid].argmin()]), int(valid[values[valid].argmax()])}
+    return np.array(sorted(kept_indices))
 
 
-def even_indices(count: int, most: int = _MAX_POINTS) -> Any:
-    """Indices (M,) of at most `most` of `count` points or rows, at even distances."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(int))
+def even_indices(count: int, max_count: int = _MAX_POINTS) -> Any:
+    """Indices (M,) of at most `max_count` of `count` points or rows, at even distances."""
+    return np.unique(np.linspace(0, count - 1, min(count, max_count)).astype(int))
 
 
 def numbers(values: Floats) -> list[float | None]:
@@ -103,22 +103,24 @@ def time_axis(flights: Sequence[FlightData], **titles: str) -> dict[str, Any]:
     marked.
     """
     layout = axes(x="time, s", **titles)
-    ends = [flight.end_time for flight in flights if flight.end_time is not None]
-    if ends:
-        layout["xaxis"]["range"] = [0.0, max(ends)]
+    end_times = [flight.end_time for flight in flights if flight.end_time is not None]
+    if end_times:
+        layout["xaxis"]["range"] = [0.0, max(end_times)]
     if len(flights) > 1:
         return layout
-    maneuvers, end = flights[0].maneuvers, flights[0].early_end
-    mark = {"shapes": [], "annotations": []} if end is None else end_mark(end)
+    maneuvers, early_end = flights[0].maneuvers, flights[0].early_end
+    end_shapes = (
+        {"shapes": [], "annotations": []} if early_end is None else early_end_shapes(early_end)
+    )
     shades = [_maneuver_shade(span, number) for number, span in enumerate(maneuvers)]
     return {
         **layout,
-        "shapes": [*shades, *mark["shapes"]],
-        "annotations": [*map(_name_above, maneuvers), *mark["annotations"]],
+        "shapes": [*shades, *end_shapes["shapes"]],
+        "annotations": [*map(_maneuver_label, maneuvers), *end_shapes["annotations"]],
     }
 
 
-def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
+def early_end_shapes(end: EarlyEndMark, *, above: bool = False) -> dict[str, list[dict[str, Any]]]:
     """A line and a label at an early end, for a layout; the label is at the bottom, or `above`.
 
     The reason is the tooltip of the label.
@@ -147,24 +149,27 @@ def end_mark(end: EndMark, *, above: bool = False) -> dict[str, list[dict[str, A
     return {"shapes": [line_at_end], "annotations": [label]}
 
 
-def limit_lines(flights: Sequence[FlightData], curve: str, **more: Any) -> list[dict[str, Any]]:
+def limit_lines(flights: Sequence[FlightData], curve: str, **options: Any) -> list[dict[str, Any]]:
     """Lines at the limit that ended a single flight early, if the limit bounds `curve`."""
-    end = flights[0].early_end if len(flights) == 1 else None
-    if end is None or end.limit is None or end.limit.curve != curve:
+    early_end = flights[0].early_end if len(flights) == 1 else None
+    if early_end is None or early_end.limit is None or early_end.limit.curve != curve:
         return []
-    limit, last = end.limit, end.time if flights[0].end_time is None else flights[0].end_time
+    limit, last_time = (
+        early_end.limit,
+        early_end.time if flights[0].end_time is None else flights[0].end_time,
+    )
     if limit.outline:
         north, east = np.array(limit.outline).T
-        return [line(f"limit: {limit.key}", east, north, CROSSED_COLOUR, dash="dash", **more)]
+        return [line(f"limit: {limit.key}", east, north, CROSSED_COLOUR, dash="dash", **options)]
     return [
         line(
             f"limit: {limit.key}",
-            np.array([0.0, last]),
+            np.array([0.0, last_time]),
             np.array([level, level]),
             CROSSED_COLOUR,
             dash="dash",
             showlegend=number == 0,
-            **more,
+            **options,
         )
         for number, level in enumerate(limit.levels)
     ]
@@ -185,7 +190,7 @@ def _maneuver_shade(span: Span, number: int) -> dict[str, Any]:
     }
 
 
-def _name_above(span: Span) -> dict[str, Any]:
+def _maneuver_label(span: Span) -> dict[str, Any]:
     """Label of a maneuver; `name` is the duration, s, so that the page can hide too wide labels."""
     return {
         "x": 0.5 * (span.begin + span.end),

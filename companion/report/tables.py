@@ -42,10 +42,10 @@ def events_at_end(flight: FlightData) -> list[Table]:
     """The events around the early end of a flight; no table if there was none, or no event."""
     if flight.early_end is None:
         return []
-    around = [
+    nearby_events = [
         each for each in flight.events if abs(each.time - flight.early_end.time) <= _END_WINDOW
     ]
-    rows = [(f"{each.time:.1f}", each.source, each.text) for each in around[:_MAX_EVENTS]]
+    rows = [(f"{each.time:.1f}", each.source, each.text) for each in nearby_events[:_MAX_EVENTS]]
     title = f"Events within {_END_WINDOW:.0f} s of the end"
     return [Table(title, ("time, s", "from", "what happened"), rows)] if rows else []
 
@@ -98,15 +98,15 @@ def comparison_tables(flights: Sequence[FlightData]) -> list[Table]:
         }
         for flight in flights
     ]
-    changed = sorted({key for each in keys_by_flight for key in each or {}})
+    changed_names = sorted({key for each in keys_by_flight for key in each or {}})
     settings = [
         (key, *(_EMPTY if each is None else each.get(key, "default") for each in keys_by_flight))
-        for key in changed
+        for key in changed_names
     ]
-    differing = [row for row in settings if len(set(row[1:])) > 1]
+    differing_settings = [row for row in settings if len(set(row[1:])) > 1]
     tables = [
         Table("Figures", ("figure", *names), figures),
-        Table("Keys that differ", ("key", *names), differing),
+        Table("Keys that differ", ("key", *names), differing_settings),
     ]
     return [table for table in tables if table.rows]
 
@@ -124,7 +124,7 @@ def _figure_rows(figures: Any) -> Iterator[tuple[str, str]]:
     response = figures.get("response") or {}
     latency, link = figures.get("latency_us") or {}, figures.get("link") or {}
     constants = response.get("time_constant_s") or {}
-    wanted: list[tuple[str, Any, str]] = [
+    rows: list[tuple[str, Any, str]] = [
         ("result", figures.get("result"), "{}"),
         ("planner", figures.get("planner"), "{}"),
         ("time constant, north", constants.get("north"), "{:.3f} s"),
@@ -135,13 +135,13 @@ def _figure_rows(figures: Any) -> Iterator[tuple[str, str]]:
         ("frames lost", link.get("lost"), "{:,}"),
     ]
     if not figures.get("lockstep"):  # In lockstep, all latencies are 0.
-        wanted += [
+        rows += [
             ("missed deadlines", figures.get("missed_deadlines"), "{:,}"),
             ("latency, median", latency.get("p50"), "{:.0f} µs"),
             ("latency, 99th percentile", latency.get("p99"), "{:.0f} µs"),
         ]
     yield from (
-        (label, text.format(value)) for label, value, text in wanted if value not in (None, "")
+        (label, text.format(value)) for label, value, text in rows if value not in (None, "")
     )
 
 

@@ -10,7 +10,7 @@ from companion.report.plots import (
     REFERENCE_COLOUR,
     Plot,
     axes,
-    end_mark,
+    early_end_shapes,
 )
 
 _EVENT_COLOURS = {2: MEASURED_COLOUR, 3: "#e69f00", 4: REFERENCE_COLOUR}
@@ -47,7 +47,7 @@ def timeline(flight: FlightData) -> Iterator[Plot]:
     layout |= {"barmode": "overlay", "showlegend": False}
     note = "Point at a mark to read the event."
     if flight.early_end is not None:
-        layout |= end_mark(flight.early_end, above=True)
+        layout |= early_end_shapes(flight.early_end, above=True)
         note = f"{flight.early_end.sentence()} {note}"
     yield Plot("Timeline", note, traces, layout, 240)
 

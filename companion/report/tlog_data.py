@@ -34,10 +34,10 @@ def logged_flight(path: Path) -> FlightData:
     reader = _TelemetryReader()
     damage: list[str] = []
     for frame, message in messages(path, _MESSAGE_NAMES, damage.append):
-        reader.take((frame.system, frame.component), message)
-    if reader.vehicle is None or reader.began is None:
+        reader.add_message((frame.system, frame.component), message)
+    if reader.vehicle is None or reader.start_time is None:
         raise LogError(f"{path}: has no telemetry of PX4 or ArduPilot")
-    curves = {**reader.curves(), **_rates_and_thrust(path, reader.began)}
+    curves = {**reader.curves(), **_rates_and_thrust(path, reader.start_time)}
     return FlightData(
         name=path.name,
         fault=damage[0] if damage else None,
@@ -52,37 +52,37 @@ class _TelemetryReader:
 
     Attributes:
         vehicle: system and component of the autopilot, from its first heartbeat.
-        began: first time stamp of attitude or position, s since boot.
+        start_time: first time stamp of attitude or position, s since boot.
         events: the autopilot's texts.
     """
 
     def __init__(self) -> None:
         self.vehicle: tuple[int, int] | None = None
-        self.began: float | None = None
+        self.start_time: float | None = None
         self.events: list[Event] = []
-        self._now = 0.0  # time of the newest attitude or position, s since `began`
+        self._now = 0.0  # time of the newest attitude or position, s since `start_time`
         self._attitudes: list[tuple[float, ...]] = []
         self._positions: list[tuple[float, ...]] = []
         self._tilts: list[tuple[float, float]] = []
         self._modes: list[tuple[float, str]] = []
 
-    def take(self, source: tuple[int, int], message: Message) -> None:
+    def add_message(self, source: tuple[int, int], message: Message) -> None:
         """Take one message from `source` (system, component)."""
-        kind = message.get_type()
-        if kind == "HEARTBEAT":
+        message_type = message.get_type()
+        if message_type == "HEARTBEAT":
             self._note_heartbeat(source, message)
         elif source != self.vehicle:
             return
-        elif kind == "STATUSTEXT":
+        elif message_type == "STATUSTEXT":
             self._note_text(message)
-        elif kind == "LOCAL_POSITION_NED":
+        elif message_type == "LOCAL_POSITION_NED":
             self._update_time(message)
             speed = np.linalg.norm((message.vx, message.vy, message.vz))
             position = message.x, message.y, -message.z
             self._positions.append((self._now, *position, float(speed)))
         else:
             self._update_time(message)
-            self._note_attitude(kind, message)
+            self._note_attitude(message_type, message)
 
     def _note_heartbeat(self, source: tuple[int, int], heartbeat: Message) -> None:
         autopilot = AUTOPILOTS_BY_NUMBER.get(heartbeat.autopilot)
@@ -95,12 +95,12 @@ class _TelemetryReader:
 
     def _update_time(self, message: Message) -> None:
         time = 1e-3 * message.time_boot_ms
-        if self.began is None:
-            self.began = time
-        self._now = time - self.began
+        if self.start_time is None:
+            self.start_time = time
+        self._now = time - self.start_time
 
-    def _note_attitude(self, kind: str, message: Message) -> None:
-        if kind == "ATTITUDE":
+    def _note_attitude(self, message_type: str, message: Message) -> None:
+        if message_type == "ATTITUDE":
             tilt = np.arccos(np.cos(message.roll) * np.cos(message.pitch))
         else:
             q = message.q1, message.q2, message.q3, message.q4
@@ -141,7 +141,7 @@ def _array(rows: Iterable[tuple[float, ...]], columns: int) -> Floats:
     return np.array(list(rows), dtype=float).reshape(-1, columns)
 
 
-def _rates_and_thrust(path: Path, began: float) -> dict[str, Curve]:
+def _rates_and_thrust(path: Path, start_time: float) -> dict[str, Curve]:
     """Rates and thrust, if the log has setpoints that the autopilot obeyed; else empty."""
     try:
         log = read_flight_log(path)
@@ -149,7 +149,7 @@ def _rates_and_thrust(path: Path, began: float) -> dict[str, Curve]:
         return {}
     sent, rates = _array(log.setpoints, 5), _array(log.rates, 4)
     return {
-        "commanded": Curve(sent[:, 0] - began, np.degrees(sent[:, 1:4])),
-        "measured": Curve(rates[:, 0] - began, np.degrees(rates[:, 1:4])),
-        "thrust": Curve(sent[:, 0] - began, sent[:, [4]]),
+        "commanded": Curve(sent[:, 0] - start_time, np.degrees(sent[:, 1:4])),
+        "measured": Curve(rates[:, 0] - start_time, np.degrees(rates[:, 1:4])),
+        "thrust": Curve(sent[:, 0] - start_time, sent[:, [4]]),
     }

@@ -59,9 +59,9 @@ class StreamEffect(Enum):
 
     CONTINUES = "continues"
     """Setpoints are sent until the autopilot obeys the exit's command, such as to land."""
-    ENDS = "ends"
+    ENDS_WITH_ZERO_RATES = "ends"
     """A setpoint of zero body rates is sent last, because later ones would not arrive in time."""
-    STOPS = "stops"
+    STOPS_AT_ONCE = "stops"
     """No more setpoint is sent, because the data for another setpoint cannot be trusted."""
 
 

@@ -86,15 +86,15 @@ class CounterWindow:
         span = last.now - first.now
         if span < _FILLED_SHARE * _AVERAGING_TIME:
             return Health()
-        stalled = self.stall_time(since=first.now)
-        missed = (last.missed_deadlines - first.missed_deadlines) / max(
+        stalled_time = self.stall_time(since=first.now)
+        missed_share = (last.missed_deadlines - first.missed_deadlines) / max(
             1, last.setpoints - first.setpoints
         )
-        lost = last.lost_frames - first.lost_frames
+        lost_frames = last.lost_frames - first.lost_frames
         return Health(
-            lost_share=share_lost(last.frames - first.frames, lost),
-            missed_share=missed if self._real_time else None,
-            starved_share=stalled / span,
+            lost_share=share_lost(last.frames - first.frames, lost_frames),
+            missed_share=missed_share if self._real_time else None,
+            starved_share=stalled_time / span,
             answer_rate=last.setpoint_intervals.rate_since(first.setpoint_intervals),
             position_rate=(last.positions - first.positions) / span,
         )

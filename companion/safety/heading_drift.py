@@ -4,32 +4,32 @@ from collections import deque
 
 from companion.control.estimator_resets import EstimatorResets
 
-_WINDOW = 20.0
+_DRIFT_WINDOW = 20.0
 """Time over which the drift is counted, s: a constant error of the gyro must not add up."""
 _SCALE_ERROR = 0.05
 """Assumed largest scale error of a gyro. In a turn it looks like a drift of the heading."""
 
 
 class HeadingDrift:
-    """Sums the estimator's gradual heading corrections over the last `_WINDOW`."""
+    """Sums the estimator's gradual heading corrections over the last `_DRIFT_WINDOW`."""
 
     def __init__(self, resets: EstimatorResets) -> None:
         self._resets = resets
-        self._sums: deque[tuple[float, float, float]] = deque()
+        self._history: deque[tuple[float, float, float]] = deque()
 
     def begin(self) -> None:
         """Forget all drift up to now."""
-        self._sums.clear()
+        self._history.clear()
 
     def drift(self, now: float) -> float:
         """Heading change that neither body rates nor jumps explain, rad; `now` in s.
 
         What a scale error of the gyro can explain is subtracted.
         """
-        sums, resets = self._sums, self._resets
-        sums.append((now, resets.heading_corrections, resets.turned))
-        while now - sums[0][0] > _WINDOW:
-            sums.popleft()
-        _, corrections, turned = sums[0]
-        unexplained = abs(resets.heading_corrections - corrections)
-        return max(0.0, unexplained - _SCALE_ERROR * (resets.turned - turned))
+        history, resets = self._history, self._resets
+        history.append((now, resets.heading_corrections, resets.turned))
+        while now - history[0][0] > _DRIFT_WINDOW:
+            history.popleft()
+        _, corrections_before, turned_before = history[0]
+        unexplained = abs(resets.heading_corrections - corrections_before)
+        return max(0.0, unexplained - _SCALE_ERROR * (resets.turned - turned_before))

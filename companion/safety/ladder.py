@@ -24,7 +24,8 @@ class SafetyLadder:
 
     The action HOLD aborts the maneuver and ends the flight. If all breaches with the action HOLD
     end within `hold_time`, the vehicle lands as soon as it is at rest, at the latest after
-    `hold_time`. Otherwise the most severe `Monitor.then` of the remaining breaches follows.
+    `hold_time`. Otherwise the most severe `Monitor.action_after_hold` of the remaining breaches
+    follows.
 
     Args:
         monitors: the monitors of the flight; among equally severe breaches the first one decides.
@@ -43,7 +44,7 @@ class SafetyLadder:
         self.breaches: dict[str, str] = {}
         self._alarms = [Alarm(monitor) for monitor in monitors]
         self._hold_time = hold_time
-        self._held_at: float | None = None
+        self._hold_start: float | None = None
         self._hold_reason = ""
 
     @property
@@ -52,30 +53,30 @@ class SafetyLadder:
         return tuple(alarm.monitor.name for alarm in self._alarms if alarm.reason is not None)
 
     def step(self, snapshot: Snapshot) -> Verdict | None:
-        """Judge one snapshot; return the action to take now, or None."""
-        raised = [
+        """Check one snapshot; return the action to take now, or None."""
+        new_alarms = [
             alarm for alarm in self._alarms if alarm.step(snapshot) and self._report_change(alarm)
         ]
-        worst = max(raised, key=_severity, default=None)
+        worst = max(new_alarms, key=_severity, default=None)
         if worst is not None and worst.monitor.action.severity > Action.HOLD.severity:
             return _verdict(worst, worst.monitor.action)
-        if self._held_at is not None:
-            return self._after_hold(snapshot, self._held_at)
+        if self._hold_start is not None:
+            return self._verdict_after_hold(snapshot, self._hold_start)
         if worst is not None and worst.monitor.action is Action.HOLD:
-            self._held_at, self._hold_reason = snapshot.now, worst.reason or ""
+            self._hold_start, self._hold_reason = snapshot.now, worst.reason or ""
             return _verdict(worst, Action.HOLD)
         return None
 
-    def _after_hold(self, snapshot: Snapshot, held_at: float) -> Verdict | None:
+    def _verdict_after_hold(self, snapshot: Snapshot, hold_start: float) -> Verdict | None:
         """The verdict if all breaches with HOLD have ended or `hold_time` is over; else None."""
-        breaches = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
-        has_time = snapshot.now - held_at < self._hold_time
-        if has_time and (breaches or snapshot.motion.moves_to_hold):
+        hold_alarms = [a for a in self._alarms if a.reason and a.monitor.action is Action.HOLD]
+        hold_time_remains = snapshot.now - hold_start < self._hold_time
+        if hold_time_remains and (hold_alarms or snapshot.motion.moves_to_hold):
             return None
-        if not breaches:
+        if not hold_alarms:
             return Verdict(Action.LAND, self._hold_reason)
-        worst = max(breaches, key=lambda alarm: alarm.monitor.then.severity)
-        return _verdict(worst, worst.monitor.then)
+        worst = max(hold_alarms, key=lambda alarm: alarm.monitor.action_after_hold.severity)
+        return _verdict(worst, worst.monitor.action_after_hold)
 
     def _report_change(self, alarm: Alarm) -> bool:
         """Report that an alarm was raised or ended; return whether it was raised."""

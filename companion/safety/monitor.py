@@ -1,4 +1,4 @@
-"""One monitor: a judge of snapshots, how long a breach must last, and the action it causes."""
+"""One monitor: a check of snapshots, how long a breach must last, and the action it causes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from companion.safety.actions import Action, StreamEffect
 from companion.safety.snapshot import Snapshot
 
-Judge = Callable[[Snapshot, bool], str | None]
+BreachCheck = Callable[[Snapshot, bool], str | None]
 """Returns the breach in words, or None. The flag tells whether the alarm is already raised. `above`
 and `below` use the flag for hysteresis, so that the alarm does not toggle at the limit."""
 
@@ -25,8 +25,8 @@ def above(
     limit: float,
     value_in: Callable[[Snapshot], float | None],
     breach_of: Callable[[float], str],
-) -> Judge:
-    """A judge whose breach is a value above `limit`, with hysteresis.
+) -> BreachCheck:
+    """A check whose breach is a value above `limit`, with hysteresis.
 
     Args:
         limit: the largest value that is no breach.
@@ -34,29 +34,29 @@ def above(
         breach_of: returns the breach in words for a value.
     """
 
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+    def check(snapshot: Snapshot, raised: bool) -> str | None:
         value = value_in(snapshot)
         if value is None or value <= with_hysteresis(limit, raised):
             return None
         return breach_of(value)
 
-    return judge
+    return check
 
 
 def below(
     limit: float,
     value_in: Callable[[Snapshot], float | None],
     breach_of: Callable[[float], str],
-) -> Judge:
-    """A judge whose breach is a value below `limit`, with hysteresis; arguments as for `above`."""
+) -> BreachCheck:
+    """A check whose breach is a value below `limit`, with hysteresis; arguments as for `above`."""
 
-    def judge(snapshot: Snapshot, raised: bool) -> str | None:
+    def check(snapshot: Snapshot, raised: bool) -> str | None:
         value = value_in(snapshot)
         if value is None or value >= (limit * (1.0 / _HYSTERESIS) if raised else limit):
             return None
         return breach_of(value)
 
-    return judge
+    return check
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,15 +65,15 @@ class Monitor:
 
     name: str
     """Name in the documentation and in messages."""
-    judge: Judge
-    """Judges each snapshot, without a clock or memory of its own; see `Judge`."""
+    check: BreachCheck
+    """Judges each snapshot, without a clock or memory of its own; see `BreachCheck`."""
     action: Action
     """Action that a breach leads to."""
-    lasts: float = 0.0
+    raise_after: float = 0.0
     """Time that a breach must last before the alarm is raised, s."""
-    calm: float = 1.0
+    clear_after: float = 1.0
     """Time without the breach before the alarm ends, s."""
-    then: Action = Action.LAND
+    action_after_hold: Action = Action.LAND
     """Action that follows if a hold does not end the breach."""
     stream: StreamEffect = StreamEffect.CONTINUES
     """Whether setpoints continue, end or stop if the breach ends control."""
@@ -90,18 +90,18 @@ class Alarm:
     def __init__(self, monitor: Monitor) -> None:
         self.monitor = monitor
         self.reason: str | None = None
-        self._since: float | None = None
+        self._change_seen_at: float | None = None
 
     def step(self, snapshot: Snapshot) -> bool:
-        """Judge one snapshot; return whether the alarm was raised or ended now."""
-        breach = self.monitor.judge(snapshot, self.reason is not None)
+        """Check one snapshot; return whether the alarm was raised or ended now."""
+        breach = self.monitor.check(snapshot, self.reason is not None)
         if (breach is None) is (self.reason is None):
-            self._since = None
+            self._change_seen_at = None
             return False
-        if self._since is None:
-            self._since = snapshot.now
-        needed = self.monitor.lasts if breach is not None else self.monitor.calm
-        if snapshot.now - self._since < needed:
+        if self._change_seen_at is None:
+            self._change_seen_at = snapshot.now
+        required_time = self.monitor.raise_after if breach is not None else self.monitor.clear_after
+        if snapshot.now - self._change_seen_at < required_time:
             return False
-        self.reason, self._since = breach, None
+        self.reason, self._change_seen_at = breach, None
         return True

@@ -1,9 +1,9 @@
 """Monitors of other packages: they run beside our monitors, and cannot disable or weaken ours.
 
-The judge of a monitor is its function that looks for a breach in each snapshot. Each monitor has
-three rows in the table: the monitor itself, one for exceptions of its judge, and one for the time
-that the judge takes. A judge that raises is not called again, and the vehicle is handed back,
-because the flight must not go on without a monitor that the user wanted. A slow judge delays
+The check of a monitor is its function that looks for a breach in each snapshot. Each monitor has
+three rows in the table: the monitor itself, one for exceptions of its check, and one for the time
+that the check takes. A check that raises is not called again, and the vehicle is handed back,
+because the flight must not go on without a monitor that the user wanted. A slow check delays
 the answers to samples, and a warning names it.
 """
 
@@ -18,13 +18,13 @@ from companion.safety.monitor import Monitor, with_hysteresis
 from companion.safety.snapshot import Snapshot
 from companion.user_code import UserCodeError, naming_user_code
 
-_ACTIONS = (Action.WARN, Action.HOLD, Action.HAND_BACK, Action.LAND)
+_ALLOWED_ACTIONS = (Action.WARN, Action.HOLD, Action.HAND_BACK, Action.LAND)
 """The actions that a monitor of another package may have."""
-_AFTER_HOLD = (Action.HAND_BACK, Action.LAND)
-_MAX_JUDGING_TIME = 0.003
-"""Longest time that a judge may take, s: a sample comes every 4 ms, and must be answered."""
+_ALLOWED_ACTIONS_AFTER_HOLD = (Action.HAND_BACK, Action.LAND)
+_MAX_CHECK_DURATION = 0.003
+"""Longest time that a check may take, s: a sample comes every 4 ms, and must be answered."""
 _SLOW_DURATION = 0.5
-"""Time for which every call of a judge must be too slow before the warning, s; a busy computer
+"""Time for which every call of a check must be too slow before the warning, s; a busy computer
 makes only some calls slow."""
 
 
@@ -32,13 +32,13 @@ def plugin_monitors(config: Config) -> tuple[Monitor, ...]:
     """The monitors that `safety.monitors` names, three rows for each.
 
     Raises:
-        ConfigError: a monitor cannot be loaded or made, or its judge fails on a snapshot in which
+        ConfigError: a monitor cannot be loaded or made, or its check fails on a snapshot in which
             nothing is known.
     """
-    return tuple(row for name in config.safety.monitors for row in _rows(name, config))
+    return tuple(row for name in config.safety.monitors for row in _monitors_named(name, config))
 
 
-def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
+def _monitors_named(name: str, config: Config) -> tuple[Monitor, ...]:
     setting = f"safety.monitors: {name}"
     try:
         factory = plugins.load(plugins.MONITORS, name)
@@ -50,59 +50,62 @@ def _rows(name: str, config: Config) -> tuple[Monitor, ...]:
         raise ConfigError(
             f"{setting} must make a companion.safety.monitor.Monitor, not {monitor!r}"
         )
-    if monitor.action not in _ACTIONS or monitor.then not in _AFTER_HOLD:
+    if (
+        monitor.action not in _ALLOWED_ACTIONS
+        or monitor.action_after_hold not in _ALLOWED_ACTIONS_AFTER_HOLD
+    ):
         raise ConfigError(
-            f"{setting}: `action` must be WARN, HOLD, HAND_BACK or LAND, and `then` (the action "
-            "after a hold) must be HAND_BACK or LAND"
+            f"{setting}: `action` must be WARN, HOLD, HAND_BACK or LAND, and "
+            "`action_after_hold` must be HAND_BACK or LAND"
         )
-    guarded_judge = GuardedJudge(monitor)
-    guarded_judge.judge(Snapshot(0.0), False)
-    if guarded_judge.fault is not None:
+    guarded_check = GuardedCheck(monitor)
+    guarded_check.check(Snapshot(0.0), False)
+    if guarded_check.fault is not None:
         raise ConfigError(
-            f"{setting} must accept a snapshot whose values are None: {guarded_judge.fault}"
+            f"{setting} must accept a snapshot whose values are None: {guarded_check.fault}"
         )
     guarded_monitor = replace(
-        monitor, name=name, judge=guarded_judge.judge, stream=StreamEffect.CONTINUES
+        monitor, name=name, check=guarded_check.check, stream=StreamEffect.CONTINUES
     )
     return (
         guarded_monitor,
         replace(
             guarded_monitor,
             name=f"{name} (its fault)",
-            judge=guarded_judge.judge_fault,
+            check=guarded_check.breach_of_fault,
             action=Action.HAND_BACK,
-            lasts=0.0,
+            raise_after=0.0,
         ),
         replace(
             guarded_monitor,
             name=f"{name} (its time)",
-            judge=guarded_judge.judge_time,
+            check=guarded_check.breach_of_time,
             action=Action.WARN,
-            lasts=_SLOW_DURATION,
+            raise_after=_SLOW_DURATION,
         ),
     )
 
 
-class GuardedJudge:
-    """Calls the judge of another package until the judge fails.
+class GuardedCheck:
+    """Calls the check of another package until the check fails.
 
     Attributes:
-        fault: how the judge failed, or None.
+        fault: how the check failed, or None.
     """
 
     def __init__(self, monitor: Monitor) -> None:
         self.fault: str | None = None
-        self._judge = monitor.judge
-        self._judging_time = 0.0
+        self._check = monitor.check
+        self._check_duration = 0.0
 
-    def judge(self, snapshot: Snapshot, raised: bool) -> str | None:
-        """The breach that the judge reports; None after its first fault."""
+    def check(self, snapshot: Snapshot, raised: bool) -> str | None:
+        """The breach that the check reports; None after its first fault."""
         if self.fault is not None:
             return None
-        began = perf_counter()
+        start_time = perf_counter()
         try:
-            with naming_user_code("judge", self._judge):
-                breach = self._judge(snapshot, raised)
+            with naming_user_code("check", self._check):
+                breach = self._check(snapshot, raised)
                 if breach is not None and not (isinstance(breach, str) and breach.strip()):
                     raise TypeError(f"it returned {breach!r}, which is neither a text nor None")
                 return breach
@@ -110,16 +113,16 @@ class GuardedJudge:
             self.fault = str(error)
             return None
         finally:
-            self._judging_time = perf_counter() - began
+            self._check_duration = perf_counter() - start_time
 
-    def judge_fault(self, snapshot: Snapshot, raised: bool) -> str | None:
-        """The fault of the judge as a breach."""
+    def breach_of_fault(self, snapshot: Snapshot, raised: bool) -> str | None:
+        """The fault of the check as a breach."""
         return None if self.fault is None else f"{self.fault}; the vehicle is handed back"
 
-    def judge_time(self, snapshot: Snapshot, raised: bool) -> str | None:
-        """A breach if the latest call of the judge took too long; None after the judge's fault."""
-        if self.fault is not None or self._judging_time <= with_hysteresis(
-            _MAX_JUDGING_TIME, raised
+    def breach_of_time(self, snapshot: Snapshot, raised: bool) -> str | None:
+        """A breach if the latest call of the check took too long; None after the check's fault."""
+        if self.fault is not None or self._check_duration <= with_hysteresis(
+            _MAX_CHECK_DURATION, raised
         ):
             return None
-        return f"this monitor takes {1e3 * self._judging_time:.0f} ms, and delays the setpoints"
+        return f"this monitor takes {1e3 * self._check_duration:.0f} ms, and delays the setpoints"

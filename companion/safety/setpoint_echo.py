@@ -7,7 +7,7 @@ from companion.attitude import BodyRates
 from companion.mavlink.messages import Message
 from companion.vehicle.autopilot import Autopilot
 
-_COUNTING_TIME = 5.0
+_COUNTING_WINDOW = 5.0
 _KEPT_REPORTS = 256
 _THRUST_ROUNDING, _RATE_ROUNDING = 1e-7, 1e-6
 """Largest difference of a reported thrust (0..1) and body rate (rad/s) from our setpoint, because
@@ -41,8 +41,8 @@ class SetpointEcho:
         self._matched_once = self.any_foreign = False
         self._foreign_times.clear()
 
-    def take(self, message: Message, now: float) -> None:
-        """Take an ATTITUDE_TARGET that arrived at `now`, s of event-loop time."""
+    def add_report(self, message: Message, now: float) -> None:
+        """Add an ATTITUDE_TARGET that arrived at `now`, s of event-loop time."""
         rates = BodyRates(message.body_roll_rate, message.body_pitch_rate, message.body_yaw_rate)
         if self._is_ours(rates, message.thrust):
             self._matched_once = True
@@ -56,7 +56,7 @@ class SetpointEcho:
         The number remains 0 until a report has matched one of our setpoints, because an autopilot
         may report changed setpoints.
         """
-        return sum(now - at <= _COUNTING_TIME for at in self._foreign_times)
+        return sum(now - at <= _COUNTING_WINDOW for at in self._foreign_times)
 
     def _is_ours(self, rates: BodyRates, thrust: float) -> bool:
         newest_first = reversed(self._sent)

@@ -10,7 +10,7 @@ from companion.guidance.reference import NorthEast, Vector
 from companion.vehicle.records import Battery, EstimatorStatus, Gps
 from companion.vehicle.timesync import Uplink
 
-UNHEARD_S = 0.3
+HEARD_TIMEOUT_S = 0.3
 """Time without a frame, s, after which the vehicle counts as not heard. From then on a takeover
 could go unnoticed."""
 
@@ -59,21 +59,21 @@ class Control(NamedTuple):
     Times are in s of event-loop time. A sample is answered when a setpoint is sent for it.
     """
 
-    last_answer: float = inf
+    last_answered_arrival: float = inf
     """Arrival of the last answered sample."""
-    last_sample: float = inf
+    last_sample_arrival: float = inf
     """Arrival of the last usable attitude sample."""
     attitude_not_finite: bool = False
     """Whether the newest attitude was refused for a NaN or infinity."""
     reason: Unanswered | None = None
     """Why the newest sample is unanswered, or None."""
-    last_position: float = inf
+    last_position_arrival: float = inf
     """Arrival of the last position that was newer than all before."""
     position_not_finite: bool = False
     """Whether the newest position was refused for a NaN or infinity."""
     command_not_finite: bool = False
     """Whether the newest command of guidance was refused for a NaN or infinity."""
-    last_heard: float = inf
+    last_frame_noticed: float = inf
     """When the arrival of a frame of any kind from the vehicle was last noticed."""
     position_fresh: bool = True
     """Whether the newest position is not older than deadman.position_stale_ms."""
@@ -81,7 +81,7 @@ class Control(NamedTuple):
     """Latest jump, stop or restart of the vehicle's clock since control began, in words, or
     None."""
     stall_time: float = 0.0
-    """Total time of the stalls of this program since `last_answer`, s."""
+    """Total time of the stalls of this program since `last_answered_arrival`, s."""
 
 
 class Health(NamedTuple):
@@ -139,5 +139,5 @@ class Snapshot(NamedTuple):
     resets: Resets = Resets()
     had_gps: bool = False
     """Whether GPS has had a 3D fix."""
-    good_flags: int = 0
+    initial_estimator_flags: int = 0
     """ESTIMATOR_STATUS flags that were set when control began."""

@@ -13,7 +13,7 @@ from companion.safety.frozen_telemetry import FrozenTelemetry
 from companion.safety.heading_drift import HeadingDrift
 from companion.safety.setpoint_echo import SetpointEcho
 from companion.safety.snapshot import (
-    UNHEARD_S,
+    HEARD_TIMEOUT_S,
     AutopilotStatus,
     Control,
     Health,
@@ -35,7 +35,7 @@ class SnapshotBuilder:
     """Collects the data that the monitors judge.
 
     Attributes:
-        echo: takes each ATTITUDE_TARGET.
+        echo: gets each ATTITUDE_TARGET.
         counters: the counters of the last second, and our own stalls.
         fence_centre_ned: centre of the fence in the frame without estimator resets, m NED; None:
             not known. The centre is where control began, unless `begin` got another one.
@@ -50,17 +50,17 @@ class SnapshotBuilder:
         self._link, self._loop, self._guidance_loop = link, loop, guidance_loop
         self.echo = SetpointEcho(loop.record.sent_setpoints)
         self.counters = CounterWindow(link, loop.record, real_time=real_time)
-        self._frozen = FrozenTelemetry()
+        self._frozen_telemetry = FrozenTelemetry()
         self._heading_drift = HeadingDrift(loop.resets)
         self._frames_heard = 0
         self._heard_at = 0.0
         self.fence_centre_ned: Vector | None = None
         self._fence_place: Place | None = None
-        self._began_at = 0.0
-        self._frame_at_begin = HeadingFrame()
-        self._shift_at_begin: Vector = (0.0, 0.0, 0.0)
-        self._good_flags = 0
-        self._clock_changes = 0
+        self._control_start = 0.0
+        self._heading_frame_at_start = HeadingFrame()
+        self._shift_at_start: Vector = (0.0, 0.0, 0.0)
+        self._initial_estimator_flags = 0
+        self._clock_change_count = 0
 
     def begin(self, now: float, centre: FenceCentre | None = None) -> None:
         """Note that control begins at `now`; earlier resets do not count.
@@ -72,21 +72,21 @@ class SnapshotBuilder:
         state, resets = self._link.state, self._loop.resets
         motion = self._guidance_loop.motion
         self.fence_centre_ned = None if motion is None else motion.position_ned
-        self._fence_place = self._place(now)
+        self._fence_place = self._current_place(now)
         if centre is not None:
             self.fence_centre_ned = minus(centre.position_ned, resets.position_shift)
             self._fence_place = centre.place
-        self._began_at = now
-        self._frame_at_begin, self._shift_at_begin = resets.frame, resets.position_shift
+        self._control_start = now
+        self._heading_frame_at_start, self._shift_at_start = resets.frame, resets.position_shift
         resets.largest_tilt_jump = 0.0
-        self._good_flags = 0 if state.estimator is None else state.estimator.flags
-        self._clock_changes = self._link.clock.change_count
+        self._initial_estimator_flags = 0 if state.estimator is None else state.estimator.flags
+        self._clock_change_count = self._link.clock.change_count
         self.counters.clear()
         self.echo.begin(self._link.autopilot)
-        self._frozen.begin(now)
+        self._frozen_telemetry.begin(now)
         self._heading_drift.begin()
 
-    def flown_fence_centre(self) -> FenceCentre | None:
+    def fence_centre_without_resets(self) -> FenceCentre | None:
         """Centre of the fence in the frame without resets; None: no position, or no control yet."""
         if self.fence_centre_ned is None:
             return None
@@ -97,14 +97,14 @@ class SnapshotBuilder:
         """Centre of the fence in the autopilot's frame; None: no position, or no control yet."""
         if self.fence_centre_ned is None:
             return None
-        to_autopilot_frame = minus((0.0, 0.0, 0.0), self._loop.resets.position_shift)
-        return FenceCentre(minus(self.fence_centre_ned, to_autopilot_frame), self._fence_place)
+        negative_shift = minus((0.0, 0.0, 0.0), self._loop.resets.position_shift)
+        return FenceCentre(minus(self.fence_centre_ned, negative_shift), self._fence_place)
 
     def long_silence(self, now: float) -> float | None:
-        """Silence of the vehicle at `now`, s; None if it is not longer than `UNHEARD_S`."""
+        """Silence of the vehicle at `now`, s; None if it is not longer than `HEARD_TIMEOUT_S`."""
         self.read_counters(now)
         silence = now - self._heard_at
-        return silence if silence > UNHEARD_S else None
+        return silence if silence > HEARD_TIMEOUT_S else None
 
     def read_counters(self, now: float) -> None:
         """Read the counters at `now`; the watch calls this at least 50 times a second."""
@@ -118,7 +118,7 @@ class SnapshotBuilder:
         """The snapshot at `now`, s of event-loop time; call `read_counters` before."""
         state, loop, clock = self._link.state, self._loop, self._link.clock
         record = loop.record
-        refused_at = self._link.stats.non_finite_at
+        non_finite_at = self._link.stats.non_finite_at
         position_received = -inf if state.position is None else state.position.received
         return Snapshot(
             now,
@@ -134,20 +134,20 @@ class SnapshotBuilder:
             Control(
                 record.last_answered_arrival,
                 record.last_sample_arrival,
-                refused_at.get("ATTITUDE_QUATERNION", -inf) > record.last_sample_arrival,
+                non_finite_at.get("ATTITUDE_QUATERNION", -inf) > record.last_sample_arrival,
                 record.reason,
                 position_received,
-                refused_at.get("LOCAL_POSITION_NED", -inf) > position_received,
+                non_finite_at.get("LOCAL_POSITION_NED", -inf) > position_received,
                 self._guidance_loop.command_not_finite,
                 self._heard_at,
                 self._guidance_loop.fresh_position() is not None,
-                None if clock.change_count == self._clock_changes else clock.last_change,
+                None if clock.change_count == self._clock_change_count else clock.last_change,
                 self.counters.stall_time(since=record.last_answered_arrival),
             ),
             self._health(now),
             self._resets(now),
             state.gps_was_good,
-            self._good_flags,
+            self._initial_estimator_flags,
         )
 
     def _motion(self) -> Motion:
@@ -172,7 +172,7 @@ class SnapshotBuilder:
         )
 
     def _health(self, now: float) -> Health:
-        since = max(self._began_at, now - _GAP_COUNTING_TIME)
+        since = max(self._control_start, now - _GAP_COUNTING_TIME)
         timesync = self._link.timesync
         return self.counters.health()._replace(
             round_trip=timesync.round_trip_s,
@@ -180,28 +180,28 @@ class SnapshotBuilder:
             uplink=timesync.uplink,
             foreign_reports=self.echo.foreign_reports(now),
             any_foreign_report=self.echo.any_foreign,
-            frozen=self._frozen_now(now),
+            frozen=self._find_frozen(now),
         )
 
-    def _frozen_now(self, now: float) -> str | None:
+    def _find_frozen(self, now: float) -> str | None:
         sent = self._loop.record.sent_setpoints
         if not sent:
             return None
         sample, position = self._loop.resets.newest_attitude, self._link.state.position
-        return self._frozen.find_frozen(now, sample, sent[-1][0], position)
+        return self._frozen_telemetry.find_frozen(now, sample, sent[-1][0], position)
 
     def _resets(self, now: float) -> Resets:
         resets = self._loop.resets
-        since = max(self._began_at, now - _RESET_COUNTING_TIME)
+        since = max(self._control_start, now - _RESET_COUNTING_TIME)
         return Resets(
             sum(at > since for at in resets.reset_times),
-            dist(resets.position_shift, self._shift_at_begin),
-            wrap_angle(resets.frame.offset - self._frame_at_begin.offset),
+            dist(resets.position_shift, self._shift_at_start),
+            wrap_angle(resets.frame.offset - self._heading_frame_at_start.offset),
             resets.largest_tilt_jump,
             self._heading_drift.drift(now),
         )
 
-    def _place(self, now: float) -> Place | None:
+    def _current_place(self, now: float) -> Place | None:
         """Latitude and longitude of the vehicle, or None if they are old."""
         newest = self._link.state.global_position
         if newest is None or now - newest.received > _MAX_PLACE_AGE:

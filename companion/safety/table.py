@@ -1,7 +1,7 @@
-"""The table of monitors: judge, action, and how long a breach must last.
+"""The table of monitors: check, action, and how long a breach must last.
 
-To add a monitor, write its judge beside the others (`*_judges.py`), its row here, and what to do in
-`companion.recording.what_to_do`.
+To add a monitor, write its check beside the others (`*_breaches.py`), its row here, and what to do
+in `companion.recording.what_to_do`.
 """
 
 from dataclasses import replace
@@ -9,7 +9,7 @@ from math import radians
 
 from companion.config import Config
 from companion.guidance.fence import Fence
-from companion.safety import autopilot_judges, link_judges, motion_judges
+from companion.safety import autopilot_breaches, link_breaches, motion_breaches
 from companion.safety.actions import Action, StreamEffect
 from companion.safety.monitor import Monitor
 from companion.safety.plugin_monitors import plugin_monitors
@@ -22,7 +22,7 @@ _MAX_UNANSWERED = 7
 """Largest number of TIMESYNC probes in a row that the vehicle may leave unanswered; they are sent
 every 0.1 s. If single probes are lost at random, eight in a row are lost once in 50 s at a loss of
 50 %, in 36 min at 30 %, in 13 h at 20 %."""
-_MAX_FOREIGN = 2
+_MAX_FOREIGN_REPORTS = 2
 """Largest number of foreign setpoints that the autopilot may report within 5 s."""
 _LARGEST_HEADING_DRIFT = radians(30.0)
 """Largest gradual change of the heading in 20 s that the body rates do not explain, rad. From 45°
@@ -55,36 +55,46 @@ def monitors(config: Config) -> tuple[Monitor, ...]:
 def _fixed_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of silence, frozen data, clock, arming, landing, failsafe; all actions are fixed."""
     limit = config.deadman.silence_limit
-    unheard = link_judges.silence(limit, heard=False)
-    silence = link_judges.silence(
-        limit, heard=True, planner=config.planner.name, guidance=config.guidance.kind
+    unheard = link_breaches.silence(limit, vehicle_heard=False)
+    silence = link_breaches.silence(
+        limit, vehicle_heard=True, planner=config.planner.name, guidance=config.guidance.kind
     )
     return (
-        Monitor("unheard", unheard, Action.LISTEN, stream=StreamEffect.STOPS),
-        Monitor("silence", silence, _HAND_BACK, stream=StreamEffect.STOPS),
-        Monitor("frozen", link_judges.frozen, _HAND_BACK, stream=StreamEffect.ENDS),
-        Monitor("clock", link_judges.clock_changed, _HAND_BACK, stream=StreamEffect.STOPS),
-        Monitor("disarmed", autopilot_judges.disarmed, _RELEASE),
-        Monitor("landed", autopilot_judges.landed, _LAND),
+        Monitor("unheard", unheard, Action.LISTEN, stream=StreamEffect.STOPS_AT_ONCE),
+        Monitor("silence", silence, _HAND_BACK, stream=StreamEffect.STOPS_AT_ONCE),
+        Monitor(
+            "frozen", link_breaches.frozen, _HAND_BACK, stream=StreamEffect.ENDS_WITH_ZERO_RATES
+        ),
+        Monitor(
+            "clock", link_breaches.clock_changed, _HAND_BACK, stream=StreamEffect.STOPS_AT_ONCE
+        ),
+        Monitor("disarmed", autopilot_breaches.disarmed, _RELEASE),
+        Monitor("landed", autopilot_breaches.landed, _LAND),
         # This is for failsafes that do not change the mode: a change of mode is a takeover.
-        Monitor("failsafe", autopilot_judges.failsafe, _HAND_BACK),
+        Monitor("failsafe", autopilot_breaches.failsafe, _HAND_BACK),
     )
 
 
 def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of battery, GPS and estimator."""
     safety = config.safety
-    resets = autopilot_judges.too_many_estimator_resets(
+    resets = autopilot_breaches.too_many_estimator_resets(
         safety.max_resets, safety.max_reset_m, safety.max_reset_angle
     )
-    drift = autopilot_judges.heading_drift(_LARGEST_HEADING_DRIFT)
-    battery = autopilot_judges.battery(config.limits.min_battery)
+    drift = autopilot_breaches.heading_drift(_LARGEST_HEADING_DRIFT)
+    battery = autopilot_breaches.battery(config.limits.min_battery)
     position = Action(safety.position_action)
     return (
-        Monitor("battery", battery, Action(safety.battery_action), lasts=_BACKLOG_TIME, calm=5.0),
-        Monitor("gps", autopilot_judges.gps, position, lasts=_BACKLOG_TIME),
-        Monitor("estimator", autopilot_judges.estimator_flags, position, lasts=0.5),
-        Monitor("reset", autopilot_judges.any_estimator_reset, Action.WARN, lasts=0.1),
+        Monitor(
+            "battery",
+            battery,
+            Action(safety.battery_action),
+            raise_after=_BACKLOG_TIME,
+            clear_after=5.0,
+        ),
+        Monitor("gps", autopilot_breaches.gps, position, raise_after=_BACKLOG_TIME),
+        Monitor("estimator", autopilot_breaches.estimator_flags, position, raise_after=0.5),
+        Monitor("reset", autopilot_breaches.any_estimator_reset, Action.WARN, raise_after=0.1),
         Monitor("resets", resets, Action(safety.reset_action)),
         Monitor("heading", drift, Action(safety.reset_action)),
     )
@@ -93,21 +103,21 @@ def _autopilot_monitors(config: Config) -> tuple[Monitor, ...]:
 def _motion_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of flight envelope, fence, tracking error and thrust."""
     safety, limits, fence = config.safety, config.limits, fence_of(config)
-    tilt = motion_judges.tilt(limits.max_tilt + safety.tilt_margin)
-    body_rate = motion_judges.body_rate(safety.max_body_rate)
-    outside, braking = motion_judges.outside(fence), motion_judges.braking(fence)
-    speed = motion_judges.speed(safety.max_speed_m_s)
-    tracking = motion_judges.tracking(safety.max_tracking_error_m)
-    thrust = motion_judges.thrust(limits.min_thrust, limits.max_thrust)
+    tilt = motion_breaches.tilt(limits.max_tilt + safety.tilt_margin)
+    body_rate = motion_breaches.body_rate(safety.max_body_rate)
+    outside, braking = motion_breaches.outside(fence), motion_breaches.braking(fence)
+    speed = motion_breaches.speed(safety.max_speed_m_s)
+    tracking = motion_breaches.tracking(safety.max_tracking_error_m)
+    thrust = motion_breaches.thrust(limits.min_thrust, limits.max_thrust)
     envelope_action, fence_action = Action(safety.envelope_action), Action(safety.fence_action)
     return (
-        Monitor("tilt", tilt, envelope_action, lasts=0.3),
-        Monitor("body rate", body_rate, envelope_action, lasts=0.2),
+        Monitor("tilt", tilt, envelope_action, raise_after=0.3),
+        Monitor("body rate", body_rate, envelope_action, raise_after=0.2),
         Monitor("fence", outside, fence_action),
-        Monitor("braking", braking, _HOLD, lasts=0.04, then=fence_action),
-        Monitor("speed", speed, Action(safety.speed_action), lasts=0.3),
-        Monitor("tracking", tracking, Action(safety.tracking_action), lasts=1.0),
-        Monitor("thrust", thrust, Action(safety.thrust_action), lasts=2.0),
+        Monitor("braking", braking, _HOLD, raise_after=0.04, action_after_hold=fence_action),
+        Monitor("speed", speed, Action(safety.speed_action), raise_after=0.3),
+        Monitor("tracking", tracking, Action(safety.tracking_action), raise_after=1.0),
+        Monitor("thrust", thrust, Action(safety.thrust_action), raise_after=2.0),
     )
 
 
@@ -115,30 +125,34 @@ def _link_monitors(config: Config) -> tuple[Monitor, ...]:
     """Monitors of the link and of this computer."""
     safety = config.safety
     link, computer = Action(safety.link_action), Action(safety.computer_action)
-    round_trip = link_judges.round_trip(safety.max_round_trip)
-    answers = link_judges.answer_rate(config.link.min_attitude_rate_hz)
-    positions = link_judges.position_rate(config.link.min_position_rate_hz)
-    late = link_judges.late_setpoints(config.deadman.telemetry_stale)
-    foreign = link_judges.foreign_setpoints(_MAX_FOREIGN)
-    lost = link_judges.lost_setpoints(_MAX_UNANSWERED)
+    round_trip = link_breaches.round_trip(safety.max_round_trip)
+    answers = link_breaches.answer_rate(config.link.min_attitude_rate_hz)
+    positions = link_breaches.position_rate(config.link.min_position_rate_hz)
+    late = link_breaches.late_setpoints(config.deadman.telemetry_stale)
+    foreign = link_breaches.foreign_setpoints(_MAX_FOREIGN_REPORTS)
+    lost = link_breaches.lost_setpoints(_MAX_UNANSWERED)
     return (
         # The vehicle keeps turning at the last rate until the next setpoint. A low rate of
         # setpoints causes errors of a few degrees; a gap of 0.4 s exceeds the whole tilt limit.
-        Monitor("answer gaps", link_judges.gaps(_MAX_GAPS), _HAND_BACK),
-        Monitor("answer rate", answers, _HAND_BACK, lasts=1.0),
-        Monitor("position rate", positions, _HAND_BACK, lasts=1.0),
-        Monitor("late setpoints", late, _HAND_BACK, stream=StreamEffect.ENDS),
-        Monitor("lost setpoints", lost, _HAND_BACK, stream=StreamEffect.ENDS),
-        # In a mode of the pilot the autopilot reports its own setpoints; `lasts` leaves time for
-        # the requested heartbeat, which contains the mode.
-        Monitor("foreign setpoints", foreign, _HAND_BACK, lasts=0.3),
-        # `lasts` lets a change of the mode, or the row above, end control first.
-        Monitor("rare setpoint", link_judges.rare_foreign_setpoint, Action.WARN, lasts=1.0),
-        Monitor("link loss", link_judges.loss(safety.max_loss), link, lasts=2.0, calm=2.0),
-        Monitor("round trip", round_trip, link, lasts=5.0, calm=5.0),
-        # `lasts` exceeds the averaging window of 1 s, so one stall of the computer is no breach.
-        Monitor("deadlines", link_judges.deadlines(safety.max_missed), computer, lasts=1.5),
-        Monitor("starvation", link_judges.starvation(safety.max_starved), computer, lasts=1.5),
+        Monitor("answer gaps", link_breaches.gaps(_MAX_GAPS), _HAND_BACK),
+        Monitor("answer rate", answers, _HAND_BACK, raise_after=1.0),
+        Monitor("position rate", positions, _HAND_BACK, raise_after=1.0),
+        Monitor("late setpoints", late, _HAND_BACK, stream=StreamEffect.ENDS_WITH_ZERO_RATES),
+        Monitor("lost setpoints", lost, _HAND_BACK, stream=StreamEffect.ENDS_WITH_ZERO_RATES),
+        # In a mode of the pilot the autopilot reports its own setpoints; `raise_after` leaves time
+        # for the requested heartbeat, which contains the mode.
+        Monitor("foreign setpoints", foreign, _HAND_BACK, raise_after=0.3),
+        # `raise_after` lets a change of the mode, or the row above, end control first.
+        Monitor("rare setpoint", link_breaches.rare_foreign_setpoint, Action.WARN, raise_after=1.0),
+        Monitor(
+            "link loss", link_breaches.loss(safety.max_loss), link, raise_after=2.0, clear_after=2.0
+        ),
+        Monitor("round trip", round_trip, link, raise_after=5.0, clear_after=5.0),
+        # `raise_after` exceeds the averaging window of 1 s: one stall is no breach.
+        Monitor("deadlines", link_breaches.deadlines(safety.max_missed), computer, raise_after=1.5),
+        Monitor(
+            "starvation", link_breaches.starvation(safety.max_starved), computer, raise_after=1.5
+        ),
     )
 
 

@@ -47,7 +47,7 @@ class Component:
         self._own_address = Address(settings.source_system, settings.source_component)
         self._sequence = self._text_id = 0
         self._start_time = time.monotonic()
-        self._sent_at: dict[tuple[Client | None, str], float] = {}
+        self._text_sent_times: dict[tuple[Client | None, str], float] = {}
 
     async def run(self) -> None:
         """Send heartbeats until cancelled."""
@@ -105,13 +105,17 @@ class Component:
         A text must not be sent if the same text or too many texts were sent to `client` within 5 s.
         """
         now = self._loop.time()
-        self._sent_at = {
-            key: sent for key, sent in self._sent_at.items() if now - sent < _TEXT_REPEAT_PERIOD
+        self._text_sent_times = {
+            key: sent_time
+            for key, sent_time in self._text_sent_times.items()
+            if now - sent_time < _TEXT_REPEAT_PERIOD
         }
-        count = sum(receiver is client for receiver, _ in self._sent_at)
-        if (client, text) in self._sent_at or (client is not None and count >= _MAX_ANSWERS):
+        count = sum(receiver is client for receiver, _ in self._text_sent_times)
+        if (client, text) in self._text_sent_times or (
+            client is not None and count >= _MAX_ANSWERS
+        ):
             return False
-        self._sent_at[client, text] = now
+        self._text_sent_times[client, text] = now
         return True
 
     def _text_messages(self, text: str, severity: int) -> list[Message]:

@@ -28,7 +28,7 @@ _BRAKING_SHARE = 0.8
 """Deceleration assumed for a client's motions, as a share of their acceleration limit."""
 _LOOKAHEAD = 10.0
 """Time over which a commanded velocity is extrapolated to a destination, s."""
-_STEP = 0.1
+_STEP_LENGTH = 0.1
 """Length of the step towards the destination that shows whether a request leads outward, m."""
 _REPORT_PAUSE = 3.0
 """Time without a stop after which the next stop is reported, s."""
@@ -40,8 +40,8 @@ _VERTICAL_STOP = AxisDemand(None, (0.0,), None)
 class FenceGuard:
     """Replaces the part of a request that would lead beyond the fence by a stop.
 
-    Each step of guidance calls `inside`. The vehicle comes to rest in front of the fence, and moves
-    again as soon as a request leads back. Horizontal and vertical motion stop independently.
+    Each step of guidance calls `keep_inside`. The vehicle comes to rest in front of the fence, and
+    moves again as soon as a request leads back. Horizontal and vertical motion stop independently.
 
     Args:
         config: limits of the fence, and of clients' motions.
@@ -61,12 +61,12 @@ class FenceGuard:
         tell: Callable[[str], None],
     ) -> None:
         fence, acceleration = fence_of(config), config.serve.max_acceleration_m_s2
-        self._wall = _FencePart(fence.walls, acceleration)
-        self._levels = _FencePart(fence.levels, min(acceleration, VERTICAL_ACCELERATION))
+        self._horizontal_part = _FencePart(fence.walls, acceleration)
+        self._vertical_part = _FencePart(fence.levels, min(acceleration, VERTICAL_ACCELERATION))
         self._centre, self._height, self._wind, self._tell = centre, height, wind, tell
         self._stopped_at = -inf
 
-    def inside(
+    def keep_inside(
         self, request: MotionRequest, reference: Reference, actual: VehicleMotion, now: float
     ) -> MotionRequest:
         """Return the request; a stop replaces each part that would lead beyond the fence.
@@ -83,25 +83,27 @@ class FenceGuard:
         home_down = None if height is None else actual.position_ned[2] + height
         frame = _FenceFrame(centre, home_down, self._wind())
         north, east, _ = reference.acceleration_ned
-        flown = _State(reference.position_ned, reference.velocity_ned, (north, east))
-        states = flown, _State(*actual, (0.0, 0.0))
-        wall = self._wall.breach(
+        flown_state = _MotionState(reference.position_ned, reference.velocity_ned, (north, east))
+        states = flown_state, _MotionState(*actual, (0.0, 0.0))
+        horizontal_breach = self._horizontal_part.breach(
             [each.horizontal() for each in states],
-            _destination(request, flown, (True, False)),
+            _destination(request, flown_state, (True, False)),
             frame,
         )
-        level = self._levels.breach(
-            [each.vertical() for each in states], _destination(request, flown, (False, True)), frame
+        vertical_breach = self._vertical_part.breach(
+            [each.vertical() for each in states],
+            _destination(request, flown_state, (False, True)),
+            frame,
         )
-        breach = wall or level
+        breach = horizontal_breach or vertical_breach
         if breach is None:
             return request
         if now - self._stopped_at > _REPORT_PAUSE:
             self._tell(f"stopped in front of the fence: the setpoints lead to {breach}")
         self._stopped_at = now
         return request._replace(
-            horizontal=request.horizontal if wall is None else _HORIZONTAL_STOP,
-            vertical=request.vertical if level is None else _VERTICAL_STOP,
+            horizontal=request.horizontal if horizontal_breach is None else _HORIZONTAL_STOP,
+            vertical=request.vertical if vertical_breach is None else _VERTICAL_STOP,
         )
 
 
@@ -116,35 +118,35 @@ class _FenceFrame(NamedTuple):
 
     def breach(self, fence: Fence, position: Vector, margin: float) -> Breach | None:
         """The breach at a position, NED in the frame of `centre`; None: no breach."""
-        return fence.breach(*self._arguments(position), self.centre.place, margin)
+        return fence.breach(*self._fence_coordinates(position), self.centre.place, margin)
 
-    def breach_of_stop(self, fence: Fence, state: "_State", margin: float) -> Breach | None:
+    def breach_of_stop(self, fence: Fence, state: "_MotionState", margin: float) -> Breach | None:
         """The breach at the place where the vehicle would stop from a state; None: no breach."""
-        offset, height = self._arguments(state.position)
+        offset, height = self._fence_coordinates(state.position)
         return fence.breach_at_stopping_point(
             offset, state.velocity, height, self.centre.place, margin, state.acceleration, self.wind
         )
 
-    def _arguments(self, position: Vector) -> tuple[Vector, float | None]:
+    def _fence_coordinates(self, position: Vector) -> tuple[Vector, float | None]:
         height = None if self.home_down is None else self.home_down - position[2]
         return minus(position, self.centre.position_ned), height
 
 
-class _State(NamedTuple):
+class _MotionState(NamedTuple):
     """Position, velocity (NED) and horizontal acceleration; SI units."""
 
     position: Vector
     velocity: Vector
     acceleration: tuple[float, float]
 
-    def horizontal(self) -> "_State":
+    def horizontal(self) -> "_MotionState":
         """The state without its vertical motion."""
         north, east, _ = self.velocity
         return self._replace(velocity=(north, east, 0.0))
 
-    def vertical(self) -> "_State":
+    def vertical(self) -> "_MotionState":
         """The state without its horizontal motion."""
-        return _State(self.position, (0.0, 0.0, self.velocity[2]), (0.0, 0.0))
+        return _MotionState(self.position, (0.0, 0.0, self.velocity[2]), (0.0, 0.0))
 
 
 class _Destination(NamedTuple):
@@ -169,10 +171,10 @@ class _FencePart:
             deceleration=min(fence.deceleration, _BRAKING_SHARE * acceleration),
             reaction_time=fence.reaction_time + _BRAKING_LEAD,
         )
-        self._stopped_for: Breach | None = None
+        self._breach_of_stop: Breach | None = None
 
     def breach(
-        self, states: Sequence[_State], destination: _Destination, frame: _FenceFrame
+        self, states: Sequence[_MotionState], destination: _Destination, frame: _FenceFrame
     ) -> Breach | None:
         """The breach to which a request leads, if the vehicle must stop now; None: no stop needed.
 
@@ -185,16 +187,16 @@ class _FencePart:
         leads_inside = frame.breach(fence, destination.position, 0.0) is None
         margin = 0.0 if destination.is_commanded and leads_inside else _MARGIN
         is_moving = hypot(*states[0].velocity) > _REST_SPEED
-        if self._stopped_for is not None and is_moving and not leads_inside:
-            return self._stopped_for
+        if self._breach_of_stop is not None and is_moving and not leads_inside:
+            return self._breach_of_stop
         breach = None
         for state in states:
             if frame.breach(fence, state.position, margin) is None:
-                found = frame.breach_of_stop(fence, state, margin)
+                state_breach = frame.breach_of_stop(fence, state, margin)
             else:  # outside already, such as below the floor after a take-off
-                found = _worsened_breach(frame, fence, state.position, destination.position)
-            breach = breach or found
-        self._stopped_for = breach
+                state_breach = _worsened_breach(frame, fence, state.position, destination.position)
+            breach = breach or state_breach
+        self._breach_of_stop = breach
         return breach
 
 
@@ -202,25 +204,34 @@ def _worsened_breach(
     frame: _FenceFrame, fence: Fence, position: Vector, destination: Vector
 ) -> Breach | None:
     """The breach after a step towards the destination, if the step makes a breach worse."""
-    way = minus(destination, position)
-    share = _STEP / max(hypot(*way), _STEP)
-    north, east, down = (a + share * b for a, b in zip(position, way, strict=True))
-    here = frame.breach(fence, position, _MARGIN)
-    ahead = frame.breach(fence, (north, east, down), _MARGIN)
-    if here is None or ahead is None or ahead.distance_outside <= here.distance_outside:
+    offset = minus(destination, position)
+    step_share = _STEP_LENGTH / max(hypot(*offset), _STEP_LENGTH)
+    north, east, down = (a + step_share * b for a, b in zip(position, offset, strict=True))
+    breach_here = frame.breach(fence, position, _MARGIN)
+    breach_after_step = frame.breach(fence, (north, east, down), _MARGIN)
+    if (
+        breach_here is None
+        or breach_after_step is None
+        or breach_after_step.distance_outside <= breach_here.distance_outside
+    ):
         return None
-    return ahead
+    return breach_after_step
 
 
-def _destination(request: MotionRequest, flown: _State, axes: tuple[bool, bool]) -> _Destination:
+def _destination(
+    request: MotionRequest, flown_state: _MotionState, axes: tuple[bool, bool]
+) -> _Destination:
     """Position to which a request leads; `axes`: whether (horizontal, vertical) motion counts."""
-    place, is_commanded = list(flown.position), False
-    for demand, begin, is_used in zip(request[:2], (0, 2), axes, strict=True):
+    position, is_commanded = list(flown_state.position), False
+    for demand, first_axis, is_used in zip(request[:2], (0, 2), axes, strict=True):
         if not is_used:
             continue
         if demand.position is not None:
-            place[begin : begin + len(demand.position)], is_commanded = demand.position, True
+            position[first_axis : first_axis + len(demand.position)], is_commanded = (
+                demand.position,
+                True,
+            )
             continue
         for axis, value in enumerate(demand.velocity or demand.acceleration or ()):
-            place[begin + axis] += _LOOKAHEAD * value
-    return _Destination((place[0], place[1], place[2]), is_commanded)
+            position[first_axis + axis] += _LOOKAHEAD * value
+    return _Destination((position[0], position[1], position[2]), is_commanded)

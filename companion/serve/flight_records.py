@@ -27,7 +27,7 @@ class FlightRecords:
         note: called with each event, as a sentence for the user.
 
     Attributes:
-        grants: results of requesting the real-time settings: each setting is granted or refused.
+        realtime_results: for each requested real-time setting, whether it was granted.
         on_recorded: called with the folder of each flight when its record is complete; returns a
             sentence for the clients, or None. Called in a thread, except on a virtual clock.
     """
@@ -35,7 +35,7 @@ class FlightRecords:
     def __init__(
         self, directory: Path | None, environment: Environment, note: Callable[[str], None]
     ) -> None:
-        self.grants: tuple[realtime.SettingResult, ...] = ()
+        self.realtime_results: tuple[realtime.SettingResult, ...] = ()
         self.on_recorded: Callable[[Path], str | None] = lambda _: None
         self._directory = directory
         self._environment, self._note = environment, note

@@ -5,7 +5,7 @@ import gc
 
 from companion.flight.commands import disarmed_text, in_role, left_disarmed_text
 from companion.mavlink.errors import LinkError
-from companion.serve.kept_fence import KeptFence
+from companion.serve.fence_across_flights import FenceAcrossFlights
 from companion.serve.ownership import Ownership, Program
 from companion.serve.served_flight import ControlRequest, ServedFlight, ServedVehicle
 from companion.serve.setpoints.request import Request
@@ -28,10 +28,10 @@ class ServedFlights:
         config = vehicle.config
         self.ownership = Ownership(config.serve.setpoint_timeout, config.serve.hold_s)
         self.current_flight: ServedFlight | None = None
-        self._vehicle, self.fence = vehicle, KeptFence(config, vehicle.link)
+        self._vehicle, self.fence = vehicle, FenceAcrossFlights(config, vehicle.link)
         self._clock, self._retry_time = asyncio.get_running_loop().time, 0.0
         self._task: asyncio.Task[None] | None = None
-        self._unfinished: set[asyncio.Task[None]] = set()
+        self._unfinished_tasks: set[asyncio.Task[None]] = set()
         self._controlled_since_arming = False
         vehicle.link.subscribe("HEARTBEAT", self._leave_offboard)
 
@@ -67,8 +67,8 @@ class ServedFlights:
         """End the flight, if there is one: hand the vehicle back, and complete all records."""
         if self.current_flight is not None:
             self.current_flight.interrupt(reason)
-        if self._unfinished:
-            await asyncio.wait(self._unfinished)
+        if self._unfinished_tasks:
+            await asyncio.wait(self._unfinished_tasks)
 
     def leave(self) -> None:
         """Stop sending setpoints at once."""
@@ -82,7 +82,7 @@ class ServedFlights:
             has_begun = await flight.run(command)
         finally:
             self.ownership.release()
-            self.fence.keep(flight.fence_centre)
+            self.fence.set_first_centre(flight.fence_centre)
             self.current_flight = self._task = None
             self._controlled_since_arming |= has_begun
             if not has_begun:
@@ -92,8 +92,8 @@ class ServedFlights:
                 gc.collect()  # between two flights
 
     def _finish_before_close(self, task: asyncio.Task[None]) -> None:
-        self._unfinished.add(task)
-        task.add_done_callback(self._unfinished.discard)
+        self._unfinished_tasks.add(task)
+        task.add_done_callback(self._unfinished_tasks.discard)
 
     def _leave_offboard(self, _: object) -> None:
         """Ask a vehicle that a client has landed to hold, if it could not be armed again.
@@ -103,8 +103,8 @@ class ServedFlights:
         """
         if self._vehicle.link.state.armed is not False or self.current_flight is not None:
             return
-        controlled, self._controlled_since_arming = self._controlled_since_arming, False
-        if controlled and in_role(self._vehicle.link, Role.OFFBOARD):
+        was_controlled, self._controlled_since_arming = self._controlled_since_arming, False
+        if was_controlled and in_role(self._vehicle.link, Role.OFFBOARD):
             self._finish_before_close(asyncio.create_task(self._ask_to_hold()))
 
     async def _ask_to_hold(self) -> None:

@@ -14,7 +14,7 @@ _SET_MODE = dialect.MAVLINK_MSG_ID_SET_MODE
 _REQUEST_DATA_STREAM = dialect.MAVLINK_MSG_ID_REQUEST_DATA_STREAM
 MISSION_ITEMS = dialect.MAVLINK_MSG_ID_MISSION_ITEM, dialect.MAVLINK_MSG_ID_MISSION_ITEM_INT
 """Ids of the messages with one mission item."""
-_GUIDED_ITEMS = 2, 3
+_GUIDED_CURRENT_VALUES = 2, 3
 """Values of a mission item's field `current` that ArduPilot obeys at once: 2 flies to the item's
 position, 3 to its height."""
 _SET_MESSAGE_INTERVAL = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
@@ -25,7 +25,7 @@ _LEAVING_COMMANDS = (
     dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH,
 )
 _CUSTOM_MODE_FLAG = 1
-_MAIN_MODE = 0xFF << 16
+_MAIN_MODE_MASK = 0xFF << 16
 """Mask of PX4's main mode in `custom_mode`; OFFBOARD has no sub mode, and PX4 ignores its bits."""
 
 
@@ -44,10 +44,10 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
     """
     if autopilot.control_entry is not ControlEntry.BY_COMMAND:
         return False
-    offboard = autopilot.modes[autopilot.offboard_mode] & _MAIN_MODE
+    offboard = autopilot.modes[autopilot.offboard_mode] & _MAIN_MODE_MASK
     if frame.message_id == _SET_MODE:
         custom_mode = decode(frame.message_id, frame.payload).custom_mode
-        return bool(custom_mode & _MAIN_MODE == offboard)
+        return bool(custom_mode & _MAIN_MODE_MASK == offboard)
     message = command_in(frame)
     if message is None:
         return False
@@ -58,7 +58,7 @@ def asks_for_control(frame: Frame, autopilot: Autopilot) -> bool:
         and isfinite(message.param1)
         and int(message.param1) & _CUSTOM_MODE_FLAG
         and isfinite(message.param2)
-        and int(message.param2) << 16 & _MAIN_MODE == offboard
+        and int(message.param2) << 16 & _MAIN_MODE_MASK == offboard
     )
 
 
@@ -72,7 +72,7 @@ def steers_in_our_mode(frame: Frame, autopilot: Autopilot) -> bool:
     if autopilot.control_entry is not ControlEntry.BY_FIRST_SETPOINT:
         return False
     if frame.message_id in MISSION_ITEMS:
-        return decode(frame.message_id, frame.payload).current in _GUIDED_ITEMS
+        return decode(frame.message_id, frame.payload).current in _GUIDED_CURRENT_VALUES
     message = command_in(frame)
     return message is not None and message.command in _STEERING_COMMANDS
 

@@ -21,9 +21,9 @@ def _commanded_speed(config: Config) -> float:
 
     The monitor `speed`, which ends a client's control, counts the vertical speed, too.
     """
-    largest = _SPEED_SHARE * config.safety.max_speed_m_s
+    max_speed = _SPEED_SHARE * config.safety.max_speed_m_s
     vertical = max(config.limits.max_climb_m_s, config.limits.max_descent_m_s)
-    return max(sqrt(max(largest**2 - vertical**2, 0.0)), 0.5 * largest)
+    return max(sqrt(max(max_speed**2 - vertical**2, 0.0)), 0.5 * max_speed)
 
 
 def commanded_motion(config: Config) -> CommandedMotion:

@@ -36,7 +36,7 @@ class ControlState(Enum):
 
 
 @dataclass
-class _Stream:
+class _SetpointStream:
     """Arrival times of the last two setpoints of one program."""
 
     newest_arrival: float = -inf
@@ -55,7 +55,7 @@ class Ownership:
     """Time for which the vehicle holds its position while the owner is silent, s."""
     owner: Program | None = field(default=None, init=False)
     """The program in control, or None."""
-    _streams: dict[Program, _Stream] = field(default_factory=dict, init=False)
+    _streams: dict[Program, _SetpointStream] = field(default_factory=dict, init=False)
 
     def note_setpoint(self, program: Program, now: float) -> str | None:
         """Note a setpoint; return why it is not flown, or None.
@@ -67,7 +67,7 @@ class Ownership:
             if self._is_live(owner, now):
                 return f"{owner} is in control"
             self.owner = program
-        stream = self._streams.setdefault(program, _Stream())
+        stream = self._streams.setdefault(program, _SetpointStream())
         stream.previous_arrival, stream.newest_arrival = stream.newest_arrival, now
         if len(self._streams) > _MAX_STREAMS:
             self._forget_silent(now)
@@ -94,7 +94,7 @@ class Ownership:
 
     def has_stream(self, program: Program, now: float) -> bool:
         """Whether a program sends a stream: its last two setpoints came within the timeout."""
-        stream = self._streams.get(program, _Stream())
+        stream = self._streams.get(program, _SetpointStream())
         return (
             self._is_live(program, now)
             and stream.newest_arrival - stream.previous_arrival <= self._timeout
@@ -103,7 +103,7 @@ class Ownership:
     def begin(self, now: float) -> None:
         """Note that control begins; if the owner is already silent, its hold time starts now."""
         if self.owner is not None:
-            stream = self._streams.setdefault(self.owner, _Stream())
+            stream = self._streams.setdefault(self.owner, _SetpointStream())
             stream.newest_arrival = max(stream.newest_arrival, now - self._timeout)
 
     def release(self) -> None:
@@ -114,13 +114,15 @@ class Ownership:
         """State of the control at the event-loop time `now`, s."""
         if self.owner is None:
             return ControlState.FREE
-        overdue = now - self._streams.get(self.owner, _Stream()).newest_arrival - self._timeout
-        if overdue <= 0.0:
+        overdue_time = (
+            now - self._streams.get(self.owner, _SetpointStream()).newest_arrival - self._timeout
+        )
+        if overdue_time <= 0.0:
             return ControlState.LIVE
-        return ControlState.HOLDING if overdue <= self._hold_time else ControlState.EXPIRED
+        return ControlState.HOLDING if overdue_time <= self._hold_time else ControlState.EXPIRED
 
     def _is_live(self, program: Program, now: float) -> bool:
-        return now - self._streams.get(program, _Stream()).newest_arrival <= self._timeout
+        return now - self._streams.get(program, _SetpointStream()).newest_arrival <= self._timeout
 
     def _forget_silent(self, now: float) -> None:
         self._streams = {
@@ -134,18 +136,18 @@ class NewestRequests:
     """Keeps the newest request of each program, unless it was refused."""
 
     def __init__(self) -> None:
-        self._newest: dict[Program, Request] = {}  # in the order of their newest requests
+        self._newest_requests: dict[Program, Request] = {}  # in the order of their newest requests
 
     def keep(self, program: Program, request: Request) -> None:
         """Keep a program's newest request; drop the oldest of more than `_MAX_REQUESTS`."""
-        self._newest.pop(program, None)
-        self._newest[program] = request
-        while len(self._newest) > _MAX_REQUESTS:
-            del self._newest[next(iter(self._newest))]
+        self._newest_requests.pop(program, None)
+        self._newest_requests[program] = request
+        while len(self._newest_requests) > _MAX_REQUESTS:
+            del self._newest_requests[next(iter(self._newest_requests))]
 
     def get(self, program: Program) -> Request | None:
         """The newest request of a program; None if it has sent none, or its request was dropped."""
-        return self._newest.get(program)
+        return self._newest_requests.get(program)
 
     def sender_of(self, client: Client, frame: Frame) -> Program:
         """The program that sent a command.
@@ -155,7 +157,9 @@ class NewestRequests:
         sent a setpoint last.
         """
         program = Program(client, source_of(frame))
-        if program in self._newest:
+        if program in self._newest_requests:
             return program
-        others = (each for each in reversed(self._newest) if each.client is client)
-        return next(others, program)
+        programs_of_client = (
+            each for each in reversed(self._newest_requests) if each.client is client
+        )
+        return next(programs_of_client, program)

@@ -26,7 +26,7 @@ class ReportPages:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._process: subprocess.Popen[str] | None = None
-        self._is_leaving = False
+        self._is_stopping = False
 
     def write(self, folder: Path) -> str:
         """Write `report.html` about the flight in `folder`.
@@ -40,9 +40,9 @@ class ReportPages:
             except (OSError, RuntimeError) as error:
                 return no_report_text(error, folder)
 
-    def leave(self) -> None:
+    def stop(self) -> None:
         """Write no further page, because the program ends."""
-        self._is_leaving = True
+        self._is_stopping = True
         if self._process is not None:
             self._process.kill()
 
@@ -53,7 +53,7 @@ class ReportPages:
             OSError: the process cannot be started.
             RuntimeError: the process wrote no page; the message says why.
         """
-        if self._is_leaving:
+        if self._is_stopping:
             raise RuntimeError(_INTERRUPTED)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "companion", "report", str(folder)],
@@ -80,12 +80,12 @@ class ReportPages:
         while True:
             with suppress(subprocess.TimeoutExpired):
                 output = process.communicate(timeout=_CHECK_PERIOD)
-                if not self._is_leaving:
+                if not self._is_stopping:
                     return output
-            if self._is_leaving or time.monotonic() > deadline:
+            if self._is_stopping or time.monotonic() > deadline:
                 process.kill()
                 late_text = f"it was not written within {_PAGE_TIMEOUT:g} s"
-                raise RuntimeError(_INTERRUPTED if self._is_leaving else late_text)
+                raise RuntimeError(_INTERRUPTED if self._is_stopping else late_text)
 
 
 def _lower_priority(pid: int) -> None:

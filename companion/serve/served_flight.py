@@ -102,7 +102,7 @@ class ServedFlight:
         self._source.resets = context.loop.resets
         self._source.fence_guard = FenceGuard(
             changes.wanted_config,
-            context.snapshot_builder.flown_fence_centre,
+            context.snapshot_builder.fence_centre_without_resets,
             lambda: link.state.height,
             lambda: context.guidance_loop.estimate.disturbance,
             self._tell_alarm,
@@ -120,8 +120,8 @@ class ServedFlight:
     def is_ending(self) -> bool:
         """Whether requests are no longer flown: a monitor holds the vehicle, or the flight ends."""
         has_begun = self._source.start_pose is not None
-        flown = self._assembled.context.guidance_loop.flown_source
-        is_replaced = has_begun and flown.source is not self._source
+        flown_source = self._assembled.context.guidance_loop.flown_source
+        is_replaced = has_begun and flown_source.source is not self._source
         return is_replaced or self._assembled.flight.failed_phase is not None
 
     @property
@@ -163,7 +163,9 @@ class ServedFlight:
                     result = await self._assembled.flight.run()
             finally:
                 self._tell_end(command, result)
-                self._summary = self._record.summary(self._assembled, result, self._records.grants)
+                self._summary = self._record.summary(
+                    self._assembled, result, self._records.realtime_results
+                )
         return self._source.start_pose is not None
 
     async def save(self) -> None:
@@ -188,8 +190,8 @@ class ServedFlight:
             self._answer(command, REJECTED)
             return
         if result == "ok":
-            released = self._assembled.flight.failed_phase is not None
-            result = "released by the client" if released else "handed back"
+            was_released = self._assembled.flight.failed_phase is not None
+            result = "released by the client" if was_released else "handed back"
         self._component.tell(f"control by {self._owner_name} has ended: {result}")
 
     async def _answer_and_tell(self, command: ControlRequest | None) -> None:
@@ -198,16 +200,16 @@ class ServedFlight:
             self._answer(command, IN_PROGRESS)
             await asyncio.sleep(_PROGRESS_PERIOD)
         self._answer(command, ACCEPTED)
-        told_owner, told_state = "", ControlState.LIVE
+        reported_owner, reported_state = "", ControlState.LIVE
         while True:
             state = self._ownership.state(self._clock())
             self._owner_name = str(self._ownership.owner or self._owner_name)
-            if self._owner_name != told_owner:  # also if another client replaced a silent owner
-                told_owner, told_state = self._owner_name, ControlState.LIVE
-                self._component.tell(f"{told_owner} is in control")
-            elif state is not told_state and state in (ControlState.LIVE, ControlState.HOLDING):
+            if self._owner_name != reported_owner:  # also if another client replaced a silent owner
+                reported_owner, reported_state = self._owner_name, ControlState.LIVE
+                self._component.tell(f"{reported_owner} is in control")
+            elif state is not reported_state and state in (ControlState.LIVE, ControlState.HOLDING):
                 self._component.tell(f"{self._owner_name}: {state.value}")
-                told_state = state
+                reported_state = state
             await asyncio.sleep(_CHECK_PERIOD)
 
     async def _send_values(self) -> None:

@@ -91,10 +91,10 @@ class ServeSession:
         """
         config, opener = self._config, self._environment.open_transport
         settings = realtime_settings(config, self._environment)
-        with realtime.request_settings(settings) as grants:
-            self.records.grants = grants
-            for grant in grants:
-                self._note(str(grant))
+        with realtime.request_settings(settings) as realtime_results:
+            self.records.realtime_results = realtime_results
+            for result in realtime_results:
+                self._note(str(result))
             async with make_link(config, self.records, self._note, opener) as link:
                 self._log_state(link)
                 link.clock.on_event = self._note

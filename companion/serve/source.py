@@ -83,15 +83,15 @@ class ServedSource:
             self._waiting_request = request
             return
         if isinstance(request, MotionRequest):
-            before = self._open_loop_reference
+            reference_before = self._open_loop_reference
             self._end_open_loop(now)
-            wanted = self._without_jumps(request)
+            request_without_jumps = self._without_jumps(request)
             try:
-                self._command(self._inside_fence(wanted, now), now)
+                self._command(self._allowed_by_fence(request_without_jumps, now), now)
             except UnplannableError:
-                self._open_loop_reference = before
+                self._open_loop_reference = reference_before
                 raise
-            self._motion_request = wanted
+            self._motion_request = request_without_jumps
         else:
             self._motion_request = None
             self._open_loop_reference = self._make_open_loop_reference(request)
@@ -112,25 +112,25 @@ class ServedSource:
         """Whether no client is in control any more: it released control, or was silent too long."""
         return self._ownership.state(now) not in _FLOWN_STATES
 
-    def _command(self, allowed: MotionRequest, now: float) -> None:
+    def _command(self, allowed_request: MotionRequest, now: float) -> None:
         """Command the motion to a request that the fence allows."""
-        self._motion.command(allowed, now, self._vehicle_motion)
-        self._allowed_request = allowed
+        self._motion.command(allowed_request, now, self._vehicle_motion)
+        self._allowed_request = allowed_request
 
     def _keep_inside_fence(self, now: float) -> None:
         """Stop in front of the fence, or go on if the request leads back."""
         if self._motion_request is None:
             return
-        allowed = self._inside_fence(self._motion_request, now)
-        if allowed != self._allowed_request:
+        allowed_request = self._allowed_by_fence(self._motion_request, now)
+        if allowed_request != self._allowed_request:
             with suppress(UnplannableError):  # the previous motion stays in force
-                self._command(allowed, now)
+                self._command(allowed_request, now)
 
-    def _inside_fence(self, wanted: MotionRequest, now: float) -> MotionRequest:
+    def _allowed_by_fence(self, request: MotionRequest, now: float) -> MotionRequest:
         if self.fence_guard is None:
-            return wanted
+            return request
         reference = self._motion.reference(now)
-        return self.fence_guard.inside(wanted, reference, self._vehicle_motion, now)
+        return self.fence_guard.keep_inside(request, reference, self._vehicle_motion, now)
 
     def _end_open_loop(self, now: float) -> None:
         """If an attitude or rates were flown, begin the commanded motion where the vehicle is."""

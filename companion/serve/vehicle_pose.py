@@ -49,7 +49,10 @@ class PoseTracker:
         if position is None:
             return None
         age = self._link.clock.age(position.vehicle_time, now) or 0.0
-        if max(age, now - position.received, now - self._network.attitude_at) > _MAX_TELEMETRY_AGE:
+        if (
+            max(age, now - position.received, now - self._network.attitude_arrival)
+            > _MAX_TELEMETRY_AGE
+        ):
             return None
         decoded = decode_attitude(self._network.attitude_payload)
         if decoded is None or not is_unit(decoded[1]):
@@ -134,8 +137,8 @@ class OriginEstimate:
             self.origin = measured
             return
         # The average must not go half round the earth where the longitude changes its sign.
-        turns = round((measured.longitude - estimate.longitude) / 360.0)
-        measured = measured._replace(longitude=measured.longitude - 360.0 * turns)
+        whole_turns = round((measured.longitude - estimate.longitude) / 360.0)
+        measured = measured._replace(longitude=measured.longitude - 360.0 * whole_turns)
         averaged = Origin(
             *(a + _NEW_ORIGIN_WEIGHT * (b - a) for a, b in zip(estimate, measured, strict=True))
         )

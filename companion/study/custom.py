@@ -70,12 +70,12 @@ def _run(case: Case, tick: Tick) -> Outcome:
 
 def _results(case: Case, responses: Responses) -> Table:
     """The table of the largest errors and rates of each method at each sample rate."""
-    count = len(case.headings_deg)
+    heading_count = len(case.headings_deg)
     reference = _reference_text(case)
     return Table(
         "custom",
         "The custom case; largest values over"
-        f" {count} heading{'s' if count > 1 else ''}, rates as commanded.",
+        f" {heading_count} heading{'s' if heading_count > 1 else ''}, rates as commanded.",
         tuple(
             {
                 "method": method.label,
@@ -145,19 +145,20 @@ def _reference_text(case: Case) -> str:
 
 
 def _conditions(case: Case) -> str:
-    loop = "body rates follow at once"
+    loop_text = "body rates follow at once"
     if case.inner_loop:
-        loop = (
+        loop_text = (
             f"complete inner loop, {case.quickness} times as fast as measured,"
             f" after {case.transport_delay_ms} ms of transport delay"
         )
-    bounds = ", ".join(
+    limits_text = ", ".join(
         f"{key} {value}" for key, value in case.limits.model_dump().items() if value is not None
     )
     return (
         f"Coefficients step from {list(case.start)} to {list(case.target)} in {case.seconds:g} s,"
         f" p = {case.gain_per_s:g} s⁻¹, heading gain {case.yaw_gain_per_s:g} s⁻¹; rates"
-        f" {list(case.rates_hz)} Hz; headings {list(case.headings_deg)}°; {loop}; limits: {bounds}."
+        f" {list(case.rates_hz)} Hz; headings {list(case.headings_deg)}°; {loop_text}; limits:"
+        f" {limits_text}."
     )
 
 

@@ -12,7 +12,7 @@ from companion.study.step import Step
 Coefficient = Annotated[float, Field(gt=-1.0, lt=1.0)]
 Pair = tuple[Coefficient, Coefficient]
 
-MOST_STEPS = 5e6
+MAX_STEPS = 5e6
 """Largest number of steps in a case, which need about 4 GB of memory; with inner_loop, less."""
 
 
@@ -69,8 +69,8 @@ class Case(Section):
 
     @model_validator(mode="after")
     def _step_makes_sense(self) -> "Case":
-        for name, end in (("start", self.start), ("target", self.target)):
-            if hypot(*end) >= sin(radians(75.0)):
+        for name, coefficients in (("start", self.start), ("target", self.target)):
+            if hypot(*coefficients) >= sin(radians(75.0)):
                 raise ValueError(f"{name} must be a tilt below 75°: √(north² + east²) below 0.966")
         if self.start == self.target:
             raise ValueError("start and target are the same: nothing to fly")
@@ -92,9 +92,9 @@ class Case(Section):
         for key in ("methods", "rates_hz"):
             if len(set(getattr(self, key))) < len(getattr(self, key)):
                 raise ValueError(f"{key} has the same value twice")
-        if self.steps_to_fly > MOST_STEPS:
+        if self.steps_to_fly > MAX_STEPS:
             raise ValueError(
-                f"{self.steps_to_fly:.0f} steps to fly, more than the {MOST_STEPS:.0f} that fit"
+                f"{self.steps_to_fly:.0f} steps to fly, more than the {MAX_STEPS:.0f} that fit"
                 " into memory; reduce headings_deg, methods, rates_hz or seconds"
             )
         return self

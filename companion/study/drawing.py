@@ -39,8 +39,8 @@ def new_figure(
 def draw_line(axes: Axes, x: Floats, y: Floats, line: LineStyle, label: str = "") -> None:
     """Draw a line, thinned to fewer than two times `_THINNED_POINTS` points if it has more."""
     stride = max(1, len(x) // _THINNED_POINTS)
-    keep = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
-    axes.plot(x[keep], y[keep], **line, label=label or None)
+    kept_indices = np.unique(np.append(np.arange(0, len(x), stride), len(x) - 1))
+    axes.plot(x[kept_indices], y[kept_indices], **line, label=label or None)
 
 
 def draw_response(
@@ -108,5 +108,7 @@ def note_magnification(
         other_axis: name of the axis that it is compared with.
         other_limits: smallest and largest value that the other axis shows.
     """
-    factor = (other_limits[1] - other_limits[0]) / (limits[1] - limits[0])
-    axes.set_title(f"{axes.get_title()}\nmagnified: {axis} spans 1/{factor:.0f} of {other_axis}")
+    magnification = (other_limits[1] - other_limits[0]) / (limits[1] - limits[0])
+    axes.set_title(
+        f"{axes.get_title()}\nmagnified: {axis} spans 1/{magnification:.0f} of {other_axis}"
+    )

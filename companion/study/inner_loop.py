@@ -91,43 +91,50 @@ class InnerLoop:
             seconds=ROLL_STEP_S,
             rate_hz=self.airframe.physics_rate_hz,
         )
-        roll = flight.body_rates[:, 0]
-        crossing = int(np.argmax(roll >= target_rate))
-        bracket = np.array([crossing - 1, crossing])
-        return float(np.interp(target_rate, roll[bracket], bracket / self.airframe.physics_rate_hz))
+        roll_rates = flight.body_rates[:, 0]
+        crossing_index = int(np.argmax(roll_rates >= target_rate))
+        bracket_indices = np.array([crossing_index - 1, crossing_index])
+        return float(
+            np.interp(
+                target_rate,
+                roll_rates[bracket_indices],
+                bracket_indices / self.airframe.physics_rate_hz,
+            )
+        )
 
     def _setpoint_queue(self, throttle: float) -> deque[tuple[BodyRates, float]]:
         """Queue of the delayed setpoints (rates, throttle), newest last; at first all rates 0."""
-        length = 1 + round(self.transport_delay * self.airframe.physics_rate_hz)
-        return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * length, maxlen=length)
+        queue_length = 1 + round(self.transport_delay * self.airframe.physics_rate_hz)
+        return deque([(BodyRates(0.0, 0.0, 0.0), throttle)] * queue_length, maxlen=queue_length)
 
 
-def faster_inner_loop(factor: int) -> InnerLoop:
-    """The default inner loop with all of its times divided by `factor`.
+def faster_inner_loop(speedup: int) -> InnerLoop:
+    """The default inner loop with all of its times divided by `speedup`.
 
-    Inertia and rotor lag are divided by `factor`, and the torques are the same. So the body rates
-    follow a command in the same way, `factor` times faster, except for the gyroscopic torque. The
-    physics rate is multiplied by `factor`.
+    Inertia and rotor lag are divided by `speedup`, and the torques are the same. So the body rates
+    follow a command in the same way, `speedup` times faster, except for the gyroscopic torque. The
+    physics rate is multiplied by `speedup`.
     """
     airframe, rate_loop = AirframeConfig(), RateLoopConfig()
     scaled_airframe = {
-        "physics_rate_hz": factor * airframe.physics_rate_hz,
-        "inertia_kg_m2": tuple(inertia / factor for inertia in airframe.inertia_kg_m2),
-        "rotor_lag_ms": airframe.rotor_lag_ms / factor,
+        "physics_rate_hz": speedup * airframe.physics_rate_hz,
+        "inertia_kg_m2": tuple(inertia / speedup for inertia in airframe.inertia_kg_m2),
+        "rotor_lag_ms": airframe.rotor_lag_ms / speedup,
     }
-    axes = {
+    scaled_axes = {
         name: axis.model_copy(
             update={
-                "integral_n_m": factor * axis.integral_n_m,
-                "damping_n_m_s2": axis.damping_n_m_s2 / factor,
-                "torque_filter_ms": axis.torque_filter_ms / factor,
-                "setpoint_delay_ms": axis.setpoint_delay_ms / factor,
+                "integral_n_m": speedup * axis.integral_n_m,
+                "damping_n_m_s2": axis.damping_n_m_s2 / speedup,
+                "torque_filter_ms": axis.torque_filter_ms / speedup,
+                "setpoint_delay_ms": axis.setpoint_delay_ms / speedup,
             }
         )
         for name, axis in rate_loop
     }
     return InnerLoop(
-        AirframeConfig(**{**airframe.model_dump(), **scaled_airframe}), RateLoopConfig(**axes)
+        AirframeConfig(**{**airframe.model_dump(), **scaled_airframe}),
+        RateLoopConfig(**scaled_axes),
     )
 
 

@@ -32,14 +32,14 @@ class LagBody:
         self.rates = BodyRates(0.0, 0.0, 0.0)
         self._decay = exp(-1e3 / (STEP_HZ * lag_ms))
         self._mean_decay = 1e-3 * lag_ms * (1.0 - self._decay) * STEP_HZ  # mean over a step
-        self._delayed = deque([self.rates] * (dead_time_ms + 1), maxlen=dead_time_ms + 1)
+        self._delayed_commands = deque([self.rates] * (dead_time_ms + 1), maxlen=dead_time_ms + 1)
 
     def simulate(self, commanded_rates: BodyRates, steps: int) -> None:
         """Simulate `steps` steps of 1/STEP_HZ s with constant commanded rates, rad/s."""
         decay, mean_decay, (roll, pitch, yaw) = self._decay, self._mean_decay, self.rates
         for _ in range(steps):
-            self._delayed.append(commanded_rates)
-            delayed_roll, delayed_pitch, delayed_yaw = self._delayed[0]
+            self._delayed_commands.append(commanded_rates)
+            delayed_roll, delayed_pitch, delayed_yaw = self._delayed_commands[0]
             # The difference of each rate from its delayed command decays.
             roll, pitch, yaw = roll - delayed_roll, pitch - delayed_pitch, yaw - delayed_yaw
             rates = (

@@ -5,7 +5,7 @@ from math import exp, log
 import numpy as np
 
 from companion.least_squares import minimise
-from companion.recording.measurements.second_order import RunData, SecondOrderModel
+from companion.recording.measurements.second_order import RunForModel, SecondOrderModel
 from companion.study.step import Floats, Response, Step
 
 _FIT_STRIDE = 10
@@ -56,9 +56,12 @@ def settling_time(response: Response) -> Floats:
     offset = response.coefficients - target[:, None]
     is_outside = np.hypot(offset[:, 0], offset[:, 1]) > 0.05 * np.hypot(*(target - start))
     after_last_outside = is_outside.shape[0] - np.argmax(is_outside[::-1], axis=0)
-    first = np.where(is_outside.any(axis=0), after_last_outside, 0)  # first sample to stay inside
+    # The first sample to stay inside.
+    settled_index = np.where(is_outside.any(axis=0), after_last_outside, 0)
     time = response.step.time
-    return np.where(first < len(time), time[np.minimum(first, len(time) - 1)], np.inf)
+    return np.where(
+        settled_index < len(time), time[np.minimum(settled_index, len(time) - 1)], np.inf
+    )
 
 
 def largest_tilt_rate(response: Response) -> float:
@@ -93,8 +96,8 @@ def fit_cells(fit: SecondOrderModel) -> dict[str, float]:
 
 def second_order_path(step: Step, fit: SecondOrderModel, time: Floats) -> Floats:
     """(n, 2) coefficients of the fitted model, from rest, at (n,) times after the step, s."""
-    at_rest = np.array([step.start, (0.0, 0.0)])
-    return fit.path_at_rows(RunData(time, at_rest, np.zeros(1), np.array([step.target])))
+    start_state = np.array([step.start, (0.0, 0.0)])
+    return fit.path_at_rows(RunForModel(time, start_state, np.zeros(1), np.array([step.target])))
 
 
 def fit_second_order(step: Step, path: Floats) -> SecondOrderModel:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from tabulate import tabulate
 
 Tick = Callable[[str], None]
-"""Progress callback: a study calls it before each of its parts, with the name of the part."""
+"""Progress callback: a study calls it before each of its steps, with the name of the step."""
 
 Cell = str | float | int
 Row = Mapping[str, Cell]
@@ -49,13 +49,13 @@ class Table:
         return self._formatted("html")
 
     def _formatted(self, table_format: str) -> str:
-        first = self.rows[0]
+        first_row = self.rows[0]
         return tabulate(
             [[_rounded(cell) for cell in row.values()] for row in self.rows],
-            list(first),
+            list(first_row),
             tablefmt=table_format,
             disable_numparse=True,
-            colalign=["left" if isinstance(cell, str) else "right" for cell in first.values()],
+            colalign=["left" if isinstance(cell, str) else "right" for cell in first_row.values()],
         )
 
 
@@ -109,6 +109,6 @@ class Job(NamedTuple):
     """A study that is ready to run."""
 
     run: Callable[[Tick], Outcome]
-    """Runs the study; calls its `Tick` before each part."""
-    parts: int
-    """Number of parts."""
+    """Runs the study; calls its `Tick` before each step."""
+    progress_steps: int
+    """Number of calls of the `Tick`."""

@@ -24,7 +24,7 @@ class Study(NamedTuple):
     """One line for `companion study --help`."""
     module: str
     """Module that is imported when the study runs. The module has `run(tick) -> Outcome`, and
-    `PARTS`, the number of times that `run` calls its tick; with `takes_case`, it has
+    `PROGRESS_STEPS`, the number of times that `run` calls its tick; with `takes_case`, it has
     `prepare(case) -> Job` instead."""
     extra: str = ""
     """Extra of the package that the study needs besides `study`; empty: none."""

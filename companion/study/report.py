@@ -63,9 +63,9 @@ def _lay_out(figure: Figure) -> None:
     The layout engine "none" still lets `savefig` draw twice; without an engine it draws once.
     """
     figure.set_dpi(_DPI)
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
+    layout_engine = figure.get_layout_engine()
+    if layout_engine is not None:
+        layout_engine.execute(figure)
     with mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)
 

@@ -58,17 +58,17 @@ def run(
     page = _prepare_folder(out, "study" if name == registry.ALL else name)
     workers = min(workers, len(jobs))
     with _progress(console) as progress:
-        total = sum(job.parts for job in jobs.values()) + 1
-        task = progress.add_task("", total=total, study="")
+        total_steps = sum(job.progress_steps for job in jobs.values()) + 1
+        task = progress.add_task("", total=total_steps, study="")
         tick = partial(_tick, progress, task)
         if workers > 1:
-            parts = {key: job.parts for key, job in jobs.items()}
-            outcomes = run_in_workers(partial(_run_named, out), parts, workers, tick)
+            progress_steps = {key: job.progress_steps for key, job in jobs.items()}
+            outcomes = run_in_workers(partial(_run_named, out), progress_steps, workers, tick)
         else:
             outcomes = {key: _run(job, out, partial(tick, key)) for key, job in jobs.items()}
         progress.update(task, description=page.name, study="")
         write_page(list(outcomes.values()), page)
-        progress.update(task, completed=total, description="done")
+        progress.update(task, completed=total_steps, description="done")
     return RunResults(page, [row for outcome in outcomes.values() for row in outcome.rows])
 
 
@@ -108,7 +108,7 @@ def _make_job(study: Study, case_file: Path | None) -> Job:
     if study.takes_case:
         job: Job = module.prepare(case_file)
         return job
-    return Job(module.run, module.PARTS)
+    return Job(module.run, module.PROGRESS_STEPS)
 
 
 def _prepare_folder(out: Path, name: str) -> Path:
@@ -140,5 +140,5 @@ def _progress(console: Console) -> Progress:
     )
 
 
-def _tick(progress: Progress, task: TaskID, study: str, part: str) -> None:
-    progress.update(task, advance=1, description=part, study=study)
+def _tick(progress: Progress, task: TaskID, study: str, step_name: str) -> None:
+    progress.update(task, advance=1, description=step_name, study=study)

@@ -36,19 +36,22 @@ class _StoppedError(Exception):
 
 
 def run_in_workers(
-    run_study: RunStudy, parts: Mapping[str, int], workers: int, tick: Callable[[str, str], None]
+    run_study: RunStudy,
+    progress_steps: Mapping[str, int],
+    workers: int,
+    tick: Callable[[str, str], None],
 ) -> dict[str, Outcome]:
     """Run studies in worker processes. On Ctrl-C each study ends after its present part.
 
     Args:
         run_study: runs one study; a function at the top level of a module.
-        parts: number of parts, such as flights, by name of the study. Studies with more parts
-            begin first, because they take longer.
+        progress_steps: number of steps, such as flights, by name of the study. Studies with more
+            steps begin first, because they take longer.
         workers: number of processes.
         tick: called in this process with study and part, soon after a part begins.
 
     Returns:
-        the outcomes by study, in the order of `parts`.
+        the outcomes by study, in the order of `progress_steps`.
 
     Raises:
         OSError: a result cannot be written, or a worker was killed.
@@ -61,10 +64,10 @@ def run_in_workers(
         with interrupts_blocked():
             futures = {
                 name: pool.submit(_run_one, run_study, name)
-                for name in sorted(parts, key=lambda name: -parts[name])
+                for name in sorted(progress_steps, key=lambda name: -progress_steps[name])
             }
         _forward_ticks(list(futures.values()), channels.tick_queue, tick)
-        return {name: futures[name].result() for name in parts}
+        return {name: futures[name].result() for name in progress_steps}
     except BrokenProcessPool as error:
         raise OSError(
             "a worker process was killed, perhaps for lack of memory; run again with --workers 1"

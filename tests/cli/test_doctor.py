@@ -332,7 +332,7 @@ def test_maneuvers_that_cannot_be_flown_are_a_finding(tmp_path):
         changed(Config(), told, "t"), KnownDrag(None, None)
     )
     assert flown is None
-    assert "gone.yaml" in finding.found
+    assert "gone.yaml" in finding.fact
     assert finding.result is CheckResult.INEFFECTIVE
 
 

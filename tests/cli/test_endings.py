@@ -263,8 +263,8 @@ class Pages:
     def __init__(self, told):
         self.told = told
 
-    def leave(self):
-        self.told.append("leave the page")
+    def stop(self):
+        self.told.append("stop the page")
 
 
 def test_a_second_ctrl_c_leaves_but_not_one_of_a_bouncing_key(monkeypatch):
@@ -273,7 +273,7 @@ def test_a_second_ctrl_c_leaves_but_not_one_of_a_bouncing_key(monkeypatch):
     session = Session(told)
     session.signals = ((0.05, signal.SIGINT), (0.1, signal.SIGINT), (0.4, signal.SIGINT))
     run_loop(serving._until_stopped(session, Pages(told)))
-    assert told == ["stop", "leave", "leave the page"]
+    assert told == ["stop", "leave", "stop the page"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
@@ -284,12 +284,12 @@ def test_a_signal_stops_serving_and_the_page_of_a_flight_gets_some_time(monkeypa
     session.signals = ((0.02, number),)
 
     class Leaving(Pages):
-        def leave(self):
-            super().leave()
+        def stop(self):
+            super().stop()
             session.over.set()
 
     run_loop(serving._until_stopped(session, Leaving(told)))
-    assert told == ["stop", "leave the page"]
+    assert told == ["stop", "stop the page"]
 
 
 def test_only_an_encoding_error_is_transliterated():

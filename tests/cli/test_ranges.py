@@ -4,7 +4,7 @@ import pytest
 
 from companion.config import Config
 from companion.files.yaml_file import ConfigError, parse
-from companion.preflight.parameter_fixes import Undo
+from companion.preflight.parameter_fixes import UndoContents
 from companion.study.custom_case import Case
 
 _BELOW = {"minimum", "exclusiveMinimum"}
@@ -27,7 +27,7 @@ def leaves(schema, node, place):
         yield from leaves(schema, node["additionalProperties"], f"{place}.*")
 
 
-@pytest.mark.parametrize("model", [Config, Case, Undo])
+@pytest.mark.parametrize("model", [Config, Case, UndoContents])
 def test_every_value_has_bounds(model):
     schema = model.model_json_schema()
     seen = 0

@@ -37,7 +37,7 @@ def drawn(monkeypatch):
 
 def arrows(drawn_topics):
     (thrust,) = (one for one in drawn_topics["/scene"][-1] if one.name == "thrust")
-    assert (thrust.frame, thrust.follows) == ("vehicle", True)
+    assert (thrust.frame, thrust.follows_frame) == ("vehicle", True)
     return thrust.arrows
 
 
@@ -121,7 +121,7 @@ def test_the_body_is_drawn_once_in_ten_times_and_the_paths_twice(drawn):
     ]
     assert with_body == [0, 10]
     body = shown["/scene"][0][0]
-    assert (body.frame, body.follows, len(body.cubes), len(body.cylinders)) == (
+    assert (body.frame, body.follows_frame, len(body.cubes), len(body.cylinders)) == (
         "vehicle",
         True,
         1,
@@ -134,7 +134,7 @@ def test_the_body_is_drawn_once_in_ten_times_and_the_paths_twice(drawn):
 def test_paths_are_in_the_world_and_start_anew_after_a_pause(drawn):
     shown = drawn(times=range(0, 10 * STEP_NS, STEP_NS))
     ((paths,), _) = shown["/paths"]
-    assert (paths.name, paths.frame, paths.follows) == ("paths", "world", False)
+    assert (paths.name, paths.frame, paths.follows_frame) == ("paths", "world", False)
     reference, flown = (list(line.points) for line in paths.lines)
     assert reference == [(4.0, 5.0, 6.0)] * 5  # every second place
     assert flown == [(1.0, 2.0, 3.0)] * 5

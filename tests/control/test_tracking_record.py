@@ -14,7 +14,7 @@ from companion.guidance.follow import Follow
 from companion.guidance.reference import HorizontalMode, TiltCommand, VerticalMode
 from companion.guidance.source import ManeuverSource
 from companion.guidance.trajectory import Laps, circle
-from companion.recording.trace import FlightTrace, ManeuverMark
+from companion.recording.trace import FlightTrace, ManeuverChange
 
 POSE = Pose((1.0, 2.0, -3.0), 0.5)
 HERE = VehicleMotion((1.5, 2.5, -3.5), (0.0, 0.0, 0.0))
@@ -78,8 +78,8 @@ def test_a_maneuver_is_told_once_and_its_end_is_marked():
     for now in (10.0, 12.0, 21.0, 22.0):
         bench.step(now, Reference((1.0, 2.0, -3.0)))
     assert bench.told == ["maneuver: program"]
-    marks = [ManeuverMark(10.0, 4.0, "program"), ManeuverMark(21.0, 15.0, None)]
-    assert bench.trace.maneuvers == marks
+    maneuver_changes = [ManeuverChange(10.0, 4.0, "program"), ManeuverChange(21.0, 15.0, None)]
+    assert bench.trace.maneuvers == maneuver_changes
     rows = bench.trace.tracking.rows()
     assert rows[0].tolist() == pytest.approx([3.0, 1.0, 2.0, -3.0, 1.5, 2.5, -3.5])
     assert len(rows) == 5

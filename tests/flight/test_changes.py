@@ -217,4 +217,4 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
     assert told["tracking"]["position_max_m"] < 0.1
     replay = Replay(read_flight(tmp_path), load(tmp_path / "config.yaml"))
     assert not replay.follows_record
-    assert [each for each in replay.run() if not each.same] == []
+    assert [each for each in replay.run() if not each.is_same] == []

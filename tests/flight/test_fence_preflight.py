@@ -15,7 +15,7 @@ from companion.guidance import Pose
 from companion.guidance.fence import Fence, Place, distance_inside
 from companion.guidance.predicted import predict
 from companion.guidance.trajectory.demand import Motion
-from companion.safety.motion_judges import braking
+from companion.safety.motion_breaches import braking
 from companion.safety.snapshot import Motion as Now
 from companion.safety.snapshot import Snapshot
 from companion.safety.table import fence_of
@@ -180,7 +180,7 @@ def test_what_is_accepted_never_makes_the_monitor_speak(seed):
     flight = ROUND if seed % 2 else {"flight": {"maneuvers": ["steps"]}}
     fence = {"limits": {"fence_radius_m": smallest_fence(flight)}}
     config = config_of(flight, fence)
-    judge = braking(fence_of(config))
+    check = braking(fence_of(config))
     (part,) = configured_maneuvers(config).parts
     for moment in predict(part):
         off = rng.normal(size=3)
@@ -192,7 +192,7 @@ def test_what_is_accepted_never_makes_the_monitor_speak(seed):
             height=5.0 - place[2],
             acceleration=moment.acceleration[:2],
         )
-        assert judge(Snapshot(0.0, motion=now), False) is None
+        assert check(Snapshot(0.0, motion=now), False) is None
 
 
 def test_the_distance_to_a_polygon():

@@ -47,7 +47,7 @@ def test_who_leaves_in_a_turn_leaves_a_vehicle_that_turns_no_further(tmp_path, a
     assert turning(state) < 0.02
     assert tilt_deg(state) < tilt_deg(left) + 15.0  # what the vehicle's lag takes it through
     samples = Replay(read_flight(tmp_path), load(tmp_path / "config.yaml")).run()
-    assert [each for each in samples if not each.same] == []
+    assert [each for each in samples if not each.is_same] == []
 
 
 def test_without_a_sample_to_answer_nothing_is_sent_in_leaving():

@@ -117,9 +117,9 @@ def test_the_motion_is_recorded_from_the_ground_to_the_ground(good):
     assert heights.max() == pytest.approx(2.0, abs=0.2)
     assert heights[-1] == pytest.approx(0.0, abs=0.2)
     assert summary.extent()["tilt_max_deg"] > 5.0
-    takeoff = summary.facts.takeoff
+    takeoff_time = summary.facts.takeoff_time
     begun = {name: time for time, name in summary.facts.phases}
-    assert begun["takeoff"] < takeoff < begun["offboard"]
+    assert begun["takeoff"] < takeoff_time < begun["offboard"]
 
 
 def test_the_state_is_shown_in_every_phase(good):
@@ -142,7 +142,7 @@ def test_a_flight_that_a_monitor_ends_says_when_where_and_why(tmp_path):
     steps = summary.maneuvers()[1]
     assert end.time_in_maneuver == pytest.approx(steps.duration, abs=0.1)
     assert end.time_in_maneuver > 1.0  # the rest before the first step
-    assert end.since_takeoff == pytest.approx(end.time - summary.facts.takeoff)
+    assert end.since_takeoff == pytest.approx(end.time - summary.facts.takeoff_time)
     words = closing_words(summary.as_dict(), None)
     assert "safety.max_body_rate_deg_s" in "\n".join(words.lines)
     assert "s into steps" in words.lines[0]
@@ -193,7 +193,7 @@ def test_a_failure_of_the_recording_at_its_close_is_an_event(tmp_path, monkeypat
     def full(*_, **__):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("companion.recording.recorder.FlightRecorder._end", full)
+    monkeypatch.setattr("companion.recording.recorder.FlightRecorder._finish_file", full)
     config = merged(QUICK_FLIGHT, {"hover": {"duration_s": 1.0}})
     summary = fly(config, QuickVehicle(), tmp_path)
     written = json.loads((tmp_path / "summary.json").read_text())

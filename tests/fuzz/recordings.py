@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError, load
-from companion.preflight.parameter_fixes import Undo
+from companion.preflight.parameter_fixes import UndoContents
 from companion.recording.mcap_file import cdr
 from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.mcap_file.fields import CDR_HEADER
@@ -36,7 +36,7 @@ def _check(case: Case) -> None:
             _command("identify", "--log", folder / "flight.tlog", "--out", folder / "v.yaml")
         if "undo.yaml" in case:
             with contextlib.suppress(ConfigError):
-                load(folder / "undo.yaml", Undo)
+                load(folder / "undo.yaml", UndoContents)
         if "mcap" in case:
             (folder / "flight.mcap").write_bytes(bytes.fromhex(case["mcap"]))
             _command("plot", folder)

@@ -260,7 +260,7 @@ def test_clients_see_the_flight_and_its_end_and_the_next_flight_takes_the_port(f
             send(helper.feed, datagram)
             say(helper.feed, "so far")
             seen += first.until("so far")[:-1]
-        assert len(seen) == len(record.content.order)
+        assert len(seen) == len(record.content.topic_order)
         poses = [message.pose.position for topic, _, message in seen if topic == "/pose"]
         assert max(each.x for each in poses) - min(each.x for each in poses) > 1.0
         thrust = [message.thrust for topic, _, message in seen if topic == "/setpoint"]

@@ -201,7 +201,7 @@ def test_the_vehicles_clock_goes_on_as_ours_does(samples, expected):
         (OtherNodes(autopilots={(1, 100)}), {}),
         (OtherNodes(autopilots={(2, 1)}), {Key.SECOND_VEHICLE: INEFFECTIVE}),
         (OtherNodes(setpoint_senders={(255, 190)}), {Key.OTHER_SETPOINTS: UNSAFE}),
-        (OtherNodes(target_is_foreign=True), {Key.OTHER_SETPOINTS: UNSAFE}),
+        (OtherNodes(has_foreign_attitude_target=True), {Key.OTHER_SETPOINTS: UNSAFE}),
     ],
 )
 def test_others_on_the_link(other_nodes, expected):
@@ -231,7 +231,7 @@ def test_a_rate_below_the_requested_one_that_is_safe_says_why():
     evidence = replace(evidence, received_counts={**GOOD.received_counts, "CURRENT_MODE": 8})
     (finding,) = stream_checks.streams(CONFIG, evidence)
     assert finding.result is CheckResult.SAFE
-    assert finding.found == (
+    assert finding.fact == (
         "telemetry arrives, Hz: ATTITUDE_QUATERNION 197 of 250 (70 % suffices), "
         "LOCAL_POSITION_NED 50 of 50, HOME_POSITION (asked for 1, too seldom to be counted here), "
         "CURRENT_MODE on change, otherwise at 2 Hz"
@@ -243,7 +243,7 @@ def test_bursts_are_judged_on_the_ground_as_in_flight():
     bursts = replace(GOOD, samples=GOOD.samples._replace(rate=41.0))
     assert found(stream_checks.streams, bursts) == {"link.min_attitude_rate_hz": UNSAFE}
     (finding, _) = stream_checks.streams(CONFIG, bursts)
-    assert "in bursts: 197 Hz on average, but its gaps are as long as at 41 Hz" in finding.found
+    assert "in bursts: 197 Hz on average, but its gaps are as long as at 41 Hz" in finding.fact
 
 
 def test_asked_again_nothing_is_asked_that_only_the_configuration_decides():
@@ -282,8 +282,8 @@ def test_a_lost_gps_tells_its_satellites(seen, told):
     lost = state(gps=Gps(0.0, 1, seen, 500.0), gps_fault="GPS position lost")
     (finding,) = vehicle_checks.gps(CONFIG, replace(GOOD, state=lost))
     assert (finding.key, finding.result) == (Key.GPS, UNSAFE)
-    assert finding.found.startswith("GPS position lost")
-    assert finding.found.endswith(told)
+    assert finding.fact.startswith("GPS position lost")
+    assert finding.fact.endswith(told)
 
 
 BOOTING = Readiness(prearm_passed=False, estimator_flags=None, has_position=False, has_home=False)
@@ -375,7 +375,7 @@ def test_silence_about_all_parameters_or_the_vital_ones_is_unsafe():
 
 
 LOSSY_LINK = {"link": QUALITY._replace(lost_count=30)}
-LOSSY_SURVEY = {"survey": GOOD.survey._replace(lossy=True)}
+LOSSY_SURVEY = {"survey": GOOD.survey._replace(link_loses_frames=True)}
 
 
 def untold(*names, autopilot=PX4, values=GOOD.survey.values, **link):
@@ -447,7 +447,7 @@ def test_the_newest_flight_that_measured_tells_the_dead_time(tmp_path, roll, exp
     if roll is None:
         (tmp_path / "2026-01-01" / "summary.json").unlink()
         (finding,) = configuration_checks.dead_time(config, GOOD)
-        assert "was not measured yet by any flight of this vehicle" in finding.found
+        assert "was not measured yet by any flight of this vehicle" in finding.fact
     assert found(configuration_checks.dead_time, config=config) == expected
 
 

@@ -66,13 +66,13 @@ def test_a_disarmed_autopilot_that_tells_of_thrust_is_steered_by_somebody():
             with LinkListener(link, asyncio.get_running_loop().time) as listener:
                 vehicle.send(target(0.0), odometry(7))
                 await until(lambda: link.state.reset_counter == 7)
-                assert not listener.other_nodes.target_is_foreign
+                assert not listener.other_nodes.has_foreign_attitude_target
                 vehicle.send(heartbeat(armed=True), target(0.4), odometry(9))
                 await until(lambda: link.state.reset_counter == 9)
-                assert not listener.other_nodes.target_is_foreign
+                assert not listener.other_nodes.has_foreign_attitude_target
                 assert listener.reset_count == 2
                 vehicle.send(heartbeat(), target(0.4), odometry(9))
-                await until(lambda: listener.other_nodes.target_is_foreign)
+                await until(lambda: listener.other_nodes.has_foreign_attitude_target)
 
     asyncio.run(scene())
 

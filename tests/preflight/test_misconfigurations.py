@@ -10,7 +10,7 @@ import pytest
 
 from companion.config.files import changed
 from companion.preflight.all_checks import run_checks
-from companion.preflight.parameter_survey import survey
+from companion.preflight.parameter_survey import survey_parameters
 from companion.preflight.session import gather
 from companion.testing import open_wire, run
 from companion.vehicle.parameter_rules import CheckResult
@@ -126,7 +126,9 @@ async def _visit(folder, mock):
         for name, value, _ in PARAMETERS[mock.autopilot]:
             before = await link.read_parameter(name)
             await link.write_parameter(name, value)
-            seeded = replace(evidence, survey=await survey(link, link.autopilot.parameters))
+            seeded = replace(
+                evidence, survey=await survey_parameters(link, link.autopilot.parameters)
+            )
             found[name, value] = amiss(run_checks(config, seeded))
             await link.write_parameter(name, before)
         found["lossy"] = await _on_a_lossy_link(mock, config, link, evidence)
@@ -164,7 +166,7 @@ async def _on_a_lossy_link(mock, config, link, evidence):
         await link.write_parameter(name, value)
     mock.inject({"kind": "drop", "probability": 0.5})
     await asyncio.sleep(0.25)
-    seeded = replace(evidence, survey=await survey(link, link.autopilot.parameters))
+    seeded = replace(evidence, survey=await survey_parameters(link, link.autopilot.parameters))
     mock.clear_faults()
     await asyncio.sleep(0.25)
     for name, value in before.items():
@@ -176,7 +178,7 @@ def test_no_unsafe_value_is_lost_with_the_frames_of_a_lossy_link(visit):
     """Each is found, or that it was not told is."""
     _, found = visit
     names, read, verdicts = found["lossy"]
-    assert read.lossy
+    assert read.link_loses_frames
     assert {name for name, verdict in verdicts.items() if verdict is UNSAFE} >= names
 
 

@@ -56,7 +56,7 @@ def flying(*changes):
 def test_a_circle_that_stays_inside_whatever_happens_is_safe_and_says_how_far():
     finding = judged(flying())
     assert finding.result is SAFE
-    assert "for 1 s (COM_OF_LOSS_T); these rates can carry the vehicle 17 m away" in finding.found
+    assert "for 1 s (COM_OF_LOSS_T); these rates can carry the vehicle 17 m away" in finding.fact
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_circle_that_stays_inside_whatever_happens_is_safe_and_says_how_far():
 def test_each_side_of_the_fence_counts(change, words):
     finding = judged(flying(change))
     assert finding.result is INEFFECTIVE
-    assert words in finding.because
+    assert words in finding.consequence
     assert finding.fix.startswith("set COM_OF_LOSS_T to 0.75, fly more slowly")
     assert "widen" not in finding.fix
     assert "raise" not in finding.fix
@@ -88,7 +88,7 @@ def test_what_is_advised_mends_it():
 def test_a_step_is_the_worst_moment_and_a_lower_rate_limit_mends_it():
     """Its rates are the planner's gain times the step, held from there."""
     steps = flying({"flight": {"maneuvers": ("steps",), "takeoff_height_m": 5.0}})
-    assert "below limits.fence_floor_m" in judged(steps).because
+    assert "below limits.fence_floor_m" in judged(steps).consequence
     slower = changed(steps, {"limits": {"max_tilt_rate_deg_s": 30.0}}, "test")
     assert judged(slower).result is SAFE
 
@@ -103,7 +103,7 @@ def test_an_autopilot_that_does_not_hold_drifts_farther():
     assert judged(flying(NARROW)).result is SAFE
     finding = judged(flying({"guidance": {"drag_per_s": 0.36}, **NARROW}), autopilot=ARDUPILOT)
     assert finding.result is INEFFECTIVE
-    assert "beyond limits.fence_radius_m" in finding.because
+    assert "beyond limits.fence_radius_m" in finding.consequence
 
 
 def test_a_trajectory_is_weighed_without_being_begun():
@@ -115,7 +115,7 @@ def test_a_trajectory_is_weighed_without_being_begun():
     duration = flown.duration
     evidence = replace(GOOD, maneuvers=fresh_copy(flown))
     (finding,) = offboard_loss(config, evidence)
-    assert "carry the vehicle" in finding.found
+    assert "carry the vehicle" in finding.fact
     assert flown.duration == duration
 
 

@@ -12,7 +12,7 @@ from companion.preflight.evidence import Identity
 from companion.preflight.finding import Finding, ParameterChange
 from companion.preflight.parameter_fixes import (
     Answer,
-    Undo,
+    UndoContents,
     UndoFile,
     VehicleArmedError,
     apply_fixes,
@@ -43,7 +43,7 @@ class FakeLink:
 
     async def write_parameter(self, name, value):
         (written,) = self._folder.glob("doctor-undo-*.yaml")
-        self.undo_at_write.append(dict(load(written, Undo).parameters))
+        self.undo_at_write.append(dict(load(written, UndoContents).parameters))
         if name in self.locked:
             raise ParameterRefused(f"{name}: the parameter is read-only")
         self.values[name] = value + (0.1 if name in self.drifting else 0.0)
@@ -114,7 +114,7 @@ def test_the_first_value_of_a_parameter_is_kept_and_no_other_runs_file_is_touche
         undo = UndoFile(tmp_path, link, Identity())
         undo.add("A", 5.0)
         undo.add("A", 1.0)
-        assert load(undo.path, Undo).parameters == {"A": 5.0}
+        assert load(undo.path, UndoContents).parameters == {"A": 5.0}
         paths.add(undo.path)
     assert len(paths) == 3
 
@@ -162,12 +162,12 @@ def test_without_an_undo_file_nothing_is_set(tmp_path):
 def test_restoring_goes_backwards_and_tells_what_it_cannot(tmp_path):
     link = FakeLink(tmp_path, A=5.0, B=2.0, C=7.0)
     path, _, _ = treat(link, tmp_path, [ALL])
-    undo, outcomes = load(path, Undo), []
-    assert undo.meant_for(link, Identity())
-    assert undo.meant_for(link, Identity(uid="00ab"))
-    assert not undo.meant_for(link, Identity(uid="00ac"))
+    undo, outcomes = load(path, UndoContents), []
+    assert undo.matches_vehicle(link, Identity())
+    assert undo.matches_vehicle(link, Identity(uid="00ab"))
+    assert not undo.matches_vehicle(link, Identity(uid="00ac"))
     link.settings.target_system = 2
-    assert not undo.meant_for(link, Identity())
+    assert not undo.matches_vehicle(link, Identity())
     del link.values["B"]
 
     async def scene():

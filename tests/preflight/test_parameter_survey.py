@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from companion.preflight import parameter_survey
-from companion.preflight.parameter_survey import RetryPolicy, Survey, survey
+from companion.preflight.parameter_survey import RetryPolicy, Survey, survey_parameters
 from companion.vehicle.ardupilot.parameters import ARDUPILOT_PARAMETERS
 from companion.vehicle.px4.parameters import PX4_PARAMETERS
 from tests.mavlink.fakes import linked
@@ -36,10 +36,10 @@ def test_an_old_version_answers_to_the_old_names(monkeypatch):
     async def scene():
         async with linked() as (link, vehicle):
             vehicle.answers["PARAM_REQUEST_READ"] = answer
-            return await survey(link, rules)
+            return await survey_parameters(link, rules)
 
-    values, names, untold, lossy = asyncio.run(scene())
-    assert (untold, lossy) == ({"ARMING_SKIPCHK"}, False)
+    values, names, untold, link_loses_frames = asyncio.run(scene())
+    assert (untold, link_loses_frames) == ({"ARMING_SKIPCHK"}, False)
     assert values == {"MAV_GCS_SYSID": 255.0, "FS_OPTIONS": 16.0}
     assert names == {"MAV_GCS_SYSID": "SYSID_MYGCS", "FS_OPTIONS": "FS_OPTIONS"}
     # All are asked for before the first has an answer; the old name only after the new had none.
@@ -62,7 +62,7 @@ def test_asked_again_it_is_asked_for_what_it_told_before_alone():
             names = {"MAV_GCS_SYSID": "SYSID_MYGCS", "FS_OPTIONS": "FS_OPTIONS"}
             told = dict.fromkeys(names, 1.0)
             before = Survey(told, names, frozenset({"ARMING_SKIPCHK"}))
-            return await survey(link, rules, earlier_survey=before)
+            return await survey_parameters(link, rules, earlier_survey=before)
 
     values, names, untold, _ = asyncio.run(scene())
     assert asked == ["SYSID_MYGCS", "FS_OPTIONS"]
@@ -110,7 +110,7 @@ class Lossy:
                 vehicle.answers["PARAM_REQUEST_READ"] = lambda request: self.answer(
                     vehicle, request
                 )
-                return await survey(link, rules)
+                return await survey_parameters(link, rules)
 
         return asyncio.run(scene())
 
@@ -119,7 +119,7 @@ def test_on_a_good_link_what_gets_no_answer_is_not_asked_for_once_more():
     """An older PX4 says nothing of what it has not, and that must not cost time twice."""
     vehicle = Lossy({})
     read = vehicle.survey()
-    assert (set(read.values), read.unread_names, read.lossy) == (
+    assert (set(read.values), read.unread_names, read.link_loses_frames) == (
         set(Lossy.VALUES),
         {"MAN_OVERRIDE_SPD"},
         False,
@@ -131,7 +131,7 @@ def test_where_a_question_was_lost_the_others_are_asked_for_once_more_after_all(
     vehicle = Lossy({"COM_OF_LOSS_T": 1, "COM_OBL_RC_ACT": 4})
     read = vehicle.survey()
     assert read.values == {"COM_OF_LOSS_T": 1.0, "COM_OBL_RC_ACT": 1.0}
-    assert (read.unread_names, read.lossy) == ({"MAN_OVERRIDE_SPD"}, True)
+    assert (read.unread_names, read.link_loses_frames) == ({"MAN_OVERRIDE_SPD"}, True)
     assert vehicle.asked.count("COM_OF_LOSS_T") == 2
     assert vehicle.asked.count("COM_OBL_RC_ACT") == 2 + 3
 
@@ -139,13 +139,13 @@ def test_where_a_question_was_lost_the_others_are_asked_for_once_more_after_all(
 def test_where_the_vehicles_frames_are_lost_they_are_too():
     vehicle = Lossy({"COM_OBL_RC_ACT": 2}, gaps=True)
     read = vehicle.survey()
-    assert (set(read.values), read.lossy) == (set(Lossy.VALUES), True)
+    assert (set(read.values), read.link_loses_frames) == (set(Lossy.VALUES), True)
 
 
 def test_what_the_autopilot_says_it_has_not_is_neither_untold_nor_asked_for_again():
     vehicle = Lossy({"COM_OF_LOSS_T": 1, "COM_OBL_RC_ACT": 9}, says_no=True)
     read = vehicle.survey()
-    assert (read.unread_names, read.lossy) == ({"COM_OBL_RC_ACT"}, True)
+    assert (read.unread_names, read.link_loses_frames) == ({"COM_OBL_RC_ACT"}, True)
     assert vehicle.asked.count("MAN_OVERRIDE_SPD") == 1
     assert vehicle.asked.count("COM_OBL_RC_ACT") == 2 + 3  # and no more: it is bounded
 

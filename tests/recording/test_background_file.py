@@ -60,7 +60,7 @@ class Slices(BackgroundFile):
     def _sync(self):
         pass
 
-    def _end(self, *, complete):
+    def _finish_file(self, *, complete):
         pass
 
 
@@ -99,7 +99,7 @@ def test_figures_do_not_wait_for_such_a_disk_either(tmp_path, monkeypatch):
     for number in range(1500):
         rows.add([float(number)])
     assert rows.rows()[:, 0].tolist() == [float(number) for number in range(1024, 1500)]
-    assert rows.lost == 1024
+    assert rows.lost_count == 1024
     assert "did not answer" in spool.failure
     answers.set()
 
@@ -112,7 +112,7 @@ class Refusing(Slices):
     def _write(self, items):
         raise ValueError("no such item")
 
-    def _end(self, *, complete):
+    def _finish_file(self, *, complete):
         self.complete = complete
 
 

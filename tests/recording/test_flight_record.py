@@ -15,7 +15,7 @@ from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import RECORD_FILE, RecordError, read_flight
 from companion.recording.folder import flight_folder, make_named_folder
 from companion.recording.mcap_file import cdr, reader, writer
-from companion.recording.mcap_file.batch import _FULL_BATCH, Batch, messages_of
+from companion.recording.mcap_file.batch import _FULL_BATCH_BYTES, Batch, messages_of
 from companion.recording.mcap_file.channels import CHANNELS, RESOURCES, TOPICS
 from companion.recording.mcap_file.loop_channels import (
     ACTION,
@@ -278,7 +278,7 @@ def test_a_file_of_a_flight_is_answered_with_its_folder(tmp_path, command, capsy
 def test_only_a_missing_record_is_one_that_was_never_begun(tmp_path, monkeypatch, capsys):
     """One that may not be read is not empty, and an empty one is not replayed with success."""
     (tmp_path / "config.yaml").write_text("")
-    assert read_flight(tmp_path).content.order == []
+    assert read_flight(tmp_path).content.topic_order == []
     assert main(["replay", str(tmp_path)]) == 2
     assert "no attitude sample is recorded there" in " ".join(capsys.readouterr().err.split())
 
@@ -291,10 +291,10 @@ def test_only_a_missing_record_is_one_that_was_never_begun(tmp_path, monkeypatch
 
 
 def test_a_chunk_that_would_not_fit_into_memory_is_damage(tmp_path, monkeypatch):
-    monkeypatch.setattr(reader, "_MOST_BYTES", 50)
+    monkeypatch.setattr(reader, "_MAX_BYTES", 50)
     content = reader.read_mcap(write(tmp_path))
     assert not content.complete
-    assert content.order == []
+    assert content.topic_order == []
     assert content.damage
 
 
@@ -333,9 +333,9 @@ def test_a_full_batch_is_sent_at_once_and_an_empty_one_never():
     batch = Batch(sent.append)
     batch.send()
     assert sent == []
-    batch.add("/log", 1, bytes(_FULL_BATCH))
+    batch.add("/log", 1, bytes(_FULL_BATCH_BYTES))
     assert len(sent) == 1
-    assert [len(data) for _, _, data in messages_of(sent[0])] == [_FULL_BATCH]
+    assert [len(data) for _, _, data in messages_of(sent[0])] == [_FULL_BATCH_BYTES]
     batch.send()
     assert len(sent) == 1
 

@@ -20,7 +20,9 @@ RED = (1.0, 0.0, 0.0, 0.5)
 GREEN = (0.0, 1.0, 0.0, 1.0)
 POINTS = [(0.0, 1.0, 2.0), (3.0, 4.0, 5.0), (6.0, 7.0, 8.0)]
 SCENE = (
-    Entity("first one", "vehicle", follows=True, arrows=[Arrow(POSE, 1.0, 0.1, 0.2, 0.3, RED)]),
+    Entity(
+        "first one", "vehicle", follows_frame=True, arrows=[Arrow(POSE, 1.0, 0.1, 0.2, 0.3, RED)]
+    ),
     Entity(
         "b",
         "world",

@@ -88,19 +88,19 @@ def test_a_full_disk_loses_rows_and_says_so(tmp_path, monkeypatch):
     assert spool.failure == "No space left on device"
     for number in range(16, 27):
         series.add([float(number), 0.0])
-    assert series.lost == 8
+    assert series.lost_count == 8
     assert len(written) == 2
     assert len(series) == 27
     assert series.rows()[:, 0].tolist() == [*range(8), *range(24, 27)]
 
 
 def test_a_disk_that_stands_still_does_not_hold_up_the_flight(tmp_path, monkeypatch):
-    monkeypatch.setattr(room, "_MOST_WAITING", 2)
+    monkeypatch.setattr(room, "_MAX_WAITING_CHUNKS", 2)
     go_on = threading.Event()
     monkeypatch.setattr(SpooledFile, "append", lambda *_: go_on.wait(10))
     series = noted(8 * 6, Spool(tmp_path))
     go_on.set()
-    assert series.lost >= 8 * 3  # one is being written, and two wait
+    assert series.lost_count >= 8 * 3  # one is being written, and two wait
 
 
 def test_nothing_stays_on_the_disk_and_the_thread_ends(tmp_path):
@@ -147,4 +147,4 @@ def test_without_a_folder_all_rows_stay_in_memory():
     series = noted(100, Spool())
     assert series.rows()[:, 0].tolist() == list(range(100))
     assert series.rows(90)[:, 0].tolist() == list(range(90, 100))
-    assert (series.lost, set(threading.enumerate()) - before) == (0, set())
+    assert (series.lost_count, set(threading.enumerate()) - before) == (0, set())

@@ -28,5 +28,5 @@ def test_rows_can_be_had_from_one_on():
 def test_lost_rows_of_each_kind_are_told(name):
     trace = FlightTrace()
     assert trace.lost_rows_warning() is None
-    getattr(trace, name).lost = 8
+    getattr(trace, name).lost_count = 8
     assert trace.lost_rows_warning() == f"8 {LOST_ROWS}: the disk was too slow"

@@ -89,7 +89,7 @@ def test_a_killed_flight_lacks_at_most_its_last_second(tmp_path, autopilot, mome
         stamps = [
             m.time_boot_ms for _, m in messages(tmp_path / "flight.tlog", {"ATTITUDE_QUATERNION"})
         ]
-        assert 1e-3 * max(stamps) >= record.began + reached - 0.1
+        assert 1e-3 * max(stamps) >= record.start_time + reached - 0.1
 
 
 def test_a_record_cut_off_anywhere_gives_what_stands_before(tmp_path, monkeypatch):

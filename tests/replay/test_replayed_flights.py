@@ -100,18 +100,18 @@ def test_so_does_a_replay_of_steps(steps):
 def test_so_does_a_replay_of_a_record_that_ends_between_a_sample_and_its_setpoint(steps):
     folder, _ = steps("ardupilot")
     record = read_flight(folder)
-    order = record.content.order
+    order = record.content.topic_order
     del order[len(order) - 1 - order[::-1].index("/setpoint") :]
     assert order[-1] == "/sample"
     samples = Replay(record, load(folder / "config.yaml")).run()
-    assert [each for each in samples if not each.same] == []
+    assert [each for each in samples if not each.is_same] == []
     assert len(samples) == order.count("/sample") - 1
 
 
 def replays_to_the_bit(folder, summary):
     assert summary.result == "ok", summary.events
     samples = replayed(folder)
-    assert [each for each in samples if not each.same] == []
+    assert [each for each in samples if not each.is_same] == []
     assert (
         sum(each.recorded_setpoint is not None for each in samples)
         == summary.counts.setpoints
@@ -174,14 +174,14 @@ def test_a_replay_of_a_flight_with_faults_is_that_flight_too(tmp_path):
     with mock_vehicle(seed=5, faults=FAULTS, wind=GUSTS) as vehicle:
         summary = fly(vehicle, tmp_path, **long)
     samples = replayed(tmp_path)
-    assert [each for each in samples if not each.same] == []
+    assert [each for each in samples if not each.is_same] == []
     reasons = {each.recorded_reason for each in samples}
     assert {"answered", "not_newer", "awaiting_mode"} <= reasons, summary.events
     with_recorded_commands = Replay(
         read_flight(tmp_path), changed(load(tmp_path / "config.yaml"), {}, "test")
     )
     with_recorded_commands.follows_record = True
-    assert all(each.same for each in with_recorded_commands.run())
+    assert all(each.is_same for each in with_recorded_commands.run())
 
 
 @pytest.fixture(scope="module")

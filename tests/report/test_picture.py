@@ -18,7 +18,7 @@ from companion.recording.mcap_file.loop_channels import SAMPLE, SETPOINT
 from companion.recording.mcap_file.writer import McapWriter
 from companion.recording.measurements.recorded_summary import _REQUIRED_KEYS
 from companion.report import PictureError
-from companion.report.early_end import EndMark
+from companion.report.early_end import EarlyEndMark
 from companion.report.flight_data import Curve, FlightData, Span
 from companion.report.picture import draw_flight
 from companion.report.picture_history import PANEL_HEIGHTS, draw_history
@@ -38,7 +38,7 @@ FLIGHT = FlightData(
         *(Span(3.0, 5.0, "takeoff"), Span(5.0, 8.2, "maneuvers")),
     ),
     maneuvers=(Span(5.0, 6.0, "hover"), Span(6.0, 8.2, "steps")),
-    early_end=EndMark(8.2, "the vehicle is 9.1 m away, which costs $100"),
+    early_end=EarlyEndMark(8.2, "the vehicle is 9.1 m away, which costs $100"),
 )
 WHOLE = {
     **dict.fromkeys(_REQUIRED_KEYS),
@@ -165,7 +165,7 @@ def test_a_reason_that_is_too_long_is_cut():
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     axes = list(Figure().subplots(len(PANEL_HEIGHTS), sharex=True))
-    draw_history(axes, replace(FLIGHT, early_end=EndMark(8.2, "x" * 500)))
+    draw_history(axes, replace(FLIGHT, early_end=EarlyEndMark(8.2, "x" * 500)))
     title = axes[0].get_title()
     assert title.startswith("ended at 8.2 s: xxx")
     assert title.endswith("xxx…")

@@ -1,16 +1,16 @@
-"""A new monitor touches two files: its judge, and its row in the one table."""
+"""A new monitor touches two files: its check, and its row in the one table."""
 
 import ast
 from pathlib import Path
 
 import companion
-from companion.safety import Action, autopilot_judges, table
+from companion.safety import Action, autopilot_breaches, table
 from companion.safety.monitor import Monitor
 from tests.flight.fly import fly, mock_vehicle
 
 ROOT = Path(companion.__file__).parent
 TABLE = ROOT / "safety" / "table.py"
-JUDGES = {path.stem for path in (ROOT / "safety").glob("*_judges.py")}
+CHECK_MODULES = {path.stem for path in (ROOT / "safety").glob("*_breaches.py")}
 
 
 def names_used(path):
@@ -38,8 +38,8 @@ def mentioning(words):
 
 
 def test_only_the_table_names_judges_and_makes_monitors():
-    assert len(JUDGES) >= 3
-    assert users(JUDGES) == {TABLE}
+    assert len(CHECK_MODULES) >= 3
+    assert users(CHECK_MODULES) == {TABLE}
     makers = {
         path
         for path in mentioning({"Monitor"})
@@ -50,18 +50,18 @@ def test_only_the_table_names_judges_and_makes_monitors():
 
 
 def test_every_judge_stands_in_the_table():
-    """A judge without a row would never be asked."""
+    """A check without a row would never be asked."""
     used = set(names_used(TABLE))
-    for stem in JUDGES:
+    for stem in CHECK_MODULES:
         tree = ast.parse((ROOT / "safety" / f"{stem}.py").read_text())
         functions = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
-        judges = {name for name in functions if not name.startswith("_")}
-        assert judges
-        assert judges <= used, judges - used
+        checks = {name for name in functions if not name.startswith("_")}
+        assert checks
+        assert checks <= used, checks - used
 
 
 def test_a_judge_and_a_row_are_all_that_a_flight_needs(monkeypatch):
-    """The new judge warns above 1 m and lands after 2 s, with no other file changed."""
+    """The new check warns above 1 m and lands after 2 s, with no other file changed."""
 
     def high(snapshot, raised):
         height = snapshot.motion.height
@@ -70,14 +70,14 @@ def test_a_judge_and_a_row_are_all_that_a_flight_needs(monkeypatch):
     rows = table._autopilot_monitors
 
     def with_new_row(config):
-        judge = autopilot_judges.high
+        check = autopilot_breaches.high
         return (
             *rows(config),
-            Monitor("high", judge, Action.WARN),
-            Monitor("too high", judge, Action.LAND, lasts=2.0),
+            Monitor("high", check, Action.WARN),
+            Monitor("too high", check, Action.LAND, raise_after=2.0),
         )
 
-    monkeypatch.setattr(autopilot_judges, "high", high, raising=False)
+    monkeypatch.setattr(autopilot_breaches, "high", high, raising=False)
     monkeypatch.setattr(table, "_autopilot_monitors", with_new_row)
     with mock_vehicle() as mock:
         summary = fly(mock, hover={"duration_s": 8.0})

@@ -11,14 +11,14 @@ from companion.safety import (
     Action,
     SafetyLadder,
     Verdict,
-    autopilot_judges,
-    link_judges,
-    motion_judges,
+    autopilot_breaches,
+    link_breaches,
+    motion_breaches,
 )
 from companion.safety.actions import Exit, FlightEnded, StreamEffect
-from companion.safety.link_judges import silence
+from companion.safety.link_breaches import silence
 from companion.safety.monitor import Monitor
-from companion.safety.motion_judges import braking
+from companion.safety.motion_breaches import braking
 from companion.safety.snapshot import AutopilotStatus, Control, Health, Motion, Resets, Snapshot
 from companion.safety.table import monitors
 from companion.vehicle.records import Battery, EstimatorStatus
@@ -42,56 +42,59 @@ def leaning(angle):
 
 
 UPPER = {
-    "tilt": (motion_judges.tilt, leaning),
+    "tilt": (motion_breaches.tilt, leaning),
     "body rate": (
-        motion_judges.body_rate,
+        motion_breaches.body_rate,
         lambda v: at(motion=Motion(body_rates=(0.6 * v, 0, 0.8 * v))),
     ),
-    "speed": (motion_judges.speed, lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0)))),
-    "tracking": (motion_judges.tracking, lambda v: at(motion=Motion(tracking_error=v))),
-    "link loss": (link_judges.loss, health("lost_share")),
-    "round trip": (link_judges.round_trip, health("round_trip")),
+    "speed": (
+        motion_breaches.speed,
+        lambda v: at(motion=Motion(velocity=(0.6 * v, -0.8 * v, 0.0))),
+    ),
+    "tracking": (motion_breaches.tracking, lambda v: at(motion=Motion(tracking_error=v))),
+    "link loss": (link_breaches.loss, health("lost_share")),
+    "round trip": (link_breaches.round_trip, health("round_trip")),
     "late setpoints": (
-        lambda most: link_judges.late_setpoints(most / 1.5),
+        lambda most: link_breaches.late_setpoints(most / 1.5),
         lambda v: at(health=Health(uplink=Uplink(v))),
     ),
-    "deadlines": (link_judges.deadlines, health("missed_share")),
-    "starvation": (link_judges.starvation, health("starved_share")),
+    "deadlines": (link_breaches.deadlines, health("missed_share")),
+    "starvation": (link_breaches.starvation, health("starved_share")),
 }
 LOWER = {
-    "answer rate": (link_judges.answer_rate, health("answer_rate")),
-    "position rate": (link_judges.position_rate, health("position_rate")),
+    "answer rate": (link_breaches.answer_rate, health("answer_rate")),
+    "position rate": (link_breaches.position_rate, health("position_rate")),
 }
 
 
 @pytest.mark.parametrize("name", UPPER)
 def test_an_upper_limit_is_allowed_and_a_breach_is_over_below_nine_tenths_of_it(name):
-    judge, seen = UPPER[name]
+    check, seen = UPPER[name]
     if name != "tilt":  # an angle from a quaternion is not exact
-        assert judge(0.5)(seen(0.5), False) is None
-    assert judge(0.0)(seen(0.0), False) is None
-    assert judge(0.5)(seen(0.4999), False) is None
-    assert judge(0.5)(seen(0.5001), False)
-    assert judge(0.5)(seen(0.4501), True)
-    assert judge(0.5)(seen(0.4499), True) is None
+        assert check(0.5)(seen(0.5), False) is None
+    assert check(0.0)(seen(0.0), False) is None
+    assert check(0.5)(seen(0.4999), False) is None
+    assert check(0.5)(seen(0.5001), False)
+    assert check(0.5)(seen(0.4501), True)
+    assert check(0.5)(seen(0.4499), True) is None
 
 
 @pytest.mark.parametrize("name", LOWER)
 def test_a_lower_limit_is_allowed_and_a_breach_is_over_a_ninth_above_it(name):
-    judge, seen = LOWER[name]
-    assert judge(45.0)(seen(45.0), False) is None
-    assert judge(45.0)(seen(44.9), False)
-    assert judge(45.0)(seen(49.9), True)
-    assert judge(45.0)(seen(50.1), True) is None
+    check, seen = LOWER[name]
+    assert check(45.0)(seen(45.0), False) is None
+    assert check(45.0)(seen(44.9), False)
+    assert check(45.0)(seen(49.9), True)
+    assert check(45.0)(seen(50.1), True) is None
 
 
 def test_counts_and_shares_at_their_limit_are_allowed():
-    assert link_judges.gaps(2)(at(health=Health(gaps=2)), False) is None
+    assert link_breaches.gaps(2)(at(health=Health(gaps=2)), False) is None
     assert (
-        autopilot_judges.battery(0.25)(autopilot(battery=Battery(inf, 14.0, 0.25)), False) is None
+        autopilot_breaches.battery(0.25)(autopilot(battery=Battery(inf, 14.0, 0.25)), False) is None
     )
     found = at(resets=Resets(3, 1.0, -0.5, 0.25))
-    assert autopilot_judges.too_many_estimator_resets(3, 1.0, 0.5)(found, False) is None
+    assert autopilot_breaches.too_many_estimator_resets(3, 1.0, 0.5)(found, False) is None
 
 
 def autopilot(**told):
@@ -100,97 +103,97 @@ def autopilot(**told):
 
 SAID = [
     (
-        lambda: autopilot_judges.landed,
+        lambda: autopilot_breaches.landed,
         autopilot(landed=True),
         "the autopilot says that it has landed",
     ),
     (
-        lambda: autopilot_judges.failsafe,
+        lambda: autopilot_breaches.failsafe,
         autopilot(failsafe=True),
         "the autopilot reports a failsafe",
     ),
     (
-        lambda: autopilot_judges.estimator_flags,
+        lambda: autopilot_breaches.estimator_flags,
         autopilot(estimator=EstimatorStatus(OLD, 0x33F)),
         "the estimator's state is not reported any more",
     ),
     (
-        lambda: autopilot_judges.any_estimator_reset,
+        lambda: autopilot_breaches.any_estimator_reset,
         at(resets=Resets(1, 0.5, 0.3)),
         "the estimator was reset: 0.5 m and 17° of heading in total; the references moved as much",
     ),
     (
-        lambda: autopilot_judges.battery(0.2),
+        lambda: autopilot_breaches.battery(0.2),
         autopilot(battery=Battery(OLD, 16.0, 0.9)),
         "the battery's state is not reported any more",
     ),
     (
-        lambda: autopilot_judges.battery(0.2),
+        lambda: autopilot_breaches.battery(0.2),
         autopilot(battery=Battery(inf, 16.0, None, OLD)),
         "the battery's charge is not reported any more",
     ),
     (
-        lambda: autopilot_judges.battery(0.7),
+        lambda: autopilot_breaches.battery(0.7),
         autopilot(battery=Battery(inf, 14.0, 0.6)),
         "battery at 60 %, below limits.min_battery_percent = 70",
     ),
     (
-        lambda: link_judges.loss(0.2),
+        lambda: link_breaches.loss(0.2),
         at(health=Health(lost_share=0.6)),
         "60 % of the vehicle's frames are lost, more than safety.max_loss = 0.2 (20 %)",
     ),
     (
-        lambda: link_judges.round_trip(0.2),
+        lambda: link_breaches.round_trip(0.2),
         at(health=Health(round_trip=0.6)),
         "the link's round trip takes 600 ms, longer than safety.max_round_trip_ms = 200",
     ),
     (
-        lambda: link_judges.late_setpoints(0.1),
+        lambda: link_breaches.late_setpoints(0.1),
         at(health=Health(uplink=Uplink(0.3))),
         "setpoints reach the vehicle too late: the link's round trip takes 300 ms, longer than "
         "1.5 · deadman.telemetry_stale_ms = 150",
     ),
     (
-        lambda: link_judges.lost_setpoints(7),
+        lambda: link_breaches.lost_setpoints(7),
         at(health=Health(uplink=Uplink(None, 10))),
         "setpoints do not reach the vehicle: the last 10 TIMESYNC requests, ten a second, were not "
         "answered",
     ),
     (
-        lambda: link_judges.foreign_setpoints(2),
+        lambda: link_breaches.foreign_setpoints(2),
         at(health=Health(foreign_reports=3)),
         "another program sends setpoints to the vehicle: within 5 s the autopilot reported 3 that "
         "this program did not send (ATTITUDE_TARGET)",
     ),
     (
-        lambda: link_judges.rare_foreign_setpoint,
+        lambda: link_breaches.rare_foreign_setpoint,
         at(health=Health(any_foreign_report=True)),
         "another program may send setpoints to the vehicle now and then: the autopilot reported "
         "one that this program did not send (ATTITUDE_TARGET)",
     ),
     (
-        lambda: link_judges.frozen,
+        lambda: link_breaches.frozen,
         at(health=Health(frozen="ATTITUDE_QUATERNION repeats one attitude")),
         "frozen telemetry: ATTITUDE_QUATERNION repeats one attitude",
     ),
     (
-        lambda: link_judges.deadlines(0.2),
+        lambda: link_breaches.deadlines(0.2),
         at(health=Health(missed_share=0.6)),
         "60 % of the setpoints miss deadman.deadline_ms, more than safety.max_missed = 0.2 (20 %)",
     ),
     (
-        lambda: link_judges.starvation(0.2),
+        lambda: link_breaches.starvation(0.2),
         at(health=Health(starved_share=0.6)),
         "CPU starvation: the program's timer was late for 60 % of the last second, "
         "more than safety.max_starved = 0.2 (20 %)",
     ),
     (
-        lambda: link_judges.gaps(2),
+        lambda: link_breaches.gaps(2),
         at(health=Health(gaps=3)),
         "setpoints paused 3 times within 5 s, each time for longer than deadman.telemetry_stale_ms",
     ),
 ]
-"""A judge, the breach that it sees, its words. The tests make the judge, so that mutants count."""
+"""A check, the breach that it sees, its words. The tests make the check, so that mutants count."""
 
 
 @pytest.mark.parametrize(("make", "snapshot", "words"), SAID, ids=[row[2] for row in SAID])
@@ -200,9 +203,10 @@ def test_a_breach_is_told_in_these_words(make, snapshot, words):
 
 def test_lost_velocity_and_lost_position_are_told_together():
     lost = at(
-        autopilot=AutopilotStatus(estimator=EstimatorStatus(NOW, 0x33F & ~0x1A)), good_flags=0x33F
+        autopilot=AutopilotStatus(estimator=EstimatorStatus(NOW, 0x33F & ~0x1A)),
+        initial_estimator_flags=0x33F,
     )
-    assert autopilot_judges.estimator_flags(lost, False).endswith(
+    assert autopilot_breaches.estimator_flags(lost, False).endswith(
         "no valid velocity, position any more"
     )
 
@@ -210,9 +214,9 @@ def test_lost_velocity_and_lost_position_are_told_together():
 def silent(reason=None, **changes):
     """Unanswered for 0.75 s, 0.5 s of them without an attitude: all exact in binary."""
     stages = {
-        "last_answer": NOW - 0.75,
-        "last_sample": NOW - 0.5,
-        "last_position": NOW - 0.5,
+        "last_answered_arrival": NOW - 0.75,
+        "last_sample_arrival": NOW - 0.5,
+        "last_position_arrival": NOW - 0.5,
         "reason": reason,
     }
     return at(control=Control(**{**stages, **changes}))
@@ -226,12 +230,15 @@ def silent(reason=None, **changes):
         (silent(Unanswered.LATE, stall_time=0.375), Unanswered.LATE.words),
         (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
         (
-            silent(last_sample=NOW - 0.6, attitude_not_finite=True),
+            silent(last_sample_arrival=NOW - 0.6, attitude_not_finite=True),
             "the vehicle's attitude is not finite (NaN or infinity)",
         ),
-        (silent(Unanswered.NO_TARGET, last_position=NOW - 0.6), "no position from the vehicle"),
         (
-            silent(Unanswered.NO_TARGET, last_position=NOW - 0.6, position_not_finite=True),
+            silent(Unanswered.NO_TARGET, last_position_arrival=NOW - 0.6),
+            "no position from the vehicle",
+        ),
+        (
+            silent(Unanswered.NO_TARGET, last_position_arrival=NOW - 0.6, position_not_finite=True),
             "the vehicle's position is not finite (NaN or infinity)",
         ),
         (
@@ -241,54 +248,61 @@ def silent(reason=None, **changes):
     ],
 )
 def test_silence_tells_the_stage_that_failed_for_longer_than_its_limit(snapshot, words):
-    assert silence(0.5, heard=True)(snapshot, False) == words
+    assert silence(0.5, vehicle_heard=True)(snapshot, False) == words
 
 
 def test_exactly_the_limit_of_silence_is_none_and_a_vehicle_not_heard_cannot_be_asked():
-    assert silence(0.75, heard=True)(silent(), False) is None
-    unheard = silent(last_heard=NOW - 0.75)
-    assert silence(0.5, heard=True)(unheard, False) is None
-    assert silence(0.5, heard=False)(unheard, False)
-    at_the_limit = Snapshot(0.3, control=Control(last_answer=-1.0, last_heard=0.0))
-    assert silence(0.5, heard=False)(at_the_limit, False)
+    assert silence(0.75, vehicle_heard=True)(silent(), False) is None
+    unheard = silent(last_frame_noticed=NOW - 0.75)
+    assert silence(0.5, vehicle_heard=True)(unheard, False) is None
+    assert silence(0.5, vehicle_heard=False)(unheard, False)
+    at_the_limit = Snapshot(
+        0.3, control=Control(last_answered_arrival=-1.0, last_frame_noticed=0.0)
+    )
+    assert silence(0.5, vehicle_heard=False)(at_the_limit, False)
     verdict = SafetyLadder(monitors(Config()), 1.0).step(unheard)
-    assert (verdict.action, verdict.stream) == (Action.LISTEN, StreamEffect.STOPS)
+    assert (verdict.action, verdict.stream) == (Action.LISTEN, StreamEffect.STOPS_AT_ONCE)
 
 
 def test_it_brakes_in_time_before_a_fence_on_the_map():
     corners = ((46.999, 7.999), (46.999, 8.001), (47.001, 8.001), (47.001, 7.999))  # 111 m north
-    judge = braking(Fence(inf, inf, -inf, (), corners, 2.0, 0.5))
+    check = braking(Fence(inf, inf, -inf, (), corners, 2.0, 0.5))
     moving = Motion(
         offset=(80.0, 0.0, 0.0),
         velocity=(2.0, 0.0, 0.0),
         height=20.0,
         origin=Place(47.0, 8.0),
     )
-    assert judge(at(motion=moving), False) is None  # stops 2 m on
+    assert check(at(motion=moving), False) is None  # stops 2 m on
     fast = moving._replace(velocity=(12.0, 0.0, 0.0))  # stops 42 m on
-    assert "braking now would end" in judge(at(motion=fast), False)
+    assert "braking now would end" in check(at(motion=fast), False)
 
 
 @pytest.mark.parametrize("more", [{"acceleration": (4.0, 0.0)}, {"wind": (2.0, 0.0)}])
 def test_it_brakes_earlier_while_the_vehicle_still_gains_speed_and_in_tail_wind(more):
-    judge = braking(Fence(10.0, inf, -inf, (), (), 2.0, 0.5, tilt_acceleration=3.0))
+    check = braking(Fence(10.0, inf, -inf, (), (), 2.0, 0.5, tilt_acceleration=3.0))
     moving = Motion(offset=(6.5, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), height=20.0)
-    assert judge(at(motion=moving), False) is None  # stops 2 m on
-    assert "braking now would end" in judge(at(motion=moving._replace(**more)), False)
+    assert check(at(motion=moving), False) is None  # stops 2 m on
+    assert "braking now would end" in check(at(motion=moving._replace(**more)), False)
 
 
-def odd(name, then=Action.LAND, action=Action.HOLD):
+def odd(name, action_after_hold=Action.LAND, action=Action.HOLD):
     """A monitor that is wrong while its bit of the flags is set: 1 for a, 2 for b."""
     bit = 1 << "ab".index(name)
     reason = f"reason {name}"
-    return Monitor(name, lambda s, _: reason if s.good_flags & bit else None, action, then=then)
+    return Monitor(
+        name,
+        lambda s, _: reason if s.initial_estimator_flags & bit else None,
+        action,
+        action_after_hold=action_after_hold,
+    )
 
 
 def test_what_holding_does_not_mend_goes_on_to_the_graver_next_rung_in_time():
     told = []
     ladder = SafetyLadder([odd("a", Action.HAND_BACK), odd("b", Action.LAND)], 2.0)
     ladder.note = told.append
-    both = Snapshot(0.0, good_flags=3)
+    both = Snapshot(0.0, initial_estimator_flags=3)
     assert ladder.step(both) == Verdict(Action.HOLD, "reason a")
     assert ladder.step(both._replace(now=1.75)) is None
     assert ladder.step(both._replace(now=2.0)) == Verdict(Action.LAND, "reason b")
@@ -299,7 +313,7 @@ def test_raised_and_ended_alarms_are_reported_with_name_reason_and_action():
     changes = []
     ladder = SafetyLadder([odd("a"), odd("b", action=Action.WARN)], 2.0)
     ladder.on_change = lambda *change: changes.append(change)
-    ladder.step(Snapshot(0.0, good_flags=3))
+    ladder.step(Snapshot(0.0, initial_estimator_flags=3))
     ladder.step(Snapshot(1.0))
     ladder.step(Snapshot(2.0))
     assert changes == [
@@ -312,7 +326,10 @@ def test_raised_and_ended_alarms_are_reported_with_name_reason_and_action():
 
 
 def test_a_ladder_that_nobody_listens_to_still_decides():
-    assert SafetyLadder([odd("a")], 2.0).step(Snapshot(0.0, good_flags=1)).action is Action.HOLD
+    assert (
+        SafetyLadder([odd("a")], 2.0).step(Snapshot(0.0, initial_estimator_flags=1)).action
+        is Action.HOLD
+    )
 
 
 def test_how_a_flight_ended_is_kept_with_its_reason():

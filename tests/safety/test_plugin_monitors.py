@@ -26,31 +26,31 @@ import asyncio
 import sys
 from companion.safety.actions import StreamEffect
 
-def made(config, judge, action=Action.WARN, **rest):
-    return Monitor("theirs", judge, action, **rest)
+def made(config, check, action=Action.WARN, **rest):
+    return Monitor("theirs", check, action, **rest)
 
 def high(config):
-    def judge(snapshot, raised):
+    def check(snapshot, raised):
         height = snapshot.motion.height
         if height is not None and height > 1.0:
             raise ArithmeticError("too thin an air")
-    return made(config, judge)
+    return made(config, check)
 
 def leaving(config):
-    def judge(snapshot, raised):
+    def check(snapshot, raised):
         if snapshot.motion.height is not None and snapshot.motion.height > 1.0:
             sys.exit(1)
-    return made(config, judge)
+    return made(config, check)
 
 def blocking(config):
     times = [1.5]
-    def judge(snapshot, raised):
+    def check(snapshot, raised):
         if times and snapshot.motion.height is not None and snapshot.motion.height > 1.0:
             asyncio.get_running_loop().clock.now += times.pop()
-    return made(config, judge)
+    return made(config, check)
 
 def silent(config):
-    return made(config, lambda snapshot, raised: None, stream=StreamEffect.STOPS)
+    return made(config, lambda snapshot, raised: None, stream=StreamEffect.STOPS_AT_ONCE)
 
 def slow(config):
     return made(config, lambda snapshot, raised: wait())
@@ -161,7 +161,7 @@ def test_a_judge_that_raises_hands_the_vehicle_back_and_is_named(autopilot, name
     code = (block("my_monitors.py") + CODE).splitlines()
     number = next(k for k, text in enumerate(code, 1) if text.strip() == line)
     assert summary.result == (
-        f"an error outside this program: the judge {name}.<locals>.judge of the module my_monitors "
+        f"an error outside this program: the check {name}.<locals>.check of the module my_monitors "
         f"raised {raised} ({path}:{number}); the vehicle is handed back"
     )
     assert vehicle.state()["mode"] == {"px4": "LOITER", "ardupilot": "BRAKE"}[autopilot]

@@ -47,7 +47,7 @@ FINE = Snapshot(
     Control(),
     Health(0.01, 0.02, 0.01, 0.01),
     had_gps=True,
-    good_flags=GOOD,
+    initial_estimator_flags=GOOD,
 )
 
 
@@ -68,18 +68,18 @@ def control(**changes):
 
 
 def unanswered(reason, **changes):
-    return control(last_answer=OLD, reason=reason, **changes)
+    return control(last_answered_arrival=OLD, reason=reason, **changes)
 
 
 OLD = NOW - 0.6
-SILENT = {"last_answer": OLD, "last_sample": OLD}
+SILENT = {"last_answered_arrival": OLD, "last_sample_arrival": OLD}
 WARN, HOLD, HAND_BACK, LAND, LISTEN, RELEASE = Action
 STALLED = "this program did not run for 0.4 s (computer overloaded or suspended)"
 TILTED = "the vehicle tilts by 57°, more than limits.max_tilt_deg + safety.tilt_margin_deg = 55"
 BREACHES = [
     (
         "unheard",
-        control(**SILENT, last_heard=OLD),
+        control(**SILENT, last_frame_noticed=OLD),
         LISTEN,
         0.0,
         "no attitude from the vehicle for 0.6",
@@ -91,10 +91,10 @@ BREACHES = [
     ("silence", unanswered(Unanswered.LATE, stall_time=0.2), HAND_BACK, 0.0, "stale_ms"),
     ("silence", unanswered(Unanswered.LATE, stall_time=0.4), HAND_BACK, 0.0, STALLED),
     ("silence", unanswered(Unanswered.AWAITING_MODE, stall_time=0.4), HAND_BACK, 0.0, STALLED),
-    ("unheard", control(**SILENT, last_heard=OLD, stall_time=0.4), LISTEN, 0.0, STALLED),
+    ("unheard", control(**SILENT, last_frame_noticed=OLD, stall_time=0.4), LISTEN, 0.0, STALLED),
     (
         "silence",
-        unanswered(Unanswered.OLD_TARGET, last_position=OLD),
+        unanswered(Unanswered.OLD_TARGET, last_position_arrival=OLD),
         HAND_BACK,
         0.0,
         "no position",
@@ -215,48 +215,48 @@ def test_in_lockstep_a_jump_of_time_is_a_silent_vehicle_and_no_stall_of_ours():
 
 
 @pytest.mark.parametrize(
-    ("name", "snapshot", "action", "lasts", "words"),
+    ("name", "snapshot", "action", "raise_after", "words"),
     BREACHES,
     ids=[f"{row[0]}-{row[4]}" for row in BREACHES],
 )
-def test_a_breach_leads_to_its_action_once_it_lasts(name, snapshot, action, lasts, words):
+def test_a_breach_leads_to_its_action_once_it_lasts(name, snapshot, action, raise_after, words):
     table = monitors(CONFIG)
     alarms = {monitor.name: Alarm(monitor) for monitor in table}
-    wrong = [monitor.name for monitor in table if monitor.judge(snapshot, False)]
+    wrong = [monitor.name for monitor in table if monitor.check(snapshot, False)]
     assert wrong == (["reset", "resets"] if name == "resets" else [name])
-    assert words in alarms[name].monitor.judge(snapshot, False)
+    assert words in alarms[name].monitor.check(snapshot, False)
     monitor = alarms[name].monitor
-    assert (monitor.action, monitor.lasts) == (action, lasts)
-    assert alarms[name].step(snapshot) is (lasts == 0.0)
-    if lasts > 0.0:
-        assert not alarms[name].step(snapshot._replace(now=NOW + lasts - 0.01))
-        assert alarms[name].step(snapshot._replace(now=NOW + lasts + 0.001))
+    assert (monitor.action, monitor.raise_after) == (action, raise_after)
+    assert alarms[name].step(snapshot) is (raise_after == 0.0)
+    if raise_after > 0.0:
+        assert not alarms[name].step(snapshot._replace(now=NOW + raise_after - 0.01))
+        assert alarms[name].step(snapshot._replace(now=NOW + raise_after + 0.001))
 
 
 def test_every_row_of_the_table_is_tried_here_and_a_calm_flight_raises_none():
     table = monitors(CONFIG)
     assert {row[0] for row in BREACHES} == {monitor.name for monitor in table}
-    assert [m.name for m in table if m.judge(FINE, False)] == []
-    assert [m.name for m in table if m.judge(Snapshot(NOW), False)] == []
+    assert [m.name for m in table if m.check(FINE, False)] == []
+    assert [m.name for m in table if m.check(Snapshot(NOW), False)] == []
 
 
 def test_what_the_rows_of_the_table_say_besides_action_and_time():
     table = monitors(Config.model_validate({"safety": {"fence_action": "hand_back"}}))
-    calm = {"battery": 5.0, "link loss": 2.0, "round trip": 5.0}
-    assert {row.name: row.calm for row in table} == {
-        row.name: calm.get(row.name, 1.0) for row in table
+    clear_after = {"battery": 5.0, "link loss": 2.0, "round trip": 5.0}
+    assert {row.name: row.clear_after for row in table} == {
+        row.name: clear_after.get(row.name, 1.0) for row in table
     }
-    assert [row.name for row in table if row.stream is StreamEffect.STOPS] == [
+    assert [row.name for row in table if row.stream is StreamEffect.STOPS_AT_ONCE] == [
         "unheard",
         "silence",
         "clock",
     ]
-    assert [row.name for row in table if row.stream is StreamEffect.ENDS] == [
+    assert [row.name for row in table if row.stream is StreamEffect.ENDS_WITH_ZERO_RATES] == [
         "frozen",
         "late setpoints",
         "lost setpoints",
     ]
-    after_hold = {row.name: row.then for row in table if row.action is HOLD}
+    after_hold = {row.name: row.action_after_hold for row in table if row.action is HOLD}
     assert after_hold == {"braking": HAND_BACK, "speed": LAND, "tracking": LAND, "thrust": LAND}
 
 
@@ -264,15 +264,15 @@ def test_tilt_is_a_breach_only_above_the_largest_commanded_tilt_and_its_margin()
     limit = degrees(CONFIG.limits.max_tilt + CONFIG.safety.tilt_margin)
     assert CONFIG.safety.tilt_margin > 0.0
     (tilt,) = (row for row in monitors(CONFIG) if row.name == "tilt")
-    assert tilt.judge(motion(q=roll(limit - 0.1)), False) is None
-    assert tilt.judge(motion(q=roll(limit + 0.1)), False)
+    assert tilt.check(motion(q=roll(limit - 0.1)), False) is None
+    assert tilt.check(motion(q=roll(limit + 0.1)), False)
 
 
 def test_a_breach_that_comes_and_goes_is_not_one_and_an_alarm_needs_calm_to_be_over():
     monitor = Monitor("odd", lambda s, _: "wrong" if s.now % 1.0 < 0.4 else None, WARN, 0.5, 0.5)
     alarm = Alarm(monitor)
     assert not any(alarm.step(FINE._replace(now=NOW + 0.1 * k)) for k in range(50))
-    latched = Alarm(Monitor("odd", monitor.judge, WARN, lasts=0.25, calm=0.7))
+    latched = Alarm(Monitor("odd", monitor.check, WARN, raise_after=0.25, clear_after=0.7))
     changes = [k for k in range(50) if latched.step(FINE._replace(now=NOW + 0.1 * k))]
     assert len(changes) == 1  # 0.6 s of calm in each second are not enough
 
@@ -342,7 +342,7 @@ def test_an_action_can_be_set_but_not_everywhere_to_a_warning():
 
 def test_in_silence_nothing_is_sent_any_more():
     verdict, _ = Climb().see(control(**SILENT), 0.0)
-    assert verdict.stream is StreamEffect.STOPS
+    assert verdict.stream is StreamEffect.STOPS_AT_ONCE
     verdict, _ = Climb().see(autopilot(landed=True), 0.0)
     assert verdict.stream is StreamEffect.CONTINUES
 

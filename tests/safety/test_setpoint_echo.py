@@ -39,18 +39,18 @@ def echo(autopilot, sent=OURS):
 def test_a_setpoint_of_ours_is_known_in_single_precision(rates, thrust):
     for autopilot in (PX4, ARDUPILOT):
         heard = echo(autopilot, [*OURS, (BodyRates(*rates), thrust)])
-        heard.take(report(*OURS[0]), 0.0)
-        heard.take(report(rates, thrust), 1.0)
+        heard.add_report(report(*OURS[0]), 0.0)
+        heard.add_report(report(rates, thrust), 1.0)
         assert heard.foreign_reports(1.0) == 0
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
 def test_each_report_that_fits_no_setpoint_of_ours_counts_for_five_seconds(autopilot):
     heard = echo(autopilot)
-    heard.take(report(*OURS[2]), 0.0)
+    heard.add_report(report(*OURS[2]), 0.0)
     for time in (1.0, 2.0, 3.0):
-        heard.take(report((0.7, 0.0, 0.0), 0.3), time)
-    heard.take(report(*OURS[4]), 3.0)
+        heard.add_report(report((0.7, 0.0, 0.0), 0.3), time)
+    heard.add_report(report(*OURS[4]), 3.0)
     assert [heard.foreign_reports(now) for now in (3.0, 6.0, 6.5, 8.5)] == [3, 3, 2, 0]
 
 
@@ -61,19 +61,19 @@ def test_px4_reports_the_rates_and_ardupilot_the_thrust():
         (ARDUPILOT, only_thrust, only_rates),
     ):
         heard = echo(autopilot)
-        heard.take(ours, 0.0)
+        heard.add_report(ours, 0.0)
         assert heard.foreign_reports(0.0) == 0
-        heard.take(other, 0.0)
+        heard.add_report(other, 0.0)
         assert heard.foreign_reports(0.0) == 1
 
 
 def test_nothing_is_foreign_before_a_report_has_shown_a_setpoint_of_ours():
     heard = echo(PX4)
     for _ in range(9):
-        heard.take(report((0.7, 0.0, 0.0), 0.3), 0.0)
+        heard.add_report(report((0.7, 0.0, 0.0), 0.3), 0.0)
     assert heard.foreign_reports(0.0) == 0
-    heard.take(report(*OURS[0]), 0.0)
-    heard.take(report((0.7, 0.0, 0.0), 0.3), 0.0)
+    heard.add_report(report(*OURS[0]), 0.0)
+    heard.add_report(report((0.7, 0.0, 0.0), 0.3), 0.0)
     assert heard.foreign_reports(0.0) == 1
     assert heard.any_foreign
     heard.begin(PX4)
@@ -84,6 +84,6 @@ def test_nothing_is_foreign_before_a_report_has_shown_a_setpoint_of_ours():
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
 def test_a_report_with_nan_says_nothing(autopilot):
     heard = echo(autopilot)
-    heard.take(report(*OURS[0]), 0.0)
-    heard.take(report((float("nan"), 0.0, 0.0), float("nan")), 0.0)
+    heard.add_report(report(*OURS[0]), 0.0)
+    heard.add_report(report((float("nan"), 0.0, 0.0), float("nan")), 0.0)
     assert heard.foreign_reports(0.0) == 0

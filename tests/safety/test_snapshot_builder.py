@@ -103,12 +103,12 @@ def test_the_autopilots_words_are_passed_on(flight):
     told = flight.snapshot()
     assert told.now == 10.0
     assert told.autopilot == AutopilotStatus(True, False, True, "battery", "gps", state.estimator)
-    assert (told.had_gps, told.good_flags) == (True, 0x33F)
+    assert (told.had_gps, told.initial_estimator_flags) == (True, 0x33F)
     flight.state.estimator = None
-    assert flight.snapshot().good_flags == 0x33F
+    assert flight.snapshot().initial_estimator_flags == 0x33F
     flight.builder.begin(11.0)
     flight.listen(11.0)
-    assert flight.snapshot(11.0).good_flags == 0
+    assert flight.snapshot(11.0).initial_estimator_flags == 0
 
 
 def test_motion_is_seen_from_where_control_began(flight):
@@ -132,7 +132,7 @@ def test_motion_is_seen_from_where_control_began(flight):
 
 def test_the_fence_may_have_another_centre_than_where_control_began(flight):
     flight.builder.begin(10.0, FenceCentre((4.0, 5.0, -6.0), Place(46.0, 7.0)))
-    assert flight.builder.flown_fence_centre().place == Place(46.0, 7.0)
+    assert flight.builder.fence_centre_without_resets().place == Place(46.0, 7.0)
     flight.listen(10.0)
     assert flight.snapshot().motion.origin == Place(46.0, 7.0)
 
@@ -149,7 +149,7 @@ def test_what_is_not_known_is_none(command):
     flight.guidance.fresh_position = lambda: None
     told = flight.snapshot()
     assert told.motion == Motion(height=12.5, tracking_error=0.9)
-    assert (told.control.last_position, told.control.position_fresh) == (-inf, False)
+    assert (told.control.last_position_arrival, told.control.position_fresh) == (-inf, False)
     flight.guidance.motion = Motions((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     assert flight.snapshot().motion[2:4] == (None, (4.0, 5.0, 6.0))
     flight.state.global_position = None
@@ -164,9 +164,9 @@ def test_before_control_begins_everything_counts_from_the_start_of_the_clock():
     flight.resets.reset_times.append(0.5)
     flight.listen(1.0, 4.0)
     told = flight.snapshot(4.0)
-    assert (told.motion.offset, told.motion.origin, told.good_flags) == (None, None, 0)
+    assert (told.motion.offset, told.motion.origin, told.initial_estimator_flags) == (None, None, 0)
     assert flight.builder.fence_centre_ned is None
-    assert told.control.last_heard == 0.0
+    assert told.control.last_frame_noticed == 0.0
     assert told.control.clock_change == "it jumped"
     flight.clock.change_count = 0
     assert flight.snapshot(4.0).control.clock_change is None
@@ -194,8 +194,12 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     flight.listen(10.04)
     flight.listen(10.24)  # late by 0.17 s
     told = flight.snapshot(10.3).control
-    assert (told.last_answer, told.last_sample, told.reason) == (9.9, 9.95, Unanswered.LATE)
-    assert (told.last_position, told.last_heard) == (9.75, 10.02)
+    assert (told.last_answered_arrival, told.last_sample_arrival, told.reason) == (
+        9.9,
+        9.95,
+        Unanswered.LATE,
+    )
+    assert (told.last_position_arrival, told.last_frame_noticed) == (9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)
     assert told.stall_time == pytest.approx(0.17)
     flight.clock.change_count = 3

@@ -231,7 +231,7 @@ def test_px4_is_asked_for_offboard_by_the_rules_of_px4_and_the_flight_is_recorde
         assert replay.follows_record
         samples = replay.run()
         assert sum(each.replayed_setpoint is not None for each in samples) == summary["setpoints"]
-        assert [each for each in samples if not each.same] == []
+        assert [each for each in samples if not each.is_same] == []
 
     fly("px4", scene, directory=tmp_path)
 

@@ -79,7 +79,7 @@ def asked(guard, velocity, position=(0.0, 0.0, -5.0), flown=(0.0, 0.0, 0.0), now
         AxisDemand(None, velocity[:2], None), AxisDemand(None, velocity[2:], None), None, None
     )
     motion = VehicleMotion(position, flown)
-    return request, guard.inside(request, Reference(*motion), motion, now)
+    return request, guard.keep_inside(request, Reference(*motion), motion, now)
 
 
 def test_low_after_a_take_off_the_vehicle_may_climb_and_fly_but_not_sink():

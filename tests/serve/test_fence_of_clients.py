@@ -13,7 +13,7 @@ from companion import testing
 from companion.config import Config
 from companion.config.files import changed
 from companion.guidance.fence import FenceCentre
-from companion.serve.kept_fence import KeptFence
+from companion.serve.fence_across_flights import FenceAcrossFlights
 from companion.vehicle.records import LocalPosition
 from tests.serve.test_control import REJECTED
 from tests.serve.virtual import (
@@ -104,7 +104,7 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
 
 
 class FakeLink:
-    """What `KeptFence` sees of a vehicle."""
+    """What `FenceAcrossFlights` sees of a vehicle."""
 
     def __init__(self):
         self.state = SimpleNamespace(armed=True, height=5.0, position=None)
@@ -132,11 +132,11 @@ class FakeLink:
 
 def test_outside_the_fence_of_the_first_flight_control_is_refused_until_the_vehicle_disarms():
     config, link = changed(Config(), {"limits": {"fence_radius_m": RADIUS}}, "test"), FakeLink()
-    fence = KeptFence(config, link)
+    fence = FenceAcrossFlights(config, link)
     link.at(100.0, 0.0, -5.0)
     assert fence.refusal() is None, "nobody was in control yet"
-    fence.keep(FenceCentre((100.0, 0.0, -5.0), None))
-    fence.keep(FenceCentre((108.0, 0.0, -5.0), None))
+    fence.set_first_centre(FenceCentre((100.0, 0.0, -5.0), None))
+    fence.set_first_centre(FenceCentre((108.0, 0.0, -5.0), None))
     link.at(108.0, 0.0, -5.0)
     assert fence.refusal() is None
     link.at(110.0, 0.0, -5.0)
@@ -151,11 +151,11 @@ def test_outside_the_fence_of_the_first_flight_control_is_refused_until_the_vehi
 def test_a_reset_of_the_estimator_between_flights_leaves_the_fence_over_the_same_ground():
     keys = {"limits": {"fence_radius_m": RADIUS}, "safety": {"max_reset_m": 4.0}}
     link = FakeLink()
-    fence = KeptFence(changed(Config(), keys, "test"), link)
+    fence = FenceAcrossFlights(changed(Config(), keys, "test"), link)
     link.at(92.0, 0.0, -5.0)
     link.jumps_to(90.0, 0.0, -5.0)  # before the fence is kept: its centre has it already
     link.at(100.0, 0.0, -5.0)
-    fence.keep(FenceCentre((100.0, 0.0, -5.0), None))
+    fence.set_first_centre(FenceCentre((100.0, 0.0, -5.0), None))
     link.at(108.0, 0.0, -5.0)
     assert fence.refusal() is None
     link.jumps_to(111.0, -1.0, -5.0)  # the vehicle is still 8 m north of the centre

@@ -69,7 +69,7 @@ def test_a_replay_makes_the_changes_of_the_flight_and_gives_its_commands_to_the_
     config = load(folder / "config.yaml")
     assert config.guidance.position_weight_per_s4 == 120.0
     samples = Replay(read_flight(folder), config).run()
-    assert [each for each in samples if not each.same] == []
+    assert [each for each in samples if not each.is_same] == []
     assert sum(each.recorded_setpoint is not None for each in samples) == summary["setpoints"]
 
 

@@ -108,7 +108,7 @@ def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():
 
     network = object.__new__(Network)
     network.routing = SimpleNamespace(forward_from_client=forward_from_client)
-    network._faults, network._note_event = set(), notes.append
+    network._noted_faults, network._note_event = set(), notes.append
     network._flush_later, network.setpoint_ids = lambda: None, frozenset()
     frames = [SimpleNamespace(message_id=0, text=text) for text in ("bad", "good", "bad", "good")]
     network.receive_frames(SimpleNamespace(name="script"), frames)
@@ -190,7 +190,7 @@ def test_garbage_is_collected_only_between_flights(monkeypatch, freeze_gc, next_
 
     flights = SimpleNamespace(
         ownership=SimpleNamespace(release=lambda: None),
-        fence=SimpleNamespace(keep=lambda centre: None),
+        fence=SimpleNamespace(set_first_centre=lambda centre: None),
         _controlled_since_arming=False,
         _vehicle=SimpleNamespace(
             config=changed(Config(), {"realtime": {"freeze_gc": freeze_gc}}, "test")

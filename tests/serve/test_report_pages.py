@@ -13,7 +13,7 @@ def test_a_page_that_cannot_be_written_is_told_in_one_sentence(tmp_path, monkeyp
     )  # the computer may be busy
     pages = ReportPages()
     failed = pages.write(tmp_path)
-    pages.leave()
+    pages.stop()
     left = pages.write(tmp_path)
     assert "is this the folder of a flight?" in failed
     assert "\n" not in failed
@@ -42,7 +42,7 @@ def test_a_process_that_cannot_be_killed_is_not_waited_for(tmp_path, monkeypatch
     pages = ReportPages()
     monkeypatch.setattr(report_pages, "_lower_priority", lambda pid: None)
     monkeypatch.setattr(report_pages, "_PAGE_TIMEOUT", 0.0)
-    hung, left = Hung(lambda: None), Hung(pages.leave)
+    hung, left = Hung(lambda: None), Hung(pages.stop)
     monkeypatch.setattr(subprocess, "Popen", lambda *_, **__: [hung, left][len(told)])
     told.append(pages.write(tmp_path))
     told.append(pages.write(tmp_path))

@@ -195,7 +195,7 @@ def test_a_client_that_claims_to_be_the_autopilot_or_us_is_not_heard(net, source
 def test_a_program_under_our_ids_is_told_but_not_an_echo_of_ours(net):
     """191 is the usual id of a companion computer: such a program met silence, without a word."""
     told = []
-    net.routing.on_taken_ids = told.append
+    net.routing.on_our_ids_used = told.append
     ours = heartbeat(OWN, 7)
     net.routing.send_to_clients(ours.raw)
     net.routing.forward_from_client(net.script, ours)  # a router behind it sends it back

@@ -76,7 +76,7 @@ def out(tmp_path_factory):
         patch.setattr(flights, "FLIGHT_S", 1)
         patch.setattr(flights, "SETTLED_AFTER_S", 0.5)
         patch.setattr(timing, "_REQUEST_COUNT", 20)
-        patch.setattr("companion.study.nmpc.study.PARTS", 3)
+        patch.setattr("companion.study.nmpc.study.PROGRESS_STEPS", 3)
         assert main(["study", "nmpc", "--out", str(folder)]) == 0
     return folder
 

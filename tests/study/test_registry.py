@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from companion.study.outcome import Finding, Outcome, Table
 
-PARTS = 1
+PROGRESS_STEPS = 1
 
 
 def run(tick):
@@ -113,7 +113,7 @@ def test_every_entry_names_a_module_that_has_what_it_promises(study):
     if study.takes_case:
         assert callable(module.prepare)
     else:
-        assert module.PARTS > 0
+        assert module.PROGRESS_STEPS > 0
         assert callable(module.run)
     assert study.summary
 

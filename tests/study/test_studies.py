@@ -22,13 +22,13 @@ from companion.study.paper import fig2, fig3, fig4, fig5_flights, kmax, rates
 from companion.study.registry import STUDIES
 
 ROOT = Path(__file__).parents[2]
-PARTS = {
-    "fig2": fig2.PARTS,
-    "fig3": fig3.PARTS,
-    "fig4": fig4.PARTS,
-    "fig5": fig5_flights.PARTS,
-    "rates": rates.PARTS,
-    "kmax": kmax.PARTS,
+PROGRESS_STEPS = {
+    "fig2": fig2.PROGRESS_STEPS,
+    "fig3": fig3.PROGRESS_STEPS,
+    "fig4": fig4.PROGRESS_STEPS,
+    "fig5": fig5_flights.PROGRESS_STEPS,
+    "rates": rates.PROGRESS_STEPS,
+    "kmax": kmax.PROGRESS_STEPS,
 }
 """The studies of the paper, and how often each should tick."""
 CASE = ROOT / "configs" / "study-case.yaml"
@@ -49,7 +49,7 @@ def results(tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(runner, "_tick", counting)
-        patch.setattr(registry, "STUDIES", {name: STUDIES[name] for name in PARTS})
+        patch.setattr(registry, "STUDIES", {name: STUDIES[name] for name in PROGRESS_STEPS})
         # They are away from the reference most, and reach 5 %, within a second; Euler in half.
         patch.setattr(fig2, "FIGURE_2", replace(fig2.FIGURE_2, headings=EIGHT, seconds=1.0))
         patch.setattr(fig3, "FIGURE_2", replace(fig3.FIGURE_2, seconds=0.5))
@@ -159,7 +159,7 @@ def test_a_slow_inner_loop_takes_the_straight_line_from_the_proposed_method(resu
 def test_every_study_writes_its_figure_and_its_tables(results):
     out, page, _ = results
     names = {path.name for path in out.iterdir()}
-    for study in PARTS:
+    for study in PROGRESS_STEPS:
         assert {f"{study}.{ending}" for ending in ("svg", "png", "csv", "md")} <= names
         assert (out / f"{study}.png").read_bytes().startswith(b"\x89PNG")
         assert f'id="{study}"' in page.read_text()
@@ -182,7 +182,7 @@ def test_the_page_stands_alone_and_states_what_did_not_hold(results):
 
 
 def test_the_progress_bar_ends_full(results):
-    assert dict(results[2]) == PARTS
+    assert dict(results[2]) == PROGRESS_STEPS
 
 
 def test_the_same_study_gives_the_same_files(results, tmp_path):

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 
 from companion.recording.mcap_file.channels import TOPICS
 
-_HEADER = struct.Struct("<BQI")
+_MESSAGE_HEADER = struct.Struct("<BQI")
 _TOPIC_NUMBERS = {topic: number for number, topic in enumerate(TOPICS)}
-_FULL_BATCH = 32_000
+_FULL_BATCH_BYTES = 32_000
 """Length above which a batch is sent, bytes; well below the buffer of a socket."""
 
 SendBatch = Callable[[bytes], None]
@@ -24,26 +24,26 @@ class Batch:
 
     def __init__(self, send: SendBatch) -> None:
         self._send = send
-        self._collected = bytearray()
+        self._collected_bytes = bytearray()
 
     def add(self, topic: str, time_ns: int, data: bytes) -> None:
         """Add a message; send the batch if it is full."""
-        self._collected += _HEADER.pack(_TOPIC_NUMBERS[topic], time_ns, len(data))
-        self._collected += data
-        if len(self._collected) > _FULL_BATCH:
+        self._collected_bytes += _MESSAGE_HEADER.pack(_TOPIC_NUMBERS[topic], time_ns, len(data))
+        self._collected_bytes += data
+        if len(self._collected_bytes) > _FULL_BATCH_BYTES:
             self.send()
 
     def send(self) -> None:
         """Send the collected messages."""
-        if self._collected:
-            self._send(bytes(self._collected))
-            self._collected.clear()
+        if self._collected_bytes:
+            self._send(bytes(self._collected_bytes))
+            self._collected_bytes.clear()
 
 
 def messages_of(datagram: bytes) -> Iterator[tuple[int, int, bytes]]:
     """Index of the channel, time and bytes of each message of a datagram, in order."""
-    at = 0
-    while at < len(datagram):
-        number, time_ns, length = _HEADER.unpack_from(datagram, at)
-        at += _HEADER.size + length
-        yield number, time_ns, datagram[at - length : at]
+    offset = 0
+    while offset < len(datagram):
+        topic_number, time_ns, length = _MESSAGE_HEADER.unpack_from(datagram, offset)
+        offset += _MESSAGE_HEADER.size + length
+        yield topic_number, time_ns, datagram[offset - length : offset]

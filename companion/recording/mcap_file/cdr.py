@@ -139,16 +139,18 @@ def fields_message(numbers: tuple[float, ...], texts: tuple[str, ...]) -> bytes:
     return message.bytes()
 
 
-def fields_of(message: bytes, numbers: int, texts: int) -> tuple[tuple[float, ...], list[str]]:
+def fields_of(
+    message: bytes, number_count: int, text_count: int
+) -> tuple[tuple[float, ...], list[str]]:
     """Decode a message of `fields_message`: the numbers and the strings.
 
     Raises:
         ValueError: the message does not have this form.
     """
     try:
-        values = struct.unpack_from(f"<{numbers}d", message, 4)
-        offset, strings = 4 + 8 * numbers, []
-        for _ in range(texts):
+        values = struct.unpack_from(f"<{number_count}d", message, 4)
+        offset, strings = 4 + 8 * number_count, []
+        for _ in range(text_count):
             text, offset = _string(message, offset)
             strings.append(text)
     except struct.error as error:

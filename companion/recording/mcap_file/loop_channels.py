@@ -26,7 +26,7 @@ UNANSWERED_CODES = (
 )
 """Names of the codes in the column "unanswered"; from "another_vehicle" on, the values of
 `Unanswered`."""
-ACTIONS = (
+ACTION_NAMES = (
     "stand_by",
     "hold_here",
     "hold_reference",
@@ -58,13 +58,13 @@ def rate_names(prefix: str) -> tuple[str, ...]:
 _NED, _AXES = ("north", "east", "down"), ("roll", "pitch", "yaw")
 
 
-def _vector(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:
+def _vector_fields(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:
     axes = zip(vector_names(prefix, unit), _NED, strict=True)
     shown_unit = unit.replace("_s", "/s")
     return tuple(Field(name, f"{meaning}, {axis}, {shown_unit}.") for name, axis in axes)
 
 
-def _rates(prefix: str, meaning: str) -> tuple[Field, ...]:
+def _rate_fields(prefix: str, meaning: str) -> tuple[Field, ...]:
     axes = zip(rate_names(prefix), _AXES, strict=True)
     return tuple(Field(name, f"{meaning} about {axis}, rad/s.") for name, axis in axes)
 
@@ -80,7 +80,7 @@ SAMPLE = Channel(
         Field("time_boot_ms", "The vehicle's stamp as received, ms."),
         Field("age_s", "Age at arrival, s. NaN: the stamp does not fit the vehicle's clock."),
         *(Field(name, "Attitude, body FRD to world NED.") for name in QUATERNION),
-        *_rates("measured", "Measured rate"),
+        *_rate_fields("measured", "Measured rate"),
         Field("checked_s", "When the age was checked again before sending, on our clock, s."),
     ),
     (
@@ -104,7 +104,7 @@ SETPOINT = Channel(
     (
         Field("received_s", "When its sample arrived, on our clock, s."),
         VEHICLE_TIME,
-        *_rates("commanded", "Commanded body rate"),
+        *_rate_fields("commanded", "Commanded body rate"),
         Field("thrust", "Collective thrust, 0..1."),
         Field("latency_us", "From the sample's arrival to the setpoint, µs. 0 in virtual time."),
         Field("target_north", "Acceleration coefficient that the planner flies to, north."),
@@ -134,11 +134,11 @@ GUIDANCE = Channel(
     (
         Field("time_s", "Time on our clock, s."),
         VEHICLE_TIME,
-        *_vector("reference", "m", "Position of the reference"),
-        *_vector("reference", "m_s", "Velocity of the reference"),
+        *_vector_fields("reference", "m", "Position of the reference"),
+        *_vector_fields("reference", "m_s", "Velocity of the reference"),
         Field("reference_heading_rad", "Heading of the reference, rad."),
-        *_vector("estimated", "m", "Estimated position now"),
-        *_vector("estimated", "m_s", "Estimated velocity now"),
+        *_vector_fields("estimated", "m", "Estimated position now"),
+        *_vector_fields("estimated", "m_s", "Estimated velocity now"),
         Field("error_m", "Distance from the reference, m. NaN: no reference, or open loop."),
         Field("wind_north_m_s2", "Acceleration by wind and bias, north, m/s²."),
         Field("wind_east_m_s2", "Acceleration by wind and bias, east, m/s²."),
@@ -169,7 +169,7 @@ TARGET = Channel(
         Field("later_heading_rad", "Target heading one period later, rad."),
         Field("later_heading_rate_rad_s", "Feedforward of the heading one period later, rad/s."),
         Field("acceleration_down_m_s2", "Wanted vertical acceleration, down, m/s²."),
-        *_rates("body", "Body rate to send instead of the planner's (NaN: the planner's)"),
+        *_rate_fields("body", "Body rate to send instead of the planner's (NaN: the planner's)"),
         Field("thrust", "Thrust to send instead of that for the acceleration; NaN: none."),
         Field("turn_rad", "Sum of the heading resets when it was made, rad."),
         Field("period_s", "Period of guidance, s."),
@@ -186,8 +186,8 @@ INPUT = Channel(
         Field("time_s", "When the step began, on our clock, s."),
         Field("position_received_s", "When the newest position arrived, on our clock, s."),
         Field("position_vehicle_time_s", "Time stamp of this position on the vehicle's clock, s."),
-        *_vector("position", "m", "LOCAL_POSITION_NED, position"),
-        *_vector("velocity", "m_s", "LOCAL_POSITION_NED, velocity"),
+        *_vector_fields("position", "m", "LOCAL_POSITION_NED, position"),
+        *_vector_fields("velocity", "m_s", "LOCAL_POSITION_NED, velocity"),
         Field("clock_offset_s", "Vehicle time minus our time, s; NaN: not known."),
         Field("battery_received_s", "When the battery was reported, on our clock, s."),
         Field("battery_v", "Battery voltage, V."),
@@ -220,5 +220,5 @@ ACTION = Channel(
         Field("drag_per_s", "For `drag_prior`: linear drag of an earlier flight, 1/s."),
         Field("quadratic_drag_per_m", "For `drag_prior`: its quadratic drag, 1/m."),
     ),
-    (CodeField("action", "The name of the call.", ACTIONS),),
+    (CodeField("action", "The name of the call.", ACTION_NAMES),),
 )

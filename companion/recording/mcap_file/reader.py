@@ -13,7 +13,7 @@ from zstandard import ZstdError
 
 from companion.recording.mcap_file.channels import TOPICS
 
-_MOST_BYTES = 1 << 28
+_MAX_BYTES = 1 << 28
 """Largest length of a record that we write, bytes; a longer one is damaged."""
 _DAMAGE_ERRORS = (
     McapError,
@@ -36,7 +36,7 @@ class McapContent:
 
     messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=lambda: defaultdict(list))
     """(time ns, data) of each message, by topic, in the order of the file."""
-    order: list[str] = field(default_factory=list)
+    topic_order: list[str] = field(default_factory=list)
     """The topic of each message, in the order of the file."""
     schemas: dict[str, bytes] = field(default_factory=dict)
     """The message definition of each topic."""
@@ -61,10 +61,10 @@ def read_mcap(path: Path) -> McapContent:
     if path.is_fifo():
         raise OSError(errno.EINVAL, "not a regular file")
     with path.open("rb") as file:
-        reader = StreamReader(file, emit_chunks=True, record_size_limit=_MOST_BYTES)
+        reader = StreamReader(file, emit_chunks=True, record_size_limit=_MAX_BYTES)
         try:
             for record in reader.records:
-                _take(record, topics, schemas, content)
+                _store(record, topics, schemas, content)
             content.complete = True
         except _DAMAGE_ERRORS as error:
             if file.read(1):  # else it was cut off in the middle of this record
@@ -72,18 +72,18 @@ def read_mcap(path: Path) -> McapContent:
     return content
 
 
-def _take(
+def _store(
     record: McapRecord, topics: dict[int, str], schemas: dict[int, bytes], content: McapContent
 ) -> None:
     if isinstance(record, Chunk):
-        if record.uncompressed_size > _MOST_BYTES:
+        if record.uncompressed_size > _MAX_BYTES:
             raise ValueError(f"a chunk of {record.uncompressed_size} bytes")
-        for inner in breakup_chunk(record, validate_crc=True):
-            _take(inner, topics, schemas, content)
+        for chunk_record in breakup_chunk(record, validate_crc=True):
+            _store(chunk_record, topics, schemas, content)
     elif isinstance(record, Message):
         topic = topics[record.channel_id]
         content.messages[topic].append((record.log_time, record.data))
-        content.order.append(topic)
+        content.topic_order.append(topic)
     elif isinstance(record, Channel):
         topics[record.id] = record.topic
         content.schemas[record.topic] = schemas[record.schema_id]
@@ -98,11 +98,15 @@ def changed_topic(content: McapContent) -> str | None:
 
     Names of codes that this version has added since the recording do not count as a change.
     """
-    ours = {topic: _columns(kind.schema) for topic, kind in TOPICS.items()}
+    our_columns = {topic: _columns(message_type.schema) for topic, message_type in TOPICS.items()}
     for topic, schema in content.schemas.items():
-        recorded = _columns(schema)
-        known = (line for line in ours.get(topic, recorded) if line in recorded or b"=" not in line)
-        if list(known) != recorded:
+        recorded_columns = _columns(schema)
+        comparable_columns = (
+            line
+            for line in our_columns.get(topic, recorded_columns)
+            if line in recorded_columns or b"=" not in line
+        )
+        if list(comparable_columns) != recorded_columns:
             return topic
     return None
 

@@ -57,7 +57,7 @@ class Entity(NamedTuple):
 
     name: str
     frame: str
-    follows: bool = False
+    follows_frame: bool = False
     """Whether the shapes move with `frame` until they are replaced."""
     arrows: Sequence[Arrow] = ()
     cubes: Sequence[Cube] = ()
@@ -85,8 +85,8 @@ def _add_entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
         message.add_doubles(*shape.pose, *shape[1:5], *shape.color)
 
     def add_box(shape: Cube | Cylinder) -> None:
-        scales = () if isinstance(shape, Cube) else (1.0, 1.0)
-        message.add_doubles(*shape.pose, *shape.size, *scales, *shape.color)
+        end_scales = () if isinstance(shape, Cube) else (1.0, 1.0)
+        message.add_doubles(*shape.pose, *shape.size, *end_scales, *shape.color)
 
     def add_line(shape: Line) -> None:
         message.add_uint8(_LINE_LIST if shape.separate_pairs else _LINE_STRIP)
@@ -103,7 +103,7 @@ def _add_entity(message: CdrMessage, time_ns: int, entity: Entity) -> None:
     message.add_text(entity.frame)
     message.add_text(entity.name)
     message.add_time(0)  # lifetime: until it is replaced
-    message.add_uint8(entity.follows)
+    message.add_uint8(entity.follows_frame)
     message.add_uint32(0)  # metadata
     _add_list(message, entity.arrows, add_arrow)
     _add_list(message, entity.cubes, add_box)
@@ -118,7 +118,7 @@ _LINE_STRIP, _LINE_LIST, _IN_PIXELS, _THICKNESS = 0, 2, 1, 2.0
 _POSE, _COLOR = "geometry_msgs/Pose pose\n", "foxglove_msgs/Color color\n"
 _SIZE = "geometry_msgs/Vector3 size\n"
 _POINTS = f"geometry_msgs/Point[] points\n{_COLOR}foxglove_msgs/Color[] colors\nuint32[] indices\n"
-_PARTS = {
+_TYPE_DEFINITIONS = {
     "SceneEntityDeletion": "uint8 MATCHING_ID=0\nuint8 ALL=1\n"
     "builtin_interfaces/Time timestamp\nuint8 type\nstring id\n",
     "SceneEntity": "builtin_interfaces/Time timestamp\nstring frame_id\nstring id\n"
@@ -146,7 +146,7 @@ _PARTS = {
 SCENE_UPDATE = cdr.message_type(
     "foxglove_msgs/msg/SceneUpdate",
     "foxglove_msgs/SceneEntityDeletion[] deletions\nfoxglove_msgs/SceneEntity[] entities\n",
-    *(f"MSG: foxglove_msgs/{name}\n{fields}" for name, fields in _PARTS.items()),
+    *(f"MSG: foxglove_msgs/{name}\n{fields}" for name, fields in _TYPE_DEFINITIONS.items()),
     "MSG: builtin_interfaces/Duration\nint32 sec\nuint32 nanosec\n",
     *cdr.GEOMETRY,
 )

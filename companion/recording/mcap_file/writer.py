@@ -28,17 +28,17 @@ class McapWriter:
         OSError: the file cannot be created or written.
     """
 
-    def __init__(self, path: Path, stream: SendBatch | None = None) -> None:
+    def __init__(self, path: Path, send_batch: SendBatch | None = None) -> None:
         self._file = path.open("wb")
         self._writer = Writer(self._file, _CHUNK_LENGTH, CompressionType.LZ4)
         self._writer.start("ros2", "mavlink-companion")
-        self._ids: dict[str, int] = {}
+        self._channel_ids: dict[str, int] = {}
         schemas: dict[str, int] = {}
         for topic, (name, schema) in TOPICS.items():
             if name not in schemas:
                 schemas[name] = self._writer.register_schema(name, SCHEMA_ENCODING, schema)
-            self._ids[topic] = self._writer.register_channel(topic, ENCODING, schemas[name])
-        self._batch = None if stream is None else Batch(stream)
+            self._channel_ids[topic] = self._writer.register_channel(topic, ENCODING, schemas[name])
+        self._batch = None if send_batch is None else Batch(send_batch)
 
     def message(self, topic: str, time_ns: int, data: bytes) -> None:
         """Add a message.
@@ -48,7 +48,7 @@ class McapWriter:
         """
         if self._batch is not None:
             self._batch.add(topic, time_ns, data)
-        self._writer.add_message(self._ids[topic], time_ns, data, time_ns)
+        self._writer.add_message(self._channel_ids[topic], time_ns, data, time_ns)
 
     def row(self, channel: Channel, time_ns: int, numbers: Sequence[float]) -> None:
         """Add a message of a numeric channel: the float64 columns, then the uint8 columns."""

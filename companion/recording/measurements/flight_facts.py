@@ -12,7 +12,7 @@ class EarlyEnd:
     time: float
     """Time since the flight began, s."""
     since_takeoff: float | None
-    """Time since `FlightFacts.takeoff`, s; None: the vehicle was on the ground."""
+    """Time since `FlightFacts.takeoff_time`, s; None: the vehicle was on the ground."""
     phase: str
     """The phase that failed."""
     maneuver: str | None = None
@@ -40,11 +40,11 @@ class EarlyEnd:
 class FlightFacts:
     """What happened in a flight, besides its figures. Times in s since the flight began."""
 
-    began: float = 0.0
+    start_time: float = 0.0
     """Beginning of the flight, s on our clock."""
     phases: tuple[tuple[float, str], ...] = ()
     """Beginning and name of each phase."""
-    takeoff: float | None = None
+    takeoff_time: float | None = None
     """Time when the vehicle left the ground, or when the checks for a takeover in the air passed;
     None: neither happened."""
     early_end: EarlyEnd | None = None
@@ -84,12 +84,12 @@ class FlightFacts:
 
     def as_dict(self) -> dict[str, Any]:
         """The facts as JSON."""
-        begin, end = self.battery
+        charge_at_takeoff, charge_at_end = self.battery
         return {
             "lockstep": self.lockstep,
             "deadline_ms": _rounded(1e3 * self.deadline),
             "phases": [{"time_s": _rounded(time), "name": name} for time, name in self.phases],
-            "takeoff_s": _rounded(self.takeoff),
+            "takeoff_s": _rounded(self.takeoff_time),
             "early_end": None if self.early_end is None else self.early_end.as_dict(),
             "vehicle_uid": self.vehicle_uid,
             "at_the_end": {
@@ -97,7 +97,11 @@ class FlightFacts:
                 "mode": self.mode,
                 "unheard_s": _rounded(self.silence),
             },
-            "battery": {"takeoff": begin, "end": end, "min": self.min_battery},
+            "battery": {
+                "takeoff": charge_at_takeoff,
+                "end": charge_at_end,
+                "min": self.min_battery,
+            },
             "advice": list(self.advice),
             "gain_warning": self.gain_warning,
             "max_tilt_deg": None if self.max_tilt is None else _rounded(degrees(self.max_tilt)),

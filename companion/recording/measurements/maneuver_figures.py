@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.recording.measurements.swing import NOT_MEASURED, SHORTEST_PART, Swing, measure_swing
-from companion.recording.trace import ManeuverMark
+from companion.recording.trace import ManeuverChange
 
 Floats = NDArray[np.float64]
 
 SETTLING_TIME = 2.0
 """Time left out at the beginning of a maneuver, s: the previous one still has an effect then."""
-_LARGEST_SHARE = 0.25
+_MAX_SETTLING_SHARE = 0.25
 """Largest share of a maneuver's duration that is left out at its beginning."""
 _MAX_SPEED_AT_REST = 0.05
 """A reference that is never faster than this is at rest, m/s."""
@@ -83,48 +83,53 @@ class ManeuverFigures:
 
 
 def measure_maneuvers(
-    rows: Floats, rates: Floats, marks: Sequence[ManeuverMark], began: float
+    rows: Floats, rates: Floats, maneuver_changes: Sequence[ManeuverChange], start_time: float
 ) -> tuple[ManeuverFigures, ...]:
     """Measure each maneuver that was flown.
 
     Args:
         rows: (N, 7), rows of `FlightTrace.tracking`.
         rates: (M, 3) vehicle time, s, and measured roll and pitch rate, rad/s.
-        marks: marks of `FlightTrace.maneuvers`.
-        began: beginning of the flight, s on our clock.
+        maneuver_changes: `FlightTrace.maneuvers`.
+        start_time: beginning of the flight, s on our clock.
     """
     return tuple(
-        _figures_of(mark.name or "", mark.time - began, part, rates)
-        for mark, part in _flown_maneuvers(rows, marks)
+        _figures_of(change.name or "", change.time - start_time, part, rates)
+        for change, part in _flown_maneuvers(rows, maneuver_changes)
     )
 
 
-def settled_parts(rows: Floats, marks: Sequence[ManeuverMark]) -> list[Floats]:
+def settled_maneuver_rows(rows: Floats, maneuver_changes: Sequence[ManeuverChange]) -> list[Floats]:
     """The rows of each maneuver in closed loop, without the settling time at its beginning.
 
     `rows` are the (N, 7) rows of `FlightTrace.tracking`.
     """
-    parts = [part for _, part in _flown_maneuvers(rows, marks) if not _is_open_loop(part)]
+    parts = [
+        part for _, part in _flown_maneuvers(rows, maneuver_changes) if not _is_open_loop(part)
+    ]
     return [part[part[:, 0] >= part[0, 0] + _settling_time(part)] for part in parts]
 
 
-def in_maneuvers(vehicle_times: Floats, marks: Sequence[ManeuverMark]) -> NDArray[np.bool_]:
+def in_maneuvers(
+    vehicle_times: Floats, maneuver_changes: Sequence[ManeuverChange]
+) -> NDArray[np.bool_]:
     """Whether each vehicle time (N,), s, lies in a maneuver; not if it is NaN."""
-    begins = np.array([mark.vehicle_time for mark in marks])
-    in_maneuver = np.array([False, *(mark.name is not None for mark in marks)])
-    inside = in_maneuver[np.searchsorted(begins, vehicle_times, side="right")]
-    return np.asarray(inside & ~np.isnan(vehicle_times))
+    change_times = np.array([change.vehicle_time for change in maneuver_changes])
+    maneuver_follows = np.array([False, *(change.name is not None for change in maneuver_changes)])
+    is_in_maneuver = maneuver_follows[np.searchsorted(change_times, vehicle_times, side="right")]
+    return np.asarray(is_in_maneuver & ~np.isnan(vehicle_times))
 
 
 def _flown_maneuvers(
-    rows: Floats, marks: Sequence[ManeuverMark]
-) -> Iterator[tuple[ManeuverMark, Floats]]:
+    rows: Floats, maneuver_changes: Sequence[ManeuverChange]
+) -> Iterator[tuple[ManeuverChange, Floats]]:
     """Each maneuver that was flown, with its rows."""
-    ends = [*(mark.vehicle_time for mark in marks[1:]), inf]
-    for mark, end in zip(marks, ends, strict=False):  # without marks, `ends` still has one entry
-        part = rows[(rows[:, 0] >= mark.vehicle_time) & (rows[:, 0] < end)]
-        if mark.name is not None and len(part) > 1:
-            yield mark, part
+    end_times = [*(change.vehicle_time for change in maneuver_changes[1:]), inf]
+    # Without changes, `end_times` still has one entry.
+    for change, end in zip(maneuver_changes, end_times, strict=False):
+        part = rows[(rows[:, 0] >= change.vehicle_time) & (rows[:, 0] < end)]
+        if change.name is not None and len(part) > 1:
+            yield change, part
 
 
 def _is_open_loop(rows: Floats) -> bool:
@@ -135,7 +140,7 @@ def _settling_time(rows: Floats) -> float:
     """Time that is left out at the beginning of a maneuver, s."""
     if _is_open_loop(rows):
         return 0.0
-    return min(SETTLING_TIME, _LARGEST_SHARE * float(rows[-1, 0] - rows[0, 0]))
+    return min(SETTLING_TIME, _MAX_SETTLING_SHARE * float(rows[-1, 0] - rows[0, 0]))
 
 
 def _swing(rates: Floats, time: Floats, settling_time: float, speed: float) -> Swing:
@@ -153,9 +158,9 @@ def _figures_of(name: str, begin: float, rows: Floats, rates: Floats) -> Maneuve
     open_loop, settling_time = _is_open_loop(rows), _settling_time(rows)
     is_settling = time < time[0] + settling_time
     error = position - reference
-    level, height = np.hypot(error[:, 0], error[:, 1]), -error[:, 2]
-    height_known = ~np.isnan(height)  # another program may command the thrust
-    settled_height = height[~is_settling & height_known]
+    horizontal_error, height_error = np.hypot(error[:, 0], error[:, 1]), -error[:, 2]
+    height_known = ~np.isnan(height_error)  # another program may command the thrust
+    settled_height_error = height_error[~is_settling & height_known]
     offset = position[:, :2] - position[0, :2]
     speed = _largest_speed(time, reference)
     return ManeuverFigures(
@@ -164,12 +169,12 @@ def _figures_of(name: str, begin: float, rows: Floats, rates: Floats) -> Maneuve
         duration,
         open_loop,
         settling_time,
-        horizontal_rms=nan if open_loop else rms(level[~is_settling]),
-        horizontal_max=nan if open_loop else largest(level[~is_settling]),
-        height_rms=rms(settled_height),
-        height_max=largest(np.abs(settled_height)),
-        height_mean=float(settled_height.mean()) if len(settled_height) else nan,
-        settling_max=largest(np.hypot(level, height)[is_settling & height_known]),
+        horizontal_rms=nan if open_loop else rms(horizontal_error[~is_settling]),
+        horizontal_max=nan if open_loop else largest(horizontal_error[~is_settling]),
+        height_rms=rms(settled_height_error),
+        height_max=largest(np.abs(settled_height_error)),
+        height_mean=float(settled_height_error.mean()) if len(settled_height_error) else nan,
+        settling_max=largest(np.hypot(horizontal_error, height_error)[is_settling & height_known]),
         drift=float(np.hypot(offset[:, 0], offset[:, 1]).max()),
         speed=speed,
         swing=NOT_MEASURED if open_loop else _swing(rates, time, settling_time, speed),
@@ -178,9 +183,9 @@ def _figures_of(name: str, begin: float, rows: Floats, rates: Floats) -> Maneuve
 
 def _largest_speed(time: Floats, reference: Floats) -> float:
     """The largest speed of the reference (95th percentile), m/s; NaN without a reference."""
-    spans = np.diff(time)
-    steps = np.linalg.norm(np.diff(reference, axis=0), axis=1)
-    speeds = steps[spans > 0.0] / spans[spans > 0.0]
+    durations = np.diff(time)
+    distances = np.linalg.norm(np.diff(reference, axis=0), axis=1)
+    speeds = distances[durations > 0.0] / durations[durations > 0.0]
     # A percentile, so that one late row does not look like a high speed.
     return float(np.percentile(speeds, 95)) if np.isfinite(speeds).all() and len(speeds) else nan
 

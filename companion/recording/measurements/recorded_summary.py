@@ -18,11 +18,11 @@ from companion.recording.mcap_file.fields import Rows, matrix
 from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES, vector_names
 from companion.recording.measurements.flight_facts import EarlyEnd, FlightFacts
 from companion.recording.measurements.summary import LoopCounts, Summary
-from companion.recording.trace import ANSWERED, RESPONSE, SENT, FlightTrace
+from companion.recording.trace import ANSWERED_COLUMNS, RESPONSE_COLUMNS, SENT_COLUMNS, FlightTrace
 
-_MOST_BYTES = 1 << 26
+_MAX_BYTES = 1 << 26
 """Largest `summary.json` that is read, bytes."""
-_REFUSALS = ("invalid_attitude", "invalid_rates", "invalid_setpoint", "not_sent")
+_REFUSED_REASONS = ("invalid_attitude", "invalid_rates", "invalid_setpoint", "not_sent")
 """Reasons of unanswered samples that count as `LoopCounts.refused`."""
 _REQUIRED_KEYS = frozenset(
     (
@@ -44,8 +44,8 @@ def summary_of(record: FlightRecord) -> tuple[dict[str, Any], bool]:
     Raises:
         RecordError: the record is not valid.
     """
-    written = _written_summary(record.folder / "summary.json")
-    return (derived_summary(record), True) if written is None else (written, False)
+    written_summary = _written_summary(record.folder / "summary.json")
+    return (derived_summary(record), True) if written_summary is None else (written_summary, False)
 
 
 def derived_summary(record: FlightRecord) -> dict[str, Any]:
@@ -59,17 +59,17 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
 
 
 def _summary_from_record(record: FlightRecord) -> Summary:
-    flight = record.metadata["flight"]
+    flight_metadata = record.metadata["flight"]
     reason = f"the record ends {record.duration:.1f} s after the flight began, before it was over"
     phase = record.phases[-1].name if record.phases else "connect"
     resources, thrust = record.rows("resources"), record.rows("thrust")
-    takeoff = _takeoff_time(record)
+    takeoff_time = _takeoff_time(record)
     return Summary(
         result=reason,
         phase=phase,
-        planner=flight.get("planner", ""),
-        gain=float(flight.get("gain_per_s", "0")),
-        counts=_loop_counts(record, float(flight.get("deadline_s", "0.004"))),
+        planner=flight_metadata.get("planner", ""),
+        gain=float(flight_metadata.get("gain_per_s", "0")),
+        counts=_loop_counts(record, float(flight_metadata.get("deadline_s", "0.004"))),
         link={
             name: int(resources[column][-1]) if len(resources) else 0
             for name, column in (("frames", "frames"), ("lost", "frames_lost"), ("sent", "sent"))
@@ -78,15 +78,17 @@ def _summary_from_record(record: FlightRecord) -> Summary:
         events=[(event.time, event.text) for event in record.events if event.source != "phase"],
         log=record.folder,
         facts=FlightFacts(
-            began=record.began,
+            start_time=record.start_time,
             phases=tuple((each.time, each.name) for each in record.phases),
-            takeoff=takeoff,
-            early_end=_early_end(record, phase, takeoff),
+            takeoff_time=takeoff_time,
+            early_end=_early_end(record, phase, takeoff_time),
             battery=(None, _last_known(thrust["battery_remaining"])),
-            min_battery=float(flight.get("min_battery", "0")),
-            max_tilt=float(flight["max_tilt_rad"]) if "max_tilt_rad" in flight else None,
-            deadline=float(flight.get("deadline_s", "0.004")),
-            lockstep=flight.get("real_time") == "no",
+            min_battery=float(flight_metadata.get("min_battery", "0")),
+            max_tilt=float(flight_metadata["max_tilt_rad"])
+            if "max_tilt_rad" in flight_metadata
+            else None,
+            deadline=float(flight_metadata.get("deadline_s", "0.004")),
+            lockstep=flight_metadata.get("real_time") == "no",
         ),
     )
 
@@ -103,7 +105,7 @@ def trace_of(record: FlightRecord) -> FlightTrace:
         for latency in setpoint["latency_us"].tolist():
             trace.latencies_ns.add([round(1e3 * latency)])
         trace.rates.extend(_rates(sample, setpoint))
-        trace.response.extend(matrix(setpoint[setpoint["is_step"] == 1], RESPONSE))
+        trace.response.extend(matrix(setpoint[setpoint["is_step"] == 1], RESPONSE_COLUMNS))
         trace.tracking.extend(_tracking(guidance[guidance["offboard_active"] == 1]))
         trace.motion.extend(matrix(record.rows("motion"), MOTION.columns))
         trace.maneuvers += record.maneuvers
@@ -114,11 +116,16 @@ def _rates(sample: Rows, setpoint: Rows) -> NDArray[np.float64]:
     """(N, 10), rows of `FlightTrace.rates`, without those whose sample was not recorded."""
     sample, setpoint = sample[sample["unanswered"] == 0], setpoint[setpoint["offboard_active"] == 1]
     # Matched by the vehicle's stamps, because two samples may arrive at the same time.
-    _, answered, sent = np.intersect1d(
+    _, sample_indices, setpoint_indices = np.intersect1d(
         sample["vehicle_time_s"], setpoint["vehicle_time_s"], return_indices=True
     )
-    rows = np.hstack([matrix(setpoint[sent], SENT), matrix(sample[answered], ANSWERED)])
-    rows[sample["age_known"][answered] == 0, -1] = np.nan
+    rows = np.hstack(
+        [
+            matrix(setpoint[setpoint_indices], SENT_COLUMNS),
+            matrix(sample[sample_indices], ANSWERED_COLUMNS),
+        ]
+    )
+    rows[sample["age_known"][sample_indices] == 0, -1] = np.nan
     return rows
 
 
@@ -145,59 +152,63 @@ def _loop_counts(record: FlightRecord, deadline: float) -> LoopCounts:
     code_counts = np.bincount(sample["unanswered"], minlength=len(UNANSWERED_CODES)).tolist()
     unanswered = dict(zip(UNANSWERED_CODES, code_counts, strict=True))
     del unanswered["answered"]
-    control_off = unanswered.pop("control_off")
-    refused = sum(unanswered[name] for name in _REFUSALS)
+    control_off_count = unanswered.pop("control_off")
+    refused_count = sum(unanswered[name] for name in _REFUSED_REASONS)
     return LoopCounts(
-        samples=len(sample) - control_off,
+        samples=len(sample) - control_off_count,
         setpoints=len(setpoint),
         missed_deadlines=int((setpoint["latency_us"] > 1e6 * deadline).sum()),
-        stale=sum(unanswered.values()) - refused,
-        refused=refused,
+        stale=sum(unanswered.values()) - refused_count,
+        refused=refused_count,
         rate_hz=_setpoint_rate(record),
         unanswered=unanswered,
     )
 
 
-def _early_end(record: FlightRecord, phase: str, takeoff: float | None) -> EarlyEnd:
+def _early_end(record: FlightRecord, phase: str, takeoff_time: float | None) -> EarlyEnd:
     """The end of the record, reported as an early end of the flight in its last phase."""
     end = record.duration
-    since = None if takeoff is None else end - takeoff
-    latest = record.maneuvers[-1] if record.maneuvers else None
-    if phase != "maneuvers" or latest is None or latest.name is None:
-        return EarlyEnd(end, since, phase)
-    return EarlyEnd(end, since, phase, latest.name, end + record.began - latest.time)
+    since_takeoff = None if takeoff_time is None else end - takeoff_time
+    last_change = record.maneuvers[-1] if record.maneuvers else None
+    if phase != "maneuvers" or last_change is None or last_change.name is None:
+        return EarlyEnd(end, since_takeoff, phase)
+    return EarlyEnd(
+        end, since_takeoff, phase, last_change.name, end + record.start_time - last_change.time
+    )
 
 
 def _takeoff_time(record: FlightRecord) -> float | None:
-    """Time of take-off or takeover, s since the flight began: see `FlightFacts.takeoff`."""
-    steps = record.rows("guidance_input")
-    flying = ("takeoff", "offboard")
-    takeoff_begin = next((each.time for each in record.phases if each.name in flying), None)
+    """Time of take-off or takeover, s since the flight began: see `FlightFacts.takeoff_time`."""
+    guidance_inputs = record.rows("guidance_input")
+    flying_phases = ("takeoff", "offboard")
+    takeoff_begin = next((each.time for each in record.phases if each.name in flying_phases), None)
     if takeoff_begin is None:
         return None
-    times = record.since_start(steps["time_s"])
-    airborne = times[(times >= takeoff_begin) & (steps["standing"] == 0)]
-    return float(airborne[0]) if len(airborne) else None
+    times = record.since_start(guidance_inputs["time_s"])
+    airborne_times = times[(times >= takeoff_begin) & (guidance_inputs["standing"] == 0)]
+    return float(airborne_times[0]) if len(airborne_times) else None
 
 
 def _setpoint_rate(record: FlightRecord) -> float:
     """Rate of setpoints in vehicle time from the first maneuver on, Hz."""
-    begins = [mark.vehicle_time for mark in record.maneuvers if mark.name is not None]
+    maneuver_starts = [
+        change.vehicle_time for change in record.maneuvers if change.name is not None
+    ]
     times = record.rows("setpoint")["vehicle_time_s"]
-    times = times[times >= begins[0]] if begins else times[:0]
-    span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
-    return (len(times) - 1) / span if span > 0.0 else 0.0
+    times = times[times >= maneuver_starts[0]] if maneuver_starts else times[:0]
+    duration = float(times[-1] - times[0]) if len(times) > 1 else 0.0
+    return (len(times) - 1) / duration if duration > 0.0 else 0.0
 
 
 def _last_known(values: NDArray[np.float64]) -> float | None:
-    known = values[~np.isnan(values)]
-    return float(known[-1]) if len(known) else None
+    known_values = values[~np.isnan(values)]
+    return float(known_values[-1]) if len(known_values) else None
 
 
 def _written_summary(path: Path) -> dict[str, Any] | None:
     """`summary.json`; None if it is missing, incomplete, or of another version."""
     try:
-        found = json.loads(read_text(path, _MOST_BYTES))
+        summary = json.loads(read_text(path, _MAX_BYTES))
     except (FileRefusedError, ValueError, RecursionError):
         return None
-    return found if isinstance(found, dict) and found.keys() >= _REQUIRED_KEYS else None
+    return summary if isinstance(summary, dict) and summary.keys() >= _REQUIRED_KEYS else None

@@ -19,7 +19,7 @@ from companion.recording.measurements.second_order import (
 
 _TIME_CONSTANT_RANGE = (0.02, 2.0)
 """Range in which the time constant is searched, s."""
-_MIN_SHARE = 0.1
+_MIN_CHANGE_SHARE = 0.1
 """A step counts for an axis (north or east) if its component along the axis is at least this share
 of the step; a smaller component is noise or wind."""
 
@@ -107,14 +107,14 @@ def first_order(steps: list[StepRun], time_constant: float) -> Floats:
         steps: the steps of the run (`StepRun.steps`); the response starts at their first row.
         time_constant: τ, s.
     """
-    since, start, target = steps[0].time[0], steps[0].measured[0], steps[0].target[0]
-    parts = []
+    step_start, start, target = steps[0].time[0], steps[0].measured[0], steps[0].target[0]
+    step_responses = []
     for step in steps:
-        start = target + (start - target) * np.exp(-(step.time[0] - since) / time_constant)
-        since, target = step.time[0], step.target[0]
-        decay = np.exp(-(step.time - since) / time_constant)
-        parts.append(target + np.outer(decay, start - target))
-    return np.concatenate(parts)
+        start = target + (start - target) * np.exp(-(step.time[0] - step_start) / time_constant)
+        step_start, target = step.time[0], step.target[0]
+        decay = np.exp(-(step.time - step_start) / time_constant)
+        step_responses.append(target + np.outer(decay, start - target))
+    return np.concatenate(step_responses)
 
 
 def _largest_deviation(step: StepRun) -> float:
@@ -123,8 +123,8 @@ def _largest_deviation(step: StepRun) -> float:
     The line begins at the attitude when the target changed; in wind this is not level.
     """
     north, east = step.direction
-    across = (step.measured - step.measured[0]) @ np.array([-east, north])
-    return float(np.abs(across).max())
+    cross_axis_deviation = (step.measured - step.measured[0]) @ np.array([-east, north])
+    return float(np.abs(cross_axis_deviation).max())
 
 
 def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
@@ -132,7 +132,7 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
     axis_runs = [
         StepRun(run.time, run.measured[:, [axis]], run.target[:, [axis]])
         for run in runs
-        if np.abs(run.changes[:, axis]).max() > _MIN_SHARE * run.largest_change
+        if np.abs(run.changes[:, axis]).max() > _MIN_CHANGE_SHARE * run.largest_change
     ]
     if not axis_runs:
         return nan
@@ -145,6 +145,6 @@ def _time_constant(runs: list[StepRun], axis: int, start: float) -> float:
         paths = np.concatenate([first_order(each, tau) for each in steps])
         return np.empty(0), (measured - paths).ravel()
 
-    lowest, highest = np.log(_TIME_CONSTANT_RANGE)
-    found = minimise(residuals, np.log([start]), np.array([lowest]), np.array([highest]))
-    return float(np.exp(found.unknowns[0]))
+    lower_bound, upper_bound = np.log(_TIME_CONSTANT_RANGE)
+    fit = minimise(residuals, np.log([start]), np.array([lower_bound]), np.array([upper_bound]))
+    return float(np.exp(fit.unknowns[0]))

@@ -37,8 +37,8 @@ class StepRun(NamedTuple):
     @property
     def changes(self) -> Floats:
         """(n, 2), targets minus the coefficients at the beginning, which are not 0 in wind."""
-        since: Floats = self.target - self.measured[0]
-        return since
+        from_start: Floats = self.target - self.measured[0]
+        return from_start
 
     @property
     def largest_change(self) -> float:
@@ -48,8 +48,8 @@ class StepRun(NamedTuple):
     @property
     def direction(self) -> Floats:
         """(2,), direction of the first of the `changes` in the plane of the coefficients."""
-        first: Floats = self.changes[0]
-        return first / max(float(np.hypot(*first)), 1e-9)
+        first_change: Floats = self.changes[0]
+        return first_change / max(float(np.hypot(*first_change)), 1e-9)
 
     @property
     def compass_point(self) -> str:
@@ -109,38 +109,42 @@ class SecondOrderModel:
         The path starts with the measured coefficients and their measured rate of change, and keeps
         this rate until the first target has an effect.
         """
-        return self.path_at_rows(RunData.of(run))
+        return self.path_at_rows(RunForModel.from_run(run))
 
-    def path_at_rows(self, data: "RunData") -> Floats:
-        """(m, 2), coefficients of the model at the times in `data`; see `path`."""
-        time, effects = data.time, data.change_times + self.dead_time
-        latest = np.searchsorted(effects, time, side="right") - 1
-        elapsed = np.maximum(time - effects[np.maximum(latest, 0)], 0.0)
-        to_rows = self._transitions(elapsed)[:, 0]
-        to_next = self._transitions(np.diff(effects))
-        first, speed = data.start
-        out: Floats = first + np.outer(time, speed)
-        state = np.array([first + self.dead_time * speed, speed])
-        for number, target in enumerate(data.targets):
-            goal = np.array([target, (0.0, 0.0)])
-            rows = latest == number
-            out[rows] = to_rows[rows] @ (state - goal) + target
-            if number < len(to_next):
-                state = to_next[number] @ (state - goal) + goal
-        return out
+    def path_at_rows(self, run: "RunForModel") -> Floats:
+        """(m, 2), coefficients of the model at the times in `run`; see `path`."""
+        time, effect_times = run.time, run.change_times + self.dead_time
+        target_index = np.searchsorted(effect_times, time, side="right") - 1
+        elapsed = np.maximum(time - effect_times[np.maximum(target_index, 0)], 0.0)
+        to_row_times = self._transitions(elapsed)[:, 0]
+        to_next_target = self._transitions(np.diff(effect_times))
+        start_coefficients, start_rate = run.start
+        path: Floats = start_coefficients + np.outer(time, start_rate)
+        state = np.array([start_coefficients + self.dead_time * start_rate, start_rate])
+        for index, target in enumerate(run.targets):
+            target_state = np.array([target, (0.0, 0.0)])
+            is_for_target = target_index == index
+            path[is_for_target] = to_row_times[is_for_target] @ (state - target_state) + target
+            if index < len(to_next_target):
+                state = to_next_target[index] @ (state - target_state) + target_state
+        return path
 
     def _transitions(self, seconds: Floats) -> Floats:
         """(m, 2, 2), `SecondOrderReference.transition` over each of these durations (m,), s."""
         decay, square = self.damping * self.frequency, self.frequency * self.frequency
-        root = np.sqrt(complex(square * (1.0 - self.damping * self.damping)))
-        slow = np.exp((-1j * root - decay) * seconds)  # the slower of the two: nothing overflows
-        even = (0.5 * slow * (1.0 + np.exp(2j * root * seconds))).real
-        odd = (slow * np.expm1(2j * root * seconds) / (2j * root)).real if root else even * seconds
-        rows = (even + decay * odd, odd), (-square * odd, even - decay * odd)
-        return np.moveaxis(np.array(rows), -1, 0)
+        omega_d = np.sqrt(complex(square * (1.0 - self.damping * self.damping)))
+        slower = np.exp((-1j * omega_d - decay) * seconds)  # of the two: nothing overflows
+        cosine = (0.5 * slower * (1.0 + np.exp(2j * omega_d * seconds))).real
+        sine = (
+            (slower * np.expm1(2j * omega_d * seconds) / (2j * omega_d)).real
+            if omega_d
+            else cosine * seconds
+        )
+        matrix_rows = (cosine + decay * sine, sine), (-square * sine, cosine - decay * sine)
+        return np.moveaxis(np.array(matrix_rows), -1, 0)
 
 
-class RunData(NamedTuple):
+class RunForModel(NamedTuple):
     """The data of a run that a model needs."""
 
     time: Floats
@@ -153,25 +157,32 @@ class RunData(NamedTuple):
     """(s, 2), coefficients of each target."""
 
     @classmethod
-    def of(cls, run: StepRun, thinning: int = 1) -> "RunData":
+    def from_run(cls, run: StepRun, thinning: int = 1) -> "RunForModel":
         """The data of a run at every `thinning`-th row."""
-        since, steps = run.time - run.time[0], run.steps()
-        early = since <= _TIME_WITHOUT_EFFECT
-        columns = np.column_stack((np.ones(int(early.sum())), since[early]))
-        start, _ = project(columns, run.measured[early])
-        changes = np.array([step.time[0] for step in steps]) - run.time[0]
-        return cls(since[::thinning], start, changes, np.array([step.target[0] for step in steps]))
+        time_in_run, steps = run.time - run.time[0], run.steps()
+        is_before_effect = time_in_run <= _TIME_WITHOUT_EFFECT
+        line_columns = np.column_stack(
+            (np.ones(int(is_before_effect.sum())), time_in_run[is_before_effect])
+        )
+        start, _ = project(line_columns, run.measured[is_before_effect])
+        change_times = np.array([step.time[0] for step in steps]) - run.time[0]
+        return cls(
+            time_in_run[::thinning],
+            start,
+            change_times,
+            np.array([step.target[0] for step in steps]),
+        )
 
 
 def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
     """The second-order model that fits the runs best: least squares over ω, ζ and dead time."""
     thinning = 1 + sum(run.time.size for run in runs) // _FITTED_ROWS
-    thinned = [RunData.of(run, thinning) for run in runs]
+    thinned_runs = [RunForModel.from_run(run, thinning) for run in runs]
     measured = np.concatenate([run.measured[::thinning] for run in runs])
 
     def residuals(parameters: Floats) -> tuple[Floats, Floats]:
         fit = _second_order_model(parameters)
-        paths = np.concatenate([fit.path_at_rows(data) for data in thinned])
+        paths = np.concatenate([fit.path_at_rows(run) for run in thinned_runs])
         return np.empty(0), (measured - paths).ravel()
 
     grid = [
@@ -180,9 +191,13 @@ def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:
         for damping in _TRIED_DAMPINGS
         for dead_time in _TRIED_DEAD_TIMES
     ]
-    start = min(grid, key=lambda point: float(np.sum(residuals(point)[1] ** 2)))
-    lowest, highest = np.array([np.log(_LAG_RANGE), np.log(_DAMPING_RANGE), _DEAD_TIME_RANGE]).T
-    return _second_order_model(minimise(residuals, start, lowest, highest).unknowns)
+    best_grid_point = min(grid, key=lambda point: float(np.sum(residuals(point)[1] ** 2)))
+    lower_bounds, upper_bounds = np.array(
+        [np.log(_LAG_RANGE), np.log(_DAMPING_RANGE), _DEAD_TIME_RANGE]
+    ).T
+    return _second_order_model(
+        minimise(residuals, best_grid_point, lower_bounds, upper_bounds).unknowns
+    )
 
 
 def _second_order_model(parameters: Floats) -> SecondOrderModel:

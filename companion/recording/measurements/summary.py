@@ -29,9 +29,11 @@ from companion.recording.measurements.response import (
     response_as_dict,
 )
 from companion.recording.measurements.verdict import checks, is_good
-from companion.recording.trace import RATES, FlightTrace
+from companion.recording.trace import RATE_COLUMNS, FlightTrace
 
-_ROLL_AND_PITCH = [RATES.index(name) for name in ("vehicle_time_s", *rate_names("measured")[:2])]
+_ROLL_AND_PITCH = [
+    RATE_COLUMNS.index(name) for name in ("vehicle_time_s", *rate_names("measured")[:2])
+]
 _HEIGHT, _SPEED, _TILT = map(MOTION.columns.index, ("height_m", "speed_m_s", "tilt_deg"))
 
 
@@ -130,7 +132,9 @@ class Summary:
     def _maneuvers(self) -> tuple[ManeuverFigures, ...]:
         trace = self.trace
         rates = trace.rates.rows()[:, _ROLL_AND_PITCH]
-        return measure_maneuvers(trace.tracking.rows(), rates, trace.maneuvers, self.facts.began)
+        return measure_maneuvers(
+            trace.tracking.rows(), rates, trace.maneuvers, self.facts.start_time
+        )
 
     def extent(self) -> dict[str, float]:
         """The largest height (m), speed (m/s) and tilt (°), and the time under control (s).
@@ -138,16 +142,16 @@ class Summary:
         Speed and tilt are given for the whole flight and for its maneuvers, from rows recorded ten
         times a second; during steps, the tilt comes from every sample.
         """
-        rows, tracked = self.trace.motion.rows(), self.trace.tracking.rows()
-        maneuvers = rows[in_maneuvers(rows[:, 1], self.trace.maneuvers)]
+        motion_rows, tracking_rows = self.trace.motion.rows(), self.trace.tracking.rows()
+        maneuver_rows = motion_rows[in_maneuvers(motion_rows[:, 1], self.trace.maneuvers)]
         tilts = np.degrees([tilt_angle(row[2], row[3]) for row in self.trace.response.rows()])
-        times = tracked[:, 0].tolist()
+        times = tracking_rows[:, 0].tolist()
         return {
-            "height_max_m": _largest_known(rows[:, _HEIGHT]),
-            "speed_max_m_s": _largest_known(rows[:, _SPEED]),
-            "tilt_max_deg": _largest_known(rows[:, _TILT], tilts),
-            "maneuver_speed_max_m_s": _largest_known(maneuvers[:, _SPEED]),
-            "maneuver_tilt_max_deg": _largest_known(maneuvers[:, _TILT], tilts),
+            "height_max_m": _largest_known(motion_rows[:, _HEIGHT]),
+            "speed_max_m_s": _largest_known(motion_rows[:, _SPEED]),
+            "tilt_max_deg": _largest_known(motion_rows[:, _TILT], tilts),
+            "maneuver_speed_max_m_s": _largest_known(maneuver_rows[:, _SPEED]),
+            "maneuver_tilt_max_deg": _largest_known(maneuver_rows[:, _TILT], tilts),
             "under_control_s": times[-1] - times[0] if times else 0.0,
         }
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class _Rule(NamedTuple):
+class _MeasuringRule(NamedTuple):
     """The criteria of a swing."""
 
     shortest_part: float
@@ -28,8 +28,8 @@ class _Rule(NamedTuple):
     """Longest period of a swing, s."""
 
 
-_LONG_HOVER, _SHORT_HOVER = _Rule(5.0, 2.0, 1, 2.5), _Rule(2.9, 1.0, 1, 1.25)
-_IN_MOTION = _Rule(4.0, 1.0, 2, 1.25)
+_LONG_HOVER, _SHORT_HOVER = _MeasuringRule(5.0, 2.0, 1, 2.5), _MeasuringRule(2.9, 1.0, 1, 1.25)
+_IN_MOTION = _MeasuringRule(4.0, 1.0, 2, 1.25)
 SHORTEST_PART = _SHORT_HOVER.shortest_part
 """Shortest part of a flight in which a swing can be measured, s."""
 _LONGEST_SAMPLE_PERIOD = 0.05
@@ -66,39 +66,46 @@ def measure_swing(time: Floats, rates: Floats, *, at_rest: bool) -> Swing:
     rule = hover if at_rest else _IN_MOTION
     if duration < rule.shortest_part:
         return NOT_MEASURED
-    step = float(np.median(np.diff(time)))
-    count = duration / step if step > 0.0 else np.inf
+    sample_period = float(np.median(np.diff(time)))
+    expected_count = duration / sample_period if sample_period > 0.0 else np.inf
     # Too few samples, or their clock jumped.
-    if step > _LONGEST_SAMPLE_PERIOD or count > 2 * len(time):
+    if sample_period > _LONGEST_SAMPLE_PERIOD or expected_count > 2 * len(time):
         return NOT_MEASURED
-    even_times = np.arange(time[0], time[-1], step)
+    even_times = np.arange(time[0], time[-1], sample_period)
     angle_steps = (
-        np.column_stack([np.interp(even_times, time, column) for column in rates.T]) * step
+        np.column_stack([np.interp(even_times, time, column) for column in rates.T]) * sample_period
     )
     angles = np.cumsum(angle_steps, axis=0)
     for _ in range(rule.passes):
-        angles = _without_slow_motion(angles, round(0.5 * rule.window / step))
+        angles = _without_slow_motion(angles, round(0.5 * rule.window / sample_period))
     rms = float(np.sqrt(np.mean(np.sum(angles**2, axis=1))))
     if rms == 0.0:
         return Swing(0.0, nan, 0.0)
-    correlation = _autocorrelation(angles)[: round(rule.longest_period / step)]
-    opposite = np.flatnonzero(correlation < 0.0)
-    later = correlation[opposite[0] :] if len(opposite) else correlation[:0]
-    if not later.max(initial=-1.0) > 0.0:
+    correlation = _autocorrelation(angles)[: round(rule.longest_period / sample_period)]
+    negative_lags = np.flatnonzero(correlation < 0.0)
+    later_correlation = correlation[negative_lags[0] :] if len(negative_lags) else correlation[:0]
+    if not later_correlation.max(initial=-1.0) > 0.0:
         return Swing(rms, nan, 0.0)
-    peaks = np.flatnonzero(later >= _PEAK_SHARE * later.max())
+    peaks = np.flatnonzero(later_correlation >= _PEAK_SHARE * later_correlation.max())
     # From the first point that is high enough, up to the top of its own peak.
-    top = int(peaks[0])
-    while top + 1 < len(later) and later[top + 1] > later[top]:
-        top += 1
-    return Swing(rms, (int(opposite[0]) + top) * step, float(later[top]))
+    peak = int(peaks[0])
+    while (
+        peak + 1 < len(later_correlation) and later_correlation[peak + 1] > later_correlation[peak]
+    ):
+        peak += 1
+    return Swing(
+        rms, (int(negative_lags[0]) + peak) * sample_period, float(later_correlation[peak])
+    )
 
 
-def _without_slow_motion(angles: Floats, half: int) -> Floats:
-    """Angles (N, 2) less their moving mean over `2 half + 1` steps: (N − 2 half, 2)."""
-    width = 2 * half + 1
-    sums = np.cumsum(np.vstack([np.zeros((1, 2)), angles]), axis=0)
-    fast_motion: Floats = angles[half : len(angles) - half] - (sums[width:] - sums[:-width]) / width
+def _without_slow_motion(angles: Floats, half_width: int) -> Floats:
+    """Angles (N, 2) less their moving mean over `2 half_width + 1` steps: (N − 2 half, 2)."""
+    width = 2 * half_width + 1
+    cumulative_sums = np.cumsum(np.vstack([np.zeros((1, 2)), angles]), axis=0)
+    fast_motion: Floats = (
+        angles[half_width : len(angles) - half_width]
+        - (cumulative_sums[width:] - cumulative_sums[:-width]) / width
+    )
     return fast_motion
 
 

@@ -77,35 +77,35 @@ def is_good(figures: Figures) -> bool:
 
 def _maneuvers(figures: Figures) -> Iterator[Check]:
     for maneuver in figures["maneuvers"]:
-        level, height = maneuver["level_rms_m"], maneuver["height_rms_m"]
-        if level is not None:
+        horizontal_rms, height_rms = maneuver["level_rms_m"], maneuver["height_rms_m"]
+        if horizontal_rms is not None:
             speed = maneuver["reference_speed_max_m_s"] or 0.0
             limit = MAX_HORIZONTAL_RMS + MAX_HORIZONTAL_RMS_PER_SPEED * speed
             yield Check(
                 maneuver["name"],
-                f"{level:.2f} m RMS from its path (limit {limit:.2f} m), "
+                f"{horizontal_rms:.2f} m RMS from its path (limit {limit:.2f} m), "
                 f"at most {maneuver['level_max_m']:.2f} m",
-                level <= limit,
-                _horizontal_remedy(speed, learned=bool(figures.get("drag_learned"))),
+                horizontal_rms <= limit,
+                _horizontal_remedy(speed, drag_was_learned=bool(figures.get("drag_learned"))),
                 f"{maneuver['name']}: {OFF_COURSE}",
             )
-        if height is not None:
+        if height_rms is not None:
             yield Check(
                 maneuver["name"],
-                f"{height:.2f} m RMS in height (limit {MAX_HEIGHT_RMS:.2f} m)",
-                height <= MAX_HEIGHT_RMS,
-                _height_remedy(height, maneuver.get("height_mean_m")),
+                f"{height_rms:.2f} m RMS in height (limit {MAX_HEIGHT_RMS:.2f} m)",
+                height_rms <= MAX_HEIGHT_RMS,
+                _height_remedy(height_rms, maneuver.get("height_mean_m")),
                 f"{maneuver['name']}: too far from its height",
             )
         yield from _swing(maneuver)
 
 
-def _horizontal_remedy(speed: float, *, learned: bool) -> str:
-    """The remedy at `speed`, m/s; `learned`: whether this flight learned drag for the next one."""
-    if learned:
+def _horizontal_remedy(speed: float, *, drag_was_learned: bool) -> str:
+    """The remedy at `speed`, m/s; `drag_was_learned`: by this flight, for the next one."""
+    if drag_was_learned:
         return "fly again: the next flight begins with the drag that this flight learned"
-    first = "fly it slower" if speed > 0.0 else "fly in less wind"
-    return f"{first}, set guidance.drag_per_s to the vehicle's drag, or run `companion identify`"
+    advice = "fly it slower" if speed > 0.0 else "fly in less wind"
+    return f"{advice}, set guidance.drag_per_s to the vehicle's drag, or run `companion identify`"
 
 
 def _height_remedy(rms: float, mean: float | None) -> str:
@@ -121,14 +121,14 @@ def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
     rms = maneuver.get("swing_rms_deg")
     if rms is None:
         return
-    regular = (maneuver["swing_regularity"] or 0.0) >= MIN_SWING_REGULARITY
+    is_regular = (maneuver["swing_regularity"] or 0.0) >= MIN_SWING_REGULARITY
     yield Check(
         maneuver["name"],
         f"swings by {rms:.1f}° RMS every {maneuver['swing_period_s']:.2g} s "
         f"(limit {MAX_SWING_RMS:g}°)"
-        if regular
+        if is_regular
         else f"no swing with a period (roll and pitch {rms:.1f}° RMS)",
-        rms <= MAX_SWING_RMS or not regular,
+        rms <= MAX_SWING_RMS or not is_regular,
         "lower planner.gain_per_s or the weights guidance.position_weight_per_s4 and "
         "velocity_weight_per_s2; `companion check-config` names the largest sensible gain",
         f"{maneuver['name']}: it swings",
@@ -137,17 +137,17 @@ def _swing(maneuver: Mapping[str, Any]) -> Iterator[Check]:
 
 def _steps(figures: Figures) -> Iterator[Check]:
     response = figures["response"]
-    size, across = response["step_size"], response["cross_axis_max"]
-    if not size or across is None:
+    step_size, cross_axis_max = response["step_size"], response["cross_axis_max"]
+    if not step_size or cross_axis_max is None:
         return
-    limit, deviation_limit = MAX_LINE_DISTANCE * size, MAX_MODEL_DEVIATION * size
-    cut = cut_steps(figures)
-    yield from cut
+    limit, deviation_limit = MAX_LINE_DISTANCE * step_size, MAX_MODEL_DEVIATION * step_size
+    tilt_checks = cut_step_checks(figures)
+    yield from tilt_checks
     yield Check(
         "straightness of the steps",
-        f"{across:.4f} from their lines (limit {limit:.4f})",
-        across <= limit,
-        _straightness_remedy(figures["planner"], cut=bool(cut)),
+        f"{cross_axis_max:.4f} from their lines (limit {limit:.4f})",
+        cross_axis_max <= limit,
+        _straightness_remedy(figures["planner"], was_cut=bool(tilt_checks)),
         "steps not straight",
     )
     deviation = response["second_order"]["deviation_max"]
@@ -158,14 +158,14 @@ def _steps(figures: Figures) -> Iterator[Check]:
         f"{deviation:.3f} from the nearest second-order model (limit {deviation_limit:.3f})",
         deviation <= deviation_limit,
         "first keep the steps within limits.max_tilt_deg, because a cut step distorts the response"
-        if cut
+        if tilt_checks
         else "a rate limit distorts large steps: lower steps.coefficient or raise "
         "limits.max_tilt_rate_deg_s",
         "steps not linear",
     )
 
 
-def cut_steps(figures: Figures) -> list[Check]:
+def cut_step_checks(figures: Figures) -> list[Check]:
     """A failed check if the tilt limit cut a step by more than `MAX_LINE_DISTANCE`; else empty."""
     response, limit = figures["response"], figures.get("max_tilt_deg")
     target_tilt = response.get("asked_tilt_deg")
@@ -187,8 +187,8 @@ def cut_steps(figures: Figures) -> list[Check]:
     ]
 
 
-def _straightness_remedy(planner: str, *, cut: bool) -> str:
-    if cut:
+def _straightness_remedy(planner: str, *, was_cut: bool) -> str:
+    if was_cut:
         return "first keep the steps within limits.max_tilt_deg, because a cut step leaves its line"
     if planner == MODEL_FOLLOWING:
         return (
@@ -223,28 +223,28 @@ def _answers(figures: Figures) -> Iterator[Check]:
 
 
 def _latency(figures: Figures) -> Iterator[Check]:
-    late = figures["latency_us"]["p99"]
-    if figures["lockstep"] or late is None:
+    p99_us = figures["latency_us"]["p99"]
+    if figures["lockstep"] or p99_us is None:
         return  # vehicle time has no latency
     deadline = figures["deadline_ms"]
     yield Check(
         LATENCY,
-        f"{1e-3 * late:.2f} ms in 99 % of the answers (deadline {deadline:g} ms)",
-        1e-3 * late <= deadline,
+        f"{1e-3 * p99_us:.2f} ms in 99 % of the answers (deadline {deadline:g} ms)",
+        1e-3 * p99_us <= deadline,
         "end other programs on this computer, or set realtime.scheduler: fifo",
         "answers too late",
     )
 
 
 def _battery(figures: Figures) -> Iterator[Check]:
-    end, least = figures["battery"]["end"], figures["battery"]["min"]
-    if end is None:
+    charge_at_end, min_charge = figures["battery"]["end"], figures["battery"]["min"]
+    if charge_at_end is None:
         return
-    limit = least + MIN_BATTERY_MARGIN
+    limit = min_charge + MIN_BATTERY_MARGIN
     yield Check(
         "battery",
-        f"{100.0 * end:.0f} % at the end (at least {100.0 * limit:.0f} %)",
-        end >= limit,
+        f"{100.0 * charge_at_end:.0f} % at the end (at least {100.0 * limit:.0f} %)",
+        charge_at_end >= limit,
         "charge it before the next flight: below limits.min_battery_percent the vehicle lands",
         "battery nearly empty",
     )

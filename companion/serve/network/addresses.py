@@ -43,7 +43,7 @@ def target_of(frame: Frame) -> Address:
 def _target_fields() -> dict[int, tuple[int, int | None]]:
     """Offsets of target system and component in the payload, by message id."""
     fields_by_id: dict[int, tuple[int, int | None]] = {}
-    for number, message_class in dialect.mavlink_map.items():
+    for message_id, message_class in dialect.mavlink_map.items():
         offsets, offset = {}, 0
         for name, code, count in zip(
             message_class.ordered_fieldnames,
@@ -53,9 +53,9 @@ def _target_fields() -> dict[int, tuple[int, int | None]]:
         ):
             offsets[name] = offset
             offset += struct.calcsize(f"<{code}") * max(1, count)
-        system_at = offsets.get("target" if number == _MANUAL_CONTROL else "target_system")
+        system_at = offsets.get("target" if message_id == _MANUAL_CONTROL else "target_system")
         if system_at is not None:
-            fields_by_id[number] = system_at, offsets.get("target_component")
+            fields_by_id[message_id] = system_at, offsets.get("target_component")
     return fields_by_id
 
 

@@ -59,7 +59,7 @@ class Network:
         ports: the open endpoints, in the order of `endpoints`.
         attitude_payload: payload of the autopilot's newest ATTITUDE_QUATERNION; empty before the
             first.
-        attitude_at: event-loop time at which `attitude_payload` arrived, s.
+        attitude_arrival: event-loop time at which `attitude_payload` arrived, s.
         overflowed: number of the vehicle's frames that were dropped because the queue was full.
         setpoint_ids: ids of the messages whose rate `SetpointLimit` limits, because this program
             flies them.
@@ -84,13 +84,13 @@ class Network:
         )
         self.ports: list[Port] = []
         self.attitude_payload = b""
-        self.attitude_at = -inf
+        self.attitude_arrival = -inf
         self.overflowed = 0
         self.setpoint_ids: frozenset[int] = frozenset()
         self._setpoint_limit = SetpointLimit(self._route)
-        self.routing.on_taken_ids = self._note_taken_ids
+        self.routing.on_our_ids_used = self._note_our_ids_used
         self._link, self._note_event = link, note
-        self._faults: set[str] = set()
+        self._noted_faults: set[str] = set()
         self._endpoints = [parse_endpoint(each) for each in endpoints]
         self._vehicle_frames: list[Frame] = []
         self._timer: asyncio.TimerHandle | None = None
@@ -177,7 +177,7 @@ class Network:
             return
         self._vehicle_frames.append(frame)
         if frame.message_id == ATTITUDE_QUATERNION and source_of(frame) == self._autopilot:
-            self.attitude_payload, self.attitude_at = frame.payload, self._loop.time()
+            self.attitude_payload, self.attitude_arrival = frame.payload, self._loop.time()
             if self._flush_handle is None:
                 self._flush_handle = self._loop.call_soon(self.flush)
         elif self._timer is None:
@@ -189,7 +189,7 @@ class Network:
         except Exception as error:
             self._note_fault_once(f"{fault_message(error)}; a frame of {client.name} was dropped")
 
-    def _note_taken_ids(self, client: Client) -> None:
+    def _note_our_ids_used(self, client: Client) -> None:
         ids = f"{self._link.settings.source_system}/{self._link.settings.source_component}"
         self._note_fault_once(
             f"{client.name} sends under our own ids {ids}, so its frames are not forwarded: "
@@ -197,8 +197,8 @@ class Network:
         )
 
     def _note_fault_once(self, text: str) -> None:
-        if text not in self._faults and len(self._faults) < _MAX_FAULTS:
-            self._faults.add(text)
+        if text not in self._noted_faults and len(self._noted_faults) < _MAX_FAULTS:
+            self._noted_faults.add(text)
             self._note_event(text)
 
     def _flush_later(self) -> None:

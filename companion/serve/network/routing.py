@@ -56,7 +56,7 @@ class Routing:
         stats: counters of frames.
         clients: the clients, in the order of `attach`.
         intercept: see `Intercept`. Until it is set, no frame of a client is forwarded.
-        on_taken_ids: called with a client whose frame names our component as its sender.
+        on_our_ids_used: called with a client whose frame names our component as its sender.
         on_own_frame: called with each client's frame for our component; None: it is dropped.
     """
 
@@ -69,21 +69,21 @@ class Routing:
     ) -> None:
         self.stats = RoutingStats()
         self.intercept: Intercept = lambda *_: True
-        self.on_taken_ids: Callable[[Client], None] = lambda _: None
+        self.on_our_ids_used: Callable[[Client], None] = lambda _: None
         self.on_own_frame: Callable[[Client, Frame], None] | None = None
         self._vehicle, self._autopilot, self._our_address = vehicle, autopilot, our_address
-        self._heard: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
+        self._heard_addresses: dict[Client | UplinkQueue, set[Address]] = {vehicle: {autopilot}}
         self.clients: tuple[Client, ...] = ()
-        self._repeats = _RepeatDetector(clock)
+        self._repeat_detector = _RepeatDetector(clock)
 
     def attach(self, client: Client) -> None:
         """Add a client; frames are forwarded to it from now on."""
-        self._heard[client] = set()
+        self._heard_addresses[client] = set()
         self.clients = (*self.clients, client)
 
     def detach(self, client: Client) -> None:
         """Remove a client and the addresses heard on its channel."""
-        self._heard.pop(client, None)
+        self._heard_addresses.pop(client, None)
         self.clients = tuple(each for each in self.clients if each is not client)
 
     def is_at_client(self, target: Address, origin: Client) -> bool:
@@ -94,7 +94,7 @@ class Routing:
         """Forward a frame that came over the link to the vehicle."""
         source = source_of(frame)
         if source != self._autopilot:  # another component, or a station behind the autopilot
-            if source == self._our_address or self._repeats.is_repeat(frame.raw):
+            if source == self._our_address or self._repeat_detector.is_repeat(frame.raw):
                 self.stats.looped += 1
                 return
             self._learn(self._vehicle, source)
@@ -119,13 +119,13 @@ class Routing:
         source = source_of(frame)
         if (
             source in (self._autopilot, self._our_address)
-            or client not in self._heard
-            or self._repeats.is_repeat(frame.raw)
+            or client not in self._heard_addresses
+            or self._repeat_detector.is_repeat(frame.raw)
         ):
             self.stats.looped += 1
             # A client that only sends our own frame back does not use our ids itself.
-            if source == self._our_address and not self._repeats.is_repeat(frame.raw):
-                self.on_taken_ids(client)
+            if source == self._our_address and not self._repeat_detector.is_repeat(frame.raw):
+                self.on_our_ids_used(client)
             return
         if source.system != 0:
             self._learn(client, source)
@@ -145,24 +145,24 @@ class Routing:
 
     def send_to_client(self, client: Client, frame: bytes) -> None:
         """Send a frame of our own component to one client."""
-        self._repeats.is_repeat(frame)  # remembers the frame, so that its echo is dropped
+        self._repeat_detector.is_repeat(frame)  # remembers the frame, so that its echo is dropped
         client.put(frame)
 
     def _learn(self, channel: Client | UplinkQueue, source: Address) -> None:
-        if len(self._heard[channel]) < _MAX_ADDRESSES:
-            self._heard[channel].add(source)
+        if len(self._heard_addresses[channel]) < _MAX_ADDRESSES:
+            self._heard_addresses[channel].add(source)
 
     def _forward(self, origin: Client, raw: bytes, target: Address) -> None:
-        others = [each for each in self.clients if each is not origin]
+        other_clients = [each for each in self.clients if each is not origin]
         if target != EVERYBODY:
-            others = [each for each in others if self._reaches(each, target)]
-        if self._is_behind_vehicle(target, known_to_client=bool(others)):
+            other_clients = [each for each in other_clients if self._reaches(each, target)]
+        if self._is_behind_vehicle(target, known_to_client=bool(other_clients)):
             self.stats.to_vehicle += 1
             self._vehicle.put(raw, origin)
-        elif not others:
+        elif not other_clients:
             self.stats.no_route += 1
-        self.stats.between_clients += len(others)
-        for each in others:
+        self.stats.between_clients += len(other_clients)
+        for each in other_clients:
             each.put(raw)
 
     def _is_behind_vehicle(self, target: Address, *, known_to_client: bool) -> bool:
@@ -173,12 +173,12 @@ class Routing:
         return target.system == self._autopilot.system and not known_to_client
 
     def _reaches(self, channel: Client | UplinkQueue, target: Address) -> bool:
-        heard = self._heard.get(channel, ())
+        addresses = self._heard_addresses.get(channel, ())
         if target.system == 0:
             return True
         if target.component == 0:
-            return any(each.system == target.system for each in heard)
-        return target in heard
+            return any(each.system == target.system for each in addresses)
+        return target in addresses
 
 
 class _RepeatDetector:

@@ -20,19 +20,19 @@ class SerialLine:
 
     def __init__(self, endpoint: SerialPort, clients: ClientListener) -> None:
         self._endpoint, self._clients = endpoint, clients
-        self._reopening: asyncio.Task[None] | None = None
+        self._reopen_task: asyncio.Task[None] | None = None
         self._client = SerialClient(endpoint.device)
         self._transport = self._open()
 
     def close(self) -> None:
         """Close the device."""
-        if self._reopening is not None:
-            self._reopening.cancel()
+        if self._reopen_task is not None:
+            self._reopen_task.cancel()
         self._transport.close()
         self._clients.detach(self._client)
 
     def _open(self) -> SerialTransport:
-        transport = SerialTransport(self._endpoint, self._receive, self._lost)
+        transport = SerialTransport(self._endpoint, self._receive, self._on_connection_lost)
         self._client.transport = transport
         self._clients.attach(self._client)
         return transport
@@ -41,9 +41,9 @@ class SerialLine:
         self._clients.receive_frames(self._client, self._client.scan(data))
         return True
 
-    def _lost(self, _reason: str) -> None:
+    def _on_connection_lost(self, _reason: str) -> None:
         self._clients.detach(self._client)
-        self._reopening = asyncio.get_running_loop().create_task(self._reopen())
+        self._reopen_task = asyncio.get_running_loop().create_task(self._reopen())
 
     async def _reopen(self) -> None:
         while True:

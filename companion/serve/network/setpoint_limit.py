@@ -36,11 +36,11 @@ class SetpointLimit:
     setpoint is always flown.
 
     Args:
-        pass_on: called at the end of a window with a client and its newest setpoint.
+        forward: called at the end of a window with a client and its newest setpoint.
     """
 
-    def __init__(self, pass_on: Callable[[Client, Frame], None]) -> None:
-        self._pass_on = pass_on
+    def __init__(self, forward: Callable[[Client, Frame], None]) -> None:
+        self._forward = forward
         self._loop = asyncio.get_running_loop()
         self._windows: WeakKeyDictionary[Client, _Window] = WeakKeyDictionary()
 
@@ -69,4 +69,4 @@ class SetpointLimit:
         newest = window.newest_setpoint
         self._windows[client] = _Window(self._loop.time(), count=1)
         if newest is not None:
-            self._pass_on(client, newest)
+            self._forward(client, newest)

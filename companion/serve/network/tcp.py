@@ -40,8 +40,8 @@ async def open_tcp_server(endpoint: TcpServer, clients: ClientListener) -> "TcpP
     try:
         await port.listen(endpoint)
     except OSError as error:
-        where = f"TCP {endpoint.host}:{endpoint.port}"
-        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
+        endpoint_text = f"TCP {endpoint.host}:{endpoint.port}"
+        raise EndpointError(f"{endpoint_text}: {why_not_opened(error)}") from error
     return port
 
 
@@ -62,7 +62,7 @@ class TcpPort:
     def __init__(self, clients: ClientListener, named_peers: NamedPeers) -> None:
         self._clients, self._named_peers = clients, named_peers
         self._server: asyncio.Server | None = None
-        self._connecting: asyncio.Task[None] | None = None
+        self._connect_task: asyncio.Task[None] | None = None
         self._connected_clients: set[TcpClient] = set()
         self._closed = False
         self.local: tuple[str, int] | None = None
@@ -76,7 +76,7 @@ class TcpPort:
 
     def connect(self, endpoint: TcpOut) -> None:
         """Keep a connection to `endpoint` open."""
-        self._connecting = asyncio.get_running_loop().create_task(self._keep_connected(endpoint))
+        self._connect_task = asyncio.get_running_loop().create_task(self._keep_connected(endpoint))
 
     async def _keep_connected(self, endpoint: TcpOut) -> None:
         loop = asyncio.get_running_loop()
@@ -122,8 +122,8 @@ class TcpPort:
     def close(self) -> None:
         """Close all connections at once."""
         self._closed = True
-        if self._connecting is not None:
-            self._connecting.cancel()
+        if self._connect_task is not None:
+            self._connect_task.cancel()
         if self._server is not None:
             self._server.close()
         for client in tuple(self._connected_clients):
@@ -175,8 +175,8 @@ class _Connection(asyncio.BufferedProtocol):
     def buffer_updated(self, nbytes: int) -> None:
         if self._client is None or self._transport is None:
             return
-        number = self._port.receive_frames(self._client, bytes(self._buffer[:nbytes]))
-        is_flood = self._flood.count(number, nbytes, self._loop.time())
+        frame_count = self._port.receive_frames(self._client, bytes(self._buffer[:nbytes]))
+        is_flood = self._flood.count(frame_count, nbytes, self._loop.time())
         if is_flood and not self._transport.is_closing():
             self._transport.pause_reading()
             self._loop.call_later(FloodDetector.WINDOW, self._resume)

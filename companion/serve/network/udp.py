@@ -38,8 +38,8 @@ async def open_udp(endpoint: UdpIn | UdpOut, clients: ClientListener) -> "UdpPor
             sock.bind(("", 0) if family == socket.AF_INET else ("::", 0))
     except OSError as error:
         sock.close()
-        where = f"UDP {endpoint.host}:{endpoint.port}"
-        raise EndpointError(f"{where}: {why_not_opened(error)}") from error
+        endpoint_text = f"UDP {endpoint.host}:{endpoint.port}"
+        raise EndpointError(f"{endpoint_text}: {why_not_opened(error)}") from error
     port = UdpPort(sock, clients, named_peers)
     if isinstance(endpoint, UdpOut):
         port.send_only_to(address)

@@ -49,14 +49,15 @@ class UplinkQueue:
         self._send, self._rate, self._burst, self._clock = send, rate, burst, clock
         self._allowed_bytes, self._refilled_at = burst, clock()
         self._queues: dict[object, deque[tuple[float, bytes]]] = {}
-        self._turns: deque[object] = deque()  # clients with queued frames, the next one first
+        # Clients with queued frames, the next one first.
+        self._client_turns: deque[object] = deque()
 
     def put(self, frame: bytes, origin: object) -> None:
         """Queue a frame of the client `origin`; drop it if that client has too many queued."""
         queue = self._queues.get(origin)
         if queue is None:
             queue = self._queues[origin] = deque()
-            self._turns.append(origin)
+            self._client_turns.append(origin)
         if len(queue) >= _MAX_QUEUED_FRAMES:
             self.dropped += 1
             return
@@ -69,8 +70,8 @@ class UplinkQueue:
             self._burst, self._allowed_bytes + self._rate * (now - self._refilled_at)
         )
         self._refilled_at = now
-        while self._turns and self._allowed_bytes > 0.0:
-            origin = self._turns[0]
+        while self._client_turns and self._allowed_bytes > 0.0:
+            origin = self._client_turns[0]
             queue = self._queues[origin]
             queued_at, frame = queue[0]
             if now - queued_at > _MAX_FRAME_AGE:
@@ -81,14 +82,14 @@ class UplinkQueue:
             else:
                 return True
             queue.popleft()
-            self._turns.popleft()
+            self._client_turns.popleft()
             if queue:
-                self._turns.append(origin)
+                self._client_turns.append(origin)
             else:
                 del self._queues[origin]
-        return bool(self._turns)
+        return bool(self._client_turns)
 
     def forget(self, origin: object) -> None:
         """Drop the queued frames of a client that is gone."""
         if self._queues.pop(origin, None) is not None:
-            self._turns.remove(origin)
+            self._client_turns.remove(origin)

@@ -102,22 +102,22 @@ class Approach:
         *,
         by_velocity: bool,
     ) -> None:
-        axes = len(limits)
-        problem = InputParameter(axes)
-        problem.current_position = list(error.position)
-        problem.current_velocity = list(error.velocity)
-        problem.current_acceleration = list(error.acceleration)
-        problem.target_position = [0.0] * axes
-        problem.max_velocity = [each.velocity for each in limits]
-        problem.min_velocity = [-each.backward_velocity for each in limits]
-        problem.max_acceleration = [each.acceleration for each in limits]
-        problem.max_jerk = [each.jerk for each in limits]
+        axis_count = len(limits)
+        ruckig_input = InputParameter(axis_count)
+        ruckig_input.current_position = list(error.position)
+        ruckig_input.current_velocity = list(error.velocity)
+        ruckig_input.current_acceleration = list(error.acceleration)
+        ruckig_input.target_position = [0.0] * axis_count
+        ruckig_input.max_velocity = [each.velocity for each in limits]
+        ruckig_input.min_velocity = [-each.backward_velocity for each in limits]
+        ruckig_input.max_acceleration = [each.acceleration for each in limits]
+        ruckig_input.max_jerk = [each.jerk for each in limits]
         if by_velocity:
-            problem.control_interface = ControlInterface.Velocity
+            ruckig_input.control_interface = ControlInterface.Velocity
         self._begin_time = begin_time
-        self._trajectory = Trajectory(axes)
+        self._trajectory = Trajectory(axis_count)
         try:
-            result = Ruckig(axes).calculate(problem, self._trajectory)
+            result = Ruckig(axis_count).calculate(ruckig_input, self._trajectory)
         # Ruckig raises ValueError for a result code that its Python enumeration lacks.
         except (RuckigError, RuntimeError, ValueError) as error_of_solver:
             raise _unplannable_error(error_of_solver) from error_of_solver

@@ -17,7 +17,7 @@ from companion.serve.setpoints.request import AttitudeRequest, RatesRequest, Ref
 _NO_ROLL_RATE, _NO_PITCH_RATE, _NO_YAW_RATE = 1, 2, 4
 _ALL_RATES = _NO_ROLL_RATE | _NO_PITCH_RATE | _NO_YAW_RATE
 _THRUST_BODY, _NO_THRUST, _NO_ATTITUDE = 32, 64, 128
-_RESERVED = 8 | 16
+_RESERVED_BITS = 8 | 16
 _LARGEST_RATE = 100.0
 """Largest body rate that is accepted, rad/s."""
 
@@ -30,7 +30,7 @@ def decode_attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
             kind that is not flown.
     """
     mask, thrust = message.type_mask, message.thrust
-    if mask & _RESERVED:
+    if mask & _RESERVED_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has reserved bits")
     if mask & _THRUST_BODY:
         raise RefusedSetpoint("thrust_body is not supported: give thrust, clear THRUST_BODY_SET")
@@ -38,17 +38,19 @@ def decode_attitude_target(message: Message) -> AttitudeRequest | RatesRequest:
         raise RefusedSetpoint("thrust is missing: clear THROTTLE_IGNORE")
     if not 0.0 <= thrust <= 1.0:
         raise RefusedSetpoint(f"thrust is outside 0..1: {thrust:g}")
-    ignored = mask & _ALL_RATES
+    ignored_rates = mask & _ALL_RATES
     if mask & _NO_ATTITUDE:
-        if ignored:
+        if ignored_rates:
             raise RefusedSetpoint("body rates are incomplete: give roll, pitch and yaw rate")
         return RatesRequest(_rates(message), thrust)
-    if ignored & (_NO_ROLL_RATE | _NO_PITCH_RATE) != _NO_ROLL_RATE | _NO_PITCH_RATE:
+    if ignored_rates & (_NO_ROLL_RATE | _NO_PITCH_RATE) != _NO_ROLL_RATE | _NO_PITCH_RATE:
         raise RefusedSetpoint(
             "attitude and body rates contradict each other: set the ignore bits of one"
         )
     return AttitudeRequest(
-        _attitude(message), 0.0 if ignored & _NO_YAW_RATE else _rate(message.body_yaw_rate), thrust
+        _attitude(message),
+        0.0 if ignored_rates & _NO_YAW_RATE else _rate(message.body_yaw_rate),
+        thrust,
     )
 
 

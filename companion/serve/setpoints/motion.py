@@ -61,12 +61,12 @@ class CommandedMotion:
             min(limits.acceleration, VERTICAL_ACCELERATION),
             min(limits.jerk, _VERTICAL_JERK),
         )
-        yaw = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
+        yaw_limits = AxisLimits(limits.yaw_rate, limits.yaw_rate, _YAW_ACCELERATION, _YAW_JERK)
         self._horizontal = CommandFollower(
             (horizontal, horizontal), _HORIZONTAL_JUMP_LIMITS, limits.timeout
         )
         self._vertical = CommandFollower((vertical,), _VERTICAL_JUMP_LIMITS, limits.timeout)
-        self._heading = CommandFollower((yaw,), _HEADING_JUMP_LIMITS, limits.timeout)
+        self._heading = CommandFollower((yaw_limits,), _HEADING_JUMP_LIMITS, limits.timeout)
         self._commanded_speed = limits.commanded_speed
         self._climb, self._descent = limits.climb, limits.descent
         self._largest_yaw_rate = limits.yaw_rate
@@ -94,9 +94,9 @@ class CommandedMotion:
         )
         horizontal, vertical = _by_axes(actual)
         try:
-            self._horizontal.command(self._slowed(request.horizontal), now, horizontal)
+            self._horizontal.command(self._within_speed_limit(request.horizontal), now, horizontal)
             (speed,), (reference_speed,) = vertical.velocity, self._vertical.at(now).velocity
-            demand = self._clamped(request.vertical, speed, reference_speed)
+            demand = self._within_vertical_limits(request.vertical, speed, reference_speed)
             self._vertical.command(demand, now, vertical)
             self._heading.command(self._heading_demand(request, now), now)
         except UnplannableError:
@@ -117,7 +117,7 @@ class CommandedMotion:
         (heading,), (rate,), _ = self._heading.at(time)
         return Reference((x, y, z), (u, v, w), (a, b, c), heading, rate)
 
-    def _slowed(self, horizontal: AxisDemand) -> AxisDemand:
+    def _within_speed_limit(self, horizontal: AxisDemand) -> AxisDemand:
         """Shorten a commanded velocity to its limit; its direction stays.
 
         A velocity with a position is not shortened: it would no longer match the position.
@@ -127,7 +127,7 @@ class CommandedMotion:
         north, east = horizontal.velocity
         return horizontal._replace(velocity=clamp_length(north, east, self._commanded_speed))
 
-    def _clamped(self, vertical: AxisDemand, *speeds: float) -> AxisDemand:
+    def _within_vertical_limits(self, vertical: AxisDemand, *speeds: float) -> AxisDemand:
         """Limit a vertical demand that has no position.
 
         The velocity is limited to the climb and descent limits, and the acceleration to
@@ -148,8 +148,10 @@ class CommandedMotion:
         acceleration = clamp(vertical.acceleration[0], VERTICAL_ACCELERATION)
         limit = self._descent if acceleration > 0.0 else -self._climb
         # The speed changes further while the acceleration is reduced to zero.
-        change = 0.5 * acceleration * abs(acceleration) / _VERTICAL_JERK
-        if acceleration and any((v + change - limit) * acceleration >= 0.0 for v in speeds):
+        further_speed_change = 0.5 * acceleration * abs(acceleration) / _VERTICAL_JERK
+        if acceleration and any(
+            (v + further_speed_change - limit) * acceleration >= 0.0 for v in speeds
+        ):
             return AxisDemand(None, vertical.velocity or (limit,), None)
         return vertical._replace(acceleration=(acceleration,))
 
@@ -158,12 +160,12 @@ class CommandedMotion:
         if request.yaw is None:
             self._newest_yaw = None
             return AxisDemand(None, (request.yaw_rate or 0.0,), None)
-        before, self._newest_yaw = self._newest_yaw, None
+        newest_yaw, self._newest_yaw = self._newest_yaw, None
         rate = request.yaw_rate
-        if before is not None:
-            yaw, heading, commanded_at = before
+        if newest_yaw is not None:
+            yaw, heading, commanded_at = newest_yaw
             if request.yaw == yaw and rate is None:
-                self._newest_yaw = before
+                self._newest_yaw = newest_yaw
                 return AxisDemand((heading,), None, None)
             heading += wrap_angle(request.yaw - yaw)
             mean_rate = wrap_angle(request.yaw - yaw) / max(now - commanded_at, 1e-3)

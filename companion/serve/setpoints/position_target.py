@@ -23,7 +23,7 @@ from companion.serve.setpoints.request import (
 _POSITION_BITS, _VELOCITY_BITS, _ACCELERATION_BITS = (1, 2, 4), (8, 16, 32), (64, 128, 256)
 _FORCE_BIT, _NO_YAW, _NO_YAW_RATE = 512, 1024, 2048
 _NO_ACCELERATION = 64 | 128 | 256
-_KNOWN_BITS = 4095
+_DEFINED_BITS = 4095
 _HORIZONTAL_AXES, _VERTICAL_AXES = (0, 1), (2,)
 
 _MAX_POSITION, _MAX_SPEED, _MAX_ACCELERATION, _MAX_YAW_RATE = 10_000.0, 100.0, 100.0, 20.0
@@ -103,7 +103,8 @@ def decode_global_target(message: Message, pose: VehiclePose) -> MotionRequest:
             raise RefusedSetpoint("the vehicle's global position is not known yet")
         local = _to_local(message, pose.origin, above_home=frame in _ABOVE_HOME_FRAMES)
         position = tuple(
-            None if used is None else value for used, value in zip(position, local, strict=True)
+            None if used_values is None else value
+            for used_values, value in zip(position, local, strict=True)
         )
     yaw, yaw_rate = _heading(message)
     return _make_request((position, velocity, acceleration), yaw, yaw_rate)
@@ -117,7 +118,7 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
     mask = message.type_mask
     if mask & _FORCE_BIT and mask & _NO_ACCELERATION != _NO_ACCELERATION:
         raise RefusedSetpoint("forces are not supported: clear FORCE_SET")
-    if mask & ~_KNOWN_BITS:
+    if mask & ~_DEFINED_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
     return (
         _used_values(mask, _POSITION_BITS, position, _MAX_POSITION, "position"),
@@ -137,13 +138,15 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
 def _used_values(
     mask: int, bits: tuple[int, int, int], values: Vector, largest: float, name: str
 ) -> _Values:
-    used = tuple(None if mask & bit else value for bit, value in zip(bits, values, strict=True))
-    for value in used:
+    used_values = tuple(
+        None if mask & bit else value for bit, value in zip(bits, values, strict=True)
+    )
+    for value in used_values:
         if value is not None and not (isfinite(value) and abs(value) <= largest):
             raise RefusedSetpoint(f"{name} is not finite or too large: {value:g}")
-    if (used[0] is None) != (used[1] is None):
+    if (used_values[0] is None) != (used_values[1] is None):
         raise RefusedSetpoint(f"{name} is incomplete: give both x and y, or neither")
-    return used
+    return used_values
 
 
 def _heading(message: Message) -> tuple[float | None, float | None]:
@@ -205,8 +208,8 @@ def _complete_vector(values: _Values, axes: tuple[int, ...]) -> tuple[float, ...
 
 def _to_local(message: Message, origin: Origin, *, above_home: bool) -> Vector:
     """The commanded global position in the local frame, NED, m; the earth is taken as flat."""
-    degrees = 1e-7
-    place = Place(message.lat_int * degrees, message.lon_int * degrees)
+    degrees_per_unit = 1e-7
+    place = Place(message.lat_int * degrees_per_unit, message.lon_int * degrees_per_unit)
     north, east = local_offset(place, Place(origin.latitude, origin.longitude))
     zero_altitude = origin.home_altitude if above_home else 0.0
     return north, east, origin.altitude - zero_altitude - message.alt

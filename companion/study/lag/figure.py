@@ -177,8 +177,8 @@ def _draw_errors(axes: Axes, scores: dict[DelayMismatch, Score]) -> None:
         cross_tracks = [
             scores[DelayMismatch(lag, dead_time)].cross_track for dead_time in FINE_ERRORS
         ]
-        line = {"color": MODEL_FOLLOWING_METHOD.colour, "linewidth": 1.3, **style}
-        axes.plot(errors, cross_tracks, label=f"lag {in_percent(lag)}", **line)
+        line_style = {"color": MODEL_FOLLOWING_METHOD.colour, "linewidth": 1.3, **style}
+        axes.plot(errors, cross_tracks, label=f"lag {in_percent(lag)}", **line_style)
     axes.set(
         xlabel="error of the assumed dead time, %", ylabel=_CROSS_TRACK_LABEL, ylim=(0.0, None)
     )

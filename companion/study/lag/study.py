@@ -38,7 +38,7 @@ from companion.study.methods import Method
 from companion.study.outcome import Outcome, Row, Table, Tick
 from companion.study.step import Response
 
-PARTS = len(DEAD_TIMES_MS) * len(LAGS_MS) + 1 + len(RATES_HZ)
+PROGRESS_STEPS = len(DEAD_TIMES_MS) * len(LAGS_MS) + 1 + len(RATES_HZ)
 
 
 _FittedModel = tuple[SecondOrderModel, float]
@@ -49,14 +49,16 @@ def run(tick: Tick) -> Outcome:
     """Fly the step of figure 2 over dead times, lags and sample rates, with true and wrong delays.
 
     Args:
-        tick: called `PARTS` times.
+        tick: called `PROGRESS_STEPS` times.
     """
     grid = fly_grid(tick)
     tick("the example")
     example = fly_example()
     complete = fly_complete(tick)
-    fitted = {method: _fit_model(response) for method, response in complete.shown_responses.items()}
-    deviations = {method: deviation for method, (_, deviation) in fitted.items()}
+    fitted_models = {
+        method: _fit_model(response) for method, response in complete.shown_responses.items()
+    }
+    deviations = {method: deviation for method, (_, deviation) in fitted_models.items()}
     return Outcome(
         name="lag",
         title="Lag: behind a rate loop with dead time and lag",
@@ -79,7 +81,7 @@ def run(tick: Tick) -> Outcome:
                 example.model_following_scores,
             ),
             _worst_table(grid),
-            _fit_table(complete, fitted),
+            _fit_table(complete, fitted_models),
             _rates_table(complete),
             _errors_table(
                 "lag-inner-loop-wrong-knowledge",
@@ -158,7 +160,7 @@ def _worst_table(grid: Grid) -> Table:
     )
 
 
-def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _FittedModel]) -> Table:
+def _fit_table(complete: CompleteLoopFlights, fitted_models: dict[Method, _FittedModel]) -> Table:
     """Score and fitted model of every method at `SHOWN_RATE_HZ`."""
     scores = complete.by_rate[SHOWN_RATE_HZ].by_method
     return Table(
@@ -172,26 +174,33 @@ def _fit_table(complete: CompleteLoopFlights, fitted: dict[Method, _FittedModel]
                 **fit_cells(fit),
                 "largest deviation from this model": deviation,
             }
-            for method, (fit, deviation) in fitted.items()
+            for method, (fit, deviation) in fitted_models.items()
         ),
     )
 
 
 def _rates_table(complete: CompleteLoopFlights) -> Table:
     """Cross-track error of every method by sample rate; model-following also with wrong delays."""
-    flown = {f"{rate:.0f} Hz": comparison for rate, comparison in complete.by_rate.items()}
+    comparison_by_column = {
+        f"{rate:.0f} Hz": comparison for rate, comparison in complete.by_rate.items()
+    }
     rows: list[Row] = [
         {"method": m.label}
-        | {column: comparison.by_method[m].cross_track for column, comparison in flown.items()}
+        | {
+            column: comparison.by_method[m].cross_track
+            for column, comparison in comparison_by_column.items()
+        }
         for m in METHODS
     ]
-    worst = {column: comparison.worst_cross_track for column, comparison in flown.items()}
+    worst_cross_tracks = {
+        column: comparison.worst_cross_track for column, comparison in comparison_by_column.items()
+    }
     label = "model-following, lag and dead time wrong by the worst error"
     return Table(
         "lag-inner-loop-rates",
         "Cross-track with the complete inner loop by sample rate. In the last row the lag and"
         " dead time of model-following are wrong by up to ±50 %; the worst combination is shown.",
-        (*rows, {"method": label, **worst}),
+        (*rows, {"method": label, **worst_cross_tracks}),
     )
 
 

@@ -43,21 +43,21 @@ def find(flights: Flights, counts: ColdStarts, times: ProcessTimes) -> tuple[Fin
 
 
 def _solve_time_finding(
-    claimant: Claimant, others: Sequence[ModelName], flights: Flights
+    claimant: Claimant, other_models: Sequence[ModelName], flights: Flights
 ) -> Finding:
-    """Whether the proposed model is solved faster than `others`, with one or more iterations."""
+    """Whether the proposed model is solved faster than the others, with one or more iterations."""
     ratios = {
         (model, iterations): _median_ms(model, iterations, flights)
         / _median_ms("proposed", iterations, flights)
-        for model in others
+        for model in other_models
         for iterations in (1, MAX_ITERATIONS)
     }
     medians = "; ".join(
         f"{STYLES[model].label} takes {ratios[model, 1]:.2f} times as long for one iteration,"
         f" {ratios[model, MAX_ITERATIONS]:.2f} times to the end"
-        for model in others
+        for model in other_models
     )
-    names = " and ".join(STYLES[model].label for model in others)
+    names = " and ".join(STYLES[model].label for model in other_models)
     return Finding(
         claimant,
         f"The proposed model is solved faster than {names}.",
@@ -72,12 +72,12 @@ def _median_ms(model: ModelName, iterations: int, flights: Flights) -> float:
 
 def _cold_start_finding(counts: ColdStarts) -> Finding:
     reached_counts = {m: sum(not isinf(count) for count in counts[m].values()) for m in MODELS}
-    others = max(reached_counts[model] for model in UNLIMITED_MODELS)
+    largest_other_count = max(reached_counts[model] for model in UNLIMITED_MODELS)
     reached_text = ", ".join(f"{STYLES[model].label} {reached_counts[model]}" for model in MODELS)
     return Finding(
         "ours",
         "With limits as constraints the solver converges from more states.",
-        reached_counts["limited"] > others,
+        reached_counts["limited"] > largest_other_count,
         f"States out of {len(STATES)} from which it reaches the tolerance: {reached_text}.",
     )
 
@@ -98,8 +98,8 @@ def _smallest_error_finding(flights: Flights) -> Finding:
     comparisons = []
     for task in (CIRCLE, EIGHT):
         errors = {model: flights[task.name, Variant(model)].rms for model in MODELS}
-        other = min((errors[model], STYLES[model].label) for model in UNLIMITED_MODELS)
-        comparisons.append((task.name, errors["limited"], *other))
+        best_other = min((errors[model], STYLES[model].label) for model in UNLIMITED_MODELS)
+        comparisons.append((task.name, errors["limited"], *best_other))
     return Finding(
         "ours",
         "If all models know the dead time, ours has the smallest error on both trajectories.",

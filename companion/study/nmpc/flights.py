@@ -69,11 +69,17 @@ class Vehicle:
         """Simulate `seconds` with a constant target and specific thrust (m/s²)."""
         dt = 1.0 / _PLANNER_HZ
         for _ in range(round(seconds * _PLANNER_HZ)):
-            before = _thrust_and_gravity(self.body.q, thrust)
+            acceleration_before = _thrust_and_gravity(self.body.q, thrust)
             rates = self._planner.rates(self.body.q, target, dt, self.body.rates)
             self.body.simulate(rates, _STEPS_PER_SAMPLE)
-            after = _thrust_and_gravity(self.body.q, thrust)
-            self._move(tuple(0.5 * (a + b) for a, b in zip(before, after, strict=True)), dt)
+            acceleration_after = _thrust_and_gravity(self.body.q, thrust)
+            self._move(
+                tuple(
+                    0.5 * (a + b)
+                    for a, b in zip(acceleration_before, acceleration_after, strict=True)
+                ),
+                dt,
+            )
 
     def _move(self, acceleration: tuple[float, ...], dt: float) -> None:
         """Integrate drag and `acceleration` (thrust, gravity; m/s²) over `dt` s, midpoint rule."""
@@ -114,11 +120,11 @@ class Flight:
         north, east, down = task.trajectory.at(task.begin).position
         self._start = Start((-north, -east, -down))
         self._inputs = [ControlInput(0.0, 0.0, 0.0, 0.0, GRAVITY)]
-        self._periods = 0
+        self._period_count = 0
 
     def step(self) -> None:
         """Simulate one period: solve, and fly with the answer of the previous period."""
-        now, vehicle, flown_input = self._periods / RATE_HZ, self._vehicle, self._inputs[-1]
+        now, vehicle, flown_input = self._period_count / RATE_HZ, self._vehicle, self._inputs[-1]
         known_state = VehicleSnapshot(
             now,
             vehicle.position,
@@ -129,7 +135,7 @@ class Flight:
         )
         trajectory_time, inputs = self._task.begin + now, tuple(self._inputs[-_INPUT_COUNT:])
         answer = self._solver.answer(
-            Request(self._periods, known_state, trajectory_time, self._start, inputs)
+            Request(self._period_count, known_state, trajectory_time, self._start, inputs)
         )
         self.solve_s.append(answer.solver_seconds)
         self.iterations.append(answer.iterations)
@@ -141,11 +147,13 @@ class Flight:
             flown_input.thrust,
             1.0 / RATE_HZ,
         )
-        self._periods += 1
+        self._period_count += 1
         self._record()
 
     def _record(self) -> None:
-        reference = self._task.trajectory.at(self._task.begin + self._periods / RATE_HZ).position
+        reference = self._task.trajectory.at(
+            self._task.begin + self._period_count / RATE_HZ
+        ).position
         shifted_reference = [a + b for a, b in zip(self._start.position, reference, strict=True)]
         self.errors.append(dist(shifted_reference, self._vehicle.position))
         self.path.append(self._vehicle.position)

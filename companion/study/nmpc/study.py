@@ -26,7 +26,7 @@ from companion.study.nmpc.variants import (
 )
 from companion.study.outcome import Outcome, Row, Table, Tick
 
-PARTS = FLIGHT_S + 2
+PROGRESS_STEPS = FLIGHT_S + 2
 
 _CAPTION = (
     "All models know the dead time; one iteration per solve. The standing start into the circle"
@@ -133,14 +133,14 @@ def _error_table(flights: Flights) -> Table:
 def _process_table(times: ProcessTimes) -> Table:
     """Answer times of the solver process."""
     rows = {"request to answer": times.answer_ms, "without data exchange": times.computing_ms}
-    shares = {"p50, ms": 50, "p99, ms": 99, "largest, ms": 100}
+    percentiles = {"p50, ms": 50, "p99, ms": 99, "largest, ms": 100}
     return Table(
         "nmpc-exchange",
         "Our model's solver in its own process at 50 Hz, one iteration per solve: from the"
         " request to the answer, with prediction, reference and data exchange.",
         tuple(
             {"what": what}
-            | {title: float(np.percentile(ms, share)) for title, share in shares.items()}
+            | {title: float(np.percentile(ms, share)) for title, share in percentiles.items()}
             for what, ms in rows.items()
         ),
     )
@@ -185,9 +185,9 @@ def _draw_paths(axes: Axes, flights: Flights) -> None:
     for model in MODELS:
         north, east, _ = np.array(flights[CIRCLE.name, Variant(model)].path).T
         axes.plot(east, north, **STYLES[model].line_style)
-    begin = CIRCLE.trajectory.at(CIRCLE.begin).position
+    start_position = CIRCLE.trajectory.at(CIRCLE.begin).position
     times = CIRCLE.begin + np.linspace(0.0, 2.0 * np.pi, 100)
-    reference = np.array([CIRCLE.trajectory.at(float(t)).position for t in times]) - begin
+    reference = np.array([CIRCLE.trajectory.at(float(t)).position for t in times]) - start_position
     axes.plot(reference[:, 1], reference[:, 0], **REFERENCE_STYLE)
     axes.plot(0.0, 0.0, "o", color="black", markersize=4)
     low, high = reference.min(axis=0) - 5.0, reference.max(axis=0) + 5.0

@@ -35,18 +35,18 @@ class State(NamedTuple):
     """Body rates, rad/s."""
 
 
-_LEVEL, _STILL = Coefficients(0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
-_ON_THE_CIRCLE = CIRCLE.trajectory.at(CIRCLE.begin)
-_V_N, _V_E, _ = _ON_THE_CIRCLE.velocity
-_REST: Vector = (0.0, 0.0, 0.0)
+_LEVEL, _NO_ROTATION = Coefficients(0.0, 0.0), BodyRates(0.0, 0.0, 0.0)
+_CIRCLE_START = CIRCLE.trajectory.at(CIRCLE.begin)
+_V_N, _V_E, _ = _CIRCLE_START.velocity
+_ZERO_VELOCITY: Vector = (0.0, 0.0, 0.0)
 
 STATES = {
-    "1 m/s too slow": State(_REST, (0.8 * _V_N, 0.8 * _V_E, 0.0), _LEVEL, _STILL),
-    "at rest": State(_REST, _REST, _LEVEL, _STILL),
-    "at rest, 3 m away": State((2.0, 2.0, 1.0), _REST, _LEVEL, _STILL),
-    "the wrong way": State(_REST, (-_V_N, -_V_E, 0.0), _LEVEL, _STILL),
+    "1 m/s too slow": State(_ZERO_VELOCITY, (0.8 * _V_N, 0.8 * _V_E, 0.0), _LEVEL, _NO_ROTATION),
+    "at rest": State(_ZERO_VELOCITY, _ZERO_VELOCITY, _LEVEL, _NO_ROTATION),
+    "at rest, 3 m away": State((2.0, 2.0, 1.0), _ZERO_VELOCITY, _LEVEL, _NO_ROTATION),
+    "the wrong way": State(_ZERO_VELOCITY, (-_V_N, -_V_E, 0.0), _LEVEL, _NO_ROTATION),
     "at rest, 37° of tilt, rolling": State(
-        _REST, _REST, Coefficients(-0.36, 0.48), BodyRates(1.5, 0.0, 0.0)
+        _ZERO_VELOCITY, _ZERO_VELOCITY, Coefficients(-0.36, 0.48), BodyRates(1.5, 0.0, 0.0)
     ),
 }
 
@@ -77,7 +77,7 @@ def _request_from_state(state: State) -> Request:
         state.body_rates,
         drag=Drag(DRAG),
     )
-    north, east, down = _ON_THE_CIRCLE.position
+    north, east, down = _CIRCLE_START.position
     return Request(0, vehicle, CIRCLE.begin, Start((-north, -east, -down)), ())
 
 

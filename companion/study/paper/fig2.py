@@ -39,7 +39,7 @@ from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _EQUALITY_TOLERANCE = 1e-9
 """Difference below which the acceleration coefficients at two headings count as the same."""
-PARTS = len(LAW_METHODS) + 1
+PROGRESS_STEPS = len(LAW_METHODS) + 1
 
 
 def _printed_quaternion_law(
@@ -105,27 +105,30 @@ def run(tick: Tick) -> Outcome:
 
 
 def _rows(label: str, response: Response, reference: Floats) -> Iterator[Row]:
-    deviations, effect = largest_deviation(response, reference), heading_effect(response)
-    shown = {label: int(deviations.argmax())}
-    if effect >= _EQUALITY_TOLERANCE:
-        shown = {
+    deviations, heading_difference = (
+        largest_deviation(response, reference),
+        heading_effect(response),
+    )
+    shown_headings = {label: int(deviations.argmax())}
+    if heading_difference >= _EQUALITY_TOLERANCE:
+        shown_headings = {
             f"{label}, {rank} at {degrees(response.step.headings[index]):.0f}°": index
             for rank, index in zip(("best", "worst"), best_and_worst(deviations), strict=True)
         }
-    for row_label, index in shown.items():
+    for row_label, index in shown_headings.items():
         yield {
             "method": row_label,
             "largest deviation from first order": float(deviations[index]),
             "cross-track": float(cross_track(response)[index]),
             "time to 5 %, s": float(settling_time(response)[index]),
-            "difference between headings": effect,
+            "difference between headings": heading_difference,
         }
 
 
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     time = FIGURE_2.time
-    _, worst = best_and_worst(largest_deviation(responses[EULER], reference))
-    shown_heading = {method: worst if method is EULER else 0 for method in PAPER_METHODS}
+    _, worst_heading = best_and_worst(largest_deviation(responses[EULER], reference))
+    shown_heading = {method: worst_heading if method is EULER else 0 for method in PAPER_METHODS}
     curves = [
         (
             method,
@@ -160,7 +163,7 @@ def _findings(
     responses: dict[Method, Response], printed_response: Response, reference: Floats
 ) -> tuple[Finding, ...]:
     deviations = {method: largest_deviation(responses[method], reference) for method in responses}
-    effect = {method: heading_effect(responses[method]) for method in responses}
+    heading_difference = {method: heading_effect(responses[method]) for method in responses}
     best_other = min(float(deviations[method].min()) for method in (QUATERNION, SO3, EULER))
     proposed_deviation = float(deviations[PROPOSED].max())
     return (
@@ -176,10 +179,12 @@ def _findings(
             "paper",
             "Heading does not change the response of the proposed, the quaternion and the SO(3)"
             " method.",
-            max(effect[method] for method in (PROPOSED, QUATERNION, SO3)) < _EQUALITY_TOLERANCE,
+            max(heading_difference[method] for method in (PROPOSED, QUATERNION, SO3))
+            < _EQUALITY_TOLERANCE,
             "Largest difference of the paths between any two headings: "
             + ", ".join(
-                f"{method.label} {effect[method]:.1g}" for method in (PROPOSED, QUATERNION, SO3)
+                f"{method.label} {heading_difference[method]:.1g}"
+                for method in (PROPOSED, QUATERNION, SO3)
             )
             + ". The error must be taken in the body frame, q⁻¹ ⊗ q_d.",
         ),
@@ -195,7 +200,7 @@ def _findings(
         Finding(
             "paper",
             "Heading changes the response of the Euler-angle method.",
-            effect[EULER] > _EQUALITY_TOLERANCE,
+            heading_difference[EULER] > _EQUALITY_TOLERANCE,
             f"Its largest deviation is {deviations[EULER].min():.2g} at the best heading and"
             f" {deviations[EULER].max():.2g} at the worst.",
         ),

@@ -16,7 +16,7 @@ from companion.study.step import FIGURE_2, Floats, Response, fly
 
 _ANGLE_COLOURS = colormaps["viridis"]
 """Colour map over the angle between the heading and the axis of the step, 0° to 90°."""
-PARTS = 2
+PROGRESS_STEPS = 2
 
 
 def run(tick: Tick) -> Outcome:
@@ -25,7 +25,7 @@ def run(tick: Tick) -> Outcome:
     response = fly(planner_of(EULER, FIGURE_2.gain), FIGURE_2)
     reference = FIGURE_2.reference()
     deviations = largest_deviation(response, reference)
-    best, worst = best_and_worst(deviations)
+    best_heading, worst_heading = best_and_worst(deviations)
     tick(PROPOSED.label)
     proposed_deviations = largest_deviation(
         fly(planner_of(PROPOSED, FIGURE_2.gain), FIGURE_2), reference
@@ -60,10 +60,10 @@ def run(tick: Tick) -> Outcome:
             Finding(
                 "ours",
                 "The Euler-angle method is much better at some headings than at others.",
-                bool(deviations[best] < 0.5 * deviations[worst]),
-                f"Largest deviation {deviations[best]:.2g} at the best heading,"
-                f" {heading_deg[best]}°, and {deviations[worst]:.2g} at the worst,"
-                f" {heading_deg[worst]}°. The proposed method has"
+                bool(deviations[best_heading] < 0.5 * deviations[worst_heading]),
+                f"Largest deviation {deviations[best_heading]:.2g} at the best heading,"
+                f" {heading_deg[best_heading]}°, and {deviations[worst_heading]:.2g} at the worst,"
+                f" {heading_deg[worst_heading]}°. The proposed method has"
                 f" {proposed_deviations.max():.2g} at every heading.",
             ),
         ),
@@ -97,9 +97,9 @@ def _figure(response: Response, reference: Floats) -> Figure:
         xticks=np.arange(-180, 181, 60),
         ylim=(0.0, None),
     )
-    bar = figure.colorbar(
+    colour_bar = figure.colorbar(
         colour_scale, ax=[east, plane], ticks=[0, 30, 60, 90], boundaries=range(91)
     )
-    bar.set_label("angle between heading and the step's axis, °")
+    colour_bar.set_label("angle between heading and the step's axis, °")
     north.legend(loc="lower right")
     return figure

@@ -38,19 +38,21 @@ MAX_TILT = radians(40.0)
 MAX_TILT_RATE = pi / 2.0
 
 _METHODS = (QUATERNION, SO3, EULER, PROPOSED, PAPER_LIMIT)
-PARTS = len(_METHODS)
+PROGRESS_STEPS = len(_METHODS)
 
 
 def run(tick: Tick) -> Outcome:
     """Fly the step of figure 4 with every method, and `first-order` with both forms of limit."""
-    tight = Limits(MAX_TILT, MAX_TILT_RATE)
-    paper = replace(tight, shape="paper")
+    tight_limits = Limits(MAX_TILT, MAX_TILT_RATE)
+    paper_limits = replace(tight_limits, shape="paper")
     responses = {}
     for method in _METHODS:
         tick(method.label)
-        limits = paper if method is PAPER_LIMIT else tight
+        limits = paper_limits if method is PAPER_LIMIT else tight_limits
         responses[method] = fly(planner_of(method, FIGURE_4.gain, limits), FIGURE_4)
-    reference = FIGURE_4.reference(FirstOrderReference(FIGURE_4.gain, paper.coefficient_speed))
+    reference = FIGURE_4.reference(
+        FirstOrderReference(FIGURE_4.gain, paper_limits.coefficient_speed)
+    )
     return Outcome(
         name="fig4",
         title="Figure 4: step response with the tilt rate limited",
@@ -89,21 +91,21 @@ def _row(method: Method, response: Response, reference: Floats) -> Row:
 
 def _figure(responses: dict[Method, Response], reference: Floats) -> Figure:
     time = FIGURE_4.time
-    slowest = int(settling_time(responses[EULER]).argmax())
-    shown_heading = {method: slowest if method is EULER else 0 for method in _METHODS}
+    slowest_heading = int(settling_time(responses[EULER]).argmax())
+    shown_heading = {method: slowest_heading if method is EULER else 0 for method in _METHODS}
     curves = [
         (method, method.label, responses[method].at_heading(shown_heading[method]))
         for method in _METHODS
     ]
-    figure, ((north, east), (rate, plane)) = new_figure(2, 2)
+    figure, ((north, east), (rate_panel, plane)) = new_figure(2, 2)
     draw_response(north, east, time, curves)
     for method, response in responses.items():
         tilt_rate = response.tilt_rate[:, shown_heading[method]]
-        draw_line(rate, time[:-1], tilt_rate, method.line_style)
+        draw_line(rate_panel, time[:-1], tilt_rate, method.line_style)
     draw_reference(north, east, time, reference, "reference, equation 33")
-    rate.axhline(MAX_TILT_RATE, **LIMIT_STYLE)
-    label_tilt_rate(rate, "Tilt rate and its limit")
-    rate.set(xlim=(0.0, 1.2), ylim=(0.0, 1.8))
+    rate_panel.axhline(MAX_TILT_RATE, **LIMIT_STYLE)
+    label_tilt_rate(rate_panel, "Tilt rate and its limit")
+    rate_panel.set(xlim=(0.0, 1.2), ylim=(0.0, 1.8))
     draw_plane(plane, curves, FIGURE_4)
     north.legend(loc="lower right")
     return figure
@@ -114,7 +116,7 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
     settling_times = {method: float(settling_time(responses[method]).max()) for method in _METHODS}
     cross_tracks = {method: float(cross_track(responses[method]).max()) for method in _METHODS}
     paper_limit_deviation = float(largest_deviation(responses[PAPER_LIMIT], reference).max())
-    euler = settling_time(responses[EULER])
+    euler_settling_times = settling_time(responses[EULER])
     return (
         Finding(
             "paper",
@@ -139,7 +141,8 @@ def _findings(responses: dict[Method, Response], reference: Floats) -> tuple[Fin
             min(settling_times, key=lambda method: settling_times[method])
             in (PROPOSED, PAPER_LIMIT),
             f"so3 takes {settling_times[SO3]:.3f} s, the quaternion method"
-            f" {settling_times[QUATERNION]:.3f} s, euler {euler.min():.3f} to {euler.max():.3f} s"
+            f" {settling_times[QUATERNION]:.3f} s, euler {euler_settling_times.min():.3f} to"
+            f" {euler_settling_times.max():.3f} s"
             f" by heading, first-order {settling_times[PROPOSED]:.3f} s. so3 leaves the straight"
             f" line by {cross_tracks[SO3]:.2g}, first-order by {cross_tracks[PROPOSED]:.2g}.",
         ),

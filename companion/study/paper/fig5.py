@@ -25,9 +25,9 @@ from companion.study.methods import (
 )
 from companion.study.outcome import Claimant, Finding, Outcome, Table, Tick
 from companion.study.paper.fig5_flights import (
-    MEASURED_FACTOR,
-    PARTS,
-    QUICK_FACTOR,
+    MEASURED_SPEEDUP,
+    PROGRESS_STEPS,
+    QUICK_SPEEDUP,
     LoopFlights,
     Sweep,
     fly_methods,
@@ -35,7 +35,7 @@ from companion.study.paper.fig5_flights import (
 )
 from companion.study.step import FIGURE_2
 
-__all__ = ["PARTS", "run"]
+__all__ = ["PROGRESS_STEPS", "run"]
 
 _SECOND_ORDER_SHARE = 0.02
 """A response counts as second order if it deviates from the fit by at most this share of the step.
@@ -45,7 +45,10 @@ _SECOND_ORDER_LINE = {**REFERENCE_STYLE, "color": "#666666", "linestyle": (0, (4
 
 def run(tick: Tick) -> Outcome:
     """Fly the step of figure 2 with every method through rate loop, rotors and rigid body."""
-    quick, measured = fly_methods(QUICK_FACTOR, tick), fly_methods(MEASURED_FACTOR, tick)
+    quick_loop, measured_loop = (
+        fly_methods(QUICK_SPEEDUP, tick),
+        fly_methods(MEASURED_SPEEDUP, tick),
+    )
     sweep = fly_sweep(tick)
     return Outcome(
         name="fig5",
@@ -55,23 +58,24 @@ def run(tick: Tick) -> Outcome:
             " lag, aerodynamic damping and a rigid body with gyroscopic torque; 8 headings. The"
             " result depends on the speed of that loop, so two loops are flown: that of the bundled"
             " vehicle, which responds as measured on a PX4 (a step of the roll rate reaches 63 %"
-            f" after {1e3 * measured.time_63:.0f} ms), and one with all times {QUICK_FACTOR} times"
-            f" shorter ({1e3 * quick.time_63:.0f} ms)."
+            f" after {1e3 * measured_loop.time_63:.0f} ms), and one with all times"
+            f" {QUICK_SPEEDUP} times"
+            f" shorter ({1e3 * quick_loop.time_63:.0f} ms)."
         ),
-        figure=_figure(quick, measured, sweep),
+        figure=_figure(quick_loop, measured_loop, sweep),
         caption=(
             "Every method at the heading with its largest cross-track: above with the quick inner"
             " loop, below with the measured one, whose rotors saturate at the start and cause a"
             " slow tail. The second-order reference, with a dead time, is fitted to first-order."
             " Below right: cross-track by the speed of the loop."
         ),
-        tables=(_table(quick, measured), _sweep_table(sweep)),
-        findings=_findings(quick, measured, sweep),
+        tables=(_table(quick_loop, measured_loop), _sweep_table(sweep)),
+        findings=_findings(quick_loop, measured_loop, sweep),
     )
 
 
-def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
-    reference = quick.responses[PROPOSED].step.reference()
+def _table(quick_loop: LoopFlights, measured_loop: LoopFlights) -> Table:
+    reference = quick_loop.responses[PROPOSED].step.reference()
     return Table(
         "fig5",
         "Step response with the complete inner loop; largest values over 8 headings. The"
@@ -85,11 +89,11 @@ def _table(quick: LoopFlights, measured: LoopFlights) -> Table:
                 ),
                 "cross-track": loop.cross_track(method),
                 "time to 5 %, s": float(settling_time(loop.responses[method]).max()),
-                **fit_cells(loop.fits[method]),
+                **fit_cells(loop.fitted_models[method]),
                 "largest deviation from this model": loop.deviation_from_second_order(method),
                 "difference between headings": heading_effect(loop.responses[method]),
             }
-            for loop in (quick, measured)
+            for loop in (quick_loop, measured_loop)
             for method in LAW_METHODS
         ),
     )
@@ -109,20 +113,22 @@ def _sweep_table(sweep: Sweep) -> Table:
     )
 
 
-def _figure(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> Figure:
+def _figure(quick_loop: LoopFlights, measured_loop: LoopFlights, sweep: Sweep) -> Figure:
     figure, axes = new_figure(4, 2, height=2.9)
-    _draw_loop((axes[0, 0], axes[0, 1], axes[1, 0]), quick)
-    _draw_loop((axes[2, 0], axes[2, 1], axes[3, 0]), measured)
+    _draw_loop((axes[0, 0], axes[0, 1], axes[1, 0]), quick_loop)
+    _draw_loop((axes[2, 0], axes[2, 1], axes[3, 0]), measured_loop)
     deviation_panel, cross_track_panel = axes[1, 1], axes[3, 1]
-    step = quick.responses[PROPOSED].step
+    step = quick_loop.responses[PROPOSED].step
     for method in PAPER_METHODS:
-        error = deviation(quick.responses[method], step.reference())[:, quick.worst_heading(method)]
+        error = deviation(quick_loop.responses[method], step.reference())[
+            :, quick_loop.worst_heading(method)
+        ]
         draw_line(deviation_panel, step.time, error, method.line_style)
         times = 1e3 * np.array(list(sweep))
         values = [cross_tracks[method] for cross_tracks in sweep.values()]
         cross_track_panel.plot(times, values, marker="o", markersize=4, **method.line_style)
     deviation_panel.set(
-        title=f"Distance from first order, {quick}",
+        title=f"Distance from first order, {quick_loop}",
         xlabel="time, s",
         ylabel="|c − reference|",
         xlim=(0.0, 1.5),
@@ -159,24 +165,30 @@ def _draw_loop(panels: tuple[Axes, Axes, Axes], loop: LoopFlights) -> None:
         panel.set_title(f"{panel.get_title()}, {loop}")
 
 
-def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[Finding, ...]:
+def _findings(
+    quick_loop: LoopFlights, measured_loop: LoopFlights, sweep: Sweep
+) -> tuple[Finding, ...]:
     """Findings on straightness, on the order of the response, and on the effect of heading."""
-    others = [method for method in PAPER_METHODS if method is not PROPOSED]
+    other_methods = [method for method in PAPER_METHODS if method is not PROPOSED]
     straightest_times = [
         t
         for t, cross_tracks in sweep.items()
-        if cross_tracks[PROPOSED] < min(cross_tracks[m] for m in others)
+        if cross_tracks[PROPOSED] < min(cross_tracks[m] for m in other_methods)
     ]
-    times = ", ".join(f"{1e3 * t:.0f}" for t in straightest_times)
+    times_text = ", ".join(f"{1e3 * t:.0f}" for t in straightest_times)
     return (
-        _straightness_finding("paper", "quick", quick),
-        _straightness_finding("ours", "as slow as measured", measured),
+        _straightness_finding("paper", "quick", quick_loop),
+        _straightness_finding("ours", "as slow as measured", measured_loop),
         Finding(
             "ours",
             "The proposed method is the straightest with every inner loop.",
             len(straightest_times) == len(sweep),
             "At heading 0 it is the straightest with "
-            + (f"loops of {times} ms (63 % of a rate step)" if times else "none of the loops")
+            + (
+                f"loops of {times_text} ms (63 % of a rate step)"
+                if times_text
+                else "none of the loops"
+            )
             + ". Its cross-track is "
             + ", ".join(f"{cross_tracks[PROPOSED]:.2g}" for cross_tracks in sweep.values())
             + " with "
@@ -186,23 +198,25 @@ def _findings(quick: LoopFlights, measured: LoopFlights, sweep: Sweep) -> tuple[
         Finding(
             "ours",
             "Heading does not change the response with a complete inner loop either.",
-            max(heading_effect(measured.responses[m]) for m in (PROPOSED, QUATERNION, SO3)) < 1e-3,
+            max(heading_effect(measured_loop.responses[m]) for m in (PROPOSED, QUATERNION, SO3))
+            < 1e-3,
             "Largest difference of the paths between any two headings, measured inner loop: "
             + ", ".join(
-                f"{m.label} {heading_effect(measured.responses[m]):.2g}" for m in PAPER_METHODS
+                f"{m.label} {heading_effect(measured_loop.responses[m]):.2g}" for m in PAPER_METHODS
             )
             + " (required: 0.001).",
         ),
-        _second_order_finding("paper", "quick", quick),
-        _second_order_finding("ours", "as slow as measured", measured),
+        _second_order_finding("paper", "quick", quick_loop),
+        _second_order_finding("ours", "as slow as measured", measured_loop),
     )
 
 
-def _straightness_finding(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
+def _straightness_finding(claimant: Claimant, speed_text: str, loop: LoopFlights) -> Finding:
     cross_tracks = {m: loop.cross_track(m) for m in (PROPOSED, QUATERNION, SO3, EULER)}
     return Finding(
         claimant,
-        f"With a complete inner loop that is {speed} ({1e3 * loop.time_63:.0f} ms) the proposed"
+        f"With a complete inner loop that is {speed_text} ({1e3 * loop.time_63:.0f} ms) the"
+        " proposed"
         " method still is the straightest.",
         cross_tracks[PROPOSED]
         < min(largest for m, largest in cross_tracks.items() if m is not PROPOSED),
@@ -212,15 +226,16 @@ def _straightness_finding(claimant: Claimant, speed: str, loop: LoopFlights) -> 
     )
 
 
-def _second_order_finding(claimant: Claimant, speed: str, loop: LoopFlights) -> Finding:
-    fit, fit_deviation = loop.fits[PROPOSED], loop.deviation_from_second_order(PROPOSED)
-    bound = _SECOND_ORDER_SHARE * hypot(*np.subtract(FIGURE_2.target, FIGURE_2.start))
+def _second_order_finding(claimant: Claimant, speed_text: str, loop: LoopFlights) -> Finding:
+    fit, fit_deviation = loop.fitted_models[PROPOSED], loop.deviation_from_second_order(PROPOSED)
+    allowed_deviation = _SECOND_ORDER_SHARE * hypot(*np.subtract(FIGURE_2.target, FIGURE_2.start))
     return Finding(
         claimant,
-        f"With a complete inner loop that is {speed} the response of the proposed method is second"
+        f"With a complete inner loop that is {speed_text} the response of the proposed method is"
+        " second"
         " order.",
-        fit_deviation < bound,
+        fit_deviation < allowed_deviation,
         f"It stays within {fit_deviation:.2g} of ω = {fit.frequency:.1f} rad/s,"
         f" ζ = {fit.damping:.2f} after a dead time of {1e3 * fit.dead_time:.0f} ms; required"
-        f" are 2 % of the step, {bound:.2g}.",
+        f" are 2 % of the step, {allowed_deviation:.2g}.",
     )

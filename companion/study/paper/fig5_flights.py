@@ -17,10 +17,10 @@ from companion.study.outcome import Tick
 from companion.study.step import FIGURE_2, Floats, Response, fly_loop
 
 STEP = replace(FIGURE_2, headings=tuple(k * pi / 4.0 for k in range(-3, 5)))
-QUICK_FACTOR, MEASURED_FACTOR = 5, 1
+QUICK_SPEEDUP, MEASURED_SPEEDUP = 5, 1
 """Speeds of the two inner loops relative to the mock vehicle, which responds as a PX4 does."""
-_SWEPT_FACTORS = (10, 5, 3, 2, 1)
-PARTS = 2 * len(LAW_METHODS) + len(_SWEPT_FACTORS)
+_SWEPT_SPEEDUPS = (10, 5, 3, 2, 1)
+PROGRESS_STEPS = 2 * len(LAW_METHODS) + len(_SWEPT_SPEEDUPS)
 
 Sweep = dict[float, dict[Method, float]]
 """Cross-track error at heading 0, by `LoopFlights.time_63` of the inner loop (s) and by method."""
@@ -33,7 +33,7 @@ class LoopFlights(NamedTuple):
     """Time until the roll rate reaches 63 % of a step of its setpoint, s."""
     responses: dict[Method, Response]
     """Response of each method."""
-    fits: dict[Method, SecondOrderModel]
+    fitted_models: dict[Method, SecondOrderModel]
     """Second-order model fitted to the response of each method at `worst_heading`."""
 
     def worst_heading(self, method: Method) -> int:
@@ -47,7 +47,7 @@ class LoopFlights(NamedTuple):
     def fitted_path(self, method: Method) -> Floats:
         """(samples + 1, 2) coefficients of the model fitted to a method."""
         step = self.responses[method].step
-        return second_order_path(step, self.fits[method], step.time)
+        return second_order_path(step, self.fitted_models[method], step.time)
 
     def deviation_from_second_order(self, method: Method) -> float:
         """Largest distance of a method's coefficients from its model, at the heading of the fit."""
@@ -58,15 +58,15 @@ class LoopFlights(NamedTuple):
         return f"63 % in {1e3 * self.time_63:.0f} ms"
 
 
-def fly_methods(factor: int, tick: Tick) -> LoopFlights:
-    """Fly every method with an inner loop `factor` times as fast as measured on a PX4."""
-    inner_loop = faster_inner_loop(factor)
+def fly_methods(speedup: int, tick: Tick) -> LoopFlights:
+    """Fly every method with an inner loop `speedup` times as fast as measured on a PX4."""
+    inner_loop = faster_inner_loop(speedup)
     flights = LoopFlights(inner_loop.rate_time_63(), {}, {})
     for method in LAW_METHODS:
         tick(f"{method.label}, {1e3 * flights.time_63:.0f} ms")
         response = fly_loop(planner_of(method, STEP.gain), STEP, inner_loop)
         flights.responses[method] = response
-        flights.fits[method] = fit_second_order(
+        flights.fitted_models[method] = fit_second_order(
             STEP, response.at_heading(flights.worst_heading(method))
         )
     return flights
@@ -75,8 +75,8 @@ def fly_methods(factor: int, tick: Tick) -> LoopFlights:
 def fly_sweep(tick: Tick) -> Sweep:
     """Fly every method of the paper with inner loops of several speeds."""
     step, sweep = replace(FIGURE_2, headings=(0.0,)), {}
-    for factor in _SWEPT_FACTORS:
-        inner_loop = faster_inner_loop(factor)
+    for speedup in _SWEPT_SPEEDUPS:
+        inner_loop = faster_inner_loop(speedup)
         time_63 = inner_loop.rate_time_63()
         tick(f"cross-track, {1e3 * time_63:.0f} ms")
         sweep[time_63] = {

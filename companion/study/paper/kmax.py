@@ -19,7 +19,7 @@ PRINTED_K_MAX = {30: 1.333, 45: 2.0, 60: 4.0}
 
 _LARGEST_TILT_SHOWN = radians(60.0)
 _DIRECTIONS = 72
-PARTS = 2
+PROGRESS_STEPS = 2
 
 
 _COLUMNS = (
@@ -127,7 +127,7 @@ def _findings(rows: tuple[_Row, ...], by_tilt: dict[float, Floats]) -> tuple[Fin
 
 
 def _figure(by_tilt: dict[float, Floats]) -> Figure:
-    figure, ((disc, over_tilt),) = new_figure(1, 2, height=3.8)
+    figure, ((disc_panel, tilt_panel),) = new_figure(1, 2, height=3.8)
     radii = np.linspace(0.0, sin(_LARGEST_TILT_SHOWN), 40)
     angles = np.linspace(0.0, 2.0 * pi, 73)
     k = np.array(
@@ -135,17 +135,21 @@ def _figure(by_tilt: dict[float, Floats]) -> Figure:
     )
     north, east = np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))
     levels = np.linspace(1.0, 4.0, 13)
-    filled_contours = disc.contourf(east, north, k, levels=levels, cmap="cividis")
-    lines = disc.contour(east, north, k, levels=[1.333, 2.0, 3.0], colors="white", linewidths=0.8)
-    disc.clabel(lines, fmt="%.3g", fontsize=7)
-    figure.colorbar(filled_contours, ax=disc, label="K", ticks=[1, 2, 3, 4])
-    disc.set(title="K for a movement to the north", xlabel="$a_E$", ylabel="$a_N$", aspect="equal")
+    filled_contours = disc_panel.contourf(east, north, k, levels=levels, cmap="cividis")
+    contour_lines = disc_panel.contour(
+        east, north, k, levels=[1.333, 2.0, 3.0], colors="white", linewidths=0.8
+    )
+    disc_panel.clabel(contour_lines, fmt="%.3g", fontsize=7)
+    figure.colorbar(filled_contours, ax=disc_panel, label="K", ticks=[1, 2, 3, 4])
+    disc_panel.set(
+        title="K for a movement to the north", xlabel="$a_E$", ylabel="$a_N$", aspect="equal"
+    )
     tilts = np.linspace(0.0, _LARGEST_TILT_SHOWN, 121)
-    over_tilt.plot(
+    tilt_panel.plot(
         np.degrees(tilts), [k_max(t) for t in tilts], label="1/(1 − 2$A_M$²)²", **REFERENCE_STYLE
     )
     for extreme, marker, label in ((np.max, "s", "largest"), (np.min, "v", "smallest")):
-        over_tilt.plot(
+        tilt_panel.plot(
             np.degrees(list(by_tilt)),
             [extreme(values) for values in by_tilt.values()],
             marker,
@@ -153,13 +157,13 @@ def _figure(by_tilt: dict[float, Floats]) -> Figure:
             markerfacecolor="none",
             label=f"{label} over the directions",
         )
-    over_tilt.plot(
+    tilt_panel.plot(
         list(PRINTED_K_MAX),
         list(PRINTED_K_MAX.values()),
         "o",
         color="black",
         label="printed in the paper",
     )
-    over_tilt.set(title="K by tilt", xlabel="tilt, °", ylabel="K", ylim=(0.0, None))
-    over_tilt.legend(loc="upper left")
+    tilt_panel.set(title="K by tilt", xlabel="tilt, °", ylabel="K", ylim=(0.0, None))
+    tilt_panel.legend(loc="upper left")
     return figure

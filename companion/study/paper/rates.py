@@ -13,7 +13,7 @@ from companion.study.step import FIGURE_2, Floats, Response, Step, fly
 
 RATES_HZ = (1000.0, 500.0, 250.0, 100.0, 50.0)
 _ROUNDING = 1e-12
-PARTS = 2 * len(RATES_HZ)
+PROGRESS_STEPS = 2 * len(RATES_HZ)
 
 
 def run(tick: Tick) -> Outcome:
@@ -59,15 +59,17 @@ def run(tick: Tick) -> Outcome:
 
 
 def _finding(largest_deviations: dict[tuple[Method, float], float]) -> Finding:
-    slowest, quickest = min(RATES_HZ), max(RATES_HZ)
+    lowest_hz, highest_hz = min(RATES_HZ), max(RATES_HZ)
     largest = max(largest_deviations[EXACT, hz] for hz in RATES_HZ)
     return Finding(
         "paper",
         "The deviation of the proposed method comes from discretisation.",
-        largest_deviations[PROPOSED, slowest] > 10.0 * largest_deviations[PROPOSED, quickest]
+        largest_deviations[PROPOSED, lowest_hz] > 10.0 * largest_deviations[PROPOSED, highest_hz]
         and largest <= _ROUNDING,
-        f"It grows from {largest_deviations[PROPOSED, quickest]:.2g} at {quickest:.0f} Hz to"
-        f" {largest_deviations[PROPOSED, slowest]:.2g} at {slowest:.0f} Hz. With exact, which"
+        f"It grows from {largest_deviations[PROPOSED, highest_hz]:.2g} at"
+        f" {highest_hz:.0f} Hz to"
+        f" {largest_deviations[PROPOSED, lowest_hz]:.2g} at {lowest_hz:.0f} Hz. With"
+        " exact, which"
         f" solves each sample in closed form, it is at most {largest:.1g} at every rate.",
     )
 
@@ -77,11 +79,11 @@ def _figure(
     largest_deviations: dict[tuple[Method, float], float],
     steps: dict[float, Step],
 ) -> Figure:
-    figure, ((over_rate, over_time, plane),) = new_figure(1, 3, width=4.0)
+    figure, ((rate_panel, time_panel, plane),) = new_figure(1, 3, width=4.0)
     for method, marker in ((PROPOSED, "o"), (EXACT, "s")):
         values = [largest_deviations[method, hz] for hz in RATES_HZ]
-        over_rate.plot(RATES_HZ, values, marker=marker, label=method.label, **method.line_style)
-    over_rate.set(
+        rate_panel.plot(RATES_HZ, values, marker=marker, label=method.label, **method.line_style)
+    rate_panel.set(
         title="Largest deviation",
         xlabel="sample rate, Hz",
         ylabel="max |c − reference|",
@@ -90,14 +92,14 @@ def _figure(
         xticks=RATES_HZ,
         xticklabels=[f"{hz:.0f}" for hz in RATES_HZ],
     )
-    over_rate.minorticks_off()
-    over_rate.legend(loc="center right")
-    slowest = min(RATES_HZ)
+    rate_panel.minorticks_off()
+    rate_panel.legend(loc="center right")
+    lowest_hz = min(RATES_HZ)
     for method in (PROPOSED, EXACT):
-        error = deviation(responses[method, slowest], steps[slowest].reference())[:, 0]
-        draw_line(over_time, steps[slowest].time[1:], error[1:], method.line_style, method.label)
-    over_time.set(
-        title=f"Deviation at {slowest:.0f} Hz",
+        error = deviation(responses[method, lowest_hz], steps[lowest_hz].reference())[:, 0]
+        draw_line(time_panel, steps[lowest_hz].time[1:], error[1:], method.line_style, method.label)
+    time_panel.set(
+        title=f"Deviation at {lowest_hz:.0f} Hz",
         xlabel="time, s",
         ylabel="|c − reference|",
         yscale="log",
@@ -105,11 +107,15 @@ def _figure(
     shades = np.linspace(1.0, 0.35, len(RATES_HZ))
     for hz, alpha in zip(reversed(RATES_HZ), shades, strict=True):
         c = responses[PROPOSED, hz].at_heading(0)
-        line = {**PROPOSED.line_style, "alpha": alpha}
-        draw_line(plane, _distance_from_line(c), c[:, 0], line, f"proposed, {hz:.0f} Hz")
-    exact = responses[EXACT, slowest].at_heading(0)
+        line_style = {**PROPOSED.line_style, "alpha": alpha}
+        draw_line(plane, _distance_from_line(c), c[:, 0], line_style, f"proposed, {hz:.0f} Hz")
+    exact = responses[EXACT, lowest_hz].at_heading(0)
     draw_line(
-        plane, _distance_from_line(exact), exact[:, 0], EXACT.line_style, f"exact, {slowest:.0f} Hz"
+        plane,
+        _distance_from_line(exact),
+        exact[:, 0],
+        EXACT.line_style,
+        f"exact, {lowest_hz:.0f} Hz",
     )
     plane.set(title="Paths, enlarged across", xlabel="($a_E$ + 0.5) × 1000", ylabel="$a_N$")
     plane.set_xlim(right=5.2)

@@ -46,16 +46,18 @@ _MARKERS = ("o", "s")
 
 def draw_figure(flights: TrackedFlights) -> Figure:
     """Draw the figure that `CAPTION` describes."""
-    telemetry = {task: 1e3 * flight.telemetry_error.rms for task, flight in flights.items()}
-    truth = {task: 1e3 * flight.true_error.rms for task, flight in flights.items()}
+    telemetry_errors_mm = {
+        task: 1e3 * flight.telemetry_error.rms for task, flight in flights.items()
+    }
+    true_errors_mm = {task: 1e3 * flight.true_error.rms for task, flight in flights.items()}
     figure, panels = new_figure(4, 2)
-    for column, trajectories in zip(panels.T, (CIRCLES, EIGHTS), strict=True):
-        _draw_paths(column[0], flights, trajectories[-1])
-        _draw_planners(column[1], telemetry, trajectories)
-        column[1].set_title("All planners in still air, by telemetry")
-        _draw_planners(column[2], truth, trajectories)
-        column[2].set_title("All planners in still air, by the truth")
-        _draw_lead_and_wind(column[3], telemetry, trajectories)
+    for column_panels, trajectories in zip(panels.T, (CIRCLES, EIGHTS), strict=True):
+        _draw_paths(column_panels[0], flights, trajectories[-1])
+        _draw_planners(column_panels[1], telemetry_errors_mm, trajectories)
+        column_panels[1].set_title("All planners in still air, by telemetry")
+        _draw_planners(column_panels[2], true_errors_mm, trajectories)
+        column_panels[2].set_title("All planners in still air, by the truth")
+        _draw_lead_and_wind(column_panels[3], telemetry_errors_mm, trajectories)
     for row in (0, 1, 3):
         panels[row, 0].legend()
     return figure

@@ -60,13 +60,13 @@ def _smallest_error_finding(
     def error_of(trajectory: TrajectoryAtSpeed, planner: str) -> float:
         return error(flights[Task(trajectory, planner)])
 
-    ours = {trajectory: error_of(trajectory, MODEL_FOLLOWING) for trajectory in TRAJECTORIES}
-    best = {
+    our_errors = {trajectory: error_of(trajectory, MODEL_FOLLOWING) for trajectory in TRAJECTORIES}
+    best_other_errors = {
         trajectory: min(_OTHER_PLANNERS, key=lambda other: error_of(trajectory, other))
         for trajectory in TRAJECTORIES
     }
     difference = {
-        trajectory: ours[trajectory] - error_of(trajectory, best[trajectory])
+        trajectory: our_errors[trajectory] - error_of(trajectory, best_other_errors[trajectory])
         for trajectory in TRAJECTORIES
     }
     larger_on = [
@@ -78,8 +78,8 @@ def _smallest_error_finding(
         trajectory for trajectory in TRAJECTORIES if difference[trajectory] < -_EQUALITY_TOLERANCE_M
     ]
     comparisons = "; ".join(
-        f"{trajectory}: {_in_mm(ours[trajectory])}, {best[trajectory]}"
-        f" {_in_mm(error_of(trajectory, best[trajectory]))}"
+        f"{trajectory}: {_in_mm(our_errors[trajectory])}, {best_other_errors[trajectory]}"
+        f" {_in_mm(error_of(trajectory, best_other_errors[trajectory]))}"
         for trajectory in larger_on
     )
     return Finding(

@@ -80,8 +80,8 @@ def fly_all(tasks: Sequence[Task], tick: Tick) -> TrackedFlights:
     core_count = usable_cores()
     futures: dict[Task, Future[TrackedFlight]] = {}
     workers = min(core_count, len(tasks))
-    context = get_context("spawn")
-    with ProcessPoolExecutor(workers, context, end_with_parent, (os.getpid(),)) as pool:
+    spawn_context = get_context("spawn")
+    with ProcessPoolExecutor(workers, spawn_context, end_with_parent, (os.getpid(),)) as pool:
         for task in tasks:
             _await_free_core(list(futures.values()), core_count)
             tick(str(task))

@@ -31,7 +31,7 @@ from companion.study.track.tasks import (
     tasks,
 )
 
-PARTS = len(tasks())
+PROGRESS_STEPS = len(tasks())
 
 _FAILED = "failed"
 
@@ -81,7 +81,9 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
         if not task.lead:
             continue
         without_lead = flights.get(task._replace(lead=False))
-        not_led = PositionError(inf, inf) if without_lead is None else without_lead.telemetry_error
+        error_without_lead = (
+            PositionError(inf, inf) if without_lead is None else without_lead.telemetry_error
+        )
         rows.append(
             {
                 "trajectory": task.trajectory.shape,
@@ -93,8 +95,8 @@ def _rows(flights: TrackedFlights) -> tuple[dict[str, Any], ...]:
                 "position_max_m": _or_null(flight.telemetry_error.largest),
                 "true_rms_m": _or_null(flight.true_error.rms),
                 "true_max_m": _or_null(flight.true_error.largest),
-                "not_led_rms_m": _or_null(not_led.rms),
-                "not_led_max_m": _or_null(not_led.largest),
+                "not_led_rms_m": _or_null(error_without_lead.rms),
+                "not_led_max_m": _or_null(error_without_lead.largest),
                 "result": flight.result,
             }
         )
@@ -149,8 +151,8 @@ def _flights_table(flights: TrackedFlights) -> Table:
 
 def _planners_table(name: str, caption: str, errors: dict[Task, float]) -> Table:
     def error(trajectory: TrajectoryAtSpeed, planner: str, guidance: str) -> Cell:
-        flown = planner in planners(guidance)
-        return _in_mm(errors[Task(trajectory, planner, guidance)]) if flown else ""
+        was_flown = planner in planners(guidance)
+        return _in_mm(errors[Task(trajectory, planner, guidance)]) if was_flown else ""
 
     return Table(
         name,

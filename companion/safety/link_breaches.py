@@ -1,47 +1,50 @@
-"""Judges of the data flow: silence, the vehicle's clock, the link, and this computer.
+"""Checks of the data flow: silence, the vehicle's clock, the link, and this computer.
 
-The docstring of each judge states its breach.
+The docstring of each check states its breach.
 """
 
 from companion.control.loop_record import Unanswered
-from companion.safety.monitor import Judge, above, below
-from companion.safety.snapshot import UNHEARD_S, Control, Snapshot
+from companion.safety.monitor import BreachCheck, above, below
+from companion.safety.snapshot import HEARD_TIMEOUT_S, Control, Snapshot
 
 _STALL_SHARE = 0.5
 """If this program did not run for more than this share of the time since its last setpoint, this
 computer is named as the cause."""
 
 
-def silence(limit: float, *, heard: bool, planner: str = "auto", guidance: str = "linear") -> Judge:
+def silence(
+    limit: float, *, vehicle_heard: bool, planner: str = "auto", guidance: str = "linear"
+) -> BreachCheck:
     """No setpoint was sent for longer than `limit` s.
 
-    `heard`: True: the judge applies only while frames come from the vehicle; False: only while no
-    frames come. `planner`, `guidance`: names of both in the configuration, for the message.
+    `vehicle_heard`: True: the check applies only while frames come from the vehicle; False: only
+    while no frames come. `planner`, `guidance`: names of both in the
+    configuration, for the message.
     """
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         now, control = snapshot.now, snapshot.control
         if (
-            now - control.last_answer <= limit
-            or (now - control.last_heard < UNHEARD_S) is not heard
+            now - control.last_answered_arrival <= limit
+            or (now - control.last_frame_noticed < HEARD_TIMEOUT_S) is not vehicle_heard
         ):
             return None
         return _silence_cause(now, control, limit, planner, guidance)
 
-    return judge
+    return check
 
 
 def _silence_cause(now: float, control: Control, limit: float, planner: str, guidance: str) -> str:
-    if control.stall_time > _STALL_SHARE * (now - control.last_answer):
+    if control.stall_time > _STALL_SHARE * (now - control.last_answered_arrival):
         # Data that came during the stall were read late, so they only seem old.
         return (
             f"this program did not run for {control.stall_time:.1f} s (computer overloaded or "
             "suspended)"
         )
-    if now - control.last_sample > limit:
+    if now - control.last_sample_arrival > limit:
         if control.attitude_not_finite:
             return "the vehicle's attitude is not finite (NaN or infinity)"
-        return f"no attitude from the vehicle for {now - control.last_sample:.1f} s"
+        return f"no attitude from the vehicle for {now - control.last_sample_arrival:.1f} s"
     reason = control.reason
     if reason in (Unanswered.NO_TARGET, Unanswered.OLD_TARGET):
         return _missing_command_cause(now, control, limit, guidance)
@@ -54,7 +57,7 @@ def _silence_cause(now: float, control: Control, limit: float, planner: str, gui
 
 
 def _missing_command_cause(now: float, control: Control, limit: float, guidance: str) -> str:
-    if now - control.last_position > limit:
+    if now - control.last_position_arrival > limit:
         if control.position_not_finite:
             return "the vehicle's position is not finite (NaN or infinity)"
         return "no position from the vehicle"
@@ -70,7 +73,7 @@ def clock_changed(snapshot: Snapshot, _: bool) -> str | None:
     return snapshot.control.clock_change
 
 
-def loss(max_share: float) -> Judge:
+def loss(max_share: float) -> BreachCheck:
     """More than the share `max_share` of the vehicle's frames is lost."""
     return above(
         max_share,
@@ -82,7 +85,7 @@ def loss(max_share: float) -> Judge:
     )
 
 
-def round_trip(max_seconds: float) -> Judge:
+def round_trip(max_seconds: float) -> BreachCheck:
     """The round trip of TIMESYNC takes longer than `max_seconds`, s."""
     return above(
         max_seconds,
@@ -94,7 +97,7 @@ def round_trip(max_seconds: float) -> Judge:
     )
 
 
-def late_setpoints(max_sample_age: float) -> Judge:
+def late_setpoints(max_sample_age: float) -> BreachCheck:
     """Every probe answered in the last 0.7 s had a round trip over 1.5 times `max_sample_age`, s.
 
     `max_sample_age` is the largest age at which a sample is used. If setpoints also
@@ -112,13 +115,13 @@ def late_setpoints(max_sample_age: float) -> Judge:
     )
 
 
-def lost_setpoints(max_unanswered: int) -> Judge:
+def lost_setpoints(max_unanswered: int) -> BreachCheck:
     """More than `max_unanswered` TIMESYNC probes in a row were sent and not answered.
 
-    Telemetry still arrives, else the judge `silence` would have ended control earlier.
+    Telemetry still arrives, else the check `silence` would have ended control earlier.
     """
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         unanswered = snapshot.health.uplink.unanswered_count
         if unanswered is None or unanswered <= max_unanswered:
             return None
@@ -127,13 +130,13 @@ def lost_setpoints(max_unanswered: int) -> Judge:
             "second, were not answered"
         )
 
-    return judge
+    return check
 
 
-def foreign_setpoints(max_reports: int) -> Judge:
+def foreign_setpoints(max_reports: int) -> BreachCheck:
     """The autopilot reported more than `max_reports` setpoints of another program within 5 s."""
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         reports = snapshot.health.foreign_reports
         if reports <= max_reports:
             return None
@@ -142,7 +145,7 @@ def foreign_setpoints(max_reports: int) -> Judge:
             f"{reports} that this program did not send (ATTITUDE_TARGET)"
         )
 
-    return judge
+    return check
 
 
 def rare_foreign_setpoint(snapshot: Snapshot, _: bool) -> str | None:
@@ -157,11 +160,11 @@ def rare_foreign_setpoint(snapshot: Snapshot, _: bool) -> str | None:
 
 def frozen(snapshot: Snapshot, _: bool) -> str | None:
     """Attitude, position or velocity repeats one measurement under new time stamps."""
-    what = snapshot.health.frozen
-    return None if what is None else f"frozen telemetry: {what}"
+    repeated_telemetry = snapshot.health.frozen
+    return None if repeated_telemetry is None else f"frozen telemetry: {repeated_telemetry}"
 
 
-def deadlines(max_share: float) -> Judge:
+def deadlines(max_share: float) -> BreachCheck:
     """More than the share `max_share` of the setpoints misses deadman.deadline_ms."""
     return above(
         max_share,
@@ -173,7 +176,7 @@ def deadlines(max_share: float) -> Judge:
     )
 
 
-def starvation(max_share: float) -> Judge:
+def starvation(max_share: float) -> BreachCheck:
     """CPU starvation: this program's timer was late for more than `max_share` of a second."""
     return above(
         max_share,
@@ -185,10 +188,10 @@ def starvation(max_share: float) -> Judge:
     )
 
 
-def gaps(max_gaps: int) -> Judge:
+def gaps(max_gaps: int) -> BreachCheck:
     """The setpoints had more than `max_gaps` gaps within 5 s."""
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         count = snapshot.health.gaps
         if count <= max_gaps:
             return None
@@ -197,10 +200,10 @@ def gaps(max_gaps: int) -> Judge:
             "deadman.telemetry_stale_ms"
         )
 
-    return judge
+    return check
 
 
-def answer_rate(min_rate: float) -> Judge:
+def answer_rate(min_rate: float) -> BreachCheck:
     """The effective rate of setpoints (`IntervalSums`) is below `min_rate` Hz."""
     return below(
         min_rate,
@@ -211,7 +214,7 @@ def answer_rate(min_rate: float) -> Judge:
     )
 
 
-def position_rate(min_rate: float) -> Judge:
+def position_rate(min_rate: float) -> BreachCheck:
     """Positions come at less than `min_rate` Hz."""
     return below(
         min_rate,

@@ -1,8 +1,8 @@
-"""Judges of the motion: tilt, body rates, speed, tracking error, thrust, and the fence.
+"""Checks of the motion: tilt, body rates, speed, tracking error, thrust, and the fence.
 
-The docstring of each judge states its breach.
+The docstring of each check states its breach.
 
-The judge `braking` reports a breach before the vehicle leaves the fence. `Fence.stopping_point`
+The check `braking` reports a breach before the vehicle leaves the fence. `Fence.stopping_point`
 predicts where the vehicle would stop if a present acceleration lasted for the reaction time and the
 vehicle then braked with `safety.braking_m_s2`, or with less if tilt limit and wind allow no more.
 """
@@ -11,11 +11,11 @@ from math import degrees, hypot
 
 from companion.attitude.kinematics import tilt_angle
 from companion.guidance.fence import Fence
-from companion.safety.monitor import Judge, above
+from companion.safety.monitor import BreachCheck, above
 from companion.safety.snapshot import Snapshot
 
 
-def tilt(limit: float) -> Judge:
+def tilt(limit: float) -> BreachCheck:
     """The thrust axis tilts more than `limit`, rad."""
 
     def angle(snapshot: Snapshot) -> float | None:
@@ -32,7 +32,7 @@ def tilt(limit: float) -> Judge:
     )
 
 
-def body_rate(limit: float) -> Judge:
+def body_rate(limit: float) -> BreachCheck:
     """The magnitude of the body rates exceeds `limit`, rad/s."""
     return above(
         limit,
@@ -44,7 +44,7 @@ def body_rate(limit: float) -> Judge:
     )
 
 
-def speed(limit: float) -> Judge:
+def speed(limit: float) -> BreachCheck:
     """The vehicle moves faster than `limit`, m/s."""
     return above(
         limit,
@@ -55,7 +55,7 @@ def speed(limit: float) -> Judge:
     )
 
 
-def tracking(limit: float) -> Judge:
+def tracking(limit: float) -> BreachCheck:
     """The vehicle is farther than `limit` from its reference, m."""
     return above(
         limit,
@@ -67,39 +67,39 @@ def tracking(limit: float) -> Judge:
     )
 
 
-def thrust(lowest: float, highest: float) -> Judge:
+def thrust(lowest: float, highest: float) -> BreachCheck:
     """The sent thrust is at one of its limits (0..1), so the height may not be held any more."""
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         sent = snapshot.motion.thrust
         if sent is None or lowest < sent < highest:
             return None
-        which, limit = ("min", lowest) if sent <= lowest else ("max", highest)
-        return f"thrust is at limits.{which}_thrust = {limit:g}"
+        limit_name, limit = ("min", lowest) if sent <= lowest else ("max", highest)
+        return f"thrust is at limits.{limit_name}_thrust = {limit:g}"
 
-    return judge
+    return check
 
 
-def outside(fence: Fence) -> Judge:
+def outside(fence: Fence) -> BreachCheck:
     """The vehicle is outside the fence.
 
     A vehicle of unknown latitude and longitude counts as outside a fence in these coordinates.
     """
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion
         if motion.offset is None:
             return None
         breach = fence.breach(motion.offset, motion.height, motion.origin)
         return None if breach is None else str(breach)
 
-    return judge
+    return check
 
 
-def braking(fence: Fence) -> Judge:
+def braking(fence: Fence) -> BreachCheck:
     """The vehicle is inside the fence, but would stop outside if it began to brake now."""
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         motion = snapshot.motion
         offset, velocity, height = motion.offset, motion.velocity, motion.height
         if offset is None or fence.breach(offset, height, motion.origin) is not None:
@@ -114,4 +114,4 @@ def braking(fence: Fence) -> Judge:
         )
         return None if breach is None else f"braking now would end {breach}"
 
-    return judge
+    return check

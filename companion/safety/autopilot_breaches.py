@@ -1,11 +1,11 @@
-"""Judges of the autopilot's own status: arming, failsafe, battery, GPS and estimator.
+"""Checks of the autopilot's own status: arming, failsafe, battery, GPS and estimator.
 
-The docstring of each judge states its breach.
+The docstring of each check states its breach.
 """
 
 from math import degrees
 
-from companion.safety.monitor import Judge, above
+from companion.safety.monitor import BreachCheck, above
 from companion.safety.snapshot import Snapshot
 from companion.vehicle.records import gps_fault, is_outdated
 
@@ -29,13 +29,13 @@ def failsafe(snapshot: Snapshot, _: bool) -> str | None:
     return "the autopilot reports a failsafe" if snapshot.autopilot.failsafe else None
 
 
-def battery(min_charge: float) -> Judge:
+def battery(min_charge: float) -> BreachCheck:
     """The battery's remaining charge is below `min_charge` (0..1), or is no longer reported.
 
     A vehicle that never reported a charge is flown without this monitor.
     """
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         newest = snapshot.autopilot.battery
         if newest is None:
             return None
@@ -43,8 +43,8 @@ def battery(min_charge: float) -> Judge:
         if is_outdated(newest.received, snapshot.now):
             return "the battery's state is not reported any more"
         if newest.remaining is None:
-            known_at = newest.charge_received
-            if known_at is None or not is_outdated(known_at, snapshot.now):
+            charge_received = newest.charge_received
+            if charge_received is None or not is_outdated(charge_received, snapshot.now):
                 return None
             return "the battery's charge is not reported any more"
         if newest.remaining >= min_charge:
@@ -54,7 +54,7 @@ def battery(min_charge: float) -> Judge:
             f"limits.min_battery_percent = {100 * min_charge:.0f}"
         )
 
-    return judge
+    return check
 
 
 def gps(snapshot: Snapshot, _: bool) -> str | None:
@@ -67,14 +67,14 @@ def estimator_flags(snapshot: Snapshot, _: bool) -> str | None:
 
     Only the flags of attitude, velocity and horizontal position count.
     """
-    estimator, good = snapshot.autopilot.estimator, snapshot.good_flags
+    estimator, start_flags = snapshot.autopilot.estimator, snapshot.initial_estimator_flags
     if estimator is None:
         return None
     if is_outdated(estimator.received, snapshot.now):
         return "the estimator's state is not reported any more"
     quantities = ("attitude", ATTITUDE_FLAG), ("velocity", VELOCITY_FLAGS)
-    lost = [name for name, bits in quantities if good & bits & ~estimator.flags]
-    if good & HORIZONTAL_POSITION_FLAGS and not estimator.flags & HORIZONTAL_POSITION_FLAGS:
+    lost = [name for name, bits in quantities if start_flags & bits & ~estimator.flags]
+    if start_flags & HORIZONTAL_POSITION_FLAGS and not estimator.flags & HORIZONTAL_POSITION_FLAGS:
         lost.append("position")
     return f"the estimator reports no valid {', '.join(lost)} any more" if lost else None
 
@@ -90,7 +90,7 @@ def any_estimator_reset(snapshot: Snapshot, _: bool) -> str | None:
     )
 
 
-def heading_drift(limit: float) -> Judge:
+def heading_drift(limit: float) -> BreachCheck:
     """The estimated heading turned by more than `limit` in 20 s, rad; the vehicle did not."""
     return above(
         limit,
@@ -102,14 +102,14 @@ def heading_drift(limit: float) -> Judge:
     )
 
 
-def too_many_estimator_resets(max_count: int, max_shift: float, max_heading: float) -> Judge:
+def too_many_estimator_resets(max_count: int, max_shift: float, max_heading: float) -> BreachCheck:
     """The estimator was reset more than `max_count` times within 30 s, or too far in this flight.
 
     Too far: position jumps of more than `max_shift` (m) in total, heading jumps of more than
     `max_heading` (rad) in total, or one jump of the thrust axis by more than half of `max_heading`.
     """
 
-    def judge(snapshot: Snapshot, _: bool) -> str | None:
+    def check(snapshot: Snapshot, _: bool) -> str | None:
         resets = snapshot.resets
         if resets.position_shift > max_shift:
             excess = (
@@ -134,4 +134,4 @@ def too_many_estimator_resets(max_count: int, max_shift: float, max_heading: flo
             return None
         return f"the autopilot's estimator was reset {excess}"
 
-    return judge
+    return check

@@ -10,7 +10,7 @@ from companion.safety.table import fence_of
 from companion.vehicle.link import Link
 
 
-class KeptFence:
+class FenceAcrossFlights:
     """Keeps the centre of the fence from one flight to the next.
 
     If each flight had its own centre, a client could move the fence by requesting control anew.
@@ -23,11 +23,11 @@ class KeptFence:
     """
 
     def __init__(self, config: Config, link: Link) -> None:
-        self._kept_centre: FenceCentre | None = None
+        self._first_centre: FenceCentre | None = None
         self._fence, self._state = fence_of(config), link.state
         self._max_shift = config.safety.max_reset_m
         self._resets = EstimatorResets()
-        self._shift_when_kept: Vector = (0.0, 0.0, 0.0)
+        self._shift_at_first_flight: Vector = (0.0, 0.0, 0.0)
         link.subscribe("HEARTBEAT", self._forget_if_disarmed)
         link.subscribe("LOCAL_POSITION_NED", self._note_position)
 
@@ -37,19 +37,19 @@ class KeptFence:
 
         The centre is in the autopilot's present local frame.
         """
-        if self._kept_centre is None:
+        if self._first_centre is None:
             return None
-        negative_shift = minus(self._shift_when_kept, self._resets.position_shift)
-        position = minus(self._kept_centre.position_ned, negative_shift)
-        return self._kept_centre._replace(position_ned=position)
+        negative_shift = minus(self._shift_at_first_flight, self._resets.position_shift)
+        position = minus(self._first_centre.position_ned, negative_shift)
+        return self._first_centre._replace(position_ned=position)
 
-    def keep(self, centre: FenceCentre | None) -> None:
+    def set_first_centre(self, centre: FenceCentre | None) -> None:
         """Keep the centre of a flight that has ended; an earlier flight's centre takes precedence.
 
         Nothing is kept if the vehicle is disarmed.
         """
-        if self._kept_centre is None and self._state.armed is not False:
-            self._kept_centre, self._shift_when_kept = centre, self._resets.position_shift
+        if self._first_centre is None and self._state.armed is not False:
+            self._first_centre, self._shift_at_first_flight = centre, self._resets.position_shift
 
     def refusal(self) -> str | None:
         """Why control must not begin; None if it may.
@@ -59,7 +59,7 @@ class KeptFence:
         position, kept_centre = self._state.position, self.centre
         if kept_centre is None or position is None:
             return None
-        shift = dist(self._resets.position_shift, self._shift_when_kept)
+        shift = dist(self._resets.position_shift, self._shift_at_first_flight)
         if shift > self._max_shift:
             return (
                 f"the estimator has moved the position by {shift:.1f} m since the first flight, "
@@ -74,7 +74,7 @@ class KeptFence:
 
     def _forget_if_disarmed(self, _: object) -> None:
         if self._state.armed is False:
-            self._kept_centre = None
+            self._first_centre = None
 
     def _note_position(self, _: object) -> None:
         if self._state.position is not None:
