@@ -26,7 +26,7 @@ def loop_counts(context: FlightContext) -> LoopCounts:
 
 def predictive_figures(context: FlightContext) -> PredictiveFigures | None:
     """The figures of predictive control; None if the flight did not use it."""
-    predictive = context.guidance_loop.maker.predictive_control
+    predictive = context.guidance_loop.command_maker.predictive_control
     if predictive is None:
         return None
     record = predictive.record

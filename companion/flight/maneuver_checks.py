@@ -46,7 +46,7 @@ def require_flyable(config: Config, part: Maneuver, drag: KnownDrag) -> None:
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """
     with naming_trajectory_errors(part.name):
-        motions = list(_predicted_motions(part, drag.least))
+        motions = list(_predicted_motions(part, drag.lower_bound))
         _require_motions_inside(config, part, motions, None)
     if isinstance(part, HeldHeadingManeuver):
         envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
@@ -65,7 +65,7 @@ def require_inside(
         ConfigError: a maneuver leaves the fence, or could not stop inside it.
     """
     for part in parts:
-        _require_motions_inside(config, part, _predicted_motions(part, drag.least), origin)
+        _require_motions_inside(config, part, _predicted_motions(part, drag.lower_bound), origin)
 
 
 def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: KnownDrag) -> None:
@@ -192,7 +192,7 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
         max_descent=limits.max_descent_m_s,
         max_speed=config.safety.max_speed_m_s,
         fence=_fence_check(config, None),
-        drag=drag.most,
+        drag=drag.upper_bound,
         gravity=GRAVITY,
     )
 

@@ -27,9 +27,9 @@ class HeadingDrift:
         What a scale error of the gyro can explain is subtracted.
         """
         sums, resets = self._sums, self._resets
-        sums.append((now, resets.heading_corrections, resets.turned))
+        sums.append((now, resets.heading_corrections, resets.total_turn))
         while now - sums[0][0] > _WINDOW:
             sums.popleft()
         _, corrections, turned = sums[0]
         unexplained = abs(resets.heading_corrections - corrections)
-        return max(0.0, unexplained - _SCALE_ERROR * (resets.turned - turned))
+        return max(0.0, unexplained - _SCALE_ERROR * (resets.total_turn - turned))
