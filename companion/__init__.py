@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from companion.api import connect as connect
     from companion.api import run as run
 
-_NAMES = (
+_PUBLIC_NAMES = (
     "Coefficients",
     "Control",
     "FlightEnded",
@@ -53,7 +53,7 @@ _NAMES = (
 
 def __getattr__(name: str) -> object:
     """Import one of the public names when a program first uses it."""
-    if name not in _NAMES:
+    if name not in _PUBLIC_NAMES:
         raise AttributeError(f"module 'companion' has no attribute {name!r}")
     from companion import api  # noqa: PLC0415  takes a quarter of a second
 
@@ -62,4 +62,4 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     """The public names too, so that an interactive Python completes them before their import."""
-    return sorted({*globals(), *_NAMES})
+    return sorted({*globals(), *_PUBLIC_NAMES})

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 Number = TypeVar("Number", float, NDArray[np.float64])
 """Type of a vector component: float or array; CasADi symbols work as well."""
 
-_TINY = 1e-12
+_SPEED_SQUARED_MARGIN = 1e-12
 """Added to the squared speed, (m/s)², so that the speed is differentiable at rest."""
 
 
@@ -107,13 +107,19 @@ class AxisDrag(NamedTuple):
         forward_rate = a_forward + heading_rate * right
         right_rate = a_right - heading_rate * forward
         speed = _smooth_speed((forward, right, 0.0))
-        mean = _MEAN_CUBE_SUM * speed
-        mean_rate = _MEAN_CUBE_SUM * (forward * forward_rate + right * right_rate) / speed
+        mean_drag_speed = _MEAN_CUBE_SUM * speed
+        mean_drag_speed_rate = (
+            _MEAN_CUBE_SUM * (forward * forward_rate + right * right_rate) / speed
+        )
         # d: deceleration along an axis, per coefficient.
-        d_forward = forward * (abs(forward) - mean)
-        d_right = right * (abs(right) - mean)
-        d_forward_rate = forward_rate * (2.0 * abs(forward) - mean) - mean_rate * forward
-        d_right_rate = right_rate * (2.0 * abs(right) - mean) - mean_rate * right
+        d_forward = forward * (abs(forward) - mean_drag_speed)
+        d_right = right * (abs(right) - mean_drag_speed)
+        d_forward_rate = (
+            forward_rate * (2.0 * abs(forward) - mean_drag_speed) - mean_drag_speed_rate * forward
+        )
+        d_right_rate = (
+            right_rate * (2.0 * abs(right) - mean_drag_speed) - mean_drag_speed_rate * right
+        )
         forward = self.coefficient * (d_forward_rate - heading_rate * d_right)
         right = self.coefficient * (d_right_rate + heading_rate * d_forward)
         return cosine * forward - sine * right, sine * forward + cosine * right
@@ -127,9 +133,9 @@ def axis_drag_deceleration(
     `cosine` and `sine` are of `AxisDrag.heading`; `north` and `east` are the airspeed, m/s.
     """
     forward, right = _body_components(cosine, sine, north, east)
-    mean = _MEAN_CUBE_SUM * _smooth_speed((forward, right, 0.0 * right))
-    forward = coefficient * forward * (abs(forward) - mean)
-    right = coefficient * right * (abs(right) - mean)
+    mean_drag_speed = _MEAN_CUBE_SUM * _smooth_speed((forward, right, 0.0 * right))
+    forward = coefficient * forward * (abs(forward) - mean_drag_speed)
+    right = coefficient * right * (abs(right) - mean_drag_speed)
     return cosine * forward - sine * right, sine * forward + cosine * right
 
 
@@ -145,5 +151,5 @@ ROUND_BODY = AxisDrag()
 
 def _smooth_speed(velocity: tuple[Number, Number, Number]) -> Number:
     north, east, down = velocity
-    speed: Number = (north * north + east * east + down * down + _TINY) ** 0.5
+    speed: Number = (north * north + east * east + down * down + _SPEED_SQUARED_MARGIN) ** 0.5
     return speed

@@ -166,8 +166,8 @@ def test_help_of_the_program_is_one_page_with_its_names() -> None:
     page = pydoc.plain(pydoc.render_doc(companion))
     assert len(page.splitlines()) <= MOST_LINES
     listed = re.findall(r"^    (\w+)  ", companion.__doc__ or "", re.MULTILINE)
-    assert set(listed) == set(companion._NAMES) == public_names(companion.api)
-    assert all(getattr(companion, name).__doc__ for name in companion._NAMES)
+    assert set(listed) == set(companion._PUBLIC_NAMES) == public_names(companion.api)
+    assert all(getattr(companion, name).__doc__ for name in companion._PUBLIC_NAMES)
 
 
 def test_an_interactive_python_completes_the_names_before_their_import() -> None:

@@ -11,7 +11,7 @@ from companion.api.ctrl_c import on_ctrl_c
 from companion.api.flight_loop import FlightLoop, flight_loop
 from companion.api.program import (
     ProgramPlan,
-    failure_words,
+    failure_text,
     flight_ended,
     mark_error_retrieved,
 )
@@ -103,7 +103,7 @@ async def connect_configured(
     environment: Environment = THIS_COMPUTER,
 ) -> AsyncGenerator[Vehicle, None]:
     """Like `connect`, with a complete configuration; without a folder nothing is recorded."""
-    loop, wait_cancelled = flight_loop(), False
+    loop, cancelled_while_waiting = flight_loop(), False
     try:
         session, program = await loop.start(_make_session(config, folder, observer, environment))
         loop.register_end(partial(_end_lost_flight, session, program))
@@ -114,12 +114,12 @@ async def connect_configured(
                 async with _connected_vehicle(loop, session, program, flight) as vehicle:
                     yield vehicle
         finally:
-            wait_cancelled = True  # stays true if the wait is cancelled
+            cancelled_while_waiting = True  # stays true if the wait is cancelled
             await asyncio.wait({flight})
-            wait_cancelled = False
+            cancelled_while_waiting = False
         flight.result()
     finally:
-        loop.close(wait=not wait_cancelled)
+        loop.close(wait=not cancelled_while_waiting)
 
 
 @asynccontextmanager
@@ -136,7 +136,7 @@ async def _connected_vehicle(
     try:
         yield Vehicle(connected)
     except BaseException as error:
-        reason = failure_words("the program", error)
+        reason = failure_text("the program", error)
         with suppress(FlightEnded):
             await asyncio.shield(loop.start(_end_failed(session, program, reason)))
         raise
@@ -213,7 +213,7 @@ async def _end_failed(session: Session, program: ProgramPlan, reason: str) -> No
 
 async def _end_flight(program: ProgramPlan) -> None:
     """End the flight: hand back in the air; on the ground leave the vehicle as it is."""
-    if program.busy:
+    if program.has_requests:
         program.interrupt("the program ended before its request was completed")
     elif not program.is_over:
         await program.request(

@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager
 from math import inf, isnan
 
 from companion.api.commanded import checked_copy
-from companion.api.program import failure_words, mark_error_retrieved
+from companion.api.program import failure_text, mark_error_retrieved
 from companion.api.state import ConnectedFlight, State
 from companion.attitude import BodyRates, Coefficients
 from companion.guidance.finite import finite_vector
@@ -41,7 +41,7 @@ class Control:
     ) -> None:
         self._flight, self._source, self._control_end = flight, source, control_end
         self._command: tuple[Reference, float, Vector | None] | None = None
-        self._posted = False
+        self._callback_posted = False
         self._start_state = self.state
 
     @property
@@ -126,13 +126,13 @@ class Control:
         jerk_ned = None if jerk_ned is None else finite_vector("jerk_ned", jerk_ned)
         self._require_control()
         self._command = reference, self._flight.loop.time(), jerk_ned
-        if not self._posted:  # else the callback posted before will take this command
-            self._posted = True
+        if not self._callback_posted:  # else the callback posted before will take this command
+            self._callback_posted = True
             self._flight.loop.post(self._post_command)
 
     def _post_command(self) -> None:
         """Give the newest command to guidance; called in the flight's loop."""
-        self._posted = False
+        self._callback_posted = False
         if self._command is not None:
             self._source.give(*self._command)
             self._flight.context.guidance_loop.step_at_once()
@@ -202,7 +202,7 @@ async def program_control(
         yield Control(flight, source, control_end)
     except BaseException as error:
         if not isinstance(error, FlightEnded):
-            flight.loop.post(source.fail, failure_words(source.name, error))
+            flight.loop.post(source.fail, failure_text(source.name, error))
         raise
     finally:
         flight.loop.post(source.end)

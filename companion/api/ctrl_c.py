@@ -37,8 +37,11 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
     finally:
         handler.ended = True
         # Of two flights that overlap, the first to end may have left its handler below ours.
-        while isinstance(top := signal.getsignal(signal.SIGINT), _Handler) and top.ended:
-            signal.signal(signal.SIGINT, top.handler_before)
+        while (
+            isinstance(current_handler := signal.getsignal(signal.SIGINT), _Handler)
+            and current_handler.ended
+        ):
+            signal.signal(signal.SIGINT, current_handler.handler_before)
 
 
 class _Handler:

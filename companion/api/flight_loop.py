@@ -28,7 +28,7 @@ would delay each setpoint by several times 5 ms, because every system call of th
 the interpreter.
 """
 
-_CHECK_PERIOD = 0.1
+_PROGRAM_CHECK_PERIOD = 0.1
 """Period with which the flight checks whether the program still exists, s."""
 
 
@@ -133,7 +133,7 @@ class OwnThreadLoop:
             # Jupyter's handler of Ctrl-C schedules its callback without waking the program's loop.
             self.post_to_program(lambda: None)
             with suppress(TimeoutError):
-                await asyncio.wait_for(self._closing.wait(), _CHECK_PERIOD)
+                await asyncio.wait_for(self._closing.wait(), _PROGRAM_CHECK_PERIOD)
         if self._end_flight is not None:
             await self._end_flight()
 

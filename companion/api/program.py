@@ -14,8 +14,8 @@ from companion.guidance import ManeuverSequence
 from companion.recording.measurements.summary import Summary
 from companion.safety.actions import FlightEnded
 
-_NEXT_CALL = "the program's next call"
-_CANCELLED = "the program cancelled its request"
+_WAITING_TEXT = "the program's next call"
+_CANCELLED_TEXT = "the program cancelled its request"
 
 
 @dataclass(slots=True, eq=False)
@@ -106,7 +106,7 @@ class ProgramPlan:
         if self.end_error is not None:
             await self.finished.wait()
             self.require_flight()
-        if self.busy:
+        if self.has_requests:
             raise RuntimeError("another call of this vehicle has not ended yet: await it first")
         request = PhaseRequest(phases, ends_flight)
         self._waiting_requests.append(request)
@@ -117,7 +117,7 @@ class ProgramPlan:
             if request in self._waiting_requests:
                 self._waiting_requests.remove(request)
             self._cancelled = True
-            self.interrupt(_CANCELLED)
+            self.interrupt(_CANCELLED_TEXT)
             raise
 
     @property
@@ -125,7 +125,7 @@ class ProgramPlan:
         """The exception that every later call raises; None: the flight continues."""
         if self._end_error is not None:
             return self._end_error
-        reason = self.end_reason() or (_CANCELLED if self._cancelled else None)
+        reason = self.end_reason() or (_CANCELLED_TEXT if self._cancelled else None)
         return None if reason is None else FlightEnded(reason)
 
     def require_flight(self) -> None:
@@ -135,7 +135,7 @@ class ProgramPlan:
             raise error
 
     @property
-    def busy(self) -> bool:
+    def has_requests(self) -> bool:
         """Whether a request is waiting or running."""
         return self._running_request is not None or bool(self._waiting_requests)
 
@@ -152,11 +152,11 @@ class ProgramPlan:
 
     def _waiting_phase(self, context: FlightContext) -> Phase:
         if context.loop.offboard_active:
-            return control_phase("hold", _NEXT_CALL, self._next_request, inf)
-        return Phase("stand by", _NEXT_CALL, self._next_request, inf)
+            return control_phase("hold", _WAITING_TEXT, self._next_request, inf)
+        return Phase("stand by", _WAITING_TEXT, self._next_request, inf)
 
     async def _next_request(self, context: FlightContext) -> None:
-        context.waiting_for = _NEXT_CALL
+        context.waiting_for = _WAITING_TEXT
         while not self._waiting_requests:
             self._new_request.clear()
             await self._new_request.wait()
@@ -172,13 +172,13 @@ def flight_ended(result: str) -> FlightEnded:
     return FlightEnded("the flight is over" if result == "ok" else result)
 
 
-def mark_error_retrieved(ended: asyncio.Future[Any]) -> None:
+def mark_error_retrieved(future: asyncio.Future[Any]) -> None:
     """Done-callback without which asyncio would warn; the program's calls raise the error."""
-    if not ended.cancelled():
-        ended.exception()
+    if not future.cancelled():
+        future.exception()
 
 
-def failure_words(name: str, error: BaseException) -> str:
+def failure_text(name: str, error: BaseException) -> str:
     """A clause that says how the program `name` failed: cancelled, dropped, or by an error."""
     if isinstance(error, asyncio.CancelledError):
         return f"{name} was cancelled"

@@ -60,11 +60,13 @@ class NewestState:
 
         States do not queue up while the program is busy.
         """
-        wake = _PendingCall(self._loop, callback)
-        self._pending_calls = (*self._pending_calls, wake)
+        pending_call = _PendingCall(self._loop, callback)
+        self._pending_calls = (*self._pending_calls, pending_call)
 
         def unsubscribe() -> None:
-            self._pending_calls = tuple(each for each in self._pending_calls if each is not wake)
+            self._pending_calls = tuple(
+                each for each in self._pending_calls if each is not pending_call
+            )
 
         return unsubscribe
 

@@ -16,7 +16,7 @@ _USUAL_SPEED = 2.0
 
 def straight_path(
     config: Config,
-    to: Vector,
+    displacement_ned: Vector,
     heading: float | None,
     speed: float | None,
     acceleration: float,
@@ -26,7 +26,7 @@ def straight_path(
 
     Args:
         config: configuration whose limits bound `_usual_speed`.
-        to: end of the line relative to its start, m NED.
+        displacement_ned: end of the line relative to its start, m NED.
         heading: rad; None: the vehicle keeps its heading.
         speed: largest speed, m/s; None: `_usual_speed`.
         acceleration: largest acceleration, m/s².
@@ -37,23 +37,25 @@ def straight_path(
         ValueError: an argument is not finite, or the heading exceeds two turns.
     """
     if speed is None:
-        speed = _usual_speed(to, config)
+        speed = _usual_speed(displacement_ned, config)
     names = "speed", "acceleration", "jerk"
     speed, acceleration, jerk = map(finite_number, names, (speed, acceleration, jerk))
     if heading is not None:
         heading = finite_number("heading", heading)
         if abs(heading) > 2.0 * tau:
             raise ValueError(f"heading is in rad, and {heading:g} rad are more than two turns")
-    if hypot(*to) < SMALLEST_DISTANCE:
+    if hypot(*displacement_ned) < SMALLEST_DISTANCE:
         return Hover(0.0, heading=heading)
-    path = line(to, speed, acceleration, jerk)
+    path = line(displacement_ned, speed, acceleration, jerk)
     return path if heading is None else replace(path, heading=FixedHeading(heading))
 
 
-def _usual_speed(to: Vector, config: Config) -> float:
-    """Speed of a line to `to` (m NED from its start), m/s: at most `_USUAL_SPEED`."""
+def _usual_speed(displacement_ned: Vector, config: Config) -> float:
+    """Speed of a line to `displacement_ned` (m NED from its start), m/s: at most `_USUAL_SPEED`."""
     speed = min(_USUAL_SPEED, config.safety.max_speed_m_s)
-    if to[2] == 0.0:
+    if displacement_ned[2] == 0.0:
         return speed
-    vertical = config.limits.max_climb_m_s if to[2] < 0.0 else config.limits.max_descent_m_s
-    return min(speed, vertical * hypot(*to) / abs(to[2]))
+    max_vertical_speed = (
+        config.limits.max_climb_m_s if displacement_ned[2] < 0.0 else config.limits.max_descent_m_s
+    )
+    return min(speed, max_vertical_speed * hypot(*displacement_ned) / abs(displacement_ned[2]))

@@ -135,9 +135,11 @@ class Vehicle:
             TrajectoryError: a limit given here is not positive.
             ValueError: an argument is not finite, or the heading exceeds two turns.
         """
-        to = minus(finite_vector("position_ned", position_ned), self._held_pose().position_ned)
+        displacement_ned = minus(
+            finite_vector("position_ned", position_ned), self._held_pose().position_ned
+        )
         config = self._flight.context.config
-        path = straight_path(config, to, heading, speed, acceleration, jerk)
+        path = straight_path(config, displacement_ned, heading, speed, acceleration, jerk)
         if heading is not None or isinstance(path, Hover):
             await self.follow(path)
         else:

@@ -22,7 +22,7 @@ at most 1e-4·p (relative).
 LONGEST_PERIOD = 1.0
 """Longest sample period that is used, s; a longer one is replaced by this value."""
 
-_SETTLED_CHANGE = 1e-14
+_LARGEST_SETTLED_CHANGE = 1e-14
 """Change of the factor f in `_rotation` below which the fixed-point iteration ends."""
 _MAX_ITERATIONS = 20
 """Largest number of fixed-point iterations in `_rotation`. Usually 4 suffice: each multiplies the
@@ -102,12 +102,14 @@ def _rotation(
     f = 2.0
     r_x = r_y = r_z = 0.0
     for _ in range(_MAX_ITERATIONS):
-        share = wanted_share
+        moved_share = wanted_share
         if max_angle < inf:
-            share = _reachable_share(
+            moved_share = _reachable_share(
                 a, x, y, remaining_north, remaining_east, wanted_share, max_angle / f
             )
-        d_w, d_x, d_y, d_z = _tilt_change(a, x, y, share * remaining_north, share * remaining_east)
+        d_w, d_x, d_y, d_z = _tilt_change(
+            a, x, y, moved_share * remaining_north, moved_share * remaining_east
+        )
         length = sqrt(d_w * d_w + d_z * d_z)
         half_tilt_yaw = atan2(d_z, d_w)
         half_yaw = half_tilt_yaw + 0.5 * heading_change
@@ -120,9 +122,9 @@ def _rotation(
             r_w, r_x, r_y, r_z = -r_w, -r_x, -r_y, -r_z
         previous_f = f
         f = angle_per_sine(r_w, sqrt(r_x * r_x + r_y * r_y + r_z * r_z))
-        unlimited = share == wanted_share and max_yaw_angle == inf
-        if abs(f - previous_f) < _SETTLED_CHANGE or (
-            unlimited and f * sqrt(r_x * r_x + r_y * r_y) <= max_angle
+        is_unlimited = moved_share == wanted_share and max_yaw_angle == inf
+        if abs(f - previous_f) < _LARGEST_SETTLED_CHANGE or (
+            is_unlimited and f * sqrt(r_x * r_x + r_y * r_y) <= max_angle
         ):
             break
     return f * r_x, f * r_y, f * r_z

@@ -41,9 +41,9 @@ class AxisLead:
     def advance(self) -> None:
         """Move on to the plan made for `plan_delay` seconds before the time of the newest plan."""
         plans = self._plans
-        planned_for = plans.time - self._plan_delay
-        self._plan = plans.tilt.at(planned_for) if self._plan_delay else plans.tilt.newest
-        self._heading_change = plans.predicted_heading_change(planned_for, self._plan)
+        plan_time = plans.time - self._plan_delay
+        self._plan = plans.tilt.at(plan_time) if self._plan_delay else plans.tilt.newest
+        self._heading_change = plans.predicted_heading_change(plan_time, self._plan)
 
     def command(self, dt: float, start_heading: float) -> float:
         """Advance to the next plan; return the rate to send between the two plans, rad/s.
@@ -54,13 +54,13 @@ class AxisLead:
             dt: time from the last plan to the next one, s.
             start_heading: see `FeedForward.advance`.
         """
-        rate, slope = self._planned_rate(start_heading)
+        rate, derivative = self._planned_rate(start_heading)
         self.advance()
-        next_rate, next_slope = self._planned_rate(start_heading)
+        next_rate, next_derivative = self._planned_rate(start_heading)
         return (
             0.5 * (rate + next_rate)
             + self._lag / dt * (next_rate - rate)
-            + self._sigma / dt * (next_slope - slope)
+            + self._sigma / dt * (next_derivative - derivative)
         )
 
     def _planned_rate(self, start_heading: float) -> tuple[float, float]:
@@ -147,12 +147,14 @@ class FeedForward:
         self._heading_model.start_at(heading, turn_rate)
         self._yaw_model.start(yaw_rate)
         self.target_frame.forget()
-        x, y, self._heading_hold_rate = model.rates()
+        x_rate, y_rate, self._heading_hold_rate = model.rates()
         plans = self.plans
         plans.time = 0.0
         plans.tilt.start(
             0.0,
-            PlannedTilt(model.north, model.east, 0.0, x, y, 0.0, 0.0, self._heading_hold_rate),
+            PlannedTilt(
+                *(model.north, model.east, 0.0, x_rate, y_rate, 0.0, 0.0, self._heading_hold_rate)
+            ),
             PlannedTilt(north, east, self._heading_hold_rate, 0.0, 0.0, 0.0, 0.0, 0.0),
         )
         plans.yaw.start(
@@ -177,24 +179,28 @@ class FeedForward:
         last_hold_rate, last_turn_rate = self._heading_hold_rate, heading_model.turn_rate
         model.advance(target, dt)
         heading_model.advance(target, dt)
-        x, y, hold_rate = model.rates()
+        x_rate, y_rate, hold_rate = model.rates()
         turn_rate = heading_model.turn_rate
-        yaw = (
+        yaw_rate = (
             0.5 * (last_hold_rate + hold_rate + last_turn_rate + turn_rate)
             + self.yaw.lag / dt * (hold_rate - last_hold_rate + turn_rate - last_turn_rate)
             + yaw_feedback
         )
-        yaw = clamp(yaw, self._max_yaw_rate)
-        yaw_model.advance(yaw, dt)
+        yaw_rate = clamp(yaw_rate, self._max_yaw_rate)
+        yaw_model.advance(yaw_rate, dt)
         self._heading_hold_rate = hold_rate
         mean_hold_rate = 0.5 * (last_hold_rate + hold_rate)
-        self.target_frame.advance(yaw, mean_hold_rate, dt)
+        self.target_frame.advance(yaw_rate, mean_hold_rate, dt)
         plans = self.plans
         hold_angle = plans.tilt.newest.heading_hold_angle + mean_hold_rate * dt
-        slopes = model.rate_slopes(x, y)
+        slopes = model.rate_slopes(x_rate, y_rate)
         plans.add(
             dt,
-            PlannedTilt(model.north, model.east, hold_angle, x, y, *slopes, hold_rate),
+            PlannedTilt(model.north, model.east, hold_angle, x_rate, y_rate, *slopes, hold_rate),
             PlannedYaw(heading_model.heading, yaw_model.yaw_angle, yaw_model.rate),
         )
-        return self._roll.command(dt, start_heading), self._pitch.command(dt, start_heading), yaw
+        return (
+            self._roll.command(dt, start_heading),
+            self._pitch.command(dt, start_heading),
+            yaw_rate,
+        )

@@ -4,8 +4,8 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
-_ROWS_PER_DROP = 64
-"""Number of rows of a `RowHistory` that are dropped together when older than `max_delay`."""
+_PLANS_PER_DROP = 64
+"""Number of plans of a `PlanSeries` that are dropped together when older than `max_delay`."""
 
 
 def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
@@ -15,10 +15,10 @@ def locate_time(times: Sequence[float], time: float) -> tuple[int, float]:
         The index i of the later neighbour, and the share of the interval from times[i − 1] to
         times[i] that has passed at `time`: below 0 before the first time, above 1 after the last.
     """
-    later, last = bisect_right(times, time), len(times) - 1
-    later = 1 if later < 1 else last if later > last else later
-    start = times[later - 1]
-    return later, (time - start) / (times[later] - start)
+    later_index, last_index = bisect_right(times, time), len(times) - 1
+    later_index = 1 if later_index < 1 else last_index if later_index > last_index else later_index
+    earlier_time = times[later_index - 1]
+    return later_index, (time - earlier_time) / (times[later_index] - earlier_time)
 
 
 class PlannedTilt(NamedTuple):
@@ -57,11 +57,11 @@ class PlannedYaw(NamedTuple):
     body_yaw_rate: float
 
 
-Row = TypeVar("Row", PlannedTilt, PlannedYaw)
+Plan = TypeVar("Plan", PlannedTilt, PlannedYaw)
 
 
-class RowHistory(Generic[Row]):
-    """Rows of a plan, each for one time; the plan between them is interpolated linearly.
+class PlanSeries(Generic[Plan]):
+    """A plan as values at ascending times; between two times it is interpolated linearly.
 
     Args:
         max_delay: the longest delay that is looked up, s.
@@ -70,35 +70,39 @@ class RowHistory(Generic[Row]):
     def __init__(self, max_delay: float) -> None:
         self._max_delay = max_delay
         self._times: list[float] = []
-        self._rows: list[Row] = []
+        self._plans: list[Plan] = []
 
-    def start(self, time: float, row: Row, slope: Row) -> None:
-        """Start again with `row` at `time`, s.
+    def start(self, time: float, plan: Plan, change_per_second: Plan) -> None:
+        """Start again with `plan` at `time`, s.
 
-        For earlier times the row is extrapolated; `slope` is its change per second.
+        For earlier times the plan is extrapolated; `change_per_second` is its change per second.
         """
-        earlier = type(row)(*[a - self._max_delay * b for a, b in zip(row, slope, strict=True)])
+        earliest_plan = type(plan)(
+            *[a - self._max_delay * b for a, b in zip(plan, change_per_second, strict=True)]
+        )
         self._times[:] = [time - self._max_delay, time]
-        self._rows[:] = [earlier, row]
+        self._plans[:] = [earliest_plan, plan]
 
-    def add(self, time: float, row: Row) -> None:
-        """Add a newer row; drop rows that are older than the longest delay."""
+    def add(self, time: float, plan: Plan) -> None:
+        """Add a newer plan; drop plans that are older than the longest delay."""
         times = self._times
         times.append(time)
-        self._rows.append(row)
-        if len(times) > _ROWS_PER_DROP and times[_ROWS_PER_DROP] < time - self._max_delay:
-            del times[:_ROWS_PER_DROP], self._rows[:_ROWS_PER_DROP]
+        self._plans.append(plan)
+        if len(times) > _PLANS_PER_DROP and times[_PLANS_PER_DROP] < time - self._max_delay:
+            del times[:_PLANS_PER_DROP], self._plans[:_PLANS_PER_DROP]
 
     @property
-    def newest(self) -> Row:
-        """The row that was added last."""
-        return self._rows[-1]
+    def newest(self) -> Plan:
+        """The plan that was added last."""
+        return self._plans[-1]
 
-    def at(self, time: float) -> Row:
-        """The plan at `time`: interpolated between two rows, extrapolated before and after all."""
-        later, share = locate_time(self._times, time)
-        before, after = self._rows[later - 1], self._rows[later]
-        return type(before)(*[a + share * (b - a) for a, b in zip(before, after, strict=True)])
+    def at(self, time: float) -> Plan:
+        """The plan at `time`: interpolated between two plans, extrapolated before and after all."""
+        later_index, fraction = locate_time(self._times, time)
+        earlier_plan, later_plan = self._plans[later_index - 1], self._plans[later_index]
+        return type(earlier_plan)(
+            *[a + fraction * (b - a) for a, b in zip(earlier_plan, later_plan, strict=True)]
+        )
 
 
 class HeadingChange(NamedTuple):
@@ -133,8 +137,8 @@ class PlanHistory:
         self._dead_time, self._yaw_dead_time = dead_time, yaw_dead_time
         max_delay = max(dead_time, yaw_dead_time) + longest_period
         self.time = 0.0
-        self.tilt: RowHistory[PlannedTilt] = RowHistory(max_delay)
-        self.yaw: RowHistory[PlannedYaw] = RowHistory(max_delay)
+        self.tilt: PlanSeries[PlannedTilt] = PlanSeries(max_delay)
+        self.yaw: PlanSeries[PlannedYaw] = PlanSeries(max_delay)
         self._heading_change_plan: PlannedTilt | None = None
         self._heading_change = HeadingChange(0.0, 0.0)  # when `_heading_change_plan` takes effect
 
@@ -149,14 +153,14 @@ class PlanHistory:
         now = self.time + lateness
         return self.tilt.at(now - self._dead_time), self.yaw.at(now - self._yaw_dead_time)
 
-    def predicted_heading_change(self, planned_for: float, plan: PlannedTilt) -> HeadingChange:
-        """The heading change when `plan`, made for the time `planned_for` (s), takes effect.
+    def predicted_heading_change(self, plan_time: float, plan: PlannedTilt) -> HeadingChange:
+        """The heading change when `plan`, made for the time `plan_time` (s), takes effect.
 
         The heading turns at the body's yaw rate minus `heading_hold_rate`.
         """
         # Cached, because both axes and `TargetFrame` ask for the newest plan.
         if plan is not self._heading_change_plan:
-            effect_time = planned_for + self._dead_time
+            effect_time = plan_time + self._dead_time
             yaw_plan = self.yaw.at(effect_time - self._yaw_dead_time)
             self._heading_change = HeadingChange(
                 yaw_plan.body_yaw - plan.heading_hold_angle,
@@ -201,11 +205,11 @@ class SampleHold:
 
     def note_sample(self, dt: float) -> None:
         """Update the attributes for a new sample, `dt` seconds after the last one."""
-        expected = self.period or dt
-        self.lateness = lateness = dt - expected
+        expected_period = self.period or dt
+        self.lateness = lateness = dt - expected_period
         # Bounded, so that the plan always advances.
-        change = max(min(lateness, expected), -0.5 * dt / _PERIOD_WEIGHT)
-        self.period = period = expected + _PERIOD_WEIGHT * change
+        bounded_lateness = max(min(lateness, expected_period), -0.5 * dt / _PERIOD_WEIGHT)
+        self.period = period = expected_period + _PERIOD_WEIGHT * bounded_lateness
         self.plan_dt = period + lateness
         self._lateness_share = min(lateness / period, 1.0)
 

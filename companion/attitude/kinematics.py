@@ -107,14 +107,14 @@ def heading_of(a: float, w: float, z: float) -> float:
     return 4.0 * atan(z / (w + a if w >= 0.0 else w - a))
 
 
-def law_weight(cosine: float, cos_recovery: float, slope: float) -> float:
+def law_weight(cosine: float, cos_recovery: float, recovery_slope: float) -> float:
     """Weight of the law beyond the recovery angle; the rest is the weight of the rotation to level.
 
     The weight falls smoothly from 1 at the recovery angle to 0 at 10° more tilt
     (`limits.RECOVERY_BLEND_ANGLE`). The formula is not valid below the recovery angle. `cosine` is
-    cos(tilt), `slope` is `Constants.recovery_slope`.
+    cos(tilt), `recovery_slope` is `Constants.recovery_slope`.
     """
-    blend = 1.0 + slope * (cosine - cos_recovery)
+    blend = 1.0 + recovery_slope * (cosine - cos_recovery)
     if blend <= 0.0:
         return 0.0
     return blend * blend * (3.0 - 2.0 * blend)

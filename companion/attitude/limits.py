@@ -86,7 +86,7 @@ class Constants(NamedTuple):
         tilt_rate_weight: 1/max_tilt_rate², s²/rad², 0 without a limit: a tilt rate exceeds the
             limit if weight·rate² > 1.
         speed_weight: 1/max_speed², s², 0 without a limit: used like `tilt_rate_weight`.
-        longest_target: largest length of target coefficients: sin of the largest tilt.
+        max_target_norm: largest length of target coefficients: sin of the largest tilt.
         cos_recovery: cosine of the recovery angle.
         recovery_slope: 1/(cos(recovery angle) − cos(recovery angle + RECOVERY_BLEND_ANGLE)).
     """
@@ -98,7 +98,7 @@ class Constants(NamedTuple):
     max_speed: float
     tilt_rate_weight: float
     speed_weight: float
-    longest_target: float
+    max_target_norm: float
     cos_recovery: float
     recovery_slope: float
 
@@ -142,7 +142,7 @@ def make_constants(
         max_speed=max_speed,
         tilt_rate_weight=limits.tilt_rate**-2,
         speed_weight=max_speed**-2,
-        longest_target=sin(max_tilt),
+        max_target_norm=sin(max_tilt),
         cos_recovery=cos(recovery_angle),
         recovery_slope=1.0 / (cos(recovery_angle) - cos(recovery_angle + RECOVERY_BLEND_ANGLE)),
     )

@@ -49,7 +49,7 @@ class ModelFollowingPlanner:
     def __init__(self, constants: Constants, response: RateLoopResponse) -> None:
         self._feed_forward = FeedForward(constants, response, LONGEST_PERIOD)
         self._sample_hold = SampleHold()
-        self._started = False
+        self._plan_started = False
         self._target: Target | None = None
         self.plan_in_effect: PlannedTilt | None = None
         self.retune(constants)
@@ -74,10 +74,10 @@ class ModelFollowingPlanner:
         """
         w, x, y, z = q = normalised(q)
         a_squared, _, _ = half_tilt_products(w, x, y, z)
-        plausible = plausible_rates(body_rates)
-        self._started = 2.0 * a_squared - 1.0 >= self._constants.cos_recovery
-        if self._started:
-            self._start(q, plausible)
+        usable_body_rates = plausible_rates(body_rates)
+        self._plan_started = 2.0 * a_squared - 1.0 >= self._constants.cos_recovery
+        if self._plan_started:
+            self._start(q, usable_body_rates)
 
     def _start(self, q: Quaternion, body_rates: BodyRates | None) -> None:
         self._sample_hold.restart()
@@ -92,7 +92,7 @@ class ModelFollowingPlanner:
                 and if its tilt is beyond the recovery angle.
             age: time from the attitude target to the newest sample, s.
         """
-        if not (self._started and is_unit(q)):
+        if not (self._plan_started and is_unit(q)):
             return
         w, x, y, z = normalised(q)
         a_squared, _, _ = half_tilt_products(w, x, y, z)
@@ -114,36 +114,36 @@ class ModelFollowingPlanner:
             InvalidPeriodError: `dt` is not positive and finite.
         """
         require_period(dt)
-        constants, forward = self._constants, self._feed_forward
+        constants, feed_forward = self._constants, self._feed_forward
         w, x, y, z = q = normalised(q)
-        target = limited_target(target, constants.longest_target)
+        target = limited_target(target, constants.max_target_norm)
         a_squared, ax, ay = half_tilt_products(w, x, y, z)
         cosine = 2.0 * a_squared - 1.0
-        plausible = plausible_rates(body_rates)
+        usable_body_rates = plausible_rates(body_rates)
         if cosine < constants.cos_recovery:
-            self._started = False
+            self._plan_started = False
             self.plan_in_effect = None
             return BodyRates(*first_order(q, target, dt, constants))
-        if not self._started:
-            self._start(q, plausible)
-            self._started = True
+        if not self._plan_started:
+            self._start(q, usable_body_rates)
+            self._plan_started = True
         dt = min(max(SHORTEST_PERIOD, dt), LONGEST_PERIOD)
         north, east, heading = -2.0 * ay, 2.0 * ax, heading_of(sqrt(a_squared), w, z)
         self._sample_hold.note_sample(dt)
-        tilt_plan, yaw_plan = forward.plans.in_effect(self._sample_hold.lateness)
+        tilt_plan, yaw_plan = feed_forward.plans.in_effect(self._sample_hold.lateness)
         self.plan_in_effect = tilt_plan
         v_north, v_east, turn_rate = self._feedback(tilt_plan, yaw_plan, north, east, heading)
         feedback_roll, feedback_pitch, feedback_yaw = speed_to_rates(
             w, z, ax, ay, 1.0 / a_squared, 1.0 / cosine, v_east, -v_north
         )
-        if plausible is not None:  # an unpredicted yaw rate is assumed to last this long
-            unpredicted_yaw_rate = plausible.yaw - yaw_plan.body_yaw_rate
-            heading += (forward.dead_time + forward.lag) * unpredicted_yaw_rate
+        if usable_body_rates is not None:  # an unpredicted yaw rate is assumed to last this long
+            unpredicted_yaw_rate = usable_body_rates.yaw - yaw_plan.body_yaw_rate
+            heading += (feed_forward.dead_time + feed_forward.lag) * unpredicted_yaw_rate
         start_heading = heading + (tilt_plan.heading_hold_angle - yaw_plan.body_yaw)
-        lead = forward.target_frame.lead(start_heading, forward.plans)
+        lead = feed_forward.target_frame.lead(start_heading, feed_forward.plans)
         roll, pitch, yaw = self._advance(target, start_heading, feedback_yaw + turn_rate)
         roll, pitch = self._sample_hold.rates(roll, pitch)
-        lead = 0.5 * (lead + forward.target_frame.lead(start_heading, forward.plans))
+        lead = 0.5 * (lead + feed_forward.target_frame.lead(start_heading, feed_forward.plans))
         roll, pitch = roll + feedback_roll, pitch + feedback_pitch
         roll, pitch = rotate_to_heading(cos(lead), sin(lead), roll, pitch)
         return BodyRates(
@@ -158,19 +158,23 @@ class ModelFollowingPlanner:
         If the newest sample came late, the plan first follows the previous target for that delay,
         because the new target was not known then.
         """
-        hold, forward = self._sample_hold, self._feed_forward
-        previous, self._target = self._target, target
-        if previous is None or previous == target or hold.lateness < SHORTEST_PERIOD:
-            return forward.advance(target, start_heading, yaw_feedback, hold.plan_dt)
-        lateness, remaining = hold.lateness, hold.plan_dt - hold.lateness
-        first = forward.advance(previous, start_heading, yaw_feedback, lateness)
-        roll_rate, pitch_rate, yaw_rate = forward.advance(
-            target, start_heading, yaw_feedback, remaining
+        sample_hold, feed_forward = self._sample_hold, self._feed_forward
+        previous_target, self._target = self._target, target
+        if (
+            previous_target is None
+            or previous_target == target
+            or sample_hold.lateness < SHORTEST_PERIOD
+        ):
+            return feed_forward.advance(target, start_heading, yaw_feedback, sample_hold.plan_dt)
+        lateness, remaining_dt = sample_hold.lateness, sample_hold.plan_dt - sample_hold.lateness
+        first_rates = feed_forward.advance(previous_target, start_heading, yaw_feedback, lateness)
+        roll_rate, pitch_rate, yaw_rate = feed_forward.advance(
+            target, start_heading, yaw_feedback, remaining_dt
         )
-        share = lateness / hold.plan_dt
+        first_share = lateness / sample_hold.plan_dt
         return (
-            roll_rate + share * (first[0] - roll_rate),
-            pitch_rate + share * (first[1] - pitch_rate),
+            roll_rate + first_share * (first_rates[0] - roll_rate),
+            pitch_rate + first_share * (first_rates[1] - pitch_rate),
             yaw_rate,
         )
 
@@ -187,10 +191,10 @@ class ModelFollowingPlanner:
         Both speeds are 0 in the first dead time after the start, when no plan has taken effect yet.
         """
         speed_north = speed_east = turn_rate = 0.0
-        forward = self._feed_forward
-        if forward.plans.time >= forward.dead_time:
+        feed_forward = self._feed_forward
+        if feed_forward.plans.time >= feed_forward.dead_time:
             speed_north = self._gain * (tilt_plan.north - north)
             speed_east = self._gain * (tilt_plan.east - east)
-        if forward.plans.time >= forward.yaw.dead_time:
+        if feed_forward.plans.time >= feed_forward.yaw.dead_time:
             turn_rate = self._yaw_gain * wrap_angle(yaw_plan.heading - heading)
         return speed_north, speed_east, turn_rate

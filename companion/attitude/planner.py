@@ -82,7 +82,7 @@ class LawPlanner:
         if not 0.0 < dt < inf:  # the check of `require_period`, without the cost of a call
             require_period(dt)
         if target is not self._last_target:  # one target serves many samples; a tuple cannot change
-            self._limited_target = limited_target(target, self.constants.longest_target)
+            self._limited_target = limited_target(target, self.constants.max_target_norm)
             self._last_target = target if isinstance(target, tuple) else _NO_TARGET
         rates = self.law(normalised(q), self._limited_target, dt, self.constants)
         return _make_body_rates(BodyRates, rates)

@@ -17,9 +17,9 @@ def constants_of(
     Raises:
         TypeError: there is an option that the planner `name` does not take.
     """
-    unknown = [option for option in options if option != "recovery_angle"]
-    if unknown:
-        raise TypeError(f"planner {name!r} does not take the option {unknown[0]!r}")
+    unknown_options = [option for option in options if option != "recovery_angle"]
+    if unknown_options:
+        raise TypeError(f"planner {name!r} does not take the option {unknown_options[0]!r}")
     return make_constants(gain, yaw_gain, limits, **options)
 
 

@@ -18,7 +18,7 @@ class PluginPlanner:
 
     def __init__(self, planner: Planner, limits: Limits) -> None:
         self._planner = planner
-        self._code = planner.law if isinstance(planner, LawPlanner) else planner
+        self._user_code = planner.law if isinstance(planner, LawPlanner) else planner
         self._tilt_rate, self._yaw_rate = limits.tilt_rate, limits.yaw_rate
 
     def rates(
@@ -31,7 +31,7 @@ class PluginPlanner:
                 finite.
             UserCodeError: the planner raised another error, or did not return three numbers.
         """
-        with naming_user_code("planner", self._code, AttitudeError):
+        with naming_user_code("planner", self._user_code, AttitudeError):
             roll, pitch, yaw = self._planner.rates(q, target, dt, body_rates)
             finite = isfinite(roll) and isfinite(pitch) and isfinite(yaw)
         if not finite:
@@ -40,10 +40,10 @@ class PluginPlanner:
 
     def note_attitude_target(self, q: Quaternion, age: float) -> None:
         """See `Planner.note_attitude_target`; raises UserCodeError if the planner raises."""
-        with naming_user_code("planner", self._code):
+        with naming_user_code("planner", self._user_code):
             self._planner.note_attitude_target(q, age)
 
     def reset(self, q: Quaternion, body_rates: BodyRates | None = None) -> None:
         """See `Planner.reset`; raises UserCodeError if the planner raises."""
-        with naming_user_code("planner", self._code):
+        with naming_user_code("planner", self._user_code):
             self._planner.reset(q, body_rates)

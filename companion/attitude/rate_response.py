@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import atan2, hypot, inf, pi, sqrt
 
-_LONGEST_TIME = 1.0
+_LONGEST_LAG_OR_DEAD_TIME = 1.0
 """Longest lag, dead time or lead that is accepted, s."""
 _SMALLEST_LAG = 1e-3
 """Smallest lag that `model-following` computes with, s."""
@@ -98,8 +98,8 @@ class RateLoopResponse:
 
 
 def _check_time(name: str, value: float) -> None:
-    if not 0.0 <= value <= _LONGEST_TIME:
-        raise ValueError(f"{name} must be from 0 to {_LONGEST_TIME:g} s, not {value}")
+    if not 0.0 <= value <= _LONGEST_LAG_OR_DEAD_TIME:
+        raise ValueError(f"{name} must be from 0 to {_LONGEST_LAG_OR_DEAD_TIME:g} s, not {value}")
 
 
 def _check_positive(name: str, value: float) -> None:

@@ -112,8 +112,8 @@ class ReferenceModel:
 
     def start_at(self, c: Coefficients, speed: Coefficients) -> None:
         """Start at `c`, shortened to the norm `_LARGEST_START_NORM` at most, with `speed` (1/s)."""
-        length = hypot(c.north, c.east)
-        scale = _LARGEST_START_NORM / length if length > _LARGEST_START_NORM else 1.0
+        norm = hypot(c.north, c.east)
+        scale = _LARGEST_START_NORM / norm if norm > _LARGEST_START_NORM else 1.0
         self.north, self.east = scale * c.north, scale * c.east
         self.speed_north, self.speed_east = self._v_north, self._v_east = speed
         self._slope_north = self._slope_east = 0.0
@@ -147,14 +147,14 @@ class ReferenceModel:
         north, east = self.north, self.east
         self._choose_v(target, dt)
         lag = self._lag
-        change, self.speed_north, self._slope_north = lag.after(
+        north_change, self.speed_north, self._slope_north = lag.after(
             self.speed_north, self._slope_north, self._v_north, dt
         )
-        self.north += change
-        change, self.speed_east, self._slope_east = lag.after(
+        self.north += north_change
+        east_change, self.speed_east, self._slope_east = lag.after(
             self.speed_east, self._slope_east, self._v_east, dt
         )
-        self.east += change
+        self.east += east_change
         self._limit_tilt(north, east, dt)
 
     def _choose_v(self, target: Target, dt: float) -> None:
@@ -190,9 +190,9 @@ class ReferenceModel:
             dt: duration of the step, s.
         """
         length = hypot(self.north, self.east)
-        if length <= self._constants.longest_target:
+        if length <= self._constants.max_target_norm:
             return
-        max_norm = max(self._constants.longest_target, hypot(north, east))
+        max_norm = max(self._constants.max_target_norm, hypot(north, east))
         if length > max_norm:
             self.north *= max_norm / length
             self.east *= max_norm / length

@@ -130,15 +130,17 @@ def limited_target(target: Target, max_norm: float) -> Target:
         if not isinstance(target, Target):  # a plain tuple is accepted
             target = Target(*target)
         north, east, heading, heading_rate = target
-        square = 0.0 + north * north + east * east  # an int too large for a float raises
-        is_usable = -inf < square + heading < inf and abs(heading_rate) <= LARGEST_HEADING_RATE
+        norm_squared = 0.0 + north * north + east * east  # an int too large for a float raises
+        is_usable = (
+            -inf < norm_squared + heading < inf and abs(heading_rate) <= LARGEST_HEADING_RATE
+        )
     except (TypeError, ValueError, OverflowError) as error:
         raise InvalidTargetError(f"a target is three or four numbers: {error}") from error
     if not is_usable:
         raise InvalidTargetError(f"target is not finite, or far too large: {target}")
-    if square <= max_norm * max_norm and -pi < heading <= pi:
+    if norm_squared <= max_norm * max_norm and -pi < heading <= pi:
         return target
-    scale = min(1.0, max_norm / sqrt(square)) if square > 0.0 else 1.0
+    scale = min(1.0, max_norm / sqrt(norm_squared)) if norm_squared > 0.0 else 1.0
     return Target(scale * north, scale * east, wrap_angle(heading), heading_rate)
 
 

@@ -44,10 +44,10 @@ class HeadingModel:
     def advance(self, target: Target, dt: float) -> None:
         """Advance by `dt` seconds towards an admissible target."""
         wanted_v = self._gain * wrap_angle(target.heading - self.heading) + target.heading_rate
-        change = clamp(wanted_v, self._max_rate) - self._v
-        v = self._v = self._v + clamp(change, self._acceleration * dt)
-        turn, self.turn_rate = first_order_step(self.turn_rate, v, self._lag, dt)
-        self.heading += turn
+        v_change = clamp(wanted_v, self._max_rate) - self._v
+        v = self._v = self._v + clamp(v_change, self._acceleration * dt)
+        heading_change, self.turn_rate = first_order_step(self.turn_rate, v, self._lag, dt)
+        self.heading += heading_change
 
 
 class YawModel:
@@ -70,13 +70,15 @@ class YawModel:
 
     def advance(self, command: float, dt: float) -> None:
         """Advance by `dt` seconds in which the yaw rate `command` (rad/s) is sent."""
-        previous, max_change = self._slewed_rate, self._acceleration * dt
+        previous_rate, max_change = self._slewed_rate, self._acceleration * dt
         slewed_rate = self._slewed_rate = (
-            previous + clamp(command - previous, max_change) if max_change < inf else command
+            previous_rate + clamp(command - previous_rate, max_change)
+            if max_change < inf
+            else command
         )
         # Uses the slewed rate at the end of the sample, which is at most half a sample early.
-        turn, self.rate = first_order_step(self.rate, slewed_rate, self._lag, dt)
-        self.yaw_angle += turn
+        yaw_change, self.rate = first_order_step(self.rate, slewed_rate, self._lag, dt)
+        self.yaw_angle += yaw_change
 
 
 LARGEST_LEAD = radians(45.0)
@@ -88,8 +90,8 @@ OLDEST_ATTITUDE_TARGET = 0.25
 _TARGET_TO_BODY_DELAY = 0.008
 """Dead time of roll and pitch from ArduPilot's attitude target to the body, s (measured)."""
 
-_ROWS_PER_DROP = 128
-"""Number of the oldest rows of a `TargetFrame` that are dropped together."""
+_TURNS_PER_DROP = 128
+"""Number of the oldest turns of a `TargetFrame` that are dropped together."""
 
 
 class TargetFrame:
@@ -105,14 +107,14 @@ class TargetFrame:
         self._lead_time = response.lead_time
         self._delay = max(0.0, response.tilt.dead_time - _TARGET_TO_BODY_DELAY)
         self._times: list[float] = []
-        self._turns: list[float] = []
+        self._target_turns: list[float] = []
         self.forget()
 
     def forget(self) -> None:
         """Forget the heading of the attitude target."""
-        self._time, self._reported_at = 0.0, -inf
+        self._time, self._target_time = 0.0, -inf
         self._heading_offset = self._slewed_rate = 0.0
-        self._times[:], self._turns[:] = [0.0], [0.0]
+        self._times[:], self._target_turns[:] = [0.0], [0.0]
 
     def note_heading(self, heading: float, age: float) -> None:
         """Note the attitude target's heading (rad), `age` seconds older than the newest sample.
@@ -121,26 +123,28 @@ class TargetFrame:
         """
         if not 0.0 <= age <= OLDEST_ATTITUDE_TARGET:
             return
-        self._reported_at = self._time - age
-        self._heading_offset = heading - self._turn_until(self._reported_at - self._delay)
+        self._target_time = self._time - age
+        self._heading_offset = heading - self._turn_until(self._target_time - self._delay)
 
     def advance(self, yaw_rate: float, heading_hold_rate: float, dt: float) -> None:
         """Advance by `dt` seconds in which `yaw_rate` (rad/s) is sent.
 
         `heading_hold_rate` is the part of `yaw_rate` that holds the heading.
         """
-        if self._reported_at == -inf:
+        if self._target_time == -inf:
             return  # no attitude target was received, so there is no heading to advance
         self._slewed_rate += clamp(yaw_rate - self._slewed_rate, self._acceleration * dt)
         self._time += dt
         times = self._times
         times.append(self._time)
-        self._turns.append(self._turns[-1] + (self._slewed_rate - heading_hold_rate) * dt)
+        self._target_turns.append(
+            self._target_turns[-1] + (self._slewed_rate - heading_hold_rate) * dt
+        )
         if (
-            len(times) > _ROWS_PER_DROP
-            and times[_ROWS_PER_DROP] < self._time - OLDEST_ATTITUDE_TARGET - self._delay
+            len(times) > _TURNS_PER_DROP
+            and times[_TURNS_PER_DROP] < self._time - OLDEST_ATTITUDE_TARGET - self._delay
         ):
-            del times[:_ROWS_PER_DROP], self._turns[:_ROWS_PER_DROP]
+            del times[:_TURNS_PER_DROP], self._target_turns[:_TURNS_PER_DROP]
 
     def lead(self, start_heading: float, plans: PlanHistory) -> float:
         """Predicted yaw lead of the attitude target over the body when rates sent now act, rad.
@@ -155,24 +159,24 @@ class TargetFrame:
         """
         target_heading = self.heading()
         if target_heading is not None:
-            change = plans.predicted_heading_change(plans.time, plans.tilt.newest)
-            lead = wrap_angle(target_heading - start_heading - change.angle)
+            heading_change = plans.predicted_heading_change(plans.time, plans.tilt.newest)
+            lead = wrap_angle(target_heading - start_heading - heading_change.angle)
             if abs(lead) <= LARGEST_LEAD:
                 return lead
         return 0.0 if self._lead_time == 0.0 else plans.predicted_yaw_change(self._lead_time)
 
     def heading(self) -> float | None:
         """Predicted heading of the attitude target when rates sent now act, rad; None: unknown."""
-        if self._time - self._reported_at > OLDEST_ATTITUDE_TARGET:
+        if self._time - self._target_time > OLDEST_ATTITUDE_TARGET:
             return None
-        return self._heading_offset + self._turns[-1]
+        return self._heading_offset + self._target_turns[-1]
 
     def _turn_until(self, time: float) -> float:
         """Turn of the attitude target by the rates sent until `time`, rad; linear interpolation."""
-        times, turns = self._times, self._turns
+        times, turns = self._times, self._target_turns
         if time < times[0]:
             return turns[0]
         if time >= times[-1]:
             return turns[-1]
-        later, share = locate_time(times, time)
-        return turns[later - 1] + share * (turns[later] - turns[later - 1])
+        later_index, fraction = locate_time(times, time)
+        return turns[later_index - 1] + fraction * (turns[later_index] - turns[later_index - 1])

@@ -15,11 +15,16 @@ from numpy.typing import ArrayLike
 from companion.attitude.kinematics import half_tilt_products
 from companion.attitude.planner import LAW_NAMES, Law, LawPlanner, Planner
 from companion.attitude.representation import require_period
-from companion.batch.checks import as_rows, compiled_check, limited_targets, unit_quaternions
+from companion.batch.checks import (
+    as_float_array,
+    compiled_check,
+    limited_targets,
+    unit_quaternions,
+)
 from companion.batch.loops import Array, Loops, compiled_loops, plain_loops
 from companion.extras import require
 
-COMPILE_FROM = 600_000
+MIN_STEPS_TO_COMPILE = 600_000
 """Steps of all vehicles together above which compiling is faster.
 
 Compiling costs 2 to 3 s once in a process, including the import of numba. A step in Python costs
@@ -62,8 +67,8 @@ def rates(
         targets: (4, n) coefficients north and east, heading in rad, heading rate in rad/s.
         dt: the sample period, s; positive and finite.
         compiled: True: numba. False: Python. None: numba if it is installed, this call has at least
-            `COMPILE_FROM` steps, and the law is a function at the top of a module. In a loop of
-            your own pass True.
+            `MIN_STEPS_TO_COMPILE` steps, and the law is a function at the top of a module. In a
+            loop of your own pass True.
 
     Returns:
         (3, n) roll, pitch, yaw in rad/s, body FRD. The results of numba and Python differ by about
@@ -80,7 +85,7 @@ def rates(
     """
     planner, q, targets, loops = _checked_arguments(planner, q, targets, dt, 1, compiled)
     body_rates = np.empty((3, q.shape[1]))
-    loops.apply(q, targets, body_rates, dt, planner.constants)
+    loops.apply_law(q, targets, body_rates, dt, planner.constants)
     return body_rates
 
 
@@ -160,25 +165,25 @@ def _checked_arguments(
             f"each made by make_planner), not {type(planner).__name__}; make one planner for each "
             "vehicle, and call its rates() for each sample"
         )
-    q, targets = as_rows(q, "q"), as_rows(targets, "targets")
+    q, targets = as_float_array(q, "q"), as_float_array(targets, "targets")
     if q.shape != targets.shape:
         raise ValueError(f"{q.shape[1]} attitudes, but {targets.shape[1]} targets")
     require_period(dt)
     if index(steps) < 0:
         raise ValueError(f"steps must not be negative, not {steps}")
     if compiled is None:
-        worth_compiling = q.shape[1] * steps >= COMPILE_FROM
+        worth_compiling = q.shape[1] * steps >= MIN_STEPS_TO_COMPILE
         compiled = worth_compiling and can_compile() and _is_plain_function(planner.law)
-    longest_target = planner.constants.longest_target
+    max_target_norm = planner.constants.max_target_norm
     if compiled:
         require("numba", "study", "a compiled batch")
         _require_plain_function(planner.law)
         loops = compiled_loops(planner.law)
-        if compiled_check()(q, targets, longest_target):
+        if compiled_check()(q, targets, max_target_norm):
             return planner, q, targets, loops
     else:
         loops = plain_loops(planner.law)
-    return planner, unit_quaternions(q), limited_targets(targets, longest_target), loops
+    return planner, unit_quaternions(q), limited_targets(targets, max_target_norm), loops
 
 
 def _is_plain_function(law: Law) -> bool:
@@ -211,10 +216,10 @@ def _final_attitudes(
 ) -> Array:
     """The attitudes (4, n) after all steps, computed block by block."""
     final_q = np.empty_like(q)
-    blocks = max(1, ceil(q.shape[1] / _BLOCK_SIZE))
-    block_size = _CACHE_LINE * max(1, ceil(q.shape[1] / blocks / _CACHE_LINE))
-    for begin in range(0, q.shape[1], block_size):
-        block = slice(begin, min(begin + block_size, q.shape[1]))
+    block_count = max(1, ceil(q.shape[1] / _BLOCK_SIZE))
+    block_size = _CACHE_LINE * max(1, ceil(q.shape[1] / block_count / _CACHE_LINE))
+    for first_vehicle in range(0, q.shape[1], block_size):
+        block = slice(first_vehicle, min(first_vehicle + block_size, q.shape[1]))
         even_q, odd_q, block_targets, block_rates = _aligned_arrays(block.stop - block.start)
         even_q[...] = q[:, block]
         block_targets[...] = targets[:, block]
@@ -228,8 +233,8 @@ def _aligned_arrays(count: int) -> tuple[Array, Array, Array, Array]:
 
     Separate or unaligned arrays make a step up to a quarter slower.
     """
-    rows = 15
-    memory = np.empty(rows * count + _CACHE_LINE)
-    first = -(memory.ctypes.data // memory.itemsize) % _CACHE_LINE
-    aligned = memory[first : first + rows * count].reshape(rows, count)
+    row_count = 15
+    memory = np.empty(row_count * count + _CACHE_LINE)
+    first_aligned = -(memory.ctypes.data // memory.itemsize) % _CACHE_LINE
+    aligned = memory[first_aligned : first_aligned + row_count * count].reshape(row_count, count)
     return aligned[0:4], aligned[4:8], aligned[8:12], aligned[12:15]

@@ -21,7 +21,7 @@ _UNIT_TOLERANCE = 1e-14
 """Largest deviation of a squared norm from 1 at which a quaternion is not normalised again."""
 
 
-def as_rows(values: ArrayLike, name: str) -> Array:
+def as_float_array(values: ArrayLike, name: str) -> Array:
     """Convert `values` to a C-contiguous float array (4, n); messages call it `name`.
 
     Raises:
@@ -35,28 +35,28 @@ def as_rows(values: ArrayLike, name: str) -> Array:
 
 @cache
 def compiled_check() -> Any:
-    """`all_fit`, compiled. In numpy the checks would take as long as a compiled law."""
-    return Compiler({}).compile_loop(all_fit)
+    """`all_usable`, compiled. In numpy the checks would take as long as a compiled law."""
+    return Compiler({}).compile_loop(all_usable)
 
 
-def all_fit(q: Array, targets: Array, max_norm: float) -> bool:
+def all_usable(q: Array, targets: Array, max_norm: float) -> bool:
     """Whether no quaternion needs normalising and no target needs limiting, for n vehicles.
 
     `q` and `targets` are (4, n); `max_norm` is the largest norm of a target's coefficients.
     Conditions are joined by `&` and counted, because only a loop without branches is vectorised.
     """
-    unfit_count = 0
+    refused_count = 0
     for i in range(q.shape[1]):
         norm_square = q[0, i] * q[0, i] + q[1, i] * q[1, i] + q[2, i] * q[2, i] + q[3, i] * q[3, i]
         length_square = targets[0, i] * targets[0, i] + targets[1, i] * targets[1, i]
-        fits = (
+        is_usable = (
             (abs(norm_square - 1.0) <= _UNIT_TOLERANCE)
             & (length_square <= max_norm * max_norm)
             & (abs(targets[2, i]) < pi)
             & (abs(targets[3, i]) <= LARGEST_HEADING_RATE)
         )
-        unfit_count += 0 if fits else 1
-    return unfit_count == 0
+        refused_count += 0 if is_usable else 1
+    return refused_count == 0
 
 
 def unit_quaternions(q: Array) -> Array:
@@ -85,10 +85,12 @@ def limited_targets(targets: Array, max_norm: float) -> Array:
     """
     north, east, heading, heading_rate = targets
     with np.errstate(over="ignore", invalid="ignore"):  # such a target is refused below
-        fits = north * north + east * east <= max_norm * max_norm
-    fits &= (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
+        is_within_limits = north * north + east * east <= max_norm * max_norm
+    is_within_limits &= (
+        (heading > -pi) & (heading <= pi) & (np.abs(heading_rate) <= LARGEST_HEADING_RATE)
+    )
     limited = targets.copy()
-    for i in np.flatnonzero(~fits):
+    for i in np.flatnonzero(~is_within_limits):
         try:
             limited[:, i] = limited_target(Target(*targets[:, i].tolist()), max_norm)
         except InvalidTargetError as error:

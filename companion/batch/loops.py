@@ -1,7 +1,7 @@
 """The loops over vehicles and samples around a law, in Python or compiled.
 
 Compiled inner loops are vectorised. To allow that, they run over whole C-contiguous arrays, from 0
-to the end, and do not write to arrays that they read. The law (`apply`) and the rotation
+to the end, and do not write to arrays that they read. The law (`apply_law`) and the rotation
 (`rotate_all`) have a loop each, because one loop for both needs more registers than a processor
 has.
 """
@@ -25,14 +25,14 @@ Array = NDArray[np.float64]
 _ARCTANGENT: Substitutes = {math.atan: series.arctangent}
 _ALL_SERIES: Substitutes = {**_ARCTANGENT, rotation.cos_and_sinc: series.cos_and_sinc}
 
-_Apply = Callable[[Array, Array, Array, float, Constants], None]
+_ApplyLaw = Callable[[Array, Array, Array, float, Constants], None]
 _RotateAll = Callable[[Array, Array, Array, float], None]
 
 
 class Loops(NamedTuple):
     """Functions that apply one law to n vehicles, compiled or in Python."""
 
-    apply: _Apply
+    apply_law: _ApplyLaw
     """(q, targets, rates, dt, constants): fills rates (3, n)."""
     advance: Callable[[Array, Array, Array, Array, float, Constants, int], None]
     """(even_q, odd_q, targets, rates, dt, constants, steps): advances the attitudes. even_q (4, n)
@@ -54,16 +54,16 @@ def _compiler(any_angle: bool) -> Compiler:
 def compiled_loops(law: Law, any_angle: bool = False) -> Loops:
     """Compile the loops of `law`; faster without `any_angle`, but only for turns up to 1 rad."""
     compiler = _compiler(any_angle)
-    one_law = compiler.compile_function(law)
+    vehicle_law = compiler.compile_function(law)
 
-    def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
+    def apply_law(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         for i in range(q.shape[1]):
             attitude = q[0, i], q[1, i], q[2, i], q[3, i]
             target = targets[0, i], targets[1, i], targets[2, i], targets[3, i]
-            rates[0, i], rates[1, i], rates[2, i] = one_law(attitude, target, dt, constants)
+            rates[0, i], rates[1, i], rates[2, i] = vehicle_law(attitude, target, dt, constants)
 
     return _sample_loops(
-        compiler.compile_loop(apply),
+        compiler.compile_loop(apply_law),
         _compiled_rotation(any_angle),
         compiler.compile_loop,
         any_angle,
@@ -90,22 +90,22 @@ def _compiled_rotation(any_angle: bool) -> _RotateAll:
 @cache
 def plain_loops(law: Law) -> Loops:
     """Loops that call `law` for one vehicle after the other, on floats as in flight."""
-    one_law: Any = law
+    vehicle_law: Any = law
     rotate: Any = rotation.after_constant_rates
 
-    def apply(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
+    def apply_law(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         vehicles = zip(q.T.tolist(), targets.T.tolist(), strict=True)
-        rates[...] = np.transpose([one_law(*vehicle, dt, constants) for vehicle in vehicles])
+        rates[...] = np.transpose([vehicle_law(*vehicle, dt, constants) for vehicle in vehicles])
 
     def rotate_all(q: Array, rates: Array, next_q: Array, dt: float) -> None:
         vehicles = zip(q.T.tolist(), rates.T.tolist(), strict=True)
         next_q[...] = np.transpose([rotate(*vehicle, dt) for vehicle in vehicles])
 
-    return _sample_loops(apply, rotate_all, lambda loop: loop, any_angle=True)
+    return _sample_loops(apply_law, rotate_all, lambda loop: loop, any_angle=True)
 
 
 def _sample_loops(
-    apply: _Apply, rotate_all: _RotateAll, compiled: Callable[[Any], Any], any_angle: bool
+    apply_law: _ApplyLaw, rotate_all: _RotateAll, compiled: Callable[[Any], Any], any_angle: bool
 ) -> Loops:
     """Make the loops over samples from the loops over vehicles.
 
@@ -122,17 +122,17 @@ def _sample_loops(
         steps: int,
     ) -> None:
         for _ in range(steps // 2):
-            apply(even_q, targets, rates, dt, constants)
+            apply_law(even_q, targets, rates, dt, constants)
             rotate_all(even_q, rates, odd_q, dt)
-            apply(odd_q, targets, rates, dt, constants)
+            apply_law(odd_q, targets, rates, dt, constants)
             rotate_all(odd_q, rates, even_q, dt)
         if steps % 2:
-            apply(even_q, targets, rates, dt, constants)
+            apply_law(even_q, targets, rates, dt, constants)
             rotate_all(even_q, rates, odd_q, dt)
 
     def record(q: Array, targets: Array, rates: Array, dt: float, constants: Constants) -> None:
         for k in range(rates.shape[0]):
-            apply(q[k], targets, rates[k], dt, constants)
+            apply_law(q[k], targets, rates[k], dt, constants)
             rotate_all(q[k], rates[k], q[k + 1], dt)
 
-    return Loops(apply, compiled(advance), compiled(record), any_angle)
+    return Loops(apply_law, compiled(advance), compiled(record), any_angle)

@@ -92,22 +92,23 @@ def _response_arrays(axes: Sequence[AxisResponse]) -> tuple[Array, NDArray[np.in
         step (rad/s), and the 2x2 transition matrix of `Lag.transition`, row by row;
         (3,), dead times in steps.
     """
-    rows = []
+    response_rows = []
     for axis in (each.with_least_lag() for each in axes):
         max_change = axis.acceleration / STEP_HZ if isfinite(axis.acceleration) else _UNLIMITED
         transition = Lag(axis.lag, axis.sigma).transition(1.0 / STEP_HZ)
-        rows.append((axis.lag, axis.sigma, max_change, *transition))
-    return np.array(rows), np.array([round(axis.dead_time * STEP_HZ) for axis in axes])
+        response_rows.append((axis.lag, axis.sigma, max_change, *transition))
+    return np.array(response_rows), np.array([round(axis.dead_time * STEP_HZ) for axis in axes])
 
 
 @cache
 def _compiled(law: Law) -> Callable[..., Quaternion]:
     """Compile the flight of one vehicle under `law`."""
     compiler = Compiler({})
-    one_law = compiler.compile_function(law)
+    vehicle_law = compiler.compile_function(law)
     rotate = compiler.compile_function(after_constant_rates)
-    lag_response, limit = compiler.compile_function(lag_step), compiler.compile_function(clamp)
-    products = compiler.compile_function(half_tilt_products)
+    lag_response = compiler.compile_function(lag_step)
+    clamp_change = compiler.compile_function(clamp)
+    tilt_products = compiler.compile_function(half_tilt_products)
     dt = 1.0 / STEP_HZ
 
     def fly(
@@ -116,32 +117,32 @@ def _compiled(law: Law) -> Callable[..., Quaternion]:
         responses: Array,
         delays: NDArray[np.int64],
         constants: Constants,
-        steps: int,
+        steps_per_sample: int,
         coefficients: Array,
         commanded_rates: Array,
     ) -> Quaternion:
-        length = delays.max() + 1
-        commands = np.zeros((length, 3))  # ring buffer of the newest commands
-        slewed, actual, slopes, mean_rates = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+        buffer_size = delays.max() + 1
+        commands = np.zeros((buffer_size, 3))  # ring buffer of the newest commands
+        slewed_rates, rates, slopes, mean_rates = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
         k = 0
         for sample in range(targets.shape[0]):
             target = targets[sample, 0], targets[sample, 1], targets[sample, 2], targets[sample, 3]
-            _, ax, ay = products(q[0], q[1], q[2], q[3])
+            _, ax, ay = tilt_products(q[0], q[1], q[2], q[3])
             coefficients[sample, 0], coefficients[sample, 1] = -2.0 * ay, 2.0 * ax
-            roll, pitch, yaw = one_law(q, target, steps * dt, constants)
+            roll, pitch, yaw = vehicle_law(q, target, steps_per_sample * dt, constants)
             commanded_rates[sample, 0], commanded_rates[sample, 1] = roll, pitch
             commanded_rates[sample, 2] = yaw
-            for _ in range(steps):
-                slot = k % length
+            for _ in range(steps_per_sample):
+                slot = k % buffer_size
                 commands[slot, 0], commands[slot, 1], commands[slot, 2] = roll, pitch, yaw
                 for axis in range(3):
-                    delayed = commands[(k + length - delays[axis]) % length, axis]
+                    delayed = commands[(k + buffer_size - delays[axis]) % buffer_size, axis]
                     response = responses[axis]
-                    lag, sigma, slew = response[0], response[1], response[2]
-                    slewed[axis] += limit(delayed - slewed[axis], slew)
+                    lag, sigma, max_change = response[0], response[1], response[2]
+                    slewed_rates[axis] += clamp_change(delayed - slewed_rates[axis], max_change)
                     transition = response[3], response[4], response[5], response[6]
-                    angle, actual[axis], slopes[axis] = lag_response(
-                        actual[axis], slopes[axis], slewed[axis], dt, lag, sigma, transition
+                    angle, rates[axis], slopes[axis] = lag_response(
+                        rates[axis], slopes[axis], slewed_rates[axis], dt, lag, sigma, transition
                     )
                     mean_rates[axis] = angle / dt
                 q = rotate(q, (mean_rates[0], mean_rates[1], mean_rates[2]), dt)

@@ -18,13 +18,13 @@ LARGEST_SQUARE = 0.25
 
 
 def _polynomial_fit(
-    function: Callable[[NDArray[np.float64]], Any], largest: float, terms: int
+    function: Callable[[NDArray[np.float64]], Any], largest_argument: float, terms: int
 ) -> tuple[float, ...]:
     """Coefficients, constant first, of the polynomial through the Chebyshev points of [0, largest].
 
     The error of this polynomial is at most a small multiple of the error of the best polynomial.
     """
-    fit = Chebyshev.interpolate(function, terms - 1, domain=[0.0, largest])
+    fit = Chebyshev.interpolate(function, terms - 1, domain=[0.0, largest_argument])
     return tuple(float(c) for c in fit.convert(kind=Polynomial).coef)
 
 
@@ -39,10 +39,10 @@ def arctangent(t: float) -> float:
     u2 = u * u
     u4 = u2 * u2
     u6 = u4 * u2
-    low = _six_terms(u, u2, u4, *_ARCTANGENT[:6])
-    middle = _six_terms(u, u2, u4, *_ARCTANGENT[6:12])
-    high = _six_terms(u, u2, u4, *_ARCTANGENT[12:])
-    return t * (low + u6 * (middle + u6 * high))
+    low_terms = _six_terms(u, u2, u4, *_ARCTANGENT[:6])
+    middle_terms = _six_terms(u, u2, u4, *_ARCTANGENT[6:12])
+    high_terms = _six_terms(u, u2, u4, *_ARCTANGENT[12:])
+    return t * (low_terms + u6 * (middle_terms + u6 * high_terms))
 
 
 def cos_and_sinc(h_squared: float) -> tuple[float, float]:

@@ -15,9 +15,9 @@ from companion.batch.compiler import Compiler
 from companion.batch.loops import Array
 from companion.batch.rate_loop import StepFlight
 
-_SHORTEST_LOG, _LONGEST_LOG = log(0.02), log(2.0)
+_LOG_SHORTEST_CONSTANT, _LOG_LONGEST_CONSTANT = log(0.02), log(2.0)
 """Range in which the time constant is searched, as natural logarithms of seconds."""
-_GOLDEN_RATIO = 0.5 * (sqrt(5.0) - 1.0)
+_GOLDEN_SECTION = 0.5 * (sqrt(5.0) - 1.0)
 _SEARCH_STEPS = 17
 """Steps of the golden-section search, which narrows the range to 0.13 % of a time constant."""
 _MIN_STEP = 1e-3
@@ -54,20 +54,24 @@ def step_figures(flight: StepFlight, gain: float, period: float) -> StepFigures:
         gain: p of the ideal model, 1/s.
         period: time between two samples, s.
     """
-    measure, fit = _compiled()
-    figures = measure(
+    distances_and_rates, fit_time_constants = _compiled()
+    first_figures = distances_and_rates(
         flight.coefficients, flight.targets, flight.commanded_rates, 1.0 / gain, period
     )
-    return StepFigures(*figures, *fit(flight.coefficients, flight.targets, period))
+    return StepFigures(
+        *first_figures, *fit_time_constants(flight.coefficients, flight.targets, period)
+    )
 
 
 @cache
 def _compiled() -> tuple[Any, Any]:
     compiler = Compiler({})
-    return compiler.compile_function(_four_figures), compiler.compile_function(_time_constants)
+    return compiler.compile_function(_distances_and_rates), compiler.compile_function(
+        _time_constants
+    )
 
 
-def _four_figures(
+def _distances_and_rates(
     coefficients: Array, targets: Array, commanded_rates: Array, time_constant: float, period: float
 ) -> tuple[float, float, float, float]:
     """The first four figures of `StepFigures`; `time_constant` is that of the ideal model, s."""
@@ -104,13 +108,13 @@ def _time_constants(coefficients: Array, targets: Array, period: float) -> tuple
     The golden-section searches for north and east run together, because a processor computes two
     models in about the time of one.
     """
-    low, high = np.full(2, _SHORTEST_LOG), np.full(2, _LONGEST_LOG)
-    left, right, new_point, largest = np.empty(2), np.empty(2), np.empty(2), np.zeros(2)
+    low, high = np.full(2, _LOG_SHORTEST_CONSTANT), np.full(2, _LOG_LONGEST_CONSTANT)
+    left, right, new_point, max_target = np.empty(2), np.empty(2), np.empty(2), np.zeros(2)
     for axis in range(2):
-        left[axis] = high[axis] - _GOLDEN_RATIO * (high[axis] - low[axis])
-        right[axis] = low[axis] + _GOLDEN_RATIO * (high[axis] - low[axis])
+        left[axis] = high[axis] - _GOLDEN_SECTION * (high[axis] - low[axis])
+        right[axis] = low[axis] + _GOLDEN_SECTION * (high[axis] - low[axis])
         for k in range(targets.shape[0]):
-            largest[axis] = max(largest[axis], abs(targets[k, axis]))
+            max_target[axis] = max(max_target[axis], abs(targets[k, axis]))
     cost_left, cost_right, cost_new = np.empty(2), np.empty(2), np.empty(2)
     keep_left = np.empty(2, np.bool_)
     _sums_of_squares(coefficients, targets, left, period, cost_left)
@@ -120,11 +124,11 @@ def _time_constants(coefficients: Array, targets: Array, period: float) -> tuple
             keep_left[axis] = cost_left[axis] < cost_right[axis]
             if keep_left[axis]:
                 high[axis], right[axis], cost_right[axis] = right[axis], left[axis], cost_left[axis]
-                left[axis] = high[axis] - _GOLDEN_RATIO * (high[axis] - low[axis])
+                left[axis] = high[axis] - _GOLDEN_SECTION * (high[axis] - low[axis])
                 new_point[axis] = left[axis]
             else:
                 low[axis], left[axis], cost_left[axis] = left[axis], right[axis], cost_right[axis]
-                right[axis] = low[axis] + _GOLDEN_RATIO * (high[axis] - low[axis])
+                right[axis] = low[axis] + _GOLDEN_SECTION * (high[axis] - low[axis])
                 new_point[axis] = right[axis]
         _sums_of_squares(coefficients, targets, new_point, period, cost_new)
         for axis in range(2):
@@ -133,22 +137,22 @@ def _time_constants(coefficients: Array, targets: Array, period: float) -> tuple
             else:
                 cost_right[axis] = cost_new[axis]
     north, east = exp(0.5 * (low[0] + high[0])), exp(0.5 * (low[1] + high[1]))
-    return north if largest[0] > _MIN_STEP else nan, east if largest[1] > _MIN_STEP else nan
+    return north if max_target[0] > _MIN_STEP else nan, east if max_target[1] > _MIN_STEP else nan
 
 
 def _sums_of_squares(
-    coefficients: Array, targets: Array, logarithms: Array, period: float, sums: Array
+    coefficients: Array, targets: Array, log_time_constants: Array, period: float, sums: Array
 ) -> None:
     """Compute the sums of squared differences from first-order models, north and east.
 
     Args:
         coefficients: (N, 2), coefficients.
         targets: (N, 2), target coefficients.
-        logarithms: (2,), natural logarithms of the time constants in s.
+        log_time_constants: (2,), natural logarithms of the time constants in s.
         period: time between two samples, s.
         sums: (2,), the output.
     """
-    constant_north, constant_east = exp(logarithms[0]), exp(logarithms[1])
+    constant_north, constant_east = exp(log_time_constants[0]), exp(log_time_constants[1])
     north, east, total_north, total_east = coefficients[0, 0], coefficients[0, 1], 0.0, 0.0
     for k in range(1, coefficients.shape[0]):
         _, north = first_order_step(north, targets[k - 1, 0], constant_north, period)

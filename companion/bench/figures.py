@@ -34,8 +34,8 @@ def measure(senders: Mapping[str, Sender], rate_hz: float, seconds: float) -> di
 def print_table(title: str, names: Mapping[str, str], figures: Mapping[str, Any]) -> None:
     """Print a row for each program: its title from `names` and its figures from `figures`."""
     table = Table(title=title)
-    for heading in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
-        table.add_column(heading, justify="right" if heading else "left")
+    for column_title in ("", "p50 µs", "p99 µs", "max µs", "CPU %", "unanswered"):
+        table.add_column(column_title, justify="right" if column_title else "left")
     for key, name in names.items():
         row = figures[key]
         table.add_row(

@@ -24,7 +24,7 @@ CLOCKS = {"lockstep": True, "free": False}
 """Whether the vehicle runs in lockstep, by name of the clock; a vehicle with the clock `free` does
 not wait for setpoints."""
 
-_FLIGHTS = 3  # of which the quickest counts
+_MEASURED_FLIGHTS = 3  # of which the quickest counts
 _WARM_UP_S = 0.2  # hover of the flight that is not measured
 _LINK_DELAY_S = 0.0005
 
@@ -59,7 +59,7 @@ def run(seconds: float, as_json: bool, profile: bool = False) -> dict[str, Any]:
 def _measure(autopilot: str, lockstep: bool, seconds: float, profile: bool) -> dict[str, Any]:
     _fly_once(autopilot, lockstep, _WARM_UP_S)
     best = min(
-        (_fly_once(autopilot, lockstep, seconds) for _ in range(_FLIGHTS)),
+        (_fly_once(autopilot, lockstep, seconds) for _ in range(_MEASURED_FLIGHTS)),
         key=lambda flight: flight["cpu_s"],
     )
     if profile:
@@ -77,9 +77,9 @@ def _fly_once(autopilot: str, lockstep: bool, seconds: float) -> dict[str, Any]:
     vehicle = MockVehicle(
         config=path, lockstep=lockstep, delay_s=_LINK_DELAY_S, compiled=compiled, prearm_delay_s=0.2
     )
-    began = process_time()
+    start_time = process_time()
     summary = fly(config, vehicle)
-    cpu_s = process_time() - began
+    cpu_s = process_time() - start_time
     if summary.result != "ok":
         raise RuntimeError(f"the flight of {autopilot} failed: {summary.result}")
     return {

@@ -22,7 +22,7 @@ from companion.bench.sender import (
 )
 from companion.extras import require
 
-_YAW_RATE_WRAP = 8192  # STAMP_MODULUS of `mavsdk_program`
+_YAW_RATE_STAMP_MODULUS = 8192  # STAMP_MODULUS of `mavsdk_program`
 
 
 class _Program(NamedTuple):
@@ -45,7 +45,7 @@ _PROGRAMS = (
     _Program("companion", "companion", "companion_program"),
     _Program("pymavlink", "blocking pymavlink", "pymavlink_program"),
     _Program("companion_mavsdk", "companion by MAVSDK", "companion_program mavsdk"),
-    _Program("mavsdk", "MAVSDK", "mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_WRAP),
+    _Program("mavsdk", "MAVSDK", "mavsdk_program", stamp_by_yaw_rate, _YAW_RATE_STAMP_MODULUS),
 )
 
 
@@ -70,7 +70,9 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
     """
     require("mavsdk", "mavsdk", "this benchmark")
     with ExitStack() as stack:
-        senders = {item.key: stack.enter_context(closing(_start(item))) for item in _PROGRAMS}
+        senders = {
+            program.key: stack.enter_context(closing(_start(program))) for program in _PROGRAMS
+        }
         for sender in senders.values():
             sender.wait_ready()
         figures = measure(senders, rate_hz, seconds)
@@ -84,8 +86,10 @@ def run(seconds: float, rate_hz: float, as_json: bool) -> dict[str, Any]:
 
 
 def _start(program: _Program) -> Sender:
-    started = BenchmarkedProgram(program.title, *f"companion.bench.{program.command}".split())
-    return Sender(started, program.read_stamp, program.modulus)
+    started_program = BenchmarkedProgram(
+        program.title, *f"companion.bench.{program.command}".split()
+    )
+    return Sender(started_program, program.read_stamp, program.modulus)
 
 
 def _show(figures: dict[str, Any], rate_hz: float) -> None:

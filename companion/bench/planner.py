@@ -91,8 +91,12 @@ def run(seconds: float, as_json: bool) -> dict[str, Any]:
 def _flight_cases() -> list[_Case]:
     """Cases of a step with an unchanged target, which is usual in flight, and with a new target."""
     q, targets = _fleet(2)
-    same, other = (Target(*row) for row in targets.T.tolist())
-    values: dict[str, Any] = {"q": tuple(q[:, 0].tolist()), "same": same, "other": other}
+    first_target, other_target = (Target(*row) for row in targets.T.tolist())
+    values: dict[str, Any] = {
+        "q": tuple(q[:, 0].tolist()),
+        "same": first_target,
+        "other": other_target,
+    }
     functions: dict[str, Callable[..., Any]] = {"baseline": _first_argument}
     functions |= {name: _planner(name).rates for name in LAW_NAMES}
     return [
@@ -114,8 +118,8 @@ def _batch_cases(compiled: bool) -> list[_Case]:
     for count in BATCH_SIZES:
         q, targets = _fleet(count)
         values: dict[str, Any] = {"q": q, "targets": targets, "compiled": compiled}
-        copy = Timer("q.copy(), targets.copy()", globals=values)
-        cases.append(_Case(str(count), "baseline", copy, count))
+        copy_timer = Timer("q.copy(), targets.copy()", globals=values)
+        cases.append(_Case(str(count), "baseline", copy_timer, count))
         for name in LAW_NAMES:
             values = {**values, "rates": batch.rates, "planner": _planner(name)}
             timer = Timer("rates(planner, q, targets, 0.004, compiled)", globals=values)
@@ -151,18 +155,18 @@ def _fleet(count: int) -> tuple[Array, Array]:
 
 def _shortest_ns(cases: list[_Case], seconds: float) -> dict[str, dict[str, float]]:
     """The shortest time of a step, ns, by group and key of the cases."""
-    runs = []
+    repeat_counts = []
     for case in cases:
         case.timer.timeit(1)  # compiles
-        runs.append(max(1, int(_REPEAT_S / case.timer.timeit(1))))
-    shortest: dict[str, dict[str, float]] = {case.group: {} for case in cases}
+        repeat_counts.append(max(1, int(_REPEAT_S / case.timer.timeit(1))))
+    shortest_ns: dict[str, dict[str, float]] = {case.group: {} for case in cases}
     deadline = perf_counter() + seconds
     while True:
-        for case, number in zip(cases, runs, strict=True):
-            ns = 1e9 * case.timer.timeit(number) / (number * case.steps)
-            shortest[case.group][case.key] = min(ns, shortest[case.group].get(case.key, ns))
+        for case, repeats in zip(cases, repeat_counts, strict=True):
+            ns = 1e9 * case.timer.timeit(repeats) / (repeats * case.steps)
+            shortest_ns[case.group][case.key] = min(ns, shortest_ns[case.group].get(case.key, ns))
         if perf_counter() >= deadline:
-            return shortest
+            return shortest_ns
 
 
 def _rounded(group: dict[str, float]) -> dict[str, float]:
@@ -182,8 +186,8 @@ def _show(figures: dict[str, Any]) -> None:
         "and targets",
     )
     table.add_column("", no_wrap=True)
-    for heading in ("flight", "new target", *(f"of {count:,}" for count in BATCH_SIZES)):
-        table.add_column(heading, justify="right", no_wrap=True)
+    for column_title in ("flight", "new target", *(f"of {count:,}" for count in BATCH_SIZES)):
+        table.add_column(column_title, justify="right", no_wrap=True)
     columns = [(figures[f"{key}_ns"], figures[f"{key}_ratio"]) for key in ("flight", "new_target")]
     columns += [(figures["batch_ns"][str(n)], figures["batch_ratio"][str(n)]) for n in BATCH_SIZES]
     for key in ("baseline", *LAW_NAMES):
@@ -207,5 +211,5 @@ def _show(figures: dict[str, Any]) -> None:
 
 
 def _cell(ns: float, ratio: float | None) -> str:
-    shown = f"{ns:,.0f}" if ns >= 100.0 else f"{ns:.3g}"
-    return shown if ratio is None else f"{shown} {ratio:.0f}×"
+    time_text = f"{ns:,.0f}" if ns >= 100.0 else f"{ns:.3g}"
+    return time_text if ratio is None else f"{time_text} {ratio:.0f}×"

@@ -10,7 +10,7 @@ from types import FrameType
 
 SAMPLE_PERIOD_S = 0.001
 """Processor time between two samples, s."""
-PARTS = {
+PROGRAM_PARTS = {
     "event loop and wire": (
         "companion/testing/",
         "companion/mavlink/lockstep.py",
@@ -38,7 +38,7 @@ PARTS = {
 }
 """Files and folders of each part; a file belongs to the first part that names it."""
 _OTHER_CODE = "rest"
-_ROOTS = tuple(
+_SOURCE_ROOTS = tuple(
     f"{Path(spec.origin).parents[1]}/"
     for spec in map(find_spec, ("companion", "sitl_mock"))
     if spec is not None and spec.origin is not None
@@ -53,14 +53,14 @@ def sampling() -> Iterator[Counter[str]]:
     part that called the function.
     """
     counts: Counter[str] = Counter()
-    parts: dict[str, str | None] = {}
+    part_by_file: dict[str, str | None] = {}
 
     def count_sample(_signal: int, frame: FrameType | None) -> None:
         while frame is not None:
             file = frame.f_code.co_filename
-            if file not in parts:
-                parts[file] = _part_of(file)
-            if part := parts[file]:
+            if file not in part_by_file:
+                part_by_file[file] = _part_of(file)
+            if part := part_by_file[file]:
                 counts[part] += 1
                 return
             frame = frame.f_back
@@ -83,9 +83,9 @@ def shares(counts: Counter[str]) -> dict[str, float]:
 
 def _part_of(file: str) -> str | None:
     """The part to which a source file belongs; None if no part names it."""
-    for root in _ROOTS:
+    for root in _SOURCE_ROOTS:
         name = file.removeprefix(root)
-        for part, prefixes in PARTS.items():
+        for part, prefixes in PROGRAM_PARTS.items():
             if name.startswith(prefixes):
                 return part
     return None

@@ -125,15 +125,15 @@ class Sender:
         """
         self._program.check_running()
         self.send_heartbeat()
-        due = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
+        due_ns = self._send_samples(_SETTLE_SAMPLES, rate_hz, time.perf_counter_ns())
         self._sent_ns.clear()
         self._recording = True
-        cpu_begin_ns, began = self._program.cpu_ns(), time.perf_counter_ns()
+        cpu_start_ns, wall_start_ns = self._program.cpu_ns(), time.perf_counter_ns()
         count = round(rate_hz * seconds)
-        self._send_samples(count, rate_hz, due)
+        self._send_samples(count, rate_hz, due_ns)
         self.sent_samples += count
-        self.cpu_ns += self._program.cpu_ns() - cpu_begin_ns
-        self.wall_ns += time.perf_counter_ns() - began
+        self.cpu_ns += self._program.cpu_ns() - cpu_start_ns
+        self.wall_ns += time.perf_counter_ns() - wall_start_ns
         self._recording = False
 
     def reset_measurements(self) -> None:
@@ -141,13 +141,13 @@ class Sender:
         self.round_trips_ns.clear()
         self.sent_samples = self.cpu_ns = self.wall_ns = 0
 
-    def _send_samples(self, count: int, rate_hz: float, due: int) -> int:
+    def _send_samples(self, count: int, rate_hz: float, due_ns: int) -> int:
         period_ns = round(1e9 / rate_hz)
         for _ in range(count):
             self._send_sample()
-            due += period_ns
-            self._listen_until(due)
-        return due
+            due_ns += period_ns
+            self._listen_until(due_ns)
+        return due_ns
 
     def _send_sample(self) -> None:
         # The stamp follows real time, and is unique because it identifies the answer.
@@ -164,7 +164,7 @@ class Sender:
 
     def _listen_until(self, due_ns: int) -> bool:
         """Receive until the time `due_ns`; return whether a setpoint answered a sample."""
-        matched = False
+        is_answered = False
         while (remaining_ns := due_ns - time.perf_counter_ns()) > 0:
             # poll() counts whole milliseconds; the rest is slept.
             if not self._poll.poll(remaining_ns // 1_000_000):
@@ -176,12 +176,12 @@ class Sender:
             now = time.perf_counter_ns()
             if len(data) == _SETPOINT_BYTES and data[7] == _SETPOINT_ID:
                 sent_ns = self._sent_ns.pop(self._read_stamp(data) % self._modulus, None)
-                matched = matched or sent_ns is not None
+                is_answered = is_answered or sent_ns is not None
                 if sent_ns is not None and self._recording:
                     self.round_trips_ns.append(now - sent_ns)
             else:
                 self._accept_commands(data)
-        return matched
+        return is_answered
 
     def _accept_commands(self, data: bytes) -> None:
         """Accept every command in the received bytes; MAVSDK needs this to start."""

@@ -110,10 +110,10 @@ def _read_counts(process: subprocess.Popen[str]) -> list[dict[str, int]]:
 def _show(figures: dict[str, Any], rate_hz: float) -> None:
     title = f"sample out → setpoint in, at {rate_hz:g} Hz, forwarding full telemetry"
     print_table(title, _TITLES, figures)
-    ratio, lost = figures["ratio"], sum(client["lost"] for client in figures["clients"])
-    received = sum(client["received"] for client in figures["clients"])
+    ratio, lost_count = figures["ratio"], sum(client["lost"] for client in figures["clients"])
+    received_count = sum(client["received"] for client in figures["clients"])
     Console().print(
         f"with clients: p50 {ratio['p50']:.2f} ×, p99 {ratio['p99']:.2f} ×; "
-        f"lost {lost} of {received + lost} forwarded frames",
+        f"lost {lost_count} of {received_count + lost_count} forwarded frames",
         highlight=False,
     )

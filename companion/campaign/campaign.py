@@ -55,7 +55,7 @@ class Campaign:
         """
         return map(self.case, self.planned_cases())
 
-    def case(self, planned: PlannedCase) -> Case:
+    def case(self, planned_case: PlannedCase) -> Case:
         """Build one case.
 
         Raises:
@@ -63,40 +63,40 @@ class Campaign:
                 names the case and the key.
             MissingExtraError: CasADi is not installed, and guidance is predictive.
         """
-        factors = {name: _stored_value(name, value) for name, value in planned.values.items()}
+        factors = {name: _stored_value(name, value) for name, value in planned_case.values.items()}
         changes: dict[str, Any] = {}
-        for name, value in planned.values.items():
+        for name, value in planned_case.values.items():
             if name not in FAULT_FACTORS:
                 for key in self.file.sweep[name].changed_keys(name):
                     changes[key] = self._new_value(name, key, value)
         try:
             config = with_keys(self.base, changes)
             require_solver(config)
-            fault = self._fault(planned.values)
+            fault = self._fault(planned_case.values)
         except ConfigError as error:
-            case = Case(planned.index, planned.seed, factors, self.base, None, {}, 0.0)
+            case = Case(planned_case.index, planned_case.seed, factors, self.base, None, {}, 0.0)
             raise ConfigError(f"{self.file_path}: {case.description()}: {error}") from error
         return Case(
-            planned.index,
-            planned.seed,
+            planned_case.index,
+            planned_case.seed,
             factors,
-            config.model_copy(update={"mock": {**(config.mock or {}), "seed": planned.seed}}),
+            config.model_copy(update={"mock": {**(config.mock or {}), "seed": planned_case.seed}}),
             fault,
             self._files_of(config),
             self.file.limits.flight_s,
         )
 
     def _new_value(self, name: str, key: str, value: Any) -> Any:
-        """The value that a key gets: `value`, times the value in `base` if `times_base` is true."""
+        """The value that a key gets: `value`, or this times the base value if `times_base`."""
         if not self.file.sweep[name].times_base or value is None:
             return value
-        base = self._base_value(key)
-        if isinstance(base, bool) or not isinstance(base, int | float):
+        base_value = self._base_value(key)
+        if isinstance(base_value, bool) or not isinstance(base_value, int | float):
             raise ConfigError(
                 f"{self.file_path}: sweep.{name}: times_base needs a number in the base "
-                f"configuration, and {key} is {base!r:.40}"
+                f"configuration, and {key} is {base_value!r:.40}"
             )
-        return value * base
+        return value * base_value
 
     def _base_value(self, key: str) -> Any:
         """The value of a dotted key in the base configuration; None if there is no such key."""

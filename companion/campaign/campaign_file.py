@@ -32,7 +32,7 @@ FAULT, FAULT_PHASE, FAULT_AFTER = "fault", "fault.phase", "fault.after_s"
 """Factors: the fault scenario, the phase in which it begins, and its delay in this phase, s."""
 FAULT_FACTORS = (FAULT, FAULT_PHASE, FAULT_AFTER)
 """Factors that are not keys of a configuration."""
-_DEFAULT_AFTER_S = {
+_DEFAULT_FAULT_DELAYS_S = {
     "stream": 0.0,
     "arm": 0.0,
     "takeoff": 0.8,
@@ -43,7 +43,7 @@ _DEFAULT_AFTER_S = {
 }
 """Default of `FaultScenario.after_s` in each phase, s."""
 TRAJECTORY, MANEUVERS = "flight.trajectory", "flight.maneuvers"
-NOUNS = {"flights": "flights", "batch": "vehicles"}
+CASE_NOUNS = {"flights": "flights", "batch": "vehicles"}
 """Plural noun for the cases of each kind of campaign."""
 
 
@@ -70,7 +70,7 @@ class FaultScenario(Section):
 
     def delay(self, phase: str) -> float:
         """Time from the beginning of a phase to the fault, s."""
-        return _DEFAULT_AFTER_S[phase] if self.after_s is None else self.after_s
+        return _DEFAULT_FAULT_DELAYS_S[phase] if self.after_s is None else self.after_s
 
     def endings(self, phase: str) -> tuple[str, ...]:
         """Permitted endings of a flight whose fault begins in `phase`; empty: none are named."""
@@ -177,9 +177,10 @@ class CampaignFile(Section):
     @model_validator(mode="after")
     def _check_consistency(self) -> "CampaignFile":
         if self.sampling == "sobol" and self.samples & (self.samples - 1):
-            power = 1 << self.samples.bit_length()
+            next_power_of_two = 1 << self.samples.bit_length()
             raise ValueError(
-                f"sampling: sobol needs a power of two; set samples to {power // 2} or {power}"
+                "sampling: sobol needs a power of two; set samples to "
+                f"{next_power_of_two // 2} or {next_power_of_two}"
             )
         if NO_FAULT in self.faults:
             raise ValueError(

@@ -25,8 +25,8 @@ follows its own setting, `distributed.scheduler.allowed-failures`."""
 _CONNECTION_LOST = "the connection to the Dask scheduler is lost"
 _CONNECT_TIMEOUT_S = 10.0
 _CLOSE_TIMEOUT_S = 5.0
-_PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
-_LOCAL_SETTINGS = {
+_NEEDED_PACKAGES = ("dask", "distributed", "numba", "pyarrow", "scipy")
+_DASK_SETTINGS = {
     "distributed.scheduler.allowed-failures": WORKER_DEATHS_TO_GIVE_UP - 1,
     # Dask's own profiler, which nobody reads here, uses 10 % of a worker's time.
     "distributed.worker.profile.enabled": False,
@@ -56,7 +56,7 @@ def require_packages() -> None:
     Raises:
         MissingExtraError: a package is missing.
     """
-    for package in _PACKAGES:
+    for package in _NEEDED_PACKAGES:
         require(package, "campaign", "`companion campaign`")
 
 
@@ -77,7 +77,7 @@ def cluster_client(scheduler: str | None, workers: int | None) -> "Iterator[Clie
     from distributed import Client, LocalCluster  # noqa: PLC0415  an extra
 
     _silence_dask()
-    with dask.config.set(_LOCAL_SETTINGS):
+    with dask.config.set(_DASK_SETTINGS):
         if scheduler is not None:
             try:
                 client = Client(scheduler, timeout=_CONNECT_TIMEOUT_S)
@@ -150,8 +150,10 @@ def _compare_versions(client: "Client") -> None:
     For the scheduler, only Python's minor version and the version of Dask are compared.
     """
     dask_versions = client.get_versions()
-    ours, scheduler = (_dask_and_python(dask_versions[side]) for side in ("client", "scheduler"))
-    require_equal(ours, scheduler, "the Dask scheduler")
+    client_versions, scheduler_versions = (
+        _dask_and_python(dask_versions[process_name]) for process_name in ("client", "scheduler")
+    )
+    require_equal(client_versions, scheduler_versions, "the Dask scheduler")
     for address, worker_versions in client.run(versions, on_error="return").items():
         if isinstance(worker_versions, BaseException):
             raise VersionError(
@@ -180,11 +182,11 @@ def run_tasks(client: "Client", tasks: Mapping[int, tuple[Any, ...]]) -> Iterato
     """
     from distributed import as_completed  # noqa: PLC0415  an extra
 
-    futures = {client.submit(*task, pure=False): number for number, task in tasks.items()}
+    futures = {client.submit(*task, pure=False): unit_number for unit_number, task in tasks.items()}
     try:
         for future in as_completed(futures):
-            number = futures.pop(future)
-            yield _ended_unit(number, future)
+            unit_number = futures.pop(future)
+            yield _ended_unit(unit_number, future)
             future.release()
     finally:
         with suppress(Exception):

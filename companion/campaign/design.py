@@ -62,15 +62,17 @@ def planned_cases(file: CampaignFile) -> Iterator[PlannedCase]:
     """
     grids = {name: swept.grid() for name, swept in file.sweep.items() if not swept.is_sampled}
     distributions = {name: swept for name, swept in file.sweep.items() if swept.is_sampled}
-    points = [dict(zip(grids, point, strict=True)) for point in product(*grids.values())]
+    grid_points = [
+        dict(zip(grids, grid_point, strict=True)) for grid_point in product(*grids.values())
+    ]
     index = 0
     for sample_number, probabilities in enumerate(_probabilities(file, len(distributions))):
         drawn_values = {
             name: swept.quantile(float(probability))
             for (name, swept), probability in zip(distributions.items(), probabilities, strict=True)
         }
-        for point in points:
-            values = {**point, **drawn_values}
+        for grid_point in grid_points:
+            values = {**grid_point, **drawn_values}
             seed = seed_of(file.seed, sample_number if file.same_seeds else index)
             yield PlannedCase(index, seed, {name: values[name] for name in file.sweep})
             index += 1
@@ -85,22 +87,22 @@ def seed_of(campaign_seed: int, number: int) -> int:
     return int.from_bytes(digest[:8], "big") & _LARGEST_SEED
 
 
-def _probabilities(file: CampaignFile, dimensions: int) -> NDArray[np.float64]:
+def _probabilities(file: CampaignFile, distribution_count: int) -> NDArray[np.float64]:
     """(n, dimensions): cumulative probability of each sample in each distribution.
 
-    `dimensions` is the number of distributions. n is `samples`, or samples**dimensions with
+    `distribution_count` is the number of distributions. n is `samples`, or samples**dimensions with
     `sampling: grid` and at least one distribution.
     """
     count = file.samples
-    if dimensions == 0:
+    if distribution_count == 0:
         return np.empty((count, 0))
     if file.sampling == "random":
-        return np.random.default_rng(file.seed).random((count, dimensions))
+        return np.random.default_rng(file.seed).random((count, distribution_count))
     if file.sampling == "grid":
         midpoints = (np.arange(count) + 0.5) / count
-        return np.array(list(product(midpoints, repeat=dimensions)))
+        return np.array(list(product(midpoints, repeat=distribution_count)))
     from scipy.stats import qmc  # noqa: PLC0415  takes half a second to import
 
     sampler = qmc.LatinHypercube if file.sampling == "latin-hypercube" else qmc.Sobol
-    probabilities: NDArray[np.float64] = sampler(dimensions, rng=file.seed).random(count)
+    probabilities: NDArray[np.float64] = sampler(distribution_count, rng=file.seed).random(count)
     return probabilities

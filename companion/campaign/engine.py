@@ -69,14 +69,14 @@ def _store_unit(
     ended_unit: EndedUnit, unit: range, campaign: Campaign, folder: Path, progress: Progress
 ) -> None:
     """Store the result of a unit, or note in `progress` that it was given up."""
-    first, last = unit[0], unit[-1]
+    first_case, last_case = unit[0], unit[-1]
     if ended_unit.result is None:
         progress.given_up_units.append(
-            f"unit {ended_unit.number} (cases {first} to {last}): {ended_unit.reason}"
+            f"unit {ended_unit.number} (cases {first_case} to {last_case}): {ended_unit.reason}"
         )
         return
     rows, wall_s, worker = ended_unit.result
-    timing = {"first": first, "last": last, "wall_s": wall_s, "worker": worker}
+    timing = {"first": first_case, "last": last_case, "wall_s": wall_s, "worker": worker}
     store.write_unit(folder, campaign.file, ended_unit.number, rows, timing)
     progress.flown_cases += len(unit)
 

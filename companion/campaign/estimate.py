@@ -5,7 +5,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from companion.campaign.campaign import Campaign
-from companion.campaign.campaign_file import NOUNS
+from companion.campaign.campaign_file import CASE_NOUNS
 from companion.campaign.case import Case
 from companion.campaign.unit import run_cases
 from companion.files.yaml_file import ConfigError
@@ -36,9 +36,9 @@ def case_time(kind: str, cases: Sequence[Case]) -> float:
         indices = sorted({0, len(cases) // 2, len(cases) - 1})[:_MOST_MEASURED_FLIGHTS]
         timed_cases = [cases[index] for index in indices]
         run_cases(kind, [replace(timed_cases[0], flight_s=1.0)])
-    began = perf_counter()
+    start_time = perf_counter()
     run_cases(kind, timed_cases)
-    return (perf_counter() - began) / len(timed_cases)
+    return (perf_counter() - start_time) / len(timed_cases)
 
 
 def check_size(campaign: Campaign, seconds_per_case: float, workers: int) -> None:
@@ -71,15 +71,15 @@ def most_cases(campaign: Campaign) -> int:
 
 def size_text(campaign: Campaign, seconds: float, workers: int) -> str:
     """The number of cases, the estimated time (`seconds`), and the number of workers, as text."""
-    noun = NOUNS[campaign.file.kind]
+    noun = CASE_NOUNS[campaign.file.kind]
     processes = "1 worker" if workers == 1 else f"{workers} workers"
     return f"{campaign.number_of_cases} {noun}, about {duration_text(seconds)} with {processes}"
 
 
 def duration_text(seconds: float) -> str:
     """A time in days, h, min or s, rounded to two digits."""
-    for unit, length in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
-        if seconds >= 1.5 * length:
-            rounded = float(f"{seconds / length:.2g}")
-            return f"{rounded:.10g} {unit}"
+    for unit, unit_s in (("days", 86_400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * unit_s:
+            rounded_count = float(f"{seconds / unit_s:.2g}")
+            return f"{rounded_count:.10g} {unit}"
     return f"{seconds:.2g} s"

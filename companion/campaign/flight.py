@@ -94,7 +94,7 @@ class CaseFlight:
             vehicle.step()
         truth_afterwards = vehicle.state()
         return self._outcomes(
-            summary, truth_at_end, truth_afterwards, flight_s, fault_begun=injector.begun
+            summary, truth_at_end, truth_afterwards, flight_s, fault_has_begun=injector.has_begun
         )
 
     def _outcomes(
@@ -104,13 +104,13 @@ class CaseFlight:
         truth_afterwards: Truth,
         flight_s: float,
         *,
-        fault_begun: bool,
+        fault_has_begun: bool,
     ) -> dict[str, Value]:
         """The outcomes of the flight.
 
         `truth_at_end` is the true state when the program ended, `flight_s` s after boot.
         `truth_afterwards` is the true state when the vehicle disarmed, or `_MAX_TIME_AFTER_END_S`
-        after the program's end. `fault_begun`: whether the phase in which the fault begins was
+        after the program's end. `fault_has_begun`: whether the phase in which the fault begins was
         reached.
         """
         figures, setpoints = summary.as_dict(), self._vehicle.setpoints
@@ -122,15 +122,15 @@ class CaseFlight:
             "flight_s": flight_s,
         }
         as_documented = None
-        if fault is not None and fault_begun and fault.ends:
+        if fault is not None and fault_has_begun and fault.ends:
             as_documented = not crashed and _ending(truth_at_end, summary.result) in fault.ends
         result = summary.result
         if self._time_limit_reached:
             result = f"ended by limits.flight_s after {self._case.flight_s:g} s of vehicle time"
         failed_checks = outcomes.failed_checks(figures)
-        good = result == "ok" and not failed_checks and not crashed
+        is_good = result == "ok" and not failed_checks and not crashed
         return {
-            "ok": good,
+            "ok": is_good,
             "result": result.replace(f"{self._files_folder}/", ""),
             "failed_checks": failed_checks,
             "phase": summary.phase,
@@ -150,21 +150,21 @@ class _FaultInjector(SilentObserver):
         fault: the scenario; None: no fault.
 
     Attributes:
-        begun: whether there is a fault, and the phase in which it begins was reached.
+        has_begun: whether there is a fault, and the phase in which it begins was reached.
     """
 
     def __init__(self, vehicle: MockVehicle, fault: Fault | None) -> None:
         self._vehicle, self._fault = vehicle, fault
-        self.begun = False
+        self.has_begun = False
         self._phases: tuple[str, ...] = () if fault is None else (fault.phase,)
         if self._phases == ("stream",):
             self._phases = "stream", "arm"  # the first one reached: not every vehicle has `stream`
 
     def phase(self, name: str, waits_for: str) -> None:
         """Inject the faults if they begin in the phase `name`."""
-        if self._fault is None or self.begun or name not in self._phases:
+        if self._fault is None or self.has_begun or name not in self._phases:
             return
-        self.begun = True
+        self.has_begun = True
         begin_s = self._vehicle.time + self._fault.after_s
         for entry in self._fault.inject:
             self._vehicle.inject({**entry, "at_s": begin_s})

@@ -50,17 +50,17 @@ class Description:
 
 def describe(campaign: Campaign, unit_size: int, seconds_per_case: float | None) -> Description:
     """The description of a campaign that begins now, with `unit_size` cases in a unit of work."""
-    file, now = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
+    file, time_text = campaign.file, datetime.now(UTC).isoformat(timespec="seconds")
     cases = campaign.number_of_cases
     return Description(
-        file.name, file.kind, file.seed, cases, unit_size, seconds_per_case, versions(), now
+        file.name, file.kind, file.seed, cases, unit_size, seconds_per_case, versions(), time_text
     )
 
 
 def new_path(campaign: Campaign) -> Path:
     """The path of a new folder, named after the campaign and the present time in UTC."""
-    stamp = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
-    return CAMPAIGNS_FOLDER / f"{campaign.file.name}-{stamp}"
+    time_text = datetime.now(UTC).strftime("%Y-%m-%dT%H-%M-%SZ")
+    return CAMPAIGNS_FOLDER / f"{campaign.file.name}-{time_text}"
 
 
 def make(folder: Path, campaign: Campaign, description: Description) -> None:

@@ -28,10 +28,10 @@ _KEYS_WITHOUT_EFFECT = (
 _SIGNING_KEYS = ("link.signing_key_file", "mock.signing")
 
 
-def check_key(key: str, base: Config, where: str) -> None:
+def check_key(key: str, base: Config, place_text: str) -> None:
     """Check that a dotted key exists in `base`, and that a campaign can change it.
 
-    `where` is file, line and section of the key, for messages.
+    `place_text` is file, line and section of the key, for messages.
 
     Raises:
         ConfigError: the key is not SECTION.KEY, does not exist, has no effect in a campaign, or
@@ -40,35 +40,37 @@ def check_key(key: str, base: Config, where: str) -> None:
     """
     section, dot, name = key.partition(".")
     if not (dot and section and name):
-        raise ConfigError(f"{where}: `{key}`: write SECTION.KEY, such as limits.max_tilt_deg")
-    if any(f"{key}.".startswith(f"{other}.") for other in _KEYS_WITHOUT_EFFECT):
+        raise ConfigError(f"{place_text}: `{key}`: write SECTION.KEY, such as limits.max_tilt_deg")
+    if any(f"{key}.".startswith(f"{excluded_key}.") for excluded_key in _KEYS_WITHOUT_EFFECT):
         raise ConfigError(
-            f"{where}: `{key}` has no effect in a campaign, or the campaign sets the key itself; "
-            "take it out"
+            f"{place_text}: `{key}` has no effect in a campaign, or the campaign sets the key "
+            "itself; take it out"
         )
-    if any(f"{key}.".startswith(f"{other}.") for other in _SIGNING_KEYS):
-        raise ConfigError(f"{where}: `{key}`: campaigns fly without signing; take it out")
+    if any(f"{key}.".startswith(f"{excluded_key}.") for excluded_key in _SIGNING_KEYS):
+        raise ConfigError(f"{place_text}: `{key}`: campaigns fly without signing; take it out")
     if section == "mock":
-        _check_mock_key(name, base.mock or {}, where)
+        _check_mock_key(name, base.mock or {}, place_text)
     elif name not in getattr(type(getattr(base, section, None)), "model_fields", ()):
         # This raises the error that names the nearest key, if there is one.
-        validated({section: {name: 0.0}}, where, Config)
-        raise ConfigError(f"{where}: there is no key `{key}`")
+        validated({section: {name: 0.0}}, place_text, Config)
+        raise ConfigError(f"{place_text}: there is no key `{key}`")
 
 
-def _check_mock_key(name: str, section: Mapping[str, Any], where: str) -> None:
+def _check_mock_key(name: str, section: Mapping[str, Any], place_text: str) -> None:
     """Check that a key of the mock vehicle exists; its value is checked later, with each case."""
-    *path, last = name.split(".")
-    complete: Any = complete_mock(section)
-    for subsection in path:
-        complete = complete.get(subsection) if isinstance(complete, dict) else None
-    if isinstance(complete, dict) and last in complete:
+    *subsections, key = name.split(".")
+    complete_section: Any = complete_mock(section)
+    for subsection in subsections:
+        complete_section = (
+            complete_section.get(subsection) if isinstance(complete_section, dict) else None
+        )
+    if isinstance(complete_section, dict) and key in complete_section:
         return
     try:
         mock_with(section, {name: 0.0})
     except ConfigError as error:
         if "unknown" in str(error) or "wrong section" in str(error):
-            raise ConfigError(f"{where}: {error}") from error
+            raise ConfigError(f"{place_text}: {error}") from error
 
 
 def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
@@ -79,16 +81,16 @@ def with_keys(base: Config, changes: Mapping[str, Any]) -> Config:
     """
     mock_changes: dict[str, Any] = {}
     # Sections without a change are not checked again, which would take most of the time.
-    data = {name: getattr(base, name) for name in Config.model_fields if name != "include"}
+    sections = {name: getattr(base, name) for name in Config.model_fields if name != "include"}
     for key, value in changes.items():
         section, _, name = key.partition(".")
         if section == "mock":
             mock_changes[name] = value
             continue
-        if not isinstance(data[section], dict):
-            data[section] = data[section].model_dump()
-        data[section][name] = value
-    config = validated(data, "the configuration", Config)
+        if not isinstance(sections[section], dict):
+            sections[section] = sections[section].model_dump()
+        sections[section][name] = value
+    config = validated(sections, "the configuration", Config)
     return config.model_copy(update={"mock": mock_with(base.mock or {}, mock_changes)})
 
 

@@ -40,11 +40,11 @@ def check_case(case: Case) -> None:
         ConfigError: the planner keeps state, no maneuver has open-loop steps, 1000 Hz is no
             multiple of the sample rate, or the case has a fault.
     """
-    if reason := _why_unflyable(case):
+    if reason := _unflyable_reason(case):
         raise ConfigError(f"{case.description()}: {reason}")
 
 
-def _why_unflyable(case: Case) -> str | None:
+def _unflyable_reason(case: Case) -> str | None:
     """Why a case cannot be flown in a batch; None: it can."""
     config = case.config
     if config.planner_name not in LAW_NAMES:
@@ -79,7 +79,7 @@ def run_case(case: Case) -> dict[str, Value]:
     law_planner = planner(config)
     assert isinstance(law_planner, LawPlanner)
     heading = wrap_angle(radians(case.mock["home"]["heading_deg"]))
-    targets = _targets(config, law_planner.constants.longest_target, heading)
+    targets = _targets(config, law_planner.constants.max_target_norm, heading)
     start = attitude(Coefficients(0.0, 0.0), heading)
     rate_hz = config.link.attitude_rate_hz
     flight = fly_steps(law_planner, _rate_loop(config), start, targets, round(STEP_HZ / rate_hz))
@@ -138,7 +138,7 @@ def _rate_loop(config: Config) -> list[AxisResponse]:
     ]
 
 
-def _targets(config: Config, longest_target: float, heading: float) -> Array:
+def _targets(config: Config, max_target_norm: float, heading: float) -> Array:
     """Targets of the open-loop steps, limited as the planner limits them.
 
     Returns:
@@ -154,17 +154,19 @@ def _targets(config: Config, longest_target: float, heading: float) -> Array:
         steps = config.steps
         amplitude = steps.coefficient, steps.coefficient
         unit_maneuver = Steps(1.0, steps.duration_s, steps.settle_s)
-    parts = _parts(unit_maneuver, config.link.attitude_rate_hz)
-    targets = np.zeros((parts[-1][1], 4))
+    constant_spans = _constant_spans(unit_maneuver, config.link.attitude_rate_hz)
+    targets = np.zeros((constant_spans[-1][1], 4))
     targets[:, 2] = heading
-    for begin, end, (north, east) in parts:
+    for begin, end, (north, east) in constant_spans:
         unlimited_target = Target(north * amplitude[0], east * amplitude[1], heading)
-        targets[begin:end] = limited_target(unlimited_target, longest_target)
+        targets[begin:end] = limited_target(unlimited_target, max_target_norm)
     return targets
 
 
 @lru_cache(maxsize=64)
-def _parts(maneuver: Corners | Steps, rate_hz: float) -> tuple[tuple[int, int, Coefficients], ...]:
+def _constant_spans(
+    maneuver: Corners | Steps, rate_hz: float
+) -> tuple[tuple[int, int, Coefficients], ...]:
     """The open-loop steps of a maneuver and the level parts between them.
 
     The maneuver has amplitude 1, so that the cached parts serve cases of all amplitudes.
@@ -175,11 +177,14 @@ def _parts(maneuver: Corners | Steps, rate_hz: float) -> tuple[tuple[int, int, C
     pose = Pose((0.0, 0.0, 0.0), 0.0)
     times = np.arange(round(maneuver.duration * rate_hz)) / rate_hz
     commanded_coefficients = [maneuver.at(float(time), pose).coefficients for time in times]
-    steps = [k for k, coefficients in enumerate(commanded_coefficients) if coefficients is not None]
+    step_samples = [
+        k for k, coefficients in enumerate(commanded_coefficients) if coefficients is not None
+    ]
     level = Coefficients(0.0, 0.0)
     targets = [
-        coefficients or level for coefficients in commanded_coefficients[steps[0] : steps[-1] + 1]
+        coefficients or level
+        for coefficients in commanded_coefficients[step_samples[0] : step_samples[-1] + 1]
     ]
-    ends = [k for k in range(1, len(targets)) if targets[k] != targets[k - 1]]
-    bounds = pairwise((0, *ends, len(targets)))
-    return tuple((begin, end, targets[begin]) for begin, end in bounds)
+    span_ends = [k for k in range(1, len(targets)) if targets[k] != targets[k - 1]]
+    spans = pairwise((0, *span_ends, len(targets)))
+    return tuple((begin, end, targets[begin]) for begin, end in spans)

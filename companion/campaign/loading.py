@@ -81,9 +81,11 @@ class _CampaignReader:
         file = file.model_copy(update={"sweep": sweep, "set": {}})
         return Campaign(file, base, self._files, str(self._path))
 
-    def _place_text(self, *where: str) -> str:
-        """File, line and section of a key, for messages; `where` are the parts of its path."""
-        return f"{nearest_place(where, self._places, str(self._path))}: {'.'.join(where[:-1])}"
+    def _place_text(self, *key_path: str) -> str:
+        """File, line and section of a key, for messages; `key_path` are the parts of its path."""
+        return (
+            f"{nearest_place(key_path, self._places, str(self._path))}: {'.'.join(key_path[:-1])}"
+        )
 
     def _base(self) -> Config:
         given_config = self._file.config
@@ -105,8 +107,8 @@ class _CampaignReader:
                 "mock.signing"
             )
         path = base.flight.trajectory
-        copy = None if path is None else self._copy_trajectory(path)
-        return replace_unchecked(base, flight={"arm": True, "trajectory": copy})
+        copied_path = None if path is None else self._copy_trajectory(path)
+        return replace_unchecked(base, flight={"arm": True, "trajectory": copied_path})
 
     def _with_copied_files(self, name: str, swept: SweptValues) -> SweptValues:
         """The factor, with each path of a trajectory file replaced by that of its copy."""
@@ -115,8 +117,10 @@ class _CampaignReader:
         listed_values = swept.values or swept.choice or ()
         if not (listed_values and all(isinstance(value, str) for value in listed_values)):
             raise ConfigError(f"{self._path}: sweep.{name}: each value must be a path")
-        copies = tuple(str(self._copy_trajectory(self._folder / value)) for value in listed_values)
-        return swept.model_copy(update={swept.kind: copies})
+        copied_paths = tuple(
+            str(self._copy_trajectory(self._folder / value)) for value in listed_values
+        )
+        return swept.model_copy(update={swept.kind: copied_paths})
 
     def _copy_trajectory(self, path: Path) -> Path:
         """Add a trajectory file, and the CSV table that it names, to the campaign's files.
@@ -127,14 +131,16 @@ class _CampaignReader:
         if path in self._copied_paths:
             return self._copied_paths[path]
         trajectory_file.read(path)
-        taken_stems = {name.parts[1] for name in self._copied_paths.values()}
+        used_stems = {name.parts[1] for name in self._copied_paths.values()}
         numbered_stems = (f"{path.stem}-{number}" for number in count(2))
-        stem = next(stem for stem in chain([path.stem], numbered_stems) if stem not in taken_stems)
+        stem = next(stem for stem in chain([path.stem], numbered_stems) if stem not in used_stems)
         with tempfile.TemporaryDirectory(prefix="companion-campaign-") as folder:
-            copies = Path(folder) / stem
-            name = copy_trajectory(path, copies)
-            for copy in sorted(copies.iterdir()):
-                self._files[f"{TRAJECTORIES_FOLDER}/{stem}/{copy.name}"] = copy.read_text("utf-8")
+            copy_folder = Path(folder) / stem
+            name = copy_trajectory(path, copy_folder)
+            for copied_file in sorted(copy_folder.iterdir()):
+                self._files[f"{TRAJECTORIES_FOLDER}/{stem}/{copied_file.name}"] = (
+                    copied_file.read_text("utf-8")
+                )
         copied_path = Path(TRAJECTORIES_FOLDER, stem, name)
         self._copied_paths[path] = copied_path
         return copied_path
@@ -178,8 +184,8 @@ class _CampaignReader:
 
 def resolved_keys(campaign: Campaign) -> dict[str, Any]:
     """The content of the campaign's file with the whole configuration and all defaults."""
-    data = campaign.file.model_dump(mode="json")
+    campaign_keys = campaign.file.model_dump(mode="json")
     if campaign.file.tune is None:
-        del data["tune"]  # a section without keys would be read as an empty one
-    data["config"] = campaign.base.model_dump(mode="json")
-    return data
+        del campaign_keys["tune"]  # a section without keys would be read as an empty one
+    campaign_keys["config"] = campaign.base.model_dump(mode="json")
+    return campaign_keys

@@ -56,11 +56,11 @@ def tracking(summary: Summary, truth: Floats) -> dict[str, float]:
     Returns:
         value by name of the outcome; empty without a closed-loop maneuver or without `truth`.
     """
-    rows = summary.trace.tracking.rows()
-    parts = settled_maneuver_rows(rows, summary.trace.maneuvers)
+    tracking_rows = summary.trace.tracking.rows()
+    settled_parts_rows = settled_maneuver_rows(tracking_rows, summary.trace.maneuvers)
     figures: dict[str, float] = {}
-    if len(truth) and parts:
-        settled_rows = np.concatenate(parts)
+    if len(truth) and settled_parts_rows:
+        settled_rows = np.concatenate(settled_parts_rows)
         figures["estimated_rms_m"] = tracking_errors(settled_rows)["position_rms_m"]
         true_position = true_positions(truth, settled_rows[:, 0])
         true_rows = np.column_stack([settled_rows[:, :4], true_position])
@@ -93,15 +93,15 @@ def _horizontal_errors(estimated_rows: Floats, true_rows: Floats) -> dict[str, f
 
 def response(summary: Summary) -> dict[str, float]:
     """Outcomes of the response to acceleration steps; empty if there were none."""
-    steps = summary.response()
-    if steps is None:
+    step_response = summary.response()
+    if step_response is None:
         return {}
-    axes = steps.time_constant_north_s, steps.time_constant_east_s
-    constants = [value for value in axes if isfinite(value)]
+    axis_time_constants = step_response.time_constant_north_s, step_response.time_constant_east_s
+    known_time_constants = [value for value in axis_time_constants if isfinite(value)]
     return {
-        "cross_axis_max": steps.cross_axis_max,
-        "model_deviation_max": steps.model_deviation_max,
-        "time_constant_s": fmean(constants) if constants else nan,
+        "cross_axis_max": step_response.cross_axis_max,
+        "model_deviation_max": step_response.model_deviation_max,
+        "time_constant_s": fmean(known_time_constants) if known_time_constants else nan,
     }
 
 
@@ -115,18 +115,24 @@ def control_effort(
     maneuver_changes = summary.trace.maneuvers
     if not maneuver_changes:
         return {}
-    begin = maneuver_changes[0].vehicle_time
-    end = next((change.vehicle_time for change in maneuver_changes if change.name is None), np.inf)
-    rows = np.array(
+    begin_time = maneuver_changes[0].vehicle_time
+    end_time = next(
+        (change.vehicle_time for change in maneuver_changes if change.name is None), np.inf
+    )
+    setpoint_rows = np.array(
         [
             (*setpoint.rates, setpoint.thrust)
             for setpoint in setpoints
-            if begin <= setpoint.time < end
+            if begin_time <= setpoint.time < end_time
         ]
     ).reshape(-1, 4)
-    if not len(rows):
+    if not len(setpoint_rows):
         return {}
-    rates, thrust, limits = np.hypot(rows[:, 0], rows[:, 1]), rows[:, 3], config.limits
+    rates, thrust, limits = (
+        np.hypot(setpoint_rows[:, 0], setpoint_rows[:, 1]),
+        setpoint_rows[:, 3],
+        config.limits,
+    )
     is_saturated = (
         (rates >= _SATURATION_SHARE * limits.max_tilt_rate)
         | (thrust >= _SATURATION_SHARE * limits.max_thrust)

@@ -21,7 +21,7 @@ from rich.progress import (
 
 from companion.campaign import engine, estimate, folder, store
 from companion.campaign.campaign import Campaign
-from companion.campaign.campaign_file import NOUNS
+from companion.campaign.campaign_file import CASE_NOUNS
 from companion.campaign.cluster import (
     ClusterError,
     cluster_client,
@@ -83,7 +83,7 @@ class _Run:
     ) -> None:
         self._campaign, self._folder, self._console = campaign, campaign_folder, console
         self._options = options
-        self._noun = NOUNS[campaign.file.kind]
+        self._noun = CASE_NOUNS[campaign.file.kind]
 
     def run(self) -> int:
         """Run the campaign; return the exit code."""
@@ -141,10 +141,12 @@ class _Run:
         )
         description = folder.describe(self._campaign, unit_size, seconds_per_case)
         folder.make(self._folder, self._campaign, description)
-        size = f"{cases} {self._noun}"
+        size_text = f"{cases} {self._noun}"
         if seconds_per_case is not None:
-            size = estimate.size_text(self._campaign, cases * seconds_per_case / workers, workers)
-        self._console.print(f"{size}; results in {self._folder}")
+            size_text = estimate.size_text(
+                self._campaign, cases * seconds_per_case / workers, workers
+            )
+        self._console.print(f"{size_text}; results in {self._folder}")
         if warning := few_samples_warning(self._campaign.file):
             self._console.print(warning)
         return description
@@ -160,9 +162,9 @@ class _Run:
 
     def _report_end(self, progress: engine.Progress, description: Description) -> int:
         """Report how the run ended; return the exit code."""
-        say = self._console.print
+        print_line = self._console.print
         for sentence in progress.given_up_units[:_MOST_SHOWN_LINES]:
-            say(f"not flown: {sentence}")
+            print_line(f"not flown: {sentence}")
         if progress.flown_cases < description.cases:
             count = len(progress.given_up_units)
             return self._report_stop(
@@ -170,22 +172,24 @@ class _Run:
             )
         errors = engine.internal_errors(self._folder, self._campaign.file)
         for error, count in errors.most_common(_MOST_SHOWN_LINES):
-            say(f"{count} of the {self._noun} ended by an {error}")
+            print_line(f"{count} of the {self._noun} ended by an {error}")
         results = Results.read(self._folder)
-        say(f"{results.good.sum()} of {progress.flown_cases} {self._noun} were good.")
+        print_line(f"{results.good.sum()} of {progress.flown_cases} {self._noun} were good.")
         for reason, count in results.failures().most_common(_MOST_SHOWN_LINES):
-            say(f"  {count} not good: {reason}")
+            print_line(f"  {count} not good: {reason}")
         if results.as_documented.size:
             documented_count, faulty_count = results.as_documented.sum(), results.as_documented.size
-            say(f"{documented_count} of {faulty_count} flights with a fault ended as documented.")
-        say(f"The results are in {self._folder}. Write their report with")
-        say(f"  {program_command('campaign', 'report', self._folder)}")
+            print_line(
+                f"{documented_count} of {faulty_count} flights with a fault ended as documented."
+            )
+        print_line(f"The results are in {self._folder}. Write their report with")
+        print_line(f"  {program_command('campaign', 'report', self._folder)}")
         return FAILED if errors else DONE
 
-    def _report_stop(self, why: str) -> int:
+    def _report_stop(self, reason: str) -> int:
         """Print why the campaign stopped and how to continue; return the exit code."""
         if not folder.holds_campaign(self._folder):
-            self._console.print(f"{why}; no campaign was started")
+            self._console.print(f"{reason}; no campaign was started")
             return FAILED
         description = folder.read_description(self._folder)
         units = unit_ranges(description.cases, description.unit)
@@ -194,22 +198,24 @@ class _Run:
         options = ["--scheduler", scheduler] if scheduler else []
         command = program_command("campaign", self._folder, *options)
         self._console.print(
-            f"{why}; the results of {finished_cases} of {description.cases} {self._noun} are kept. "
-            f"Continue with\n  {command}"
+            f"{reason}; the results of {finished_cases} of {description.cases} {self._noun} are "
+            f"kept. Continue with\n  {command}"
         )
         return FAILED
 
 
-def progress_bar(console: Console, before: ProgressColumn, *after: ProgressColumn) -> Progress:
-    """A progress bar with numbers and times, between the columns `before` and `after`."""
+def progress_bar(
+    console: Console, first_column: ProgressColumn, *last_columns: ProgressColumn
+) -> Progress:
+    """A progress bar with numbers and times, between `first_column` and `last_columns`."""
     return Progress(
-        before,
+        first_column,
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("left"),
         TimeRemainingColumn(),
-        *after,
+        *last_columns,
         console=console,
     )
 

@@ -55,8 +55,8 @@ def schema(file: CampaignFile) -> "pa.Schema":
     factor_metadata = {
         name: {**swept.description(), "unit": unit_of(name)} for name, swept in file.sweep.items()
     }
-    contents = {"name": file.name, "kind": file.kind, "factors": factor_metadata}
-    return pa.schema(columns, metadata={METADATA_KEY: json.dumps(contents).encode()})
+    campaign_metadata = {"name": file.name, "kind": file.kind, "factors": factor_metadata}
+    return pa.schema(columns, metadata={METADATA_KEY: json.dumps(campaign_metadata).encode()})
 
 
 def _column_type(file: CampaignFile, name: str) -> str:

@@ -66,19 +66,23 @@ class SweptValues(Section):
                 raise ValueError("each value must be a number, a word, true, false, null or a list")
             if any(isinstance(item, float) and not isfinite(item) for item in items):
                 raise ValueError("each number must be finite")
-        stored = [column_value(value) for value in values or ()]
-        if any(stored.index(value) != position for position, value in enumerate(stored)):
+        stored_values = [column_value(value) for value in values or ()]
+        if any(
+            stored_values.index(value) != position for position, value in enumerate(stored_values)
+        ):
             raise ValueError("a value is listed twice")
         return values
 
     @model_validator(mode="after")
     def _check_consistency(self) -> "SweptValues":
-        kinds = [kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None]
-        if len(kinds) != 1:
+        given_kinds = [
+            kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None
+        ]
+        if len(given_kinds) != 1:
             raise ValueError(f"give exactly one of {', '.join((*_GRID, *_DISTRIBUTIONS))}")
         for kind in ("range", "uniform", "loguniform", "within"):
-            pair = getattr(self, kind)
-            if pair is not None and not pair[0] < pair[1]:
+            bounds = getattr(self, kind)
+            if bounds is not None and not bounds[0] < bounds[1]:
                 raise ValueError(f"{kind}: the first value must be below the second")
         if self.loguniform is not None and self.loguniform[0] <= 0.0:
             raise ValueError("loguniform: both values must be above 0")
@@ -142,12 +146,12 @@ class SweptValues(Section):
 
     def description(self) -> dict[str, Any]:
         """Kind and values of the factor, for the metadata of the results."""
-        details = {"count": self.count, "within": self.within}
+        optional_entries = {"count": self.count, "within": self.within}
         return {
             "kind": self.kind,
             "sampled": self.is_sampled,
             self.kind: [column_value(value) for value in getattr(self, self.kind)],
-            **{key: value for key, value in details.items() if value is not None},
+            **{key: value for key, value in optional_entries.items() if value is not None},
             "times_base": self.times_base,
         }
 
@@ -164,5 +168,5 @@ def column_value(value: Any) -> Value:
     """A value as stored in the results: the items of a list are joined by commas."""
     if isinstance(value, list | tuple):
         return ",".join(str(item) for item in value)
-    plain: Value = value
-    return plain
+    scalar: Value = value
+    return scalar

@@ -45,7 +45,9 @@ def fly_planned_cases(
         VersionError: the versions of this process differ from the client's.
     """
     require_equal(client_versions, versions(), f"the worker {_worker_address()}")
-    return _run_timed(campaign.file.kind, [campaign.case(item) for item in planned_cases])
+    return _run_timed(
+        campaign.file.kind, [campaign.case(planned_case) for planned_case in planned_cases]
+    )
 
 
 def fly_cases(kind: str, cases: Sequence[Case], client_versions: Versions) -> UnitResult:
@@ -68,9 +70,9 @@ def _run_timed(kind: str, cases: Sequence[Case]) -> UnitResult:
     rows: list[Row] = []
     wall_s: list[float] = []
     for group in [cases] if kind == "batch" else [[case] for case in cases]:
-        began = perf_counter()
+        start_time = perf_counter()
         rows += run_cases(kind, group)
-        wall_s.append(round(perf_counter() - began, 4))
+        wall_s.append(round(perf_counter() - start_time, 4))
     return UnitResult(rows, wall_s, _worker_address())
 
 
@@ -99,8 +101,8 @@ def cases_per_unit(cases: int, seconds_per_case: float, workers: int) -> int:
     `workers` is 0 while the first worker is awaited, and then counts as 1.
     """
     size_by_time = int(LONGEST_UNIT_S / max(seconds_per_case, 1e-6))
-    size_by_share = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
-    return max(1, min(size_by_time, size_by_share))
+    size_by_worker_count = -(-cases // (_UNITS_PER_WORKER * max(1, workers)))
+    return max(1, min(size_by_time, size_by_worker_count))
 
 
 def unit_ranges(cases: int, size: int) -> list[range]:

@@ -61,28 +61,28 @@ def _version(package: str) -> str:
         return "not installed"
 
 
-def difference(ours: Versions, others: Versions) -> str:
+def difference(our_versions: Versions, other_versions: Versions) -> str:
     """The differences between two sets of versions, as text; empty if they are equal."""
-    names = {"source": "the source of companion", "python": "Python"}
+    labels = {"source": "the source of companion", "python": "Python"}
     return ", ".join(
-        f"{names.get(name, name)} {others.get(name, 'unknown')} instead of "
-        f"{ours.get(name, 'unknown')}"
-        for name in ours | others
-        if others.get(name) != ours.get(name)
+        f"{labels.get(name, name)} {other_versions.get(name, 'unknown')} instead of "
+        f"{our_versions.get(name, 'unknown')}"
+        for name in our_versions | other_versions
+        if other_versions.get(name) != our_versions.get(name)
     )
 
 
-def require_equal(ours: Versions, others: Versions, who: str) -> None:
-    """Refuse another process with different versions; `who` names it in the message.
+def require_equal(our_versions: Versions, other_versions: Versions, other_process: str) -> None:
+    """Refuse another process with different versions; `other_process` names it in the message.
 
     Raises:
         VersionError: says what differs.
     """
-    differences = difference(ours, others)
+    differences = difference(our_versions, other_versions)
     if differences:
         raise VersionError(
-            f"{who} has {differences}: results of two versions must not be mixed, so install the "
-            "same version there"
+            f"{other_process} has {differences}: results of two versions must not be mixed, so "
+            "install the same version there"
         )
 
 

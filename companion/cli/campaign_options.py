@@ -12,10 +12,15 @@ _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
 def with_campaign_run(arguments: Sequence[str]) -> list[str]:
     """The arguments, with `campaign FILE` expanded to `campaign run FILE`."""
     words = list(arguments)
-    position = next((n for n, word in enumerate(words) if not word.startswith("-")), len(words))
-    command, following = words[position : position + 1], words[position + 1 : position + 2]
-    if command == [_CAMPAIGN] and not set(following).intersection(_SUB_COMMANDS):
-        words.insert(position + 1, _RUN)
+    command_position = next(
+        (n for n, word in enumerate(words) if not word.startswith("-")), len(words)
+    )
+    command, next_word = (
+        words[command_position : command_position + 1],
+        words[command_position + 1 : command_position + 2],
+    )
+    if command == [_CAMPAIGN] and not set(next_word).intersection(_SUB_COMMANDS):
+        words.insert(command_position + 1, _RUN)
     return words
 
 
@@ -28,15 +33,15 @@ def add_campaign(commands: Commands) -> None:
         "memory, over swept keys of the configuration and of the vehicle. Examples of FILE are "
         "in configs/campaigns; docs/campaigns.md explains it.",
     )
-    kinds = campaign.add_subparsers(required=True, metavar="WHAT")
-    _add_run(kinds)
-    _add_report(kinds)
-    _add_rerun(kinds)
-    _add_tune(kinds)
+    sub_commands = campaign.add_subparsers(required=True, metavar="WHAT")
+    _add_run(sub_commands)
+    _add_report(sub_commands)
+    _add_rerun(sub_commands)
+    _add_tune(sub_commands)
 
 
-def _add_run(kinds: Commands) -> None:
-    run = kinds.add_parser(_RUN, help="run a campaign; the word `run` may be left out")
+def _add_run(sub_commands: Commands) -> None:
+    run = sub_commands.add_parser(_RUN, help="run a campaign; the word `run` may be left out")
     add_path(run, "file", "the campaign's file, or the folder of a campaign that was stopped")
     add_path(
         run,
@@ -67,8 +72,8 @@ def _add_cluster_options(command: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_rerun(kinds: Commands) -> None:
-    rerun = kinds.add_parser(
+def _add_rerun(sub_commands: Commands) -> None:
+    rerun = sub_commands.add_parser(
         "rerun",
         help="fly one case again, with a full recording and its report",
         description="Fly one case of a campaign again, record it as `companion fly` does, write "
@@ -81,8 +86,8 @@ def _add_rerun(kinds: Commands) -> None:
     rerun.set_defaults(run="cli.flights.rerun")
 
 
-def _add_report(kinds: Commands) -> None:
-    report = kinds.add_parser(
+def _add_report(sub_commands: Commands) -> None:
+    report = sub_commands.add_parser(
         "report",
         help="write the page about a campaign, finished or not, and its results as one table",
         description="Write report.html with success rates, worst cases, sensitivity, Pareto front "
@@ -93,8 +98,8 @@ def _add_report(kinds: Commands) -> None:
     report.set_defaults(run="campaign.report.page.run")
 
 
-def _add_tune(kinds: Commands) -> None:
-    tune = kinds.add_parser(
+def _add_tune(sub_commands: Commands) -> None:
+    tune = sub_commands.add_parser(
         "tune",
         help="search limits, gains and weights over the flights of a campaign",
         description="Search the keys in `tune.search` of the campaign's file for the smallest true "

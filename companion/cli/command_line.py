@@ -31,9 +31,9 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     Returns:
         The options; their attribute `typed` holds the arguments as typed.
     """
-    typed = sys.argv[1:] if arguments is None else list(arguments)
-    options = _parser().parse_args(with_campaign_run(typed))
-    options.typed = typed
+    typed_arguments = sys.argv[1:] if arguments is None else list(arguments)
+    options = _parser().parse_args(with_campaign_run(typed_arguments))
+    options.typed = typed_arguments
     return options
 
 

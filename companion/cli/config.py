@@ -45,27 +45,34 @@ def show(options: argparse.Namespace) -> int:
 
 def _named_keys(config: Config, name: str) -> list[ConfigKey]:
     """The key with that name, or all keys of a section."""
-    known = list(keys(config))
-    matching = [key for key in known if name in (key.section, f"{key.section}.{key.name}")]
+    known_keys = list(keys(config))
+    matching = [key for key in known_keys if name in (key.section, f"{key.section}.{key.name}")]
     if not matching:
-        near = _suggestions(known, name)
-        hint = f"did you mean {', '.join(near)}?" if near else "`companion config` prints them all"
+        similar_names = _suggestions(known_keys, name)
+        hint = (
+            f"did you mean {', '.join(similar_names)}?"
+            if similar_names
+            else "`companion config` prints them all"
+        )
         raise ConfigError(f"--get: there is no key `{name}`; {hint}")
     return matching
 
 
-def _suggestions(known: list[ConfigKey], name: str) -> list[str]:
+def _suggestions(known_keys: list[ConfigKey], name: str) -> list[str]:
     """Suggestions for an unknown name: the keys that contain it, else the most similar ones."""
-    keys_by_dotted_name = {f"{key.section}.{key.name}": key for key in known}
-    containing = [each for each, key in keys_by_dotted_name.items() if name in key.name]
-    if containing:
-        return containing
-    candidates: dict[str, list[str]] = {key.section: [key.section] for key in known}
-    for each, key in keys_by_dotted_name.items():
-        candidates[each] = [each]
-        candidates.setdefault(key.name, []).append(each)  # several sections may have such a key
-    near = most_similar_name(name, candidates, MIN_SIMILARITY)
-    return [] if near is None else candidates[near]
+    keys_by_dotted_name = {f"{key.section}.{key.name}": key for key in known_keys}
+    containing_names = [
+        dotted_name for dotted_name, key in keys_by_dotted_name.items() if name in key.name
+    ]
+    if containing_names:
+        return containing_names
+    candidates: dict[str, list[str]] = {key.section: [key.section] for key in known_keys}
+    for dotted_name, key in keys_by_dotted_name.items():
+        candidates[dotted_name] = [dotted_name]
+        # Several sections may have a key of this name.
+        candidates.setdefault(key.name, []).append(dotted_name)
+    similar_name = most_similar_name(name, candidates, MIN_SIMILARITY)
+    return [] if similar_name is None else candidates[similar_name]
 
 
 def init(options: argparse.Namespace) -> int:

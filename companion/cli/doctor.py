@@ -62,12 +62,12 @@ def doctor(options: argparse.Namespace) -> int:
             work = doctor_run.run_checks(options.wait, fix=options.fix, without_asking=options.yes)
         else:
             work = doctor_run.restore(undo, options.undo)
-        code = run(work, in_lockstep=config.link.lockstep)
+        exit_code = run(work, in_lockstep=config.link.lockstep)
     except KeyboardInterrupt:
-        code = doctor_run.report_interrupt()
+        exit_code = doctor_run.report_interrupt()
     if options.json:
         print(json.dumps(doctor_run.result, allow_nan=False))
-    return code
+    return exit_code
 
 
 def _with_options(config: Config, options: argparse.Namespace) -> Config:
@@ -87,9 +87,9 @@ def _maneuvers(config: Config, drag: KnownDrag) -> tuple[ManeuverSequence | None
     try:
         return configured_maneuvers(config, drag), []
     except ConfigError as error:
-        found = f"the configured maneuvers cannot be flown: {error}"
-        because = "`companion fly` refuses to fly them"
-        return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, found, because)]
+        refusal_text = f"the configured maneuvers cannot be flown: {error}"
+        explanation = "`companion fly` refuses to fly them"
+        return None, [Finding(Key.MANEUVERS, CheckResult.INEFFECTIVE, refusal_text, explanation)]
 
 
 def _response_findings(config: Config) -> list[Finding]:
@@ -99,8 +99,8 @@ def _response_findings(config: Config) -> list[Finding]:
     response = expected_response(config)
     result = CheckResult.INEFFECTIVE if response.gain_is_too_high else CheckResult.SAFE
     source = "planner, rate loop and limits"
-    because = f"{response.sentence()}; {hold_sentence(config)}"
-    return [Finding(Key.RESPONSE, result, response.gain_sentence(), because, source=source)]
+    explanation = f"{response.sentence()}; {hold_sentence(config)}"
+    return [Finding(Key.RESPONSE, result, response.gain_sentence(), explanation, source=source)]
 
 
 class _DoctorRun:
@@ -128,13 +128,19 @@ class _DoctorRun:
             except (LinkTimeout, LinkLost) as error:
                 return self._report(vehicle.unanswered_findings(error))
             drag = drag_of_vehicle(config, config.recording.directory, evidence.identity.uid)
-            maneuvers, refused = _maneuvers(config, drag)
+            maneuvers, refused_findings = _maneuvers(config, drag)
             evidence = replace(evidence, maneuvers=maneuvers, known_drag=drag)
-            findings = [*refused, *run_checks(config, evidence), *_response_findings(config)]
-            code = self._report(findings)
+            findings = [
+                *refused_findings,
+                *run_checks(config, evidence),
+                *_response_findings(config),
+            ]
+            exit_code = self._report(findings)
             if fix:
-                code = await self._fix(vehicle, evidence, findings, without_asking=without_asking)
-        return code
+                exit_code = await self._fix(
+                    vehicle, evidence, findings, without_asking=without_asking
+                )
+        return exit_code
 
     def report_interrupt(self) -> int:
         """Report Ctrl-C, and which parameters were set before it; return the exit code."""
@@ -156,7 +162,7 @@ class _DoctorRun:
                     f"{undo.system}, hardware id {undo.uid or 'unknown'}); nothing was set; "
                     "connect that vehicle, or name the undo file of this one"
                 )
-            await restore(link, undo, self._note)
+            await restore(link, undo, self._report_outcome)
         self.result = {"changes": [outcome_as_dict(outcome) for outcome in self._outcomes]}
         return EXIT_FAILURE if any(outcome.refusal for outcome in self._outcomes) else EXIT_OK
 
@@ -169,8 +175,8 @@ class _DoctorRun:
         without_asking: bool,
     ) -> int:
         link, config = vehicle.link, self._config
-        proposed = [finding for finding in findings if finding.change is not None]
-        if not proposed:
+        fixable_findings = [finding for finding in findings if finding.change is not None]
+        if not fixable_findings:
             if self.result["result"] == "ok":
                 self.say("`--fix` has no parameter to set.")
                 return EXIT_OK
@@ -180,7 +186,11 @@ class _DoctorRun:
         undo = UndoFile(config.recording.directory, link, evidence.identity)
         try:
             await apply_fixes(
-                link, proposed, _accept_all if without_asking else self._ask, undo, self._note
+                link,
+                fixable_findings,
+                _accept_all if without_asking else self._ask,
+                undo,
+                self._report_outcome,
             )
         finally:
             if undo.path.exists():
@@ -189,11 +199,13 @@ class _DoctorRun:
         evidence = replace(
             evidence, survey=await survey_parameters(link, link.autopilot.parameters)
         )
-        _, refused = _maneuvers(config, evidence.known_drag)
-        code = self._report([*refused, *run_checks(config, evidence), *_response_findings(config)])
+        _, refused_findings = _maneuvers(config, evidence.known_drag)
+        exit_code = self._report(
+            [*refused_findings, *run_checks(config, evidence), *_response_findings(config)]
+        )
         self.result["changes"] = [outcome_as_dict(outcome) for outcome in self._outcomes]
         self.result["undo"] = str(undo.path) if undo.path.exists() else None
-        return code
+        return exit_code
 
     async def _ask(self, finding: Finding) -> Answer:
         change = finding.change
@@ -217,7 +229,7 @@ class _DoctorRun:
         self.result = as_dict(self._config, findings)
         return EXIT_OK if self.result["result"] == "ok" else EXIT_FAILURE
 
-    def _note(self, outcome: ChangeOutcome) -> None:
+    def _report_outcome(self, outcome: ChangeOutcome) -> None:
         self._outcomes.append(outcome)
         self.say(outcome_line(outcome))
 

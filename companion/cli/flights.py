@@ -41,12 +41,12 @@ def rerun(options: argparse.Namespace) -> int:
     """Fly one case of a campaign again, and tell whether the flight is identical."""
     from companion.campaign.rerun import rerun as fly_again  # noqa: PLC0415  no other command
 
-    flown = fly_again(options.folder, options.case)
-    page = flying.write_flight_page(flown.folder)
+    rerun_result = fly_again(options.folder, options.case)
+    page = flying.write_flight_page(rerun_result.folder)
     console = Console(highlight=False, soft_wrap=True, markup=False)
-    for text in (*flown.lines, f"Recorded in {flown.folder}", page):
+    for text in (*rerun_result.lines, f"Recorded in {rerun_result.folder}", page):
         console.print(text)
-    return EXIT_OK if flown.identical else EXIT_FAILURE
+    return EXIT_OK if rerun_result.identical else EXIT_FAILURE
 
 
 def _console(options: argparse.Namespace) -> FlightConsole:

@@ -44,7 +44,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
         raise ConfigError(
             "--trajectory flies only its file, so --maneuvers has no effect; leave out one of them"
         )
-    keys = {
+    option_values = {
         "link": {"endpoint": options.endpoint, "lockstep": options.lockstep},
         "flight": {
             "maneuvers": ("trajectory",) if options.trajectory else options.maneuvers,
@@ -55,7 +55,7 @@ def with_options(config: Config, options: argparse.Namespace, planner: str | Non
     }
     changes = {
         section: {key: value for key, value in values.items() if value}  # only given options
-        for section, values in keys.items()
+        for section, values in option_values.items()
     }
     if options.arm or options.take_over:  # --arm replaces take_over of the file, and the reverse
         changes["flight"] |= {"arm": options.arm, "take_over": options.take_over}
@@ -117,15 +117,15 @@ def fly(
     interrupts.raise_interrupt_on(interrupts.signals_with_default_handler())
     with suppress(OSError):
         console.print(flight_table(summary))
-        not_recorded = f"Not recorded: {folder} was removed or renamed in flight"
-        place = f"Recorded in {folder}" if folder.is_dir() else not_recorded
-        console.print(place, soft_wrap=True)
-        words = closing_words(summary.as_dict(), invocation)
-        console.print(styled_text(words), soft_wrap=True)
+        no_record_text = f"Not recorded: {folder} was removed or renamed in flight"
+        record_text = f"Recorded in {folder}" if folder.is_dir() else no_record_text
+        console.print(record_text, soft_wrap=True)
+        closing_text = closing_words(summary.as_dict(), invocation)
+        console.print(styled_text(closing_text), soft_wrap=True)
     if config.recording.report:  # even if nobody reads the console, as after `| head`
-        page = write_flight_page(folder)
+        page_text = write_flight_page(folder)
         with suppress(OSError):
-            console.print(page, soft_wrap=True)
+            console.print(page_text, soft_wrap=True)
     return summary
 
 

@@ -45,17 +45,19 @@ def helper_process(
         require("nicegui", "live", "--live")
     if options.foxglove is not None:
         require("foxglove", "foxglove", "--foxglove")
-    page = None if options.live is None else open_page_socket(options.live)
+    page_socket = None if options.live is None else open_page_socket(options.live)
     # After the page, so that a port given to both is refused.
-    stream = None if options.foxglove is None else stream_address(options.foxglove)
-    for each in (page, stream):
-        if each is not None:
-            console.print(each.address_text(), highlight=False, soft_wrap=True)
-    watched = path if options.watch else None
-    tasks = HelperTasks(watched, config_as_read, page, stream, folder is not None, folder)
+    foxglove_address = None if options.foxglove is None else stream_address(options.foxglove)
+    for address in (page_socket, foxglove_address):
+        if address is not None:
+            console.print(address.address_text(), highlight=False, soft_wrap=True)
+    watched_config = path if options.watch else None
+    tasks = HelperTasks(
+        watched_config, config_as_read, page_socket, foxglove_address, folder is not None, folder
+    )
     helper = Helper(tasks, config)
-    if page is not None:
-        page.listening_socket.close()  # the helper process has its own copy
+    if page_socket is not None:
+        page_socket.listening_socket.close()  # the helper process has its own copy
     reason = "the program has ended"
     try:
         yield helper

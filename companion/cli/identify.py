@@ -46,7 +46,7 @@ def identify(options: argparse.Namespace) -> int:
     """Fly and fit, or fit a recorded flight; write the fit if it is usable."""
     console = FlightConsole(stderr=options.json, highlight=False)
     if options.log is not None:
-        log = _log_of(options.log)
+        log = _log_file(options.log)
         out = options.out or log.with_name(_FRAGMENT)
         require_writable(out, "--out", force=options.force)
         return _fit(log, out, options, console)
@@ -71,7 +71,7 @@ def identify(options: argparse.Namespace) -> int:
         return EXIT_FAILURE
 
 
-def _log_of(given_path: Path) -> Path:
+def _log_file(given_path: Path) -> Path:
     """The log that `--log` names: a file, or the log in the folder of a flight."""
     log = given_path / TLOG_FILE if given_path.is_dir() else given_path
     if log.is_file() and log.suffix != ".mcap":
@@ -95,8 +95,8 @@ def _suggestion(folder: Path) -> str:
     flights = sorted(folder.glob(f"*/{TLOG_FILE}"), key=lambda log: log.stat().st_mtime)
     if flights:
         return f"; write --log {shlex.quote(str(flights[-1].parent))}"
-    others = sorted(folder.glob("*.tlog"))
-    return f"; write --log {shlex.quote(str(others[0]))}" if others else ""
+    other_logs = sorted(folder.glob("*.tlog"))
+    return f"; write --log {shlex.quote(str(other_logs[0]))}" if other_logs else ""
 
 
 def _fly_doublets(options: argparse.Namespace, console: FlightConsole) -> Summary:
@@ -112,15 +112,15 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
     """Fit the data of a log, show the fit, write it to `out` if usable; return the exit code."""
     with suppress(OSError):
         console.print("fitting…")
-    rows = read_flight_log(log)
-    if rows.damage is not None:
+    log_data = read_flight_log(log)
+    if log_data.damage is not None:
         with suppress(OSError):
-            console.print(rows.damage, style="bold yellow", soft_wrap=True)
-    vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
+            console.print(log_data.damage, style="bold yellow", soft_wrap=True)
+    vehicle = identify_vehicle(log_data.setpoints, log_data.rates, log_data.specific_thrust)
     configured_axes = _configured_axes(log)
     try:
         text = vehicle_fragment(
-            vehicle, GRAVITY, configured_axes, _flight_name(log), autopilot=rows.autopilot
+            vehicle, GRAVITY, configured_axes, _flight_name(log), autopilot=log_data.autopilot
         )
     except BadFitError as error:
         with suppress(OSError):
@@ -137,8 +137,8 @@ def _fit(log: Path, out: Path, options: argparse.Namespace, console: FlightConso
     }
     with suppress(OSError):
         console.print(vehicle_table(vehicle, GRAVITY))
-        for axis, words in kept_values.items():
-            console.print(f"{axis}: {words}", style="bold yellow", soft_wrap=True)
+        for axis, note in kept_values.items():
+            console.print(f"{axis}: {note}", style="bold yellow", soft_wrap=True)
         console.print(_how_to_include(out, options.config), soft_wrap=True)
     result = {"result": "ok", "log": str(log), "file": str(out), "kept": kept_values}
     _print_json(options, {**result, **_figures(vehicle)})

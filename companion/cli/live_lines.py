@@ -16,8 +16,8 @@ _RED = "\x1b[1;31m{}\x1b[0m"
 
 def can_redraw(file: IO[str]) -> bool:
     """Whether lines can be rewritten: a terminal with ANSI codes, and NO_COLOR is not set."""
-    dumb = os.environ.get("TERM", "dumb") in ("", "dumb", "unknown")
-    return file.isatty() and not dumb and not os.environ.get("NO_COLOR")
+    is_dumb = os.environ.get("TERM", "dumb") in ("", "dumb", "unknown")
+    return file.isatty() and not is_dumb and not os.environ.get("NO_COLOR")
 
 
 def status_lines(status: FlightStatus) -> list[str]:
@@ -47,18 +47,18 @@ def elapsed_text(elapsed: float, timeout: float) -> str:
 
 
 def _setpoints(status: FlightStatus) -> str:
-    rate = "no setpoints" if status.setpoint_rate is None else f"{status.setpoint_rate:.0f} Hz"
+    rate_text = "no setpoints" if status.setpoint_rate is None else f"{status.setpoint_rate:.0f} Hz"
     if status.latency is None:
-        return rate
-    return f"{rate}  latency {1e3 * status.latency:.2f} ms ({status.missed_deadlines} late)"
+        return rate_text
+    return f"{rate_text}  latency {1e3 * status.latency:.2f} ms ({status.missed_deadlines} late)"
 
 
 def _battery(status: FlightStatus) -> str:
     battery = status.battery
     if battery is None or battery.remaining is None:
         return "–"
-    volts = "" if battery.voltage_v is None else f" {battery.voltage_v:.1f} V"
-    return f"{100.0 * battery.remaining:.0f} %{volts}"
+    voltage_text = "" if battery.voltage_v is None else f" {battery.voltage_v:.1f} V"
+    return f"{100.0 * battery.remaining:.0f} %{voltage_text}"
 
 
 def _safety(status: FlightStatus) -> str:
@@ -67,10 +67,10 @@ def _safety(status: FlightStatus) -> str:
     return "ok" if status.monitored else "off"
 
 
-def _number(value: float | None, digits: str, unit: str) -> str:
+def _number(value: float | None, number_format: str, unit: str) -> str:
     if value is None:
         return "–"
-    text = f"{value:{digits}}"
+    text = f"{value:{number_format}}"
     text = text.removeprefix("-") if float(text) == 0.0 else text
     return f"{text}{'' if unit == '°' else ' '}{unit}"
 
@@ -89,26 +89,28 @@ class LiveLines:
 
     def show(self, lines: Sequence[str], *, alarm: bool = False) -> None:
         """Replace the lines; with `alarm`, the last one shows an alarm."""
-        to_first_line, columns = self._to_first_line(), self._columns()
-        plain = lines if self._is_unicode else [ascii_for(line) for line in lines]
-        self._lines = [line[: columns - 1] for line in plain]
-        drawn = list(self._lines)
-        if alarm and drawn:
-            drawn[-1] = _RED.format(drawn[-1])
-        self._write(to_first_line + "".join(f"{line}\x1b[K\n" for line in drawn) + "\x1b[J")
+        cursor_to_first_line, columns = self._cursor_to_first_line(), self._columns()
+        printable_lines = lines if self._is_unicode else [ascii_for(line) for line in lines]
+        self._lines = [line[: columns - 1] for line in printable_lines]
+        drawn_lines = list(self._lines)
+        if alarm and drawn_lines:
+            drawn_lines[-1] = _RED.format(drawn_lines[-1])
+        self._write(
+            cursor_to_first_line + "".join(f"{line}\x1b[K\n" for line in drawn_lines) + "\x1b[J"
+        )
 
     def write_above(self, text: str) -> None:
         """Write `text`, which consists of whole lines, above the status lines."""
         status_text = "".join(f"{line}\n" for line in self._lines)
-        self._write(f"{self._to_first_line()}\x1b[J{text}{status_text}")
+        self._write(f"{self._cursor_to_first_line()}\x1b[J{text}{status_text}")
 
     def clear(self) -> None:
         """Remove the lines."""
         if self._lines:
-            self._write(f"{self._to_first_line()}\x1b[J")
+            self._write(f"{self._cursor_to_first_line()}\x1b[J")
             self._lines = []
 
-    def _to_first_line(self) -> str:
+    def _cursor_to_first_line(self) -> str:
         """Code that moves the cursor to the first line, even if a narrow terminal wrapped lines."""
         columns = self._columns()
         rows = sum(max(1, -(-len(line) // columns)) for line in self._lines)

@@ -10,9 +10,11 @@ Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 Options: TypeAlias = "argparse.ArgumentParser | argparse._MutuallyExclusiveGroup"
 
 
-def add_path(options: Options, name: str, help: str, metavar: str = "FILE", **more: Any) -> None:
-    """Add an option or an argument whose value is a path; `more` goes to argparse."""
-    options.add_argument(name, type=Path, metavar=metavar, help=help, **more)
+def add_path(
+    options: Options, name: str, help: str, metavar: str = "FILE", **argument_options: Any
+) -> None:
+    """Add an option or an argument whose value is a path; `argument_options` goes to argparse."""
+    options.add_argument(name, type=Path, metavar=metavar, help=help, **argument_options)
 
 
 def add_flight_folder(command: argparse.ArgumentParser) -> None:

@@ -92,15 +92,15 @@ def replay(options: argparse.Namespace) -> int:
     if options.csv is not None:  # a long flight takes a minute to replay
         require_writable(options.csv, "--csv", force=True)
     record = read_flight(options.folder)
-    own_config = options.config is None and not options.set
+    uses_own_config = options.config is None and not options.set
     config = load(options.config or options.folder / "config.yaml")
     config = with_assignments(config, options.set)
-    replayed = Replay(record, config)
-    samples = replayed.run()
-    whole = _is_whole(record)
+    replay_run = Replay(record, config)
+    samples = replay_run.run()
+    is_whole = _is_whole(record)
     if not samples:
         raise ConfigError(f"{options.folder}: no attitude sample is recorded there to replay")
-    for line in result_lines(samples, record.start_time, follows_record=replayed.follows_record):
+    for line in result_lines(samples, record.start_time, follows_record=replay_run.follows_record):
         print(line)
     if options.csv is not None:
         try:
@@ -108,5 +108,5 @@ def replay(options: argparse.Namespace) -> int:
         except OSError as error:
             raise ConfigError(f"{options.csv}: cannot write it: {error.strerror}") from error
         print(options.csv)
-    all_same = not own_config or all(each.is_same for each in samples)
-    return EXIT_OK if whole and all_same else EXIT_FAILURE
+    all_same = not uses_own_config or all(sample.is_same for sample in samples)
+    return EXIT_OK if is_whole and all_same else EXIT_FAILURE

@@ -54,13 +54,13 @@ def run(command: Command, options: argparse.Namespace) -> int:
     Raises:
         KeyboardInterrupt: Ctrl-C where no flight handles it.
     """
-    code = EXIT_FAILURE
+    exit_code = EXIT_FAILURE
     reason: str | None = None
     os_error: OSError | None = None
     try:
-        code = command(options)
+        exit_code = command(options)
     except _USAGE_ERRORS as error:
-        reason, code = str(error), EXIT_USAGE
+        reason, exit_code = str(error), EXIT_USAGE
     except _FLIGHT_ERRORS as error:
         reason = str(error)
     except BrokenPipeError:
@@ -73,20 +73,20 @@ def run(command: Command, options: argparse.Namespace) -> int:
         if options.debug:
             traceback.print_exc()
         reason = f"internal error: {error!r}; run again with --debug to see where it happened"
-    fault = flush_output()
+    output_fault = flush_output()
     # An error without a file may be that of standard output, which is reported below.
-    if os_error is not None and (fault is None or os_error.filename is not None):
+    if os_error is not None and (output_fault is None or os_error.filename is not None):
         reason = file_and_reason(os_error)
     if reason is not None:
         _print_error(reason)
         if getattr(options, "json", False):
             with suppress(OSError):  # reported below
                 print(json.dumps({"result": reason}))
-            fault = fault or flush_output()
-    if fault:
-        _print_error(f"standard output cannot be written: {fault}")
-        return code or EXIT_FAILURE
-    return code
+            output_fault = output_fault or flush_output()
+    if output_fault:
+        _print_error(f"standard output cannot be written: {output_fault}")
+        return exit_code or EXIT_FAILURE
+    return exit_code
 
 
 def _print_error(text: str) -> None:

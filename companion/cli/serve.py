@@ -9,7 +9,7 @@ from typing import Any
 
 from companion.cli.exit_codes import EXIT_OK
 from companion.cli.helper_process import flight_environment, helper_process
-from companion.cli.signals import SECOND_CTRL_C_AFTER, hangup_signals
+from companion.cli.signals import MIN_CTRL_C_INTERVAL, hangup_signals
 from companion.cli.terminal import FlightConsole, TerminalObserver
 from companion.config import Config
 from companion.config.files import changed, load, with_assignments
@@ -32,10 +32,10 @@ def serve(options: argparse.Namespace) -> int:
     config = _with_options(config_as_read, options)
     console = FlightConsole(stderr=options.json, highlight=False)
     observer = _ServeObserver(console)
-    began = time.monotonic()
+    start_time = time.monotonic()
 
     def note(text: str) -> None:
-        observers.event(time.monotonic() - began, text)
+        observers.event(time.monotonic() - start_time, text)
 
     with helper_process(options, config, options.config, config_as_read, None, console) as helper:
         observers = observer if helper is None else SeveralObservers(observer, helper)
@@ -66,11 +66,11 @@ class _ServeObserver(TerminalObserver):
 
     def __init__(self, console: FlightConsole) -> None:
         super().__init__(console)
-        self._began = time.monotonic()
+        self._start_time = time.monotonic()
 
     def event(self, _: float, text: str) -> None:
         """Show an event of a flight or of the command."""
-        super().event(time.monotonic() - self._began, text)
+        super().event(time.monotonic() - self._start_time, text)
 
     def status(self, status: FlightStatus) -> None:
         """Do nothing: there are no live lines."""
@@ -90,7 +90,7 @@ async def _until_stopped(session: ServeSession, pages: ReportPages) -> dict[str,
         if stopped_at is None:
             stopped_at = loop.time()
             stop()
-        elif loop.time() - stopped_at >= SECOND_CTRL_C_AFTER:
+        elif loop.time() - stopped_at >= MIN_CTRL_C_INTERVAL:
             session.leave()
             pages.stop()
 

@@ -11,14 +11,14 @@ from collections.abc import Callable
 from companion.flight.session import Session
 from companion.recording.measurements.summary import Summary
 
-SECOND_CTRL_C_AFTER = 1.0
+MIN_CTRL_C_INTERVAL = 1.0
 """Time after a Ctrl-C from which another Ctrl-C stops the setpoints at once, s.
 
 A Ctrl-C that comes sooner is ignored, because a key may bounce.
 """
 
 HOW_TO_LEAVE = (
-    f"to stop the setpoints at once, press Ctrl-C again after {SECOND_CTRL_C_AFTER:g} s or more; "
+    f"to stop the setpoints at once, press Ctrl-C again after {MIN_CTRL_C_INTERVAL:g} s or more; "
     "then the pilot or the autopilot's offboard-loss failsafe flies the vehicle"
 )
 
@@ -56,11 +56,11 @@ class SignalHandler:
                 self._hand_back(number.name)
 
     def _handle_ctrl_c(self) -> None:
-        previous, self._ctrl_c_at = self._ctrl_c_at, self._clock()
-        if previous is None:
+        previous_time, self._ctrl_c_at = self._ctrl_c_at, self._clock()
+        if previous_time is None:
             self._hand_back("the user (Ctrl-C)")
             self._session.note(HOW_TO_LEAVE)
-        elif self._ctrl_c_at - previous >= SECOND_CTRL_C_AFTER:
+        elif self._ctrl_c_at - previous_time >= MIN_CTRL_C_INTERVAL:
             self._session.leave()
 
     def _hand_back(self, cause: str) -> None:

@@ -52,14 +52,14 @@ class _PrintThread:
             self._thread.join(_CLOSE_TIMEOUT)
 
     def _print_lines(self) -> None:
-        broken = False
+        terminal_is_gone = False
         while (print_line := self._lines.get()) is not None:
-            if broken:
+            if terminal_is_gone:
                 continue
             try:
                 print_line()
             except (OSError, ValueError):  # the terminal is gone or closed
-                broken = True
+                terminal_is_gone = True
 
 
 async def read_line() -> str:

@@ -104,9 +104,9 @@ def flush_output() -> str | None:
     if failure is None:
         return None
     with suppress(OSError, ValueError):
-        null = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(null, sys.stdout.fileno())
-        os.close(null)
+        null_descriptor = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null_descriptor, sys.stdout.fileno())
+        os.close(null_descriptor)
     return "" if isinstance(failure, BrokenPipeError) else reason_of(failure)
 
 

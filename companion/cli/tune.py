@@ -35,9 +35,9 @@ def tune(options: argparse.Namespace) -> int:
     """Propose values, fly the proposal on the mock vehicle, and write it."""
     console = Console(stderr=options.json, highlight=False, soft_wrap=True, markup=False)
     source: Path = options.vehicle
-    vehicle = source / _VEHICLE if source.is_dir() else source
-    output = options.output or vehicle.with_name(_OUTPUT_NAME)
-    config, included = _configuration(source, vehicle, options.config)
+    vehicle_file = source / _VEHICLE if source.is_dir() else source
+    output = options.output or vehicle_file.with_name(_OUTPUT_NAME)
+    config, has_vehicle_file = _configuration(source, vehicle_file, options.config)
     require_writable(output, "--out", force=options.force)
     config = _with_learned_drag(config, source)
     log = source / TLOG_FILE
@@ -48,8 +48,8 @@ def tune(options: argparse.Namespace) -> int:
     proposal = propose(config, disturbances)
     flights = {} if options.no_flights else _fly_trials(proposal, console)
     vehicle_source: Path | dict[str, Any]
-    if included:
-        vehicle_source = Path(os.path.relpath(vehicle.resolve(), output.resolve().parent))
+    if has_vehicle_file:
+        vehicle_source = Path(os.path.relpath(vehicle_file.resolve(), output.resolve().parent))
     else:
         values = proposal.tuned.vehicle.model_dump(
             mode="json", exclude_none=True, exclude_defaults=True
@@ -60,7 +60,7 @@ def tune(options: argparse.Namespace) -> int:
     write_whole(output, proposal_text(proposal, vehicle_source, flights, source.name))
     load(output)
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
-    user_config = vehicle if included and not _is_vehicle_file(vehicle) else None
+    user_config = vehicle_file if has_vehicle_file and not _is_vehicle_file(vehicle_file) else None
     console.print(_next_step(output, keys, user_config))
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
@@ -85,31 +85,33 @@ def _next_step(output: Path, keys: Sequence[str], user_config: Path | None) -> s
     )
 
 
-def _configuration(source: Path, vehicle: Path, base: Path | None) -> tuple[Config, bool]:
+def _configuration(source: Path, vehicle_file: Path, base: Path | None) -> tuple[Config, bool]:
     """The configuration to tune, and whether the vehicle's response comes from a vehicle file."""
-    recorded = source / _CONFIG
-    if base is None and source.is_dir() and recorded.exists():
-        base = recorded
-    if not vehicle.exists():
+    recorded_config = source / _CONFIG
+    if base is None and source.is_dir() and recorded_config.exists():
+        base = recorded_config
+    if not vehicle_file.exists():
         if base is None or source.is_file() or not source.exists():
             raise ConfigError(
-                f"{vehicle} does not exist; name the file or the flight folder that `companion "
-                "identify` wrote"
+                f"{vehicle_file} does not exist; name the file or the flight folder that "
+                "`companion identify` wrote"
             )
         return _with_hover(load(base)), False
-    identified = load(vehicle)
+    identified_config = load(vehicle_file)
     if base is None:  # a file with a mock vehicle cannot be included
-        return _with_hover(identified), identified.mock is None
-    identified_keys = identified.model_dump(exclude_unset=True, include=set(_VEHICLE_SECTIONS))
-    return _with_hover(changed(load(base), identified_keys, str(vehicle))), True
+        return _with_hover(identified_config), identified_config.mock is None
+    identified_keys = identified_config.model_dump(
+        exclude_unset=True, include=set(_VEHICLE_SECTIONS)
+    )
+    return _with_hover(changed(load(base), identified_keys, str(vehicle_file))), True
 
 
 def _with_learned_drag(config: Config, source: Path) -> Config:
     """The configuration with the drag learned by the flights in the same folder as `source`."""
-    learned = newest_learned(source.resolve().parent) if source.is_dir() else None
-    if config.guidance.drag is not None or learned is None:
+    learned_file = newest_learned(source.resolve().parent) if source.is_dir() else None
+    if config.guidance.drag is not None or learned_file is None:
         return config
-    return changed(config, learned.as_keys(), str(learned.path))
+    return changed(config, learned_file.as_keys(), str(learned_file.path))
 
 
 def _with_hover(config: Config) -> Config:
@@ -136,29 +138,29 @@ def _figures(
     proposal: Proposal, flights: dict[str, tuple[TrialResult, TrialResult]], output: Path
 ) -> dict[str, Any]:
     """The figures for `--json`; a value that a failed flight did not measure is null."""
-    expected = {}
-    for name, each in (("before", proposal.before), ("after", proposal.after)):
-        margins = each.margins
-        expected[name] = {
+    expected_figures = {}
+    for name, tuning in (("before", proposal.before), ("after", proposal.after)):
+        margins = tuning.margins
+        expected_figures[name] = {
             "gain_margin_db": round(margins.gain_db, 2),
             "phase_margin_deg": round(margins.phase_deg, 1),
             "delay_margin_ms": round(1e3 * margins.delay, 1),
-            "error_by_gusts_m": round(each.errors.gusts, 4),
-            "error_on_a_path_m": round(each.errors.path, 4),
-            "error_by_noise_m": round(each.errors.noise, 4),
-            "settling_s": round(each.settling_time, 2),
+            "error_by_gusts_m": round(tuning.errors.gusts, 4),
+            "error_on_a_path_m": round(tuning.errors.path, 4),
+            "error_by_noise_m": round(tuning.errors.noise, 4),
+            "settling_s": round(tuning.settling_time, 2),
         }
     flown_figures = {
         name: {
             when: {key: _rounded(value) for key, value in asdict(flight).items()}
-            for when, flight in zip(("before", "after"), pair, strict=True)
+            for when, flight in zip(("before", "after"), trial_results, strict=True)
         }
-        for name, pair in flights.items()
+        for name, trial_results in flights.items()
     }
     return {
         "file": str(output),
         "proposed": proposal.changes,
-        "expected": expected,
+        "expected": expected_figures,
         "flights": flown_figures,
     }
 

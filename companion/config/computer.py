@@ -44,7 +44,7 @@ class LinkConfig(Section):
     """Refuse to fly at a lower rate of positions; in flight, hand back if it is lower for 1 s."""
 
     @model_validator(mode="after")
-    def _consistent(self) -> "LinkConfig":
+    def _check_consistency(self) -> "LinkConfig":
         if self.min_attitude_rate_hz > self.attitude_rate_hz:
             raise ValueError("min_attitude_rate_hz must not exceed attitude_rate_hz")
         if self.min_position_rate_hz > self.position_rate_hz:
@@ -53,8 +53,8 @@ class LinkConfig(Section):
             raise ValueError(
                 "backend: mavsdk can neither fly in lockstep nor sign; set link.backend: direct"
             )
-        ours, theirs = self.source_component, self.target_component
-        if (self.source_system, ours) == (self.target_system, theirs):
+        source, target = self.source_component, self.target_component
+        if (self.source_system, source) == (self.target_system, target):
             raise ValueError(
                 "source_system and source_component must not both equal target_system and "
                 "target_component; 191 is usual for source_component"

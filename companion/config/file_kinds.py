@@ -28,7 +28,7 @@ _KEYS: Mapping[FileKind, Iterable[str]] = {
     FileKind.TRAJECTORY: TRAJECTORY_KEYS,
     FileKind.CAMPAIGN: CAMPAIGN_KEYS,
 }
-_USED_BY: Mapping[FileKind, str] = {
+_USES: Mapping[FileKind, str] = {
     FileKind.CONFIG: "`companion fly --config` flies it, and the key `config` of a campaign file "
     "names it",
     FileKind.TRAJECTORY: "`companion fly --trajectory` flies it",
@@ -37,14 +37,18 @@ _USED_BY: Mapping[FileKind, str] = {
 }
 
 
-def require_kind(path: Path | str, keys: Iterable[str], wanted: FileKind) -> None:
+def require_kind(path: Path | str, keys: Iterable[str], wanted_kind: FileKind) -> None:
     """Refuse a file whose top-level keys fit another kind of file better.
 
     Raises:
         ConfigError: the file is of another kind; the message names what takes such a file.
     """
-    given = set(keys)
-    found = {kind: len(given.intersection(known)) for kind, known in _KEYS.items()}
-    likely = max(found, key=lambda kind: (found[kind], kind is wanted))
-    if likely is not wanted:
-        raise ConfigError(f"{path} is {likely.value}, not {wanted.value}; {_USED_BY[likely]}")
+    given_keys = set(keys)
+    match_counts = {
+        kind: len(given_keys.intersection(kind_keys)) for kind, kind_keys in _KEYS.items()
+    }
+    likely_kind = max(match_counts, key=lambda kind: (match_counts[kind], kind is wanted_kind))
+    if likely_kind is not wanted_kind:
+        raise ConfigError(
+            f"{path} is {likely_kind.value}, not {wanted_kind.value}; {_USES[likely_kind]}"
+        )

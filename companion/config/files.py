@@ -25,7 +25,7 @@ FILE_KEYS: tuple[tuple[str, ...], ...] = (
     ("mock", "signing", "passphrase_file"),
 )
 """Keys that name a file to read. A relative path starts at the folder of the file with the key."""
-_MAX_DEPTH = 4
+_MAX_INCLUDE_DEPTH = 4
 """Largest depth of nested includes."""
 
 
@@ -84,8 +84,8 @@ def _drop_mixed_identification(merged: Contents) -> None:
     identified_place = merged.places.get(("vehicle", "identified"))
     files = {
         place.file
-        for where, place in merged.places.items()
-        if where[:1] == ("vehicle",) and len(where) > 1
+        for key_path, place in merged.places.items()
+        if key_path[:1] == ("vehicle",) and len(key_path) > 1
     }
     if identified_place is not None and files != {identified_place.file}:
         merged.keys["vehicle"] |= {"identified": None, "autopilot": None}
@@ -103,49 +103,49 @@ class _IncludeReader:
         self.merged = Contents({}, {})
         self.files: list[Path] = []
 
-    def add(self, chain: tuple[Path, ...], contents: Contents) -> None:
+    def add(self, include_chain: tuple[Path, ...], contents: Contents) -> None:
         """Add the keys of a file, after those of the files that it includes.
 
         Args:
-            chain: the including files, the outermost first, and at the end the file itself.
+            include_chain: the including files, the outermost first, and at the end the file itself.
             contents: contents of the file itself.
 
         Raises:
             ConfigError: see `load`.
         """
-        for path in _included_paths(chain[-1], contents.keys):
-            self.add((*chain, path), self._read_included(*chain, path))
+        for path in _included_paths(include_chain[-1], contents.keys):
+            self.add((*include_chain, path), self._read_included(*include_chain, path))
         _merge(self.merged, contents)
 
-    def _read_included(self, *chain: Path) -> Contents:
-        *_, including_file, path = chain
+    def _read_included(self, *include_chain: Path) -> Contents:
+        *_, including_file, path = include_chain
         self.files.append(path)
         if len(self.files) > MOST_INCLUDED:
-            raise ConfigError(f"{chain[0]}: more than {MOST_INCLUDED} files are included")
-        if realpath(path) in map(realpath, chain[:-1]):
-            names = " includes ".join(str(each) for each in chain)
-            raise ConfigError(f"{chain[0]}: a file must not include itself: {names}")
-        if len(chain) - 1 > _MAX_DEPTH:
+            raise ConfigError(f"{include_chain[0]}: more than {MOST_INCLUDED} files are included")
+        if realpath(path) in map(realpath, include_chain[:-1]):
+            names = " includes ".join(str(each) for each in include_chain)
+            raise ConfigError(f"{include_chain[0]}: a file must not include itself: {names}")
+        if len(include_chain) - 1 > _MAX_INCLUDE_DEPTH:
             raise ConfigError(
-                f"{including_file}: includes may be nested at most {_MAX_DEPTH} files deep"
+                f"{including_file}: includes may be nested at most {_MAX_INCLUDE_DEPTH} files deep"
             )
         try:
-            included = _read(path)
+            included_contents = _read(path)
         except UnreadableFileError as error:
             raise ConfigError(f"{error} (included by {including_file})") from error
-        _check_included(path, included.keys)
-        return included
+        _check_included(path, included_contents.keys)
+        return included_contents
 
 
 def _included_paths(path: Path, keys: dict[str, Any]) -> list[Path]:
-    names = keys.get(_INCLUDE, [])
-    names = [names] if isinstance(names, str) else names
-    if not isinstance(names, list) or not all(
-        isinstance(name, str) and yaml_file.is_path(name) for name in names
+    file_names = keys.get(_INCLUDE, [])
+    file_names = [file_names] if isinstance(file_names, str) else file_names
+    if not isinstance(file_names, list) or not all(
+        isinstance(name, str) and yaml_file.is_path(name) for name in file_names
     ):
-        shown = shortened_text(names)
-        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {shown}")
-    return [path.parent / yaml_file.expanded_path(name) for name in names]
+        text = shortened_text(file_names)
+        raise ConfigError(f"{path}: `{_INCLUDE}` must be a file or a list of files, not {text}")
+    return [path.parent / yaml_file.expanded_path(name) for name in file_names]
 
 
 def _check_included(path: Path, keys: dict[str, Any]) -> None:
@@ -159,23 +159,23 @@ def _check_included(path: Path, keys: dict[str, Any]) -> None:
         if section == _INCLUDE:
             continue
         if section in Config.model_fields and not isinstance(values, dict):
-            shown = shortened_text(values)
-            raise ConfigError(f"{path}: `{section}` must hold keys, not {shown}")
+            text = shortened_text(values)
+            raise ConfigError(f"{path}: `{section}` must hold keys, not {text}")
 
 
 def _merge(merged: Contents, contents: Contents) -> None:
     """Let the keys of a file override earlier ones, and remember the file of each key."""
-    data = merged.keys
+    merged_keys = merged.keys
     for section, values in contents.keys.items():
-        data.setdefault(section, {})
-        if isinstance(values, dict) and isinstance(data[section], dict):
+        merged_keys.setdefault(section, {})
+        if isinstance(values, dict) and isinstance(merged_keys[section], dict):
             replaced_keys: set[KeyPath] = {(section, key) for key in values}
-            data[section] = {**data[section], **values}
+            merged_keys[section] = {**merged_keys[section], **values}
         else:
-            replaced_keys = {where for where in merged.places if where[:1] == (section,)}
-            data[section] = values
-        for where in [where for where in merged.places if where[:2] in replaced_keys]:
-            del merged.places[where]
+            replaced_keys = {key_path for key_path in merged.places if key_path[:1] == (section,)}
+            merged_keys[section] = values
+        for key_path in [key_path for key_path in merged.places if key_path[:2] in replaced_keys]:
+            del merged.places[key_path]
     merged.places.update(contents.places)
 
 
@@ -189,9 +189,9 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     """
     data = config.model_dump()
     for section, values in changes.items():
-        known = data.get(section)
-        if isinstance(known, dict) and isinstance(values, Mapping):
-            known.update(values)
+        present_section = data.get(section)
+        if isinstance(present_section, dict) and isinstance(values, Mapping):
+            present_section.update(values)
         elif section == "include":
             raise ConfigError(f"{name}: `include` belongs in a file; load that file instead")
         else:  # `validated` refuses it, and names the key that was probably meant
@@ -199,7 +199,7 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
     return yaml_file.validated(data, name, Config)
 
 
-def with_assignments(config: Config, texts: Sequence[str]) -> Config:
+def with_assignments(config: Config, assignments: Sequence[str]) -> Config:
     """The configuration changed by texts such as `limits.max_tilt_deg=20`, with values in YAML.
 
     Raises:
@@ -207,12 +207,12 @@ def with_assignments(config: Config, texts: Sequence[str]) -> Config:
             is not valid.
     """
     changes: dict[str, dict[str, Any]] = {}
-    for text in texts:
-        key, equals, value = text.partition("=")
+    for text in assignments:
+        key, equals_sign, value = text.partition("=")
         section, dot, name = key.strip().partition(".")
-        if equals and not dot and (found := dotted_keys(section, Config)):
-            raise ConfigError(f"--set {text}: name the section, as in {found}")
-        if not (equals and dot and section and name):
+        if equals_sign and not dot and (suggested_keys := dotted_keys(section, Config)):
+            raise ConfigError(f"--set {text}: name the section, as in {suggested_keys}")
+        if not (equals_sign and dot and section and name):
             raise ConfigError(f"--set {text}: write SECTION.KEY=VALUE, as limits.max_tilt_deg=20")
         if section not in Config.model_fields:
             raise ConfigError(f"--set {text}: there is no section `{section}`")

@@ -20,9 +20,10 @@ GUIDANCE_NAMES = (LINEAR, "nmpc")
 def require_known_name(kind: str, name: str, our_names: tuple[str, ...], group: str) -> None:
     """Raise `ValueError` unless `name` is in `our_names` or a plug-in of `group` has it."""
     if name not in our_names and name not in (installed := plugins.names(group)):
-        known = (*our_names, *installed)
+        known_names = (*our_names, *installed)
         raise ValueError(
-            f"unknown {kind} {name!r}; known: {', '.join(known)}{name_hint(name, known)}"
+            f"unknown {kind} {name!r}; known: {', '.join(known_names)}"
+            f"{name_hint(name, known_names)}"
         )
 
 
@@ -46,7 +47,7 @@ class PlannerConfig(Section):
     """
 
     @model_validator(mode="after")
-    def _known_name(self) -> "PlannerConfig":
+    def _check_name(self) -> "PlannerConfig":
         require_known_name("planner", self.name, (AUTO, *PLANNER_NAMES), plugins.PLANNERS)
         return self
 
@@ -114,7 +115,7 @@ class GuidanceConfig(Section):
     position_lateness = Si("position_lateness_ms")
 
     @model_validator(mode="after")
-    def _known_kind(self) -> "GuidanceConfig":
+    def _check_kind(self) -> "GuidanceConfig":
         require_known_name("guidance", self.kind, GUIDANCE_NAMES, plugins.GUIDANCE)
         return self
 

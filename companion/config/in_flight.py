@@ -52,20 +52,23 @@ def changeable_keys() -> dict[tuple[str, str], str]:
 def differences(before: Config, after: Config) -> Iterator[Difference]:
     """The keys with different values; `mock` and `include` count as one key each."""
     for section in Config.model_fields:
-        old, new = getattr(before, section), getattr(after, section)
-        if not (isinstance(old, BaseModel) and isinstance(new, BaseModel)):
-            if old != new:
-                yield Difference(section, "", old, new)
+        old_section, new_section = getattr(before, section), getattr(after, section)
+        if not (isinstance(old_section, BaseModel) and isinstance(new_section, BaseModel)):
+            if old_section != new_section:
+                yield Difference(section, "", old_section, new_section)
             continue
-        for key in type(old).model_fields:
-            if getattr(old, key) != getattr(new, key):
-                yield Difference(section, key, getattr(old, key), getattr(new, key))
+        for key in type(old_section).model_fields:
+            if getattr(old_section, key) != getattr(new_section, key):
+                yield Difference(section, key, getattr(old_section, key), getattr(new_section, key))
 
 
-def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> Config:
-    """The configuration `now` with new values, checked against `start`, that of the flight's start.
+def changed_in_flight(
+    start_config: Config, present_config: Config, values: Values, name: str
+) -> Config:
+    """The present configuration with new values.
 
-    Error messages begin with `name`, the source of the new values.
+    They are checked against `start_config`, that of the flight's start. Error messages begin with
+    `name`, the source of the new values.
 
     Raises:
         ConfigError: a key must not change in flight, or the result is not valid.
@@ -73,23 +76,26 @@ def changed_in_flight(start: Config, now: Config, values: Values, name: str) -> 
     for section, keys in values.items():
         for key in keys:
             full_name, model = f"{section}.{key}".rstrip("."), sections().get(section)
-            known = section in Config.model_fields if model is None else key in model.model_fields
-            if not known:
+            is_known = (
+                section in Config.model_fields if model is None else key in model.model_fields
+            )
+            if not is_known:
                 raise ConfigError(f"{name}: there is no key `{full_name}`")
             if (section, key) not in changeable_keys():
                 raise ConfigError(
                     f"{name}: {full_name} cannot be changed in flight; "
                     "a change applies from the next flight on"
                 )
-    new_config = changed(now, values, name)
+    new_config = changed(present_config, values, name)
     for section, keys in values.items():
         for key in keys:
-            checked, new = (
-                getattr(getattr(config, section), key) for config in (start, new_config)
+            start_value, new_value = (
+                getattr(getattr(config, section), key) for config in (start_config, new_config)
             )
-            if changeable_keys()[section, key] == UP_TO_START and new > checked:
+            if changeable_keys()[section, key] == UP_TO_START and new_value > start_value:
                 raise ConfigError(
-                    f"{name}: {section}.{key} {new:g} is more than {checked:g}, the value checked "
-                    "before take-off; in flight you may lower it, and raise it back to that value"
+                    f"{name}: {section}.{key} {new_value:g} is more than {start_value:g}, the "
+                    "value checked before take-off; in flight you may lower it, and raise it back "
+                    "to that value"
                 )
     return new_config

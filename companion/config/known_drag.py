@@ -32,12 +32,12 @@ class KnownDrag(NamedTuple):
     """Why the file of a learned drag could not be used; None: no fault, or no file."""
 
     @property
-    def least(self) -> Drag:
+    def lower_bound(self) -> Drag:
         """The drag that may be counted on to brake the vehicle; zero if it is unknown."""
         return self.drag or NO_DRAG
 
     @property
-    def most(self) -> Drag:
+    def upper_bound(self) -> Drag:
         """The drag that thrust must be able to overcome; a large one if it is unknown."""
         return self.drag or _LARGEST_DRAG
 
@@ -55,8 +55,8 @@ def drag_before_connecting(config: Config) -> KnownDrag:
     """The configured drag, or the one of the vehicle that flew last; unknown without either."""
     if config.guidance.drag is not None:
         return KnownDrag(config.guidance.drag)
-    learned = newest_learned(config.recording.directory)
-    return KnownDrag() if learned is None else KnownDrag(learned.drag, learned.path)
+    learned_file = newest_learned(config.recording.directory)
+    return KnownDrag() if learned_file is None else KnownDrag(learned_file.drag, learned_file.path)
 
 
 def drag_of_vehicle(config: Config, directory: Path | None, uid: str | None) -> KnownDrag:
@@ -71,8 +71,12 @@ def drag_of_vehicle(config: Config, directory: Path | None, uid: str | None) -> 
         return KnownDrag(config.guidance.drag)
     if uid is None or directory is None:
         return KnownDrag()
-    learned, fault = LearnedFile(directory, uid).load()
-    return KnownDrag(file_fault=fault) if learned is None else KnownDrag(learned.drag, learned.path)
+    learned_drag, fault = LearnedFile(directory, uid).load()
+    return (
+        KnownDrag(file_fault=fault)
+        if learned_drag is None
+        else KnownDrag(learned_drag.drag, learned_drag.path)
+    )
 
 
 def prior_of(drag: Drag | None) -> DragPrior:

@@ -66,7 +66,7 @@ class LimitsConfig(Section):
         return GRAVITY * tan(self.max_tilt)
 
     @model_validator(mode="after")
-    def _consistent(self) -> "LimitsConfig":
+    def _check_consistency(self) -> "LimitsConfig":
         if self.max_tilt_deg > self.recovery_angle_deg:
             raise ValueError("max_tilt_deg must not exceed recovery_angle_deg")
         if self.min_thrust >= self.max_thrust:
@@ -103,7 +103,7 @@ class DeadmanConfig(Section):
     deadline = Si("deadline_ms")
 
     @model_validator(mode="after")
-    def _consistent(self) -> "DeadmanConfig":
+    def _check_consistency(self) -> "DeadmanConfig":
         if self.silence_limit_ms < max(self.telemetry_stale_ms, self.target_stale_ms):
             raise ValueError(
                 "silence_limit_ms must be at least telemetry_stale_ms and target_stale_ms"

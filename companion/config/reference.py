@@ -113,16 +113,16 @@ def as_markdown(config_keys: Iterable[ConfigKey]) -> str:
 def _allowed_values(schema: dict[str, Any]) -> str:
     """Range or choices of a key, from its JSON Schema."""
     options = [schema, *schema.get("anyOf", [])]
-    words = []
+    range_texts = []
     for option in options:
         if "enum" in option:
-            words.append(" or ".join(str(choice) for choice in option["enum"]))
-        words += [text.format(option[bound]) for bound, text in _BOUNDS if bound in option]
+            range_texts.append(" or ".join(str(choice) for choice in option["enum"]))
+        range_texts += [text.format(option[bound]) for bound, text in _BOUNDS if bound in option]
         if option.get("type") == "null":
-            words.append("or null")
+            range_texts.append("or null")
     if IN_FLIGHT in schema:
-        words.append(f"changeable in flight {schema[IN_FLIGHT]}")
-    return ", ".join(words)
+        range_texts.append(f"changeable in flight {schema[IN_FLIGHT]}")
+    return ", ".join(range_texts)
 
 
 def _comment(text: str, indent: str) -> list[str]:

@@ -100,7 +100,7 @@ class Config(Section):
         )
 
     @model_validator(mode="after")
-    def _consistent(self) -> "Config":
+    def _check_consistency(self) -> "Config":
         faults = list(_contradictions(self))
         if faults:
             raise ValueError("; ".join(faults))
@@ -126,22 +126,22 @@ def _thrust_contradictions(config: Config) -> Iterator[str]:
     """A message if the thrust cannot hold the height at the largest tilt."""
     limits, thrust = config.limits, config.thrust
     curve = ThrustCurve(thrust.curve_factor)
-    hover_share = curve.share(thrust.hover_thrust)
+    hover_force = curve.share(thrust.hover_thrust)
     # An autopilot that compensates the tilt may use the full thrust.
-    most_share = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
-    tilt = degrees(largest_tilt(hover_share, most_share))
-    if hover_share >= most_share or tilt >= limits.max_tilt_deg:
+    max_force = 1.0 if thrust.autopilot_compensates_tilt else curve.share(limits.max_thrust)
+    tilt_deg = degrees(largest_tilt(hover_force, max_force))
+    if hover_force >= max_force or tilt_deg >= limits.max_tilt_deg:
         return
-    needed_share = hover_share / cos(limits.max_tilt) / TILT_THRUST_SHARE
-    remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt))}"
-    if needed_share <= 1.0 and not thrust.autopilot_compensates_tilt:
+    needed_force = hover_force / cos(limits.max_tilt) / TILT_THRUST_SHARE
+    remedy = f"lower limits.max_tilt_deg to {max(1, floor(tilt_deg))}"
+    if needed_force <= 1.0 and not thrust.autopilot_compensates_tilt:
         remedy += (
-            f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed_share)) / 100.0:.2f}"
+            f" or raise limits.max_thrust to {ceil(100.0 * curve.signal(needed_force)) / 100.0:.2f}"
         )
     yield (
         f"limits.max_tilt_deg {limits.max_tilt_deg:g} does not fit limits.max_thrust "
         f"{limits.max_thrust:g}: with thrust.hover_thrust {thrust.hover_thrust:g} the "
-        f"vehicle holds its height only up to {tilt:.0f}°; {remedy}"
+        f"vehicle holds its height only up to {tilt_deg:.0f}°; {remedy}"
     )
 
 
@@ -151,11 +151,11 @@ def _maneuver_contradictions(config: Config) -> Iterator[str]:
     largest_coefficient = sin(limits.max_tilt)
     if "steps" in flight.maneuvers and config.steps.coefficient > largest_coefficient:
         yield "steps.coefficient must not exceed the sine of limits.max_tilt_deg"
-    corner = hypot(corners.north_coefficient, corners.east_coefficient)
-    if "corners" in flight.maneuvers and corner > largest_coefficient:
+    corner_coefficient = hypot(corners.north_coefficient, corners.east_coefficient)
+    if "corners" in flight.maneuvers and corner_coefficient > largest_coefficient:
         yield (
-            f"√(corners.north_coefficient² + corners.east_coefficient²) is {corner:.3g}, and must "
-            "not exceed the sine of limits.max_tilt_deg"
+            f"√(corners.north_coefficient² + corners.east_coefficient²) is "
+            f"{corner_coefficient:.3g}, and must not exceed the sine of limits.max_tilt_deg"
         )
     slows_down = "trajectory" in flight.maneuvers and flight.slow_down
     if slows_down and flight.slow_down_reserve_m_s2 >= limits.max_horizontal_acceleration:

@@ -109,7 +109,7 @@ class SafetyConfig(Section):
     max_round_trip = Si("max_round_trip_ms")
 
     @model_validator(mode="after")
-    def _consistent(self) -> "SafetyConfig":
+    def _check_consistency(self) -> "SafetyConfig":
         for name in self.monitors:
             require_known_name("monitor", name, (), plugins.MONITORS)
         if self.fence_polygon_m and self.fence_polygon_deg:

@@ -8,18 +8,18 @@ from companion.config.reference import keys
 from companion.config.root import Config
 from companion.files.value_faults import mistaken_unit
 
-BODY_RATE = "safety.max_body_rate_deg_s"
+BODY_RATE_KEY = "safety.max_body_rate_deg_s"
 _CLIMB_SPEED, _LIFT_OFF_TIME = 1.5, 4.0
 """Speed of a take-off, m/s, and time before the vehicle leaves the ground, s; by the defaults of
 the autopilot with the slower climb."""
 _DESCENT_SPEED, _LANDING_SPEED, _LANDING_HEIGHT = 1.5, 0.5, 10.0
 """Speeds of a landing above and below this height, m/s and m; by the defaults of the autopilot with
 the slower landing."""
-_USUAL_VALUES = {"_deg_s2": 1000.0, "_ms": 50.0}
+_USUAL_VALUE_BY_SUFFIX = {"_deg_s2": 1000.0, "_ms": 50.0}
 """Usual value of a key whose default is null, by the suffix of the key."""
-_MAX_SUSPECT_SHARE = 1.0 / 20.0
+_MAX_SHARE_OF_USUAL = 1.0 / 20.0
 """A value is suspect only if it is below this share of the usual value."""
-_MIN_MEANT_SHARE = 1.0 / 5.0
+_MIN_CONVERTED_SHARE_OF_USUAL = 1.0 / 5.0
 """A value is suspect only if converting it from the mistaken unit gives more than this share of the
 usual value."""
 
@@ -57,14 +57,15 @@ def suspect_values(config: Config) -> Iterator[SuspectValue]:
 
 def _low_body_rate_limit(config: Config) -> Iterator[SuspectValue]:
     """`safety.max_body_rate_deg_s`, if the planner may command a rate that reaches it."""
-    limits, allowed = config.limits, config.safety.max_body_rate_deg_s
-    commanded = hypot(limits.max_tilt_rate_deg_s, limits.max_yaw_rate_deg_s)
-    if allowed <= commanded:
+    limits, limit_deg_s = config.limits, config.safety.max_body_rate_deg_s
+    commanded_deg_s = hypot(limits.max_tilt_rate_deg_s, limits.max_yaw_rate_deg_s)
+    if limit_deg_s <= commanded_deg_s:
         yield SuspectValue(
-            BODY_RATE,
-            f"{BODY_RATE} is {allowed:g} °/s, and the planner may command {commanded:.0f} °/s",
+            BODY_RATE_KEY,
+            f"{BODY_RATE_KEY} is {limit_deg_s:g} °/s, and the planner may command "
+            f"{commanded_deg_s:.0f} °/s",
             "a turn at the commanded rate trips the body-rate monitor, which ends the flight",
-            f"raise {BODY_RATE}, or lower limits.max_tilt_rate_deg_s and max_yaw_rate_deg_s",
+            f"raise {BODY_RATE_KEY}, or lower limits.max_tilt_rate_deg_s and max_yaw_rate_deg_s",
         )
 
 
@@ -74,8 +75,9 @@ def _short_times(config: Config) -> Iterator[SuspectValue]:
     if flight.take_over:
         return
     height = flight.takeoff_height_m
-    low, high = min(height, _LANDING_HEIGHT), max(0.0, height - _LANDING_HEIGHT)
-    for key, allowed, needed, end in (
+    slow_descent = min(height, _LANDING_HEIGHT)
+    fast_descent = height - slow_descent
+    for key, allowed_s, needed_s, consequence in (
         (
             "flight.takeoff_timeout_s",
             flight.takeoff_timeout_s,
@@ -85,15 +87,16 @@ def _short_times(config: Config) -> Iterator[SuspectValue]:
         (
             "flight.landing_timeout_s",
             flight.landing_timeout_s,
-            low / _LANDING_SPEED + high / _DESCENT_SPEED,
+            slow_descent / _LANDING_SPEED + fast_descent / _DESCENT_SPEED,
             "the flight ends while the vehicle still sinks",
         ),
     ):
-        if allowed < needed:
+        if allowed_s < needed_s:
             yield SuspectValue(
                 key,
-                f"{key} is {allowed:g} s, and flight.takeoff_height_m {height:g} m",
-                f"at the autopilot's default speeds that takes about {needed:.0f} s, so {end}",
+                f"{key} is {allowed_s:g} s, and flight.takeoff_height_m {height:g} m",
+                f"at the autopilot's default speeds that takes about {needed_s:.0f} s, "
+                f"so {consequence}",
                 f"raise {key} if the speeds are not higher",
             )
 
@@ -103,25 +106,29 @@ def _mistaken_units(config: Config) -> Iterator[SuspectValue]:
     for key in keys(config):
         if isinstance(key.value, bool) or not isinstance(key.value, int | float) or key.value <= 0:
             continue
-        usual = key.default
-        if usual is None:
-            usual = next(
-                (value for suffix, value in _USUAL_VALUES.items() if key.name.endswith(suffix)),
+        usual_value = key.default
+        if usual_value is None:
+            usual_value = next(
+                (
+                    value
+                    for suffix, value in _USUAL_VALUE_BY_SUFFIX.items()
+                    if key.name.endswith(suffix)
+                ),
                 None,
             )
-        if key.value == key.default or not isinstance(usual, int | float) or not usual:
+        if key.value == key.default or not isinstance(usual_value, int | float) or not usual_value:
             continue
-        unit, converted = mistaken_unit(key.name, key.value)
+        mistaken_unit_name, converted = mistaken_unit(key.name, key.value)
         if (
             converted > key.value
-            and key.value < usual * _MAX_SUSPECT_SHARE
-            and converted > usual * _MIN_MEANT_SHARE
+            and key.value < usual_value * _MAX_SHARE_OF_USUAL
+            and converted > usual_value * _MIN_CONVERTED_SHARE_OF_USUAL
         ):
             name = f"{key.section}.{key.name}"
             yield SuspectValue(
                 name,
                 f"{name} is {key.value:g} {key.unit}",
-                f"that is unusually small; {key.value:g} {unit} would be "
+                f"that is unusually small; {key.value:g} {mistaken_unit_name} would be "
                 f"{converted:.4g} {key.unit}",
                 f"write {converted:.4g} if that was meant",
             )

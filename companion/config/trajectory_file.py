@@ -36,11 +36,11 @@ from companion.guidance.trajectory.timed_curve import TimedCurve
 from companion.guidance.trajectory.waypoints import largest_detour
 
 _MOST_COLUMNS_SHOWN = 10
-_SMALLEST_NOTED_DETOUR = 0.05
+_SMALLEST_REPORTED_DETOUR = 0.05
 """Smallest distance of a curve from the lines between its points that a note reports, m."""
 _SHORTEST_RAMP = 0.05
 """Shortest extra duration by ramps that a note reports, s."""
-_MOST_TURNED = 13.0
+_LARGEST_YAW_RANGE = 13.0
 """Largest change of yaw that no note reports, rad: a little more than two turns."""
 _MOST_ROWS_COMPARED = 2000
 """Tables with more rows are not compared with the path, because their rows are dense."""
@@ -90,8 +90,10 @@ class CsvShape(Section):
     def _frame(self, table_frame: str | None, path: Path) -> Frame | None:
         """The frame that this section or the table names; None if neither does."""
         if table_frame is not None and table_frame not in {frame.value for frame in Frame}:
-            known = ", ".join(frame.value for frame in Frame)
-            raise TrajectoryError(f"{path}: its frame {table_frame!r:.40} is not one of {known}")
+            known_frames = ", ".join(frame.value for frame in Frame)
+            raise TrajectoryError(
+                f"{path}: its frame {table_frame!r:.40} is not one of {known_frames}"
+            )
         if None not in (self.frame, table_frame) and self.frame != table_frame:
             raise TrajectoryError(
                 f"{path}: its comment says frame: {table_frame}, and csv.frame says {self.frame}; "
@@ -121,20 +123,20 @@ def _table_notes(
     path: Path, frame: Frame | None, table: Table, trajectory: TimedCurve
 ) -> tuple[str, ...]:
     """Notes on a table: its frame, its unused columns, and ramps that were added."""
-    axes = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
+    axes_note = f"{path.name} is read in s, m and rad with {_AXES[frame or Frame.ENU]}"
     if frame is None:
-        axes += (
+        axes_note += (
             ", because it names no frame; to name one, write `# frame: ned` in its first line, or "
             "csv.frame in a YAML file that names it"
         )
-    notes = [axes]
+    notes = [axes_note]
     if table.unused_columns:
-        names = ", ".join(table.unused_columns[:_MOST_COLUMNS_SHOWN])
-        notes.append(f"{path.name}: these columns are not used: {names}")
-    if table.yaw is not None and (turned := float(np.ptp(table.yaw))) > _MOST_TURNED:
+        column_names = ", ".join(table.unused_columns[:_MOST_COLUMNS_SHOWN])
+        notes.append(f"{path.name}: these columns are not used: {column_names}")
+    if table.yaw is not None and (yaw_range := float(np.ptp(table.yaw))) > _LARGEST_YAW_RANGE:
         notes.append(
-            f"{path.name}: its yaw turns by {turned:.4g} rad, {turned / tau:.1f} turns; if the "
-            "column is in degrees, convert it to rad"
+            f"{path.name}: its yaw turns by {yaw_range:.4g} rad, {yaw_range / tau:.1f} turns; if "
+            "the column is in degrees, convert it to rad"
         )
     table_duration = float(table.times[-1])
     if trajectory.duration > table_duration + _SHORTEST_RAMP:
@@ -160,7 +162,7 @@ def _detour_notes(
     if not (isinstance(trajectory, TimedCurve) and isinstance(trajectory.curve, SplineCurve)):
         return ()
     detour = largest_detour(trajectory.curve.spline, times)
-    if detour < _SMALLEST_NOTED_DETOUR:
+    if detour < _SMALLEST_REPORTED_DETOUR:
         return ()
     return (
         f"{trajectory.name}: the curve leaves the straight lines between its points by up to "
@@ -180,10 +182,10 @@ class TrajectoryFile(Section):
     csv: CsvShape | None = None
 
     @model_validator(mode="after")
-    def _one_shape(self) -> "TrajectoryFile":
+    def _require_one_shape(self) -> "TrajectoryFile":
         if len(self.model_fields_set) != 1:
-            known = ", ".join(type(self).model_fields)
-            raise ValueError(f"give exactly one trajectory, one of: {known}")
+            shape_names = ", ".join(type(self).model_fields)
+            raise ValueError(f"give exactly one trajectory, one of: {shape_names}")
         return self
 
     def read(self, folder: Path) -> LoadedTrajectory:
@@ -234,14 +236,14 @@ def read(path: Path) -> LoadedTrajectory:
     """
     try:
         with computable():
-            loaded = (
+            loaded_trajectory = (
                 CsvShape(file=Path(path.name)).read(path.parent)
                 if is_table(path)
                 else load_shape(path).read(path.parent)
             )
-            loaded.trajectory.check_times()  # in the block, because it may overflow too
-            return loaded
+            loaded_trajectory.trajectory.check_times()  # in the block, because it may overflow too
+            return loaded_trajectory
     except TrajectoryError as error:
         # The errors of a table name it already.
-        names_file = is_table(path) and str(error).startswith(str(path))
-        raise ConfigError(str(error) if names_file else f"{path}: {error}") from error
+        error_names_file = is_table(path) and str(error).startswith(str(path))
+        raise ConfigError(str(error) if error_names_file else f"{path}: {error}") from error

@@ -144,7 +144,7 @@ class WaypointsShape(Section):
     """Instead of `heading`: heading at each point, clockwise from north; null: any heading."""
 
     @model_validator(mode="after")
-    def _one_heading(self) -> "WaypointsShape":
+    def _require_one_heading(self) -> "WaypointsShape":
         if self.headings_deg is not None and "heading" in self.model_fields_set:
             raise ValueError("give either heading or headings_deg")
         if self.stops and self.heading == "along":

@@ -46,8 +46,8 @@ class AxisKeys(NamedTuple):
 
         A new lag without a damping makes the response first order.
         """
-        base = self if keys[0] is None else self._replace(damping=None)
-        return AxisKeys(*(a if b is None else b for a, b in zip(base, keys, strict=True)))
+        base_axis = self if keys[0] is None else self._replace(damping=None)
+        return AxisKeys(*(a if b is None else b for a, b in zip(base_axis, keys, strict=True)))
 
 
 class VehicleConfig(Section):

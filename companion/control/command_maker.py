@@ -49,9 +49,7 @@ class CommandMaker:
         *,
         offboard_active: bool,
     ) -> tuple[Reference, GuidanceCommand | None]:
-        """The reference at `now`, and the command that follows it.
-
-        The command is None if the guidance (a plug-in, for example) returned NaN or infinity.
+        """The reference at `now` and its command, which is None if guidance gave NaN or infinity.
 
         Args:
             now: event-loop time, s.
@@ -66,27 +64,29 @@ class CommandMaker:
         guidance_output = self.guidance.command(reference_at, now, inputs)
         if self.predictive_control is not None:
             vehicle = self._estimate.vehicle(now, inputs)
-            followed = self._flown_source.followed_trajectory(now)
+            followed_trajectory = self._flown_source.followed_trajectory(now)
             guidance_output = self.predictive_control.replacement_for(
-                guidance_output, frame, vehicle, followed
+                guidance_output, frame, vehicle, followed_trajectory
             )
-        target, later, down = guidance_output
+        target, later_target, acceleration_down = guidance_output
         # Open-loop steps, predictive control and `InnerResponse.target` ignore the learned limit.
-        target, later = (self._learning.limit_tilt(each, down) for each in (target, later))
-        if not all(map(isfinite, (*target, *later, down))):
+        target, later_target = (
+            self._learning.limit_tilt(each, acceleration_down) for each in (target, later_target)
+        )
+        if not all(map(isfinite, (*target, *later_target, acceleration_down))):
             return reference, None
         # Guidance of another package may want more thrust than there is; it does not accelerate.
-        vertical = min(max(0.0, GRAVITY - down), inputs.thrust_limits[1])
-        self._estimate.vertical_thrust = vertical if offboard_active else GRAVITY
+        vertical_thrust = min(max(0.0, GRAVITY - acceleration_down), inputs.thrust_limits[1])
+        self._estimate.vertical_thrust = vertical_thrust if offboard_active else GRAVITY
         command = GuidanceCommand(
             target,
-            down,
+            acceleration_down,
             now,
             is_step=reference.coefficients is not None and reference.thrust is None,
             body_rates=reference.body_rates,
             thrust=reference.thrust,
             frame=frame,
-            later_target=later,
+            later_target=later_target,
             period=self._period,
         )
         return reference, command

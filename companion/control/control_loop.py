@@ -18,7 +18,7 @@ from companion.attitude import (
 )
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.loop_record import Deadlines, LoopRecord, Unanswered
+from companion.control.loop_record import Deadlines, LoopRecord, UnansweredReason
 from companion.control.planner_runner import PlannerRunner
 from companion.control.sample_recorder import SampleRecorder
 from companion.control.sample_rows import LoopFlags
@@ -32,8 +32,11 @@ SendSetpoint = Callable[[int, BodyRates, float], bool]
 """Sends time_boot_ms of a sample, body rates and thrust as a setpoint; False: the link refused it.
 In lockstep the link keeps setpoints until the step ends, and sends only the last one of a step."""
 
-_MISFIT_REASONS = {Misfit.NOT_NEWER: Unanswered.NOT_NEWER, Misfit.AHEAD: Unanswered.AHEAD}
-_FINAL_OUTCOMES = {None, Unanswered.OLD_TARGET, Unanswered.AWAITING_MODE}
+_MISFIT_REASONS = {
+    Misfit.NOT_NEWER: UnansweredReason.NOT_NEWER,
+    Misfit.AHEAD: UnansweredReason.STAMPED_AHEAD,
+}
+_FINAL_REASONS = {None, UnansweredReason.OLD_TARGET, UnansweredReason.AWAITING_MODE}
 """After `end_stream`, the loop releases control at one of these outcomes: None (the sample was
 answered), or a reason for which no later sample can be answered either."""
 
@@ -43,7 +46,7 @@ class ControlLoop:
 
     After a gap in the setpoints the autopilot may have left offboard, and PX4 would enter offboard
     again on the next setpoint. So after a gap while `taking_over` or `offboard_active`, the loop
-    calls `ask_mode` and sends nothing until `resume`.
+    calls `request_mode` and sends nothing until `resume`.
 
     Attributes:
         command: the newest command, written by guidance; None before the first and after
@@ -55,7 +58,7 @@ class ControlLoop:
         resets: the estimator's resets, which are removed from what the planner gets.
         planner: runs the planner.
         record: counters, latest times, and reasons of unanswered samples.
-        ask_mode: called once after each gap, to request the mode.
+        request_mode: called once after each gap, to request the mode.
         is_same_vehicle: returns, at each sample, whether the vehicle is the one that was checked.
     """
 
@@ -75,7 +78,7 @@ class ControlLoop:
         self.resets = EstimatorResets()
         self.planner = PlannerRunner(planner, self.resets, limits)
         self.record = LoopRecord()
-        self.ask_mode: Callable[[], None] = lambda: None
+        self.request_mode: Callable[[], None] = lambda: None
         self.is_same_vehicle: Callable[[], bool] = lambda: True
         self._hover_thrust = hover_thrust
         self._send = send
@@ -119,54 +122,54 @@ class ControlLoop:
             return
         record.samples += 1
         command = self._final_command or self.command
-        reason: Unanswered | None
+        reason: UnansweredReason | None
         if not self.is_same_vehicle():
-            reason = Unanswered.ANOTHER_VEHICLE
+            reason = UnansweredReason.ANOTHER_VEHICLE
         elif sample.misfit is not None:
             reason = _MISFIT_REASONS[sample.misfit]
         elif not sample.age <= self._deadlines.telemetry_stale:
-            reason = Unanswered.LATE
+            reason = UnansweredReason.LATE
         elif command is None:
-            reason = Unanswered.NO_TARGET
+            reason = UnansweredReason.NO_TARGET
         elif sample.received - command.made_at > self._deadlines.target_stale:
-            reason = Unanswered.OLD_TARGET
+            reason = UnansweredReason.OLD_TARGET
         elif self._after_gap(sample.received):
-            reason = Unanswered.AWAITING_MODE
+            reason = UnansweredReason.AWAITING_MODE
         else:
             reason = self._send_answer(sample, command, period)
         record.reason = reason
         if reason is not None:
             record.unanswered[reason] += 1
-        if self._final_command is not None and reason in _FINAL_OUTCOMES:
+        if self._final_command is not None and reason in _FINAL_REASONS:
             self.release()
 
     def _after_gap(self, now: float) -> bool:
         """Whether setpoints wait for `resume` after a gap; at a new gap, ask for the mode."""
         if not (self.offboard_active or self.taking_over):
             return False
-        gap = now - self.record.gap_from
+        gap = now - self.record.gap_start
         if gap > self._deadlines.telemetry_stale and not self.awaiting_mode:
             self.awaiting_mode = True
             self.record.gaps.append(now)
-            self.ask_mode()
+            self.request_mode()
         return self.awaiting_mode
 
     def _send_answer(
         self, sample: AttitudeSample, command: GuidanceCommand, period: float
-    ) -> Unanswered | None:
+    ) -> UnansweredReason | None:
         """Send the setpoint for a sample; return why it could not be sent, or None."""
         try:
             rates, thrust = self._compute_setpoint(sample, command, period)
             # This process may have been stopped since the sample came.
             now = self._recorder.checked_at = self._clock()
             if sample.age + now - sample.received > self._deadlines.telemetry_stale:
-                return Unanswered.LATE
+                return UnansweredReason.LATE
             if not self._send(sample.time_boot_ms, rates, thrust):
-                return Unanswered.NOT_SENT
+                return UnansweredReason.NOT_SENT
         except AttitudeError as error:
-            return Unanswered.of(error)
+            return UnansweredReason.of(error)
         except InvalidSetpoint:
-            return Unanswered.INVALID_SETPOINT
+            return UnansweredReason.INVALID_SETPOINT
         self._note_answer(sample, command, rates, thrust)
         return None
 
@@ -183,11 +186,11 @@ class ControlLoop:
         # Checked here, because body rates from guidance bypass the planner's own check.
         if not is_unit(sample.q):
             raise InvalidQuaternionError(f"attitude {sample.q} is no unit quaternion")
-        hover = self._hover_thrust
+        hover_thrust = self._hover_thrust
         thrust = (
-            hover.normalised_thrust(command.acceleration_down, sample.q, sample.body_rates)
+            hover_thrust.normalised_thrust(command.acceleration_down, sample.q, sample.body_rates)
             if command.thrust is None
-            else hover.within_limits(command.thrust)
+            else hover_thrust.within_limits(command.thrust)
         )
         return self.planner.rates(sample, command, period), thrust
 
@@ -232,4 +235,4 @@ class ControlLoop:
     def resume(self) -> None:
         """Send setpoints again after a gap, because the autopilot has confirmed offboard."""
         self.awaiting_mode = False
-        self.record.gap_from = inf
+        self.record.gap_start = inf

@@ -37,7 +37,7 @@ _LONGEST_POSITION_GAP = 0.5
 _LARGEST_ACCELERATION_CHANGE = 10.0
 """Assumed largest change of the vehicle's acceleration between two positions, m/s²; a position
 change that it explains is no jump."""
-_ONE_RESET_TIME = 0.5
+_RESET_MERGE_TIME = 0.5
 """Time within which several jumps count as one reset, s. ODOMETRY, which counts the same reset,
 comes at 10 Hz."""
 
@@ -50,7 +50,7 @@ class EstimatorResets:
         position_shift: sum of the position jumps, m NED.
         heading_corrections: sum of the estimator's gradual heading corrections, rad: heading
             changes that the body rates do not explain, without the jumps; see `StepFrame`.
-        turned: sum of all turns about the body's z axis, in either direction, rad.
+        total_turn: sum of all turns about the body's z axis, in either direction, rad.
         rate_lag: learned lag of the body rates behind the attitude.
         largest_tilt_jump: largest jump of the thrust axis, rad; it is not compensated.
         newest_attitude: the newest attitude, or None.
@@ -60,7 +60,7 @@ class EstimatorResets:
     def __init__(self) -> None:
         self.frame = HeadingFrame()
         self.position_shift: Vector = (0.0, 0.0, 0.0)
-        self.heading_corrections = self.turned = 0.0
+        self.heading_corrections = self.total_turn = 0.0
         self.rate_lag = RateLag()
         self.largest_tilt_jump = 0.0
         self.reset_times: deque[float] = deque(maxlen=32)
@@ -72,33 +72,35 @@ class EstimatorResets:
         """Compare a newer sample with the last one; return whether the thrust axis jumped."""
         if not is_unit(sample.q):
             return False
-        before, self.newest_attitude = self.newest_attitude, sample
-        if before is None:
+        previous, self.newest_attitude = self.newest_attitude, sample
+        if previous is None:
             return False
-        dt = sample.vehicle_time - before.vehicle_time
+        dt = sample.vehicle_time - previous.vehicle_time
         if not 0.0 < dt <= _LONGEST_ATTITUDE_GAP:
             return False
-        rates = self.rate_lag.mean(before.body_rates, sample.body_rates, dt)
-        predicted = after_constant_rates(before.q, rates, dt)
-        yaw, tilt, threshold = _attitude_jump(before, sample, predicted, dt)
-        jumped = tilt > threshold
-        if abs(yaw) > threshold:
-            self.frame = HeadingFrame(wrap_difference(self.frame.offset + yaw))
-        elif not jumped:
+        rates = self.rate_lag.mean(previous.body_rates, sample.body_rates, dt)
+        predicted_q = after_constant_rates(previous.q, rates, dt)
+        yaw_jump, tilt_jump, threshold = _attitude_jump(previous, sample, predicted_q, dt)
+        thrust_axis_jumped = tilt_jump > threshold
+        if abs(yaw_jump) > threshold:
+            self.frame = HeadingFrame(wrap_difference(self.frame.offset + yaw_jump))
+        elif not thrust_axis_jumped:
             if dt <= _LONGEST_CORRECTED_GAP:
-                self.heading_corrections += yaw
-                self.turned += abs(rates[2]) * dt
-                self.rate_lag.learn(before.body_rates, sample.body_rates, predicted, sample.q)
+                self.heading_corrections += yaw_jump
+                self.total_turn += abs(rates[2]) * dt
+                self.rate_lag.learn(previous.body_rates, sample.body_rates, predicted_q, sample.q)
             return False
         self._count_reset(sample.received)
-        self.largest_tilt_jump = max(self.largest_tilt_jump, tilt if jumped else 0.0)
-        return jumped
+        self.largest_tilt_jump = max(
+            self.largest_tilt_jump, tilt_jump if thrust_axis_jumped else 0.0
+        )
+        return thrust_axis_jumped
 
     def position_without_jumps(self, position: LocalPosition) -> LocalPosition:
         """The position in the frame without jumps; a new position is first checked for a jump."""
-        before, self._newest_position = self._newest_position, position
-        if before is not None:
-            self._find_position_jump(before, position)
+        previous, self._newest_position = self._newest_position, position
+        if previous is not None:
+            self._find_position_jump(previous, position)
         return position._replace(position_ned=minus(position.position_ned, self.position_shift))
 
     def forget(self) -> None:
@@ -112,16 +114,16 @@ class EstimatorResets:
             self._count_reset(now)
         self._reset_counter = counter
 
-    def _find_position_jump(self, before: LocalPosition, position: LocalPosition) -> None:
-        dt = position.vehicle_time - before.vehicle_time
+    def _find_position_jump(self, previous: LocalPosition, position: LocalPosition) -> None:
+        dt = position.vehicle_time - previous.vehicle_time
         if not 0.0 < dt <= _LONGEST_POSITION_GAP:
             return
         jump = [
             new - old - 0.5 * dt * (v_old + v_new)
             for old, new, v_old, v_new in zip(
-                before.position_ned,
+                previous.position_ned,
                 position.position_ned,
-                before.velocity_ned,
+                previous.velocity_ned,
                 position.velocity_ned,
                 strict=True,
             )
@@ -132,24 +134,24 @@ class EstimatorResets:
             self._count_reset(position.received)
 
     def _count_reset(self, now: float) -> None:
-        if not self.reset_times or now - self.reset_times[-1] > _ONE_RESET_TIME:
+        if not self.reset_times or now - self.reset_times[-1] > _RESET_MERGE_TIME:
             self.reset_times.append(now)
 
 
 def _attitude_jump(
-    before: AttitudeSample, after: AttitudeSample, predicted: Quaternion, dt: float
+    previous: AttitudeSample, newest: AttitudeSample, predicted_q: Quaternion, dt: float
 ) -> tuple[float, float, float]:
     """Jump of the heading, jump of the thrust axis, and the threshold for both; rad."""
-    p, q, r = before.body_rates
-    new_p, new_q, new_r = after.body_rates
-    w, x, y, z = predicted
-    a, b, c, d = after.q
+    p, q, r = previous.body_rates
+    new_p, new_q, new_r = newest.body_rates
+    w, x, y, z = predicted_q
+    a, b, c, d = newest.q
     # after.q ⊗ predicted⁻¹: the unexplained rotation, about world axes.
     r_w = a * w + b * x + c * y + d * z
     r_x = -a * x + b * w - c * z + d * y
     r_y = -a * y + b * z + c * w - d * x
     r_z = -a * z - b * y + c * x + d * w
-    yaw = wrap_difference(2.0 * atan2(r_z, r_w))
-    tilt = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
-    change = sqrt((new_p - p) ** 2 + (new_q - q) ** 2 + (new_r - r) ** 2)
-    return yaw, tilt, _SMALLEST_ATTITUDE_JUMP + 0.5 * change * dt
+    yaw_jump = wrap_difference(2.0 * atan2(r_z, r_w))
+    tilt_jump = 2.0 * asin(min(1.0, hypot(r_x, r_y)))
+    rate_change = sqrt((new_p - p) ** 2 + (new_q - q) ** 2 + (new_r - r) ** 2)
+    return yaw_jump, tilt_jump, _SMALLEST_ATTITUDE_JUMP + 0.5 * rate_change * dt

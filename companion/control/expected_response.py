@@ -15,7 +15,7 @@ from companion.control.inner_loop import (
 )
 from companion.guidance import InnerResponse
 
-_NOTICEABLE_SHARE = 0.99
+_NOTICEABLE_TIME_SHARE = 0.99
 """The removal of a cause of delay is reported if it reduces the time constant below this share of
 the present time constant."""
 
@@ -31,7 +31,7 @@ class ExpectedResponse:
     """`steps.coefficient`, at which the step ends."""
     time_constant: float
     """Time until 63 % of the step is covered, s."""
-    time_constants_without: dict[str, float]
+    time_constants_without_cause: dict[str, float]
     """For each cause of delay, by name, the time constant (s) without this cause: without the rate
     limit, the lag or the dead time. The entry for the gain is the value with twice the gain."""
     gain: float
@@ -42,9 +42,11 @@ class ExpectedResponse:
     """Time constant with `largest_gain` and without the rate limit, s; None: no `largest_gain`."""
 
     @property
-    def limited_by(self) -> str:
+    def main_cause(self) -> str:
         """Name of the cause of delay whose removal reduces the time constant most."""
-        return min(self.time_constants_without, key=self.time_constants_without.__getitem__)
+        return min(
+            self.time_constants_without_cause, key=self.time_constants_without_cause.__getitem__
+        )
 
     @property
     def gain_is_too_high(self) -> bool:
@@ -57,20 +59,24 @@ class ExpectedResponse:
         The parts give the time constant, its causes in the order of their effect, and the shortest
         possible time constant.
         """
-        changes = ", ".join(
+        effects_text = ", ".join(
             f"{time:.2f} s {'with twice' if name == _GAIN_KEY else 'without'} {name}"
-            for name, time in sorted(self.time_constants_without.items(), key=lambda item: item[1])
-            if time < _NOTICEABLE_SHARE * self.time_constant
+            for name, time in sorted(
+                self.time_constants_without_cause.items(), key=lambda item: item[1]
+            )
+            if time < _NOTICEABLE_TIME_SHARE * self.time_constant
         )
-        tilt = degrees(asin(self.coefficient))
+        tilt_deg = degrees(asin(self.coefficient))
         clauses = [
-            f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt:.0f}° of tilt) is "
-            f"expected to have a time constant of {self.time_constant:.2f} s",
-            f"{self.limited_by} lengthens the time constant most ({changes})",
+            f"a step from -{self.coefficient:g} to {self.coefficient:g} (±{tilt_deg:.0f}° of tilt) "
+            f"is expected to have a time constant of {self.time_constant:.2f} s",
+            f"{self.main_cause} lengthens the time constant most ({effects_text})",
         ]
-        shortest = self.shortest_time_constant
-        if shortest is not None:
-            clauses.append(f"with the largest sensible gain and no rate limit: {shortest:.2f} s")
+        shortest_time = self.shortest_time_constant
+        if shortest_time is not None:
+            clauses.append(
+                f"with the largest sensible gain and no rate limit: {shortest_time:.2f} s"
+            )
         return clauses
 
     def sentence(self) -> str:
@@ -89,17 +95,17 @@ def gain_warning(config: Config) -> str | None:
 
     A planner of another package gets no warning.
     """
-    gain, largest = config.planner.gain_per_s, sensible_gain(config)
-    if config.planner_name not in PLANNER_NAMES or gain <= largest:
+    gain, largest_gain = config.planner.gain_per_s, sensible_gain(config)
+    if config.planner_name not in PLANNER_NAMES or gain <= largest_gain:
         return None
-    return _gain_sentence(gain, largest)
+    return _gain_sentence(gain, largest_gain)
 
 
-def _gain_sentence(gain: float, largest: float) -> str:
+def _gain_sentence(gain: float, largest_gain: float) -> str:
     remedy = "; lower it, because a larger gain makes the response overshoot and the hold swing"
     return (
-        f"planner.gain_per_s is {gain:g}, and {largest:.1f} is the largest sensible one "
-        f"({LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)){remedy if gain > largest else ''}"
+        f"planner.gain_per_s is {gain:g}, and {largest_gain:.1f} is the largest sensible one "
+        f"({LARGEST_GAIN_TIMES_DELAY} / (lag + dead time)){remedy if gain > largest_gain else ''}"
     )
 
 
@@ -107,8 +113,8 @@ def expected_response(config: Config) -> ExpectedResponse:
     """Predict the response by a linear model of planner and rate loop with the tilt rate limit."""
     step_size, response = 2.0 * config.steps.coefficient, tilt_response(config)
     max_rate = _largest_coefficient_rate(config)
-    gain, largest = config.planner.gain_per_s, sensible_gain(config)
-    time_constants_without = {
+    gain, largest_gain = config.planner.gain_per_s, sensible_gain(config)
+    time_constants_without_cause = {
         _GAIN_KEY: tilt_response(with_gain(config, 2.0 * gain)).step_time(step_size, max_rate),
         _RATE_LIMIT_KEY: response.step_time(step_size),
         **_without_rate_loop_delays(config, response, max_rate),
@@ -116,10 +122,12 @@ def expected_response(config: Config) -> ExpectedResponse:
     return ExpectedResponse(
         config.steps.coefficient,
         response.step_time(step_size, max_rate),
-        time_constants_without,
+        time_constants_without_cause,
         gain,
-        None if largest == inf else largest,
-        None if largest == inf else tilt_response(with_gain(config, largest)).step_time(step_size),
+        None if largest_gain == inf else largest_gain,
+        None
+        if largest_gain == inf
+        else tilt_response(with_gain(config, largest_gain)).step_time(step_size),
     )
 
 
@@ -156,8 +164,8 @@ def expectations(config: Config) -> list[str]:
     if config.planner_name not in PLANNER_NAMES:
         return [hold_sentence(config)]
     response = expected_response(config)
-    lines = "\n  ".join(response.clauses())
-    return [lines, response.gain_sentence(), hold_sentence(config)]
+    response_text = "\n  ".join(response.clauses())
+    return [response_text, response.gain_sentence(), hold_sentence(config)]
 
 
 def hold_sentence(config: Config) -> str:

@@ -129,14 +129,14 @@ class FlownSource:
         `_RETURN_TIME`. Open loop that begins before the return does not restart this time.
         """
         distance = dist(reference.position_ned, motion.position_ned)
-        since = self._returning_since
+        returning_since = self._returning_since
         if not reference.holds_position:
-            self._returning_since = inf if since is None else since
+            self._returning_since = inf if returning_since is None else returning_since
             return None
-        if since is not None:
-            self._returning_since = since = min(now, since)
+        if returning_since is not None:
+            self._returning_since = returning_since = min(now, returning_since)
             if distance <= _REJOINED_DISTANCE:
                 self._returning_since = None
-            elif now - since <= _RETURN_TIME:
+            elif now - returning_since <= _RETURN_TIME:
                 return None
         return None if self.pose is None else distance

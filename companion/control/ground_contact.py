@@ -6,11 +6,11 @@ from companion.vehicle.state import GROUND_HEIGHT, VehicleState
 
 _STILL_SPEED = 0.5
 """Largest estimated vertical speed of a vehicle on the ground, m/s."""
-_LIFTED_HEIGHT = 1.0
+_LIFT_OFF_HEIGHT = 1.0
 """Climb since the take-off command, m, above which the vehicle counts as lifted off."""
 _MAX_SPEED_AGE = 0.5
 """Largest age of a vertical speed that is used, s."""
-_LANDED_TIME = 0.5
+_MIN_LANDED_TIME = 0.5
 """Time for which the landed flag must be set before the vehicle counts as landed, s."""
 
 
@@ -32,7 +32,7 @@ class GroundContact:
         self.takeoff_commanded = False
         self._state, self._clock = state, clock
         self._start_height: float | None = None
-        self._left_ground = False
+        self._has_left_ground = False
         self._landed_since: float | None = None
 
     def command_takeoff(self) -> None:
@@ -42,7 +42,7 @@ class GroundContact:
 
     def note_flying(self) -> None:
         """Note that the vehicle already flies, although this program commanded no take-off."""
-        self.takeoff_commanded = self._left_ground = True
+        self.takeoff_commanded = self._has_left_ground = True
 
     def update(self) -> None:
         """Use the newest telemetry; to be called at least 50 times a second."""
@@ -51,8 +51,8 @@ class GroundContact:
             self._landed_since = None
         elif self._landed_since is None:
             self._landed_since = self._clock()
-        if self.takeoff_commanded and (state.flying or self._climbed()):
-            self._left_ground = True
+        if self.takeoff_commanded and (state.flying or self._has_climbed()):
+            self._has_left_ground = True
 
     @property
     def may_idle(self) -> bool:
@@ -62,32 +62,40 @@ class GroundContact:
     @property
     def standing(self) -> bool:
         """Whether the landed flag is set and the vehicle has not risen since a take-off command."""
-        return self._state.landed and not self._left_ground and not self._rising()
+        return self._state.landed and not self._has_left_ground and not self._is_rising()
 
     @property
-    def lifted(self) -> bool:
+    def has_lifted_off(self) -> bool:
         """Whether landed flag, height or vertical speed show that the vehicle left the ground."""
-        return self._state.flying or self._left_ground or self._rising()
+        return self._state.flying or self._has_left_ground or self._is_rising()
 
     @property
-    def touched_down(self) -> bool:
+    def has_touched_down(self) -> bool:
         """Whether the vehicle has landed: landed flag set for 0.5 s, and small vertical speed."""
-        since = self._landed_since
-        if not self._state.landed or since is None or self._clock() - since < _LANDED_TIME:
+        landed_since = self._landed_since
+        if (
+            not self._state.landed
+            or landed_since is None
+            or self._clock() - landed_since < _MIN_LANDED_TIME
+        ):
             return False
         return abs(self._vertical_speed()) < _STILL_SPEED
 
     def _plausibly_on_ground(self) -> bool:
         height = self._state.height
-        high = height is not None and abs(height) > GROUND_HEIGHT
-        return not high and abs(self._vertical_speed()) < _STILL_SPEED
+        is_high = height is not None and abs(height) > GROUND_HEIGHT
+        return not is_high and abs(self._vertical_speed()) < _STILL_SPEED
 
-    def _rising(self) -> bool:
+    def _is_rising(self) -> bool:
         return self.takeoff_commanded and self._vertical_speed() < -_STILL_SPEED
 
-    def _climbed(self) -> bool:
-        height, start = self._state.height, self._start_height
-        return height is not None and start is not None and height - start > _LIFTED_HEIGHT
+    def _has_climbed(self) -> bool:
+        height, start_height = self._state.height, self._start_height
+        return (
+            height is not None
+            and start_height is not None
+            and height - start_height > _LIFT_OFF_HEIGHT
+        )
 
     def _vertical_speed(self) -> float:
         """Vertical speed, positive down, m/s; 0 if it is no longer received."""

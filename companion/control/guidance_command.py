@@ -41,15 +41,15 @@ class GuidanceCommand(NamedTuple):
 
     def target_at(self, time: float) -> Target:
         """The target at `time` (s of event-loop time), between `target` and `later_target`."""
-        before, after, elapsed = self.target, self.later_target, time - self.made_at
-        if after is None or not elapsed > 0.0:
-            return before
+        target, later_target, elapsed = self.target, self.later_target, time - self.made_at
+        if later_target is None or not elapsed > 0.0:
+            return target
         if elapsed >= self.period:
-            return after
-        share = elapsed / self.period
+            return later_target
+        fraction = elapsed / self.period
         return Target(
-            before.north + share * (after.north - before.north),
-            before.east + share * (after.east - before.east),
-            before.heading + share * wrap_angle(after.heading - before.heading),
-            before.heading_rate + share * (after.heading_rate - before.heading_rate),
+            target.north + fraction * (later_target.north - target.north),
+            target.east + fraction * (later_target.east - target.east),
+            target.heading + fraction * wrap_angle(later_target.heading - target.heading),
+            target.heading_rate + fraction * (later_target.heading_rate - target.heading_rate),
         )

@@ -39,11 +39,10 @@ class GuidanceLoop:
         motion: motion of the vehicle at the last step, without resets, or None.
         command_not_finite: True if guidance returned NaN or infinity at the last step.
         acceleration: horizontal acceleration of the vehicle at the last step, m/s², NED.
-        tracking_error: distance from the reference at the last step, m; see
-            `FlownSource.tracking_error`.
+        tracking_error: see `FlownSource.tracking_error`; that of the last step, m.
         estimate: estimates the motion.
         learning: learns the hover thrust.
-        maker: makes the commands.
+        command_maker: makes the commands.
         hold: brakes and holds.
         before_step: called at the beginning of each step with the time, s.
         recorder: records the steps.
@@ -72,9 +71,13 @@ class GuidanceLoop:
         self.tracking_error: float | None = None
         self.estimate = estimate
         self.learning = HoverLearning(hover_thrust, vehicle.state)
-        self.maker = CommandMaker(guidance, self.flown_source, estimate, self.learning, period)
+        self.command_maker = CommandMaker(
+            guidance, self.flown_source, estimate, self.learning, period
+        )
         self._loop, self._vehicle = loop, vehicle
-        self.hold = Hold(self.flown_source, self.maker, self.learning, max_tilt, assumed_braking)
+        self.hold = Hold(
+            self.flown_source, self.command_maker, self.learning, max_tilt, assumed_braking
+        )
         self._max_position_age = max_position_age
         self.before_step: Callable[[float], None] = lambda _: None
         self._clock = clock
@@ -116,7 +119,7 @@ class GuidanceLoop:
         """Hold the pose of the present reference, after a maneuver; raises as `hold_here`."""
         now = self._clock()
         self.recorder.action(now, "hold_reference")
-        motion = self.maker.guidance_input(now).now
+        motion = self.command_maker.guidance_input(now).now
         reference = self.flown_source.reference(now, motion, self._heading())(now)
         self.flown_source.clear()
         self.flown_source.pose = Pose(reference.position_ned, reference.heading)
@@ -172,7 +175,7 @@ class GuidanceLoop:
         Raises:
             RuntimeError: no position has come yet.
         """
-        return self.maker.guidance_input(self._clock()).now
+        return self.command_maker.guidance_input(self._clock()).now
 
     def attitude(self) -> Quaternion:
         """The newest attitude, in the frame without estimator resets."""
@@ -185,14 +188,14 @@ class GuidanceLoop:
         position = self._vehicle.fresh_position(now, self._max_position_age)
         standing = self._vehicle.ground.standing
         may_idle = standing and self._vehicle.ground.may_idle
-        before, active = self._loop.command, self._loop.offboard_active
+        command_before, offboard_active = self._loop.command, self._loop.offboard_active
         output = self._step(now, position, standing=standing, may_idle=may_idle)
         command = self._loop.command
         self.recorder.step(
-            StepFlags(position is not None, standing, may_idle, active),
+            StepFlags(position is not None, standing, may_idle, offboard_active),
             now,
             output,
-            None if command is before else command,
+            None if command is command_before else command,
         )
 
     def _step(
@@ -214,7 +217,7 @@ class GuidanceLoop:
         position = self._loop.resets.position_without_jumps(position)
         self.estimate.note_heading_resets(self._loop.resets.frame.offset)
         self.estimate.note_position(position, offboard_active=self._loop.offboard_active)
-        inputs = self.maker.guidance_input(now)
+        inputs = self.command_maker.guidance_input(now)
         self.motion, self.acceleration = inputs.now, inputs.acceleration
         self.hold.begin_if_tilted(now, inputs.now, self._q, self._heading())
         reference = self._write_command(now, inputs)
@@ -231,7 +234,7 @@ class GuidanceLoop:
 
     def _write_command(self, now: float, inputs: GuidanceInput) -> Reference:
         """Write the command for `now`, unless it would not be finite; return the reference."""
-        reference, command = self.maker.make(
+        reference, command = self.command_maker.make(
             now,
             inputs,
             self._heading(),

@@ -12,7 +12,7 @@ _LARGEST_OFFSET = radians(3.0)
 """Largest offset of the frame, rad; limits the effect of a wrong gyro."""
 _DECAY_S = 2.0
 """Time constant with which the offset decays after the steps, s."""
-_FOLLOWING_S = 1.0 / 4.5
+_ATTITUDE_CONTROL_TIME_S = 1.0 / 4.5
 """Time constant with which ArduPilot's attitude controller follows its target (ATC_ANG_*_P), s."""
 
 
@@ -83,16 +83,18 @@ class StepFrame:
             dt: time since the last call, s.
             stepping: whether an open-loop step is flown.
         """
-        before = self.frame.offset
+        offset_before = self.frame.offset
         if stepping:
             offset = clamp(corrections - self._corrections_at_zero, _LARGEST_OFFSET)
         else:
-            offset = before * exp(-dt / _DECAY_S)
+            offset = offset_before * exp(-dt / _DECAY_S)
             self._corrections_at_zero = corrections - offset
         self.frame = HeadingFrame(offset)
         if dt > 0.0:
-            change_rate = (offset - before) / dt
-            _, self.offset_rate = first_order_step(self.offset_rate, change_rate, _FOLLOWING_S, dt)
+            change_rate = (offset - offset_before) / dt
+            _, self.offset_rate = first_order_step(
+                self.offset_rate, change_rate, _ATTITUDE_CONTROL_TIME_S, dt
+            )
 
     def rates(self, q: Quaternion, rates: BodyRates) -> BodyRates:
         """Body rates in the estimator's frame, from body rates in this frame at attitude `q`."""

@@ -25,7 +25,7 @@ class Hold:
 
     _flown_source: FlownSource
     """What guidance flies; the hold replaces it."""
-    _maker: CommandMaker
+    _command_maker: CommandMaker
     """Provides the estimated motion of the vehicle."""
     _learning: HoverLearning
     """Learns the hover thrust, which limits the tilt at which the height is held."""
@@ -46,10 +46,12 @@ class Hold:
         """
         if self._flown_source.remaining_braking_time(now) > 0.0:
             return  # a new braking would stop the vehicle further away
-        inputs = self._maker.guidance_input(now)
+        inputs = self._command_maker.guidance_input(now)
         motion, (north, east, _) = inputs.now, inputs.now.velocity_ned
-        by_tilt = GRAVITY * tan(self._largest_tilt())
-        acceleration = acceleration_beside_wind(by_tilt, (north, east), inputs.disturbance)
+        acceleration_by_tilt = GRAVITY * tan(self._largest_tilt())
+        acceleration = acceleration_beside_wind(
+            acceleration_by_tilt, (north, east), inputs.disturbance
+        )
         self._flown_source.hold(brake(now, motion, heading, acceleration, self._assumed_braking))
 
     def move_upwind(self, now: float, wind: NorthEast) -> None:

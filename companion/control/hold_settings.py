@@ -15,7 +15,7 @@ from companion.guidance import ObserverSettings, Weights, horizontal_gains
 from companion.guidance.feedback import HorizontalGains
 from companion.guidance.position_correction import CorrectionSettings
 
-_CALM_WEIGHTS = Weights(position=1.0, velocity=1.5)
+_IDENTIFY_HOLD_WEIGHTS = Weights(position=1.0, velocity=1.5)
 """Low weights of the hold between doublets, so that its commands do not disturb `identify`."""
 _USUAL_RATE_LOOP_DELAY = 0.12
 """Lag plus dead time of a heavy vehicle's rate loop, assumed if none is identified, s."""
@@ -38,11 +38,11 @@ amplifies the noise. The ArduPilot mock, limited to 90 °/s, oscillated without 
 7.5 and a quick observer."""
 _BANDWIDTH_INCREASE = 0.6
 """`ObserverSettings.bandwidth_increase` of a quick observer."""
-_CALM_BANDWIDTH = 1.0
+_IDENTIFY_BANDWIDTH = 1.0
 """Bandwidth of the disturbance estimate in a flight that identifies the vehicle, rad/s."""
 _POSITION_TIME_CONSTANT = 0.1
 """Time constant with which the estimated position follows the measured one, s."""
-_POSITION_COUPLING = 4.0, 8.0
+_POSITION_COUPLINGS = 4.0, 8.0
 """`ObserverSettings.position_coupling` with a slow and with a quick rate loop, 1/s. Without it, the
 velocities of PX4 and ArduPilot, off by 0.05 m/s for seconds (measured), would be trusted."""
 _TRUSTED_COUPLING_INCREASE = 5.0
@@ -105,8 +105,10 @@ def _rate_loop_delay(config: Config) -> float:
     same length.
     """
     lag, dead_time = tilt_lag_and_dead_time(config)
-    share = FIRST_ORDER_LAG_SHARE if isfinite(tilt_damping(config)) else 1.0
-    return dead_time + (1.0 - 0.5 * share) * lag if config.vehicle.response_known else inf
+    first_order_share = FIRST_ORDER_LAG_SHARE if isfinite(tilt_damping(config)) else 1.0
+    return (
+        dead_time + (1.0 - 0.5 * first_order_share) * lag if config.vehicle.response_known else inf
+    )
 
 
 def observer_quickness(config: Config) -> float:
@@ -120,30 +122,30 @@ def observer_quickness(config: Config) -> float:
     """
     if config.guidance.disturbance_bandwidth_rad_s is not None or flies_identify(config):
         return 0.0
-    by_rate_loop = _falling_ramp(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS)
-    return by_rate_loop * _falling_ramp(config.planner.gain_per_s, _QUICK_OBSERVER_GAINS)
+    quickness_by_rate_loop = _falling_ramp(_rate_loop_delay(config), _QUICK_OBSERVER_DELAYS)
+    return quickness_by_rate_loop * _falling_ramp(config.planner.gain_per_s, _QUICK_OBSERVER_GAINS)
 
 
 def observer_settings(config: Config) -> ObserverSettings:
     """The settings of the motion observer."""
-    slow, quick = _POSITION_COUPLING
-    quickness = _falling_ramp(_rate_loop_delay(config), _STIFF_HOLD_DELAYS)
+    slow_coupling, quick_coupling = _POSITION_COUPLINGS
+    loop_quickness = _falling_ramp(_rate_loop_delay(config), _STIFF_HOLD_DELAYS)
     return ObserverSettings(
-        _CALM_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
+        _IDENTIFY_BANDWIDTH if flies_identify(config) else disturbance_bandwidth(config),
         _POSITION_TIME_CONSTANT,
-        slow + quickness * (quick - slow),
+        slow_coupling + loop_quickness * (quick_coupling - slow_coupling),
         config.guidance.max_disturbance_m_s2,
         _BANDWIDTH_INCREASE * observer_quickness(config),
-        quickness * _TRUSTED_COUPLING_INCREASE,
+        loop_quickness * _TRUSTED_COUPLING_INCREASE,
     )
 
 
 def correction_settings(config: Config) -> CorrectionSettings:
     """The settings of the position correction."""
-    slow, quick = _CORRECTION_FILTER_TIMES
+    slow_time, quick_time = _CORRECTION_FILTER_TIMES
     return CorrectionSettings(
         _CORRECTION_TIME_CONSTANT,
-        slow + observer_quickness(config) * (quick - slow),
+        slow_time + observer_quickness(config) * (quick_time - slow_time),
         _LARGEST_CORRECTION,
         config.guidance.position_lateness,
     )
@@ -151,8 +153,8 @@ def correction_settings(config: Config) -> CorrectionSettings:
 
 def disturbance_bandwidth(config: Config) -> float:
     """Bandwidth of the wind estimate, rad/s: as configured, or 1.5/T (see `hold_weights`)."""
-    configured = config.guidance.disturbance_bandwidth_rad_s
-    return 1.5 / _hold_delay(config) if configured is None else configured
+    configured_bandwidth = config.guidance.disturbance_bandwidth_rad_s
+    return 1.5 / _hold_delay(config) if configured_bandwidth is None else configured_bandwidth
 
 
 def attitude_delay(config: Config) -> float:
@@ -161,8 +163,8 @@ def attitude_delay(config: Config) -> float:
     The gain counts as at most the largest sensible gain: more gain hardly makes the attitude
     quicker, and a stiffer hold would oscillate.
     """
-    excess = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
-    delay = feedback_delay(config) + max(0.0, excess)
+    excess_delay = 1.0 / sensible_gain(config) - 1.0 / config.planner.gain_per_s
+    delay = feedback_delay(config) + max(0.0, excess_delay)
     if isfinite(tilt_damping(config)):
         delay += _SECOND_ORDER_LAG_SHARE * tilt_lag_and_dead_time(config)[0]
     return delay if config.vehicle.response_known else delay + _USUAL_RATE_LOOP_DELAY
@@ -184,7 +186,7 @@ def hold_gains(config: Config) -> HorizontalGains:
     Raises:
         ValueError: no positive and finite gains follow.
     """
-    weights = _CALM_WEIGHTS if flies_identify(config) else hold_weights(config)
+    weights = _IDENTIFY_HOLD_WEIGHTS if flies_identify(config) else hold_weights(config)
     return horizontal_gains(weights, feedback_delay(config), drag_prior(config).drag.linear)
 
 

@@ -8,20 +8,20 @@ from companion.guidance import GRAVITY, HoverThrust
 from companion.guidance.reference import clamp_length
 from companion.guidance.thrust import largest_tilt
 
-_CLEAR_HEIGHT = 1.0
+_MIN_LEARNING_HEIGHT = 1.0
 """Height above home from which there is neither ground contact nor ground effect, m."""
 
 _MAX_THRUST_AGE = 0.3
 """Largest age of an ATTITUDE_TARGET whose thrust is used, s; PX4 sends it at 10 Hz."""
 
-_BEYOND_LEARNING_SHARE = 0.1
+_MAX_TAKEOVER_DIFFERENCE = 0.1
 """Largest relative difference at takeover between the measured hover thrust and the learned one,
 which `thrust.correction_limit` bounds."""
 
-_LARGEST_IDLE_SHARE = 0.9
+_MAX_SMALLEST_THRUST = 0.9
 """Largest share of the weight that the smallest thrust may carry, so the vehicle can descend."""
 
-_MISMATCH_SHARE = 0.15
+_MAX_UNREPORTED_ERROR = 0.15
 """Largest relative error of the configured hover thrust that is not reported."""
 
 
@@ -36,9 +36,9 @@ class HoverLearning:
         hover_thrust: the estimate.
     """
 
-    def __init__(self, hover_thrust: HoverThrust, state: Telemetry) -> None:
+    def __init__(self, hover_thrust: HoverThrust, telemetry: Telemetry) -> None:
         self.hover_thrust = hover_thrust
-        self._state = state
+        self._telemetry = telemetry
         self._had_control = False
 
     @property
@@ -53,8 +53,8 @@ class HoverLearning:
 
     def limit_tilt(self, target: Target, acceleration_down: float) -> Target:
         """The target with its tilt limited to `largest_tilt`."""
-        largest = sin(self.largest_tilt(acceleration_down))
-        north, east = clamp_length(target.north, target.east, largest)
+        max_norm = sin(self.largest_tilt(acceleration_down))
+        north, east = clamp_length(target.north, target.east, max_norm)
         return target._replace(north=north, east=east)
 
     def step(self, now: float, q: Quaternion, *, offboard_active: bool, steady: bool) -> None:
@@ -66,7 +66,7 @@ class HoverLearning:
             offboard_active: whether the autopilot obeys the setpoints.
             steady: whether the commanded thrust is steady; the rotors lag behind a changing thrust.
         """
-        battery, position = self._state.battery, self._state.position
+        battery, position = self._telemetry.battery, self._telemetry.position
         if battery is not None:
             self.hover_thrust.note_voltage(battery.received, battery.voltage_v)
         self._had_control = self._had_control or offboard_active
@@ -85,39 +85,49 @@ class HoverLearning:
 
         A refusal is possible only if the autopilot reports its own thrust.
         """
-        thrust = self.hover_thrust
-        measured, learned, (lowest, _) = thrust.measured_hover, thrust.learned_hover, thrust.limits
-        if thrust.smallest_specific_thrust * learned / measured > _LARGEST_IDLE_SHARE * GRAVITY:
+        hover_thrust = self.hover_thrust
+        measured_hover, learned_hover, (min_thrust, _) = (
+            hover_thrust.measured_hover,
+            hover_thrust.learned_hover,
+            hover_thrust.limits,
+        )
+        if (
+            hover_thrust.smallest_specific_thrust * learned_hover / measured_hover
+            > _MAX_SMALLEST_THRUST * GRAVITY
+        ):
             return (
-                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}, so with "
-                f"limits.min_thrust {lowest:g} it cannot descend; set limits.min_thrust to "
-                f"{0.4 * measured:.2f}, and thrust.hover_thrust to {measured:.2f}"
+                f"not taken over: the vehicle hovers at a thrust of {measured_hover:.2f}, so with "
+                f"limits.min_thrust {min_thrust:g} it cannot descend; set limits.min_thrust to "
+                f"{0.4 * measured_hover:.2f}, and thrust.hover_thrust to {measured_hover:.2f}"
             )
-        if abs(measured - learned) > _BEYOND_LEARNING_SHARE * learned:
+        if abs(measured_hover - learned_hover) > _MAX_TAKEOVER_DIFFERENCE * learned_hover:
             return (
-                f"not taken over: the vehicle hovers at a thrust of {measured:.2f}, and "
-                f"thrust.hover_thrust {thrust.configured_hover:.2f} differs by more than "
-                f"thrust.correction_limit allows; set thrust.hover_thrust to {measured:.2f}"
+                f"not taken over: the vehicle hovers at a thrust of {measured_hover:.2f}, and "
+                f"thrust.hover_thrust {hover_thrust.configured_hover:.2f} differs by more than "
+                f"thrust.correction_limit allows; set thrust.hover_thrust to {measured_hover:.2f}"
             )
         return None
 
     def mismatch_warning(self) -> str | None:
         """Advice to set thrust.hover_thrust, if the learned one differs by over 15 %; else None."""
         hover_thrust = self.hover_thrust
-        configured, learned = hover_thrust.configured_hover, hover_thrust.measured_hover
-        if not self._had_control or abs(learned - configured) <= _MISMATCH_SHARE * configured:
+        configured_hover, learned_hover = hover_thrust.configured_hover, hover_thrust.measured_hover
+        if (
+            not self._had_control
+            or abs(learned_hover - configured_hover) <= _MAX_UNREPORTED_ERROR * configured_hover
+        ):
             return None
         return (
-            f"the vehicle hovers at a thrust of {learned:.2f}, but thrust.hover_thrust is "
-            f"{configured:.2f}; set it to {learned:.2f}"
+            f"the vehicle hovers at a thrust of {learned_hover:.2f}, but thrust.hover_thrust is "
+            f"{configured_hover:.2f}; set it to {learned_hover:.2f}"
         )
 
     def _note_autopilot_thrust(self, now: float, q: Quaternion) -> bool:
         """Note the autopilot's thrust; return False if unknown, or if the vehicle does not fly."""
-        target, height = self._state.attitude_target_thrust, self._state.height
+        target, height = self._telemetry.attitude_target_thrust, self._telemetry.height
         if target is None or now - target.received > _MAX_THRUST_AGE:
             return False
-        if not self._state.armed or height is None or height < _CLEAR_HEIGHT:
+        if not self._telemetry.armed or height is None or height < _MIN_LEARNING_HEIGHT:
             return False
         self.hover_thrust.note_thrust(target.thrust, q)
         return True

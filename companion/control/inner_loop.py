@@ -135,10 +135,10 @@ def with_gain(config: Config, gain: float) -> Config:
 def tilt_response(config: Config) -> InnerResponse:
     """Response of the acceleration coefficients to their targets: planner and rate loop."""
     gain, (lag, dead_time) = config.planner.gain_per_s, tilt_lag_and_dead_time(config)
-    follows = config.planner_name == MODEL_FOLLOWING
-    if follows:
+    follows_model = config.planner_name == MODEL_FOLLOWING
+    if follows_model:
         gain, lag = model_response(gain, model_lag(gain, lag))
-    return InnerResponse(gain, lag, dead_time, follows)
+    return InnerResponse(gain, lag, dead_time, follows_model)
 
 
 def tilt_lag_and_dead_time(config: Config) -> tuple[float, float]:
@@ -164,8 +164,8 @@ def tilt_damping(config: Config) -> float:
 def sensible_gain(config: Config) -> float:
     """Largest sensible gain of the planner, 1/s; infinite if the rate loop is not identified."""
     delay = sum(tilt_lag_and_dead_time(config))
-    identified = config.vehicle.response_known and delay > 0.0
-    return LARGEST_GAIN_TIMES_DELAY / delay if identified else inf
+    is_identified = config.vehicle.response_known and delay > 0.0
+    return LARGEST_GAIN_TIMES_DELAY / delay if is_identified else inf
 
 
 def heading_response(config: Config) -> InnerResponse:

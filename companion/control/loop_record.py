@@ -16,12 +16,12 @@ _KEPT_GAPS = 32
 """Number of latest gaps that are kept; a flight ends after far fewer gaps."""
 
 
-class Unanswered(Enum):
+class UnansweredReason(Enum):
     """Why a sample is unanswered. The value is the reason's name in `summary.json` and reports."""
 
     ANOTHER_VEHICLE = "another_vehicle"
     NOT_NEWER = "not_newer"
-    AHEAD = "stamped_ahead"
+    STAMPED_AHEAD = "stamped_ahead"
     LATE = "late"
     NO_TARGET = "no_target"
     OLD_TARGET = "old_target"
@@ -32,16 +32,16 @@ class Unanswered(Enum):
     INVALID_RATES = "invalid_rates"
 
     @classmethod
-    def of(cls, error: AttitudeError) -> "Unanswered":
+    def of(cls, error: AttitudeError) -> "UnansweredReason":
         """The reason for a planner's error: an invalid attitude, or invalid rates."""
         if isinstance(error, InvalidQuaternionError | InvalidBodyRatesError):
             return cls.INVALID_ATTITUDE
         return cls.INVALID_RATES
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """The reason in words, for messages."""
-        return _REASON_WORDS[self]
+        return _REASON_TEXTS[self]
 
     @property
     def is_refusal(self) -> bool:
@@ -49,28 +49,29 @@ class Unanswered(Enum):
         return self in _REFUSALS
 
 
-_REASON_WORDS = {
-    Unanswered.ANOTHER_VEHICLE: "this may be another vehicle than the one that was checked",
-    Unanswered.NOT_NEWER: "the vehicle's clock stands still: new attitude samples carry no later "
-    "time stamp",
-    Unanswered.AHEAD: "attitude is stamped far ahead of the vehicle's clock",
-    Unanswered.LATE: "attitude arrives, but older than deadman.telemetry_stale_ms",
-    Unanswered.NO_TARGET: "guidance makes no commands",
-    Unanswered.OLD_TARGET: "guidance makes no commands any more",
-    Unanswered.AWAITING_MODE: "after a gap in telemetry the autopilot did not confirm offboard",
-    Unanswered.INVALID_ATTITUDE: "attitude from the vehicle cannot be used: it is no unit "
+_REASON_TEXTS = {
+    UnansweredReason.ANOTHER_VEHICLE: "this may be another vehicle than the one that was checked",
+    UnansweredReason.NOT_NEWER: "the vehicle's clock stands still: new attitude samples carry no "
+    "later time stamp",
+    UnansweredReason.STAMPED_AHEAD: "attitude is stamped far ahead of the vehicle's clock",
+    UnansweredReason.LATE: "attitude arrives, but older than deadman.telemetry_stale_ms",
+    UnansweredReason.NO_TARGET: "guidance makes no commands",
+    UnansweredReason.OLD_TARGET: "guidance makes no commands any more",
+    UnansweredReason.AWAITING_MODE: "after a gap in telemetry the autopilot did not confirm "
+    "offboard",
+    UnansweredReason.INVALID_ATTITUDE: "attitude from the vehicle cannot be used: it is no unit "
     "quaternion",
-    Unanswered.INVALID_SETPOINT: "the setpoints cannot be used: they are not finite or out of "
-    "range",
-    Unanswered.NOT_SENT: "setpoints cannot be sent: the connection does not accept them",
-    Unanswered.INVALID_RATES: "the planner gives no body rates: they are NaN or infinite, or it "
-    "refuses the target",
+    UnansweredReason.INVALID_SETPOINT: "the setpoints cannot be used: they are not finite or out "
+    "of range",
+    UnansweredReason.NOT_SENT: "setpoints cannot be sent: the connection does not accept them",
+    UnansweredReason.INVALID_RATES: "the planner gives no body rates: they are NaN or infinite, or "
+    "it refuses the target",
 }
 _REFUSALS = {
-    Unanswered.INVALID_ATTITUDE,
-    Unanswered.INVALID_SETPOINT,
-    Unanswered.NOT_SENT,
-    Unanswered.INVALID_RATES,
+    UnansweredReason.INVALID_ATTITUDE,
+    UnansweredReason.INVALID_SETPOINT,
+    UnansweredReason.NOT_SENT,
+    UnansweredReason.INVALID_RATES,
 }
 
 
@@ -95,9 +96,11 @@ class LoopRecord:
     setpoints: int = 0
     missed_deadlines: int = 0
     """Setpoints sent later than `Deadlines.deadline` after their sample."""
-    unanswered: dict[Unanswered, int] = field(default_factory=lambda: dict.fromkeys(Unanswered, 0))
+    unanswered: dict[UnansweredReason, int] = field(
+        default_factory=lambda: dict.fromkeys(UnansweredReason, 0)
+    )
     """Unanswered samples, by reason."""
-    reason: Unanswered | None = None
+    reason: UnansweredReason | None = None
     """Why the newest sample is unanswered, or None."""
     latency_ns: int = 0
     """Time from the arrival of the last answered sample to its setpoint, ns."""
@@ -111,7 +114,7 @@ class LoopRecord:
     """Vehicle time of the newest sample that fits the vehicle's clock, s."""
     last_answered_arrival: float = -inf
     """When the newest answered sample arrived, s of event-loop time."""
-    gap_from: float = inf
+    gap_start: float = inf
     """Time from which the present gap between setpoints counts: `last_answered_arrival`; inf
     (no gap) before the first answer and after `ControlLoop.resume`."""
     gaps: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_GAPS))
@@ -130,22 +133,22 @@ class LoopRecord:
         return period
 
     def note_answer(
-        self, received: float, rates: BodyRates, thrust: float, longest_interval: float
+        self, sample_arrival: float, rates: BodyRates, thrust: float, longest_interval: float
     ) -> None:
         """Note that a setpoint was sent.
 
         Args:
-            received: when its sample arrived, s of event-loop time.
+            sample_arrival: when its sample arrived, s of event-loop time.
             rates: body rates of the setpoint, rad/s.
             thrust: thrust of the setpoint, 0..1.
             longest_interval: a longer interval between setpoints is a gap, s.
         """
         self.setpoints += 1
         self.sent_setpoints.append((rates, thrust))
-        interval = received - self.last_answered_arrival
-        if interval <= longest_interval:
-            self.setpoint_intervals.add(interval)
-        self.last_answered_arrival = self.gap_from = received
+        setpoint_interval = sample_arrival - self.last_answered_arrival
+        if setpoint_interval <= longest_interval:
+            self.setpoint_intervals.add(setpoint_interval)
+        self.last_answered_arrival = self.gap_start = sample_arrival
 
     @property
     def thrust(self) -> float:

@@ -45,19 +45,19 @@ class MotionEstimate:
         observer: MotionObserver,
         correction: PositionCorrection,
         drag: DragEstimate,
-        offset: Callable[[], float | None],
+        clock_offset: Callable[[], float | None],
     ) -> None:
         self.vertical_thrust = GRAVITY
         self._observer = observer
         self._correction = correction
         self.drag = drag
-        self._offset = offset
+        self._clock_offset = clock_offset
         self._slopes = SlopeHistory()
         self._climb_bias = ClimbBias()
         self._q: Quaternion = (1.0, 0.0, 0.0, 0.0)
         self._body_rates = BodyRates(0.0, 0.0, 0.0)
         self._position: LocalPosition | None = None
-        self._heading_resets = 0.0
+        self._heading_reset_sum = 0.0
         self._heading = 0.0
 
     @property
@@ -79,52 +79,54 @@ class MotionEstimate:
         """Take a measured attitude, which gives the direction of the thrust."""
         self._q, self._body_rates = sample.q, sample.body_rates
         self._heading = 2.0 * atan2(sample.q[3], sample.q[0])
-        square, ax, ay = half_tilt_products(*sample.q)
-        cosine = max(2.0 * square - 1.0, _LEAST_COS_TILT)
+        a_squared, ax, ay = half_tilt_products(*sample.q)
+        cosine = max(2.0 * a_squared - 1.0, _LEAST_COS_TILT)
         self._slopes.add(sample.vehicle_time, (-2.0 * ay / cosine, 2.0 * ax / cosine))
 
-    def note_heading_resets(self, total: float) -> None:
+    def note_heading_resets(self, heading_reset_sum: float) -> None:
         """Take the sum of the heading resets, rad.
 
         If the sum changed, the disturbance is rotated, and the earlier attitudes and the filtered
         position correction are discarded.
         """
-        if total != self._heading_resets:
-            self._observer.rotate_disturbance(total - self._heading_resets)
+        if heading_reset_sum != self._heading_reset_sum:
+            self._observer.rotate_disturbance(heading_reset_sum - self._heading_reset_sum)
             self._slopes.forget()
             self._correction.reset()
-            self._heading_resets = total
+            self._heading_reset_sum = heading_reset_sum
 
     def note_position(self, position: LocalPosition, *, offboard_active: bool) -> None:
         """Take a measured position and velocity; the same message again is ignored.
 
         Drag is learned only while offboard is active.
         """
-        before, self._position = self._position, position
-        if before is not None and position.vehicle_time == before.vehicle_time:
+        previous, self._position = self._position, position
+        if previous is not None and position.vehicle_time == previous.vehicle_time:
             return
-        since = position.vehicle_time if before is None else before.vehicle_time
-        slope = self._slopes.mean(since, position.vehicle_time)
+        slope_start = position.vehicle_time if previous is None else previous.vehicle_time
+        slope = self._slopes.mean(slope_start, position.vehicle_time)
         north, east, down = position.velocity_ned
         down = self._climb_bias.corrected_speed(
             position.vehicle_time, position.position_ned[2], down
         )
-        measured = self._correction.corrected_motion(
+        measured_motion = self._correction.corrected_motion(
             position.vehicle_time, VehicleMotion(position.position_ned, (north, east, down))
         )
-        modelled = self._modelled_acceleration(slope, measured)
-        self._observer.observe(position.vehicle_time, measured, modelled, self._correction.trust)
-        if offboard_active and before is not None:
-            self._learn_drag(before, position, slope)
+        modelled_acceleration = self._modelled_acceleration(slope, measured_motion)
+        self._observer.observe(
+            position.vehicle_time, measured_motion, modelled_acceleration, self._correction.trust
+        )
+        if offboard_active and previous is not None:
+            self._learn_drag(previous, position, slope)
 
     def guidance_input(
-        self, now: float, ahead: float, thrust_limits: tuple[float, float]
+        self, now: float, prediction_time: float, thrust_limits: tuple[float, float]
     ) -> GuidanceInput:
-        """The motion at `now` and `ahead` seconds later, with thrust, disturbance and drag.
+        """The motion at `now` and `prediction_time` s later, with thrust, disturbance and drag.
 
         Args:
             now: event-loop time, s.
-            ahead: prediction time, s.
+            prediction_time: time from `now` to the predicted motion, s.
             thrust_limits: smallest and largest available specific thrust, m/s².
 
         Raises:
@@ -133,17 +135,28 @@ class MotionEstimate:
         if self._position is None:
             raise RuntimeError("guidance was asked to hold before any position came")
         time = self.vehicle_time(now, self._position)
-        measured = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
+        measured_motion = VehicleMotion(self._position.position_ned, self._position.velocity_ned)
         slope = self._slopes.mean(self._position.vehicle_time, time)
-        motion = self._observer.at(time, self._modelled_acceleration(slope, measured)) or measured
-        slope = self._slopes.mean(self._position.vehicle_time, time + ahead)
-        modelled = self._modelled_acceleration(slope, motion)
-        predicted = self._observer.at(time + ahead, modelled) or measured
+        present_motion = (
+            self._observer.at(time, self._modelled_acceleration(slope, measured_motion))
+            or measured_motion
+        )
+        slope = self._slopes.mean(self._position.vehicle_time, time + prediction_time)
+        modelled_acceleration = self._modelled_acceleration(slope, present_motion)
+        predicted_motion = (
+            self._observer.at(time + prediction_time, modelled_acceleration) or measured_motion
+        )
         north, east = self._slopes.newest
         thrust = self.vertical_thrust * north, self.vertical_thrust * east
         disturbance, drag = self._observer.disturbance, self.drag.drag
         return GuidanceInput(
-            motion, predicted, thrust, disturbance, drag, thrust_limits, self._axis_drag
+            present_motion,
+            predicted_motion,
+            thrust,
+            disturbance,
+            drag,
+            thrust_limits,
+            self._axis_drag,
         )
 
     def vehicle(self, now: float, inputs: GuidanceInput) -> VehicleSnapshot:
@@ -170,17 +183,19 @@ class MotionEstimate:
 
         Before the offset of that clock is known, `position` counts as measured when it arrived.
         """
-        offset = self._offset()
-        return now + (position.vehicle_time - position.received if offset is None else offset)
+        clock_offset = self._clock_offset()
+        return now + (
+            position.vehicle_time - position.received if clock_offset is None else clock_offset
+        )
 
     def mismatch_warning(self) -> str | None:
         """Advice to change the drag keys if the learned drag differs from them; else None."""
         if (mismatch := self._drag_mismatch()) is None:
             return None
-        drag, (speed, learned, assumed) = self.drag.drag, mismatch
+        drag, (speed, learned_drag, assumed_drag) = self.drag.drag, mismatch
         return (
-            f"the vehicle's drag at {speed:.1f} m/s is {learned:.2f} 1/s, but "
-            f"{assumed:.2f} was assumed; set guidance.drag_per_s to "
+            f"the vehicle's drag at {speed:.1f} m/s is {learned_drag:.2f} 1/s, but "
+            f"{assumed_drag:.2f} was assumed; set guidance.drag_per_s to "
             f"{drag.linear:.2f} and guidance.quadratic_drag_per_m to {drag.quadratic:.3f}"
         )
 
@@ -188,33 +203,37 @@ class MotionEstimate:
         """A message that the learned drag differs from the assumed one; None: they are similar."""
         if (mismatch := self._drag_mismatch()) is None:
             return None
-        speed, learned, assumed = mismatch
+        speed, learned_drag, assumed_drag = mismatch
         return (
-            f"the vehicle's drag at {speed:.1f} m/s is {learned:.2f} 1/s; this "
-            f"flight began with {assumed:.2f} 1/s, and the vehicle's next flight begins with the "
-            "drag that this flight learned"
+            f"the vehicle's drag at {speed:.1f} m/s is {learned_drag:.2f} 1/s; this "
+            f"flight began with {assumed_drag:.2f} 1/s, and the vehicle's next flight begins with "
+            "the drag that this flight learned"
         )
 
     def _drag_mismatch(self) -> tuple[float, float, float] | None:
         """Top speed, m/s; learned and assumed drag at it, 1/s; None: nearly equal, or uncertain."""
         speed = self.drag.top_speed
-        learned = self.drag.drag.per_velocity(speed)
-        assumed = self.drag.prior_drag.per_velocity(speed)
-        if not self.drag.certain or abs(learned - assumed) <= _DRAG_MISMATCH:
+        learned_drag = self.drag.drag.per_velocity(speed)
+        assumed_drag = self.drag.prior_drag.per_velocity(speed)
+        if not self.drag.certain or abs(learned_drag - assumed_drag) <= _DRAG_MISMATCH:
             return None
-        return speed, learned, assumed
+        return speed, learned_drag, assumed_drag
 
-    def _learn_drag(self, before: LocalPosition, after: LocalPosition, slope: NorthEast) -> None:
-        dt = after.vehicle_time - before.vehicle_time
+    def _learn_drag(self, previous: LocalPosition, newest: LocalPosition, slope: NorthEast) -> None:
+        dt = newest.vehicle_time - previous.vehicle_time
         if not 0.0 < dt < _LONGEST_POSITION_GAP:
             return
-        old, new = before.velocity_ned, after.velocity_ned
-        north, east, down = ((b - a) / dt for a, b in zip(old, new, strict=True))
+        old_velocity, new_velocity = previous.velocity_ned, newest.velocity_ned
+        north, east, down = ((b - a) / dt for a, b in zip(old_velocity, new_velocity, strict=True))
         # The measured acceleration gives the actual thrust, which differs from the commanded one.
         vertical_thrust = GRAVITY - down
         self.drag.observe(
             dt,
-            (0.5 * (old[0] + new[0]), 0.5 * (old[1] + new[1]), 0.5 * (old[2] + new[2])),
+            (
+                0.5 * (old_velocity[0] + new_velocity[0]),
+                0.5 * (old_velocity[1] + new_velocity[1]),
+                0.5 * (old_velocity[2] + new_velocity[2]),
+            ),
             (north - vertical_thrust * slope[0], east - vertical_thrust * slope[1]),
             self._heading,
         )

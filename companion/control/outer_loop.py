@@ -68,27 +68,29 @@ def make_guidance(config: Config) -> Guidance:
     return PluginGuidance(flight_guidance)
 
 
-def _require_command(kind: str, guidance: Guidance, thrust: tuple[float, float]) -> None:
+def _require_command(kind: str, guidance: Guidance, thrust_limits: tuple[float, float]) -> None:
     """Check guidance of another package: ask it once to hold a vehicle that is at rest.
 
-    `kind`: its name in `guidance.kind`. `thrust`: smallest and largest specific thrust, m/s².
+    `kind`: its name in `guidance.kind`. `thrust_limits`: of the specific thrust, m/s².
 
     Raises:
         ConfigError: the guidance raises, or does not return a `LinearCommand` of finite numbers.
     """
-    rest = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    inputs = GuidanceInput(rest, rest, (0.0, 0.0), (0.0, 0.0), NO_DRAG, thrust)
+    motion_at_rest = VehicleMotion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    inputs = GuidanceInput(
+        motion_at_rest, motion_at_rest, (0.0, 0.0), (0.0, 0.0), NO_DRAG, thrust_limits
+    )
     try:
-        command = guidance.command(lambda _: Reference(rest.position_ned), 0.0, inputs)
+        command = guidance.command(lambda _: Reference(motion_at_rest.position_ned), 0.0, inputs)
         target, later_target, acceleration_down = command
         numbers = (guidance.acts_after, *target, *later_target, acceleration_down)
-        finite = all(map(isfinite, numbers))
+        is_finite = all(map(isfinite, numbers))
     except (Exception, SystemExit) as error:
         raise ConfigError(
             f"guidance.kind: {kind} cannot be flown: {error!r}; guidance must have the methods of "
             "companion.guidance.linear.Guidance"
         ) from error
-    if not finite:
+    if not is_finite:
         raise ConfigError(
             f"guidance.kind: {kind} cannot be flown: at rest its command must be finite, and it is "
             f"{command} with acts_after {guidance.acts_after} s"
@@ -121,16 +123,16 @@ def linear_settings(config: Config) -> LinearSettings:
     )
 
 
-def motion_estimate(config: Config, offset: Callable[[], float | None]) -> MotionEstimate:
+def motion_estimate(config: Config, clock_offset: Callable[[], float | None]) -> MotionEstimate:
     """The motion estimate with its observer, position correction and drag estimate.
 
-    `offset`: returns vehicle time minus event-loop time, s; None: not known yet.
+    `clock_offset`: returns vehicle time minus event-loop time, s; None: not known yet.
     """
     return MotionEstimate(
         MotionObserver(observer_settings(config)),
         PositionCorrection(correction_settings(config)),
         DragEstimate(drag_prior(config)),
-        offset,
+        clock_offset,
     )
 
 

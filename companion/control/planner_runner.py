@@ -47,11 +47,11 @@ class PlannerRunner:
         self._model_follower = planner if isinstance(planner, ModelFollowingPlanner) else None
         self._estimator_resets, self._limits = resets, limits
         self._step_frame = StepFrame()
-        self._planned_at = -inf
+        self._last_plan_time = -inf
         self._period = 0.0
-        self._passed_target: AttitudeTarget | None = None
-        self._reported_target: AttitudeTarget | None = None
-        self._resets_frame, self._reset_at_ms = HeadingFrame(), -1
+        self._planner_attitude_target: AttitudeTarget | None = None
+        self._reported_attitude_target: AttitudeTarget | None = None
+        self._frame_after_reset, self._reset_time_boot_ms = HeadingFrame(), -1
 
     def retune(self, constants: Constants, limits: Limits) -> None:
         """Use other gains and limits from the next sample on.
@@ -68,7 +68,7 @@ class PlannerRunner:
 
     def restart(self) -> None:
         """Reset the planner at the next sample, because its state is not valid any more."""
-        self._planned_at = -inf
+        self._last_plan_time = -inf
 
     @property
     def planned_tilt(self) -> PlannedTilt | None:
@@ -103,7 +103,7 @@ class PlannerRunner:
 
         The target is in the frame without resets.
         """
-        period = sample.vehicle_time - self._planned_at
+        period = sample.vehicle_time - self._last_plan_time
         # Over a gap the body rates are not known, so the frame does not follow the estimator.
         stepping = is_step and period <= _LONGEST_PERIOD
         self._step_frame.advance(
@@ -117,30 +117,30 @@ class PlannerRunner:
             # A gap is not the period of the samples, so an earlier period is used.
             period = self._period or min(arrival_period, _LONGEST_PERIOD)
         self._period = period
-        self._planned_at = sample.vehicle_time
+        self._last_plan_time = sample.vehicle_time
         self._note_attitude_target(sample)
         self.planner_input = q, target
         # A vehicle's clock that stood still or went back must not keep the sample unanswered.
         rates = self._planner.rates(q, target, max(SHORTEST_PERIOD, period), sample.body_rates)
-        return rates if self._passed_target is None else self._step_frame.rates(q, rates)
+        return rates if self._planner_attitude_target is None else self._step_frame.rates(q, rates)
 
     def _note_attitude_target(self, sample: AttitudeSample) -> None:
         """Pass a new ATTITUDE_TARGET to the planner, unless `sample` is older than the message.
 
         An ATTITUDE_TARGET from before a heading reset is ignored: its frame is not known.
         """
-        if self._estimator_resets.frame != self._resets_frame:
-            self._resets_frame, self._reset_at_ms = (
+        if self._estimator_resets.frame != self._frame_after_reset:
+            self._frame_after_reset, self._reset_time_boot_ms = (
                 self._estimator_resets.frame,
                 sample.time_boot_ms,
             )
         target = self.attitude_target()
-        if target is None or target is self._passed_target:
+        if target is None or target is self._planner_attitude_target:
             return
-        if target is not self._reported_target and self.on_attitude_target is not None:
-            self._reported_target = target
+        if target is not self._reported_attitude_target and self.on_attitude_target is not None:
+            self._reported_attitude_target = target
             self.on_attitude_target(target)
-        if self._reset_at_ms < target.time_boot_ms <= sample.time_boot_ms:
-            self._passed_target = target
+        if self._reset_time_boot_ms < target.time_boot_ms <= sample.time_boot_ms:
+            self._planner_attitude_target = target
             age = 1e-3 * (sample.time_boot_ms - target.time_boot_ms)
             self._planner.note_attitude_target(self.attitude(target.q), age)

@@ -72,7 +72,7 @@ class PredictiveControl:
         self._period = period
         self._vehicle_waits = vehicle_waits
         self._request_number = 0
-        self._inputs: deque[ControlInput] = deque(maxlen=50)
+        self._control_inputs: deque[ControlInput] = deque(maxlen=50)
         self._solver = solver(self._report)
 
     def close(self) -> None:
@@ -84,7 +84,7 @@ class PredictiveControl:
         linear_command: LinearCommand,
         frame: HeadingFrame,
         vehicle: VehicleSnapshot,
-        followed: FollowedTrajectory | None,
+        followed_trajectory: FollowedTrajectory | None,
     ) -> LinearCommand:
         """The solver's answer for this step, or `linear_command`; requests the next answer.
 
@@ -93,20 +93,20 @@ class PredictiveControl:
 
         `frame`: the frame without heading resets.
         """
-        target, down = linear_command.target, linear_command.down
+        target, acceleration_down = linear_command.target, linear_command.down
         target = target._replace(heading=frame.estimated_heading(target.heading))
-        answer = None if followed is None else self._answer(vehicle.time)
+        answer = None if followed_trajectory is None else self._answer(vehicle.time)
         if answer is not None:
             self.record.flown_answers += 1
             self.record.computing_seconds.append(answer.computing_seconds)
-            target, down = _command_of(answer)
-        self._record_input(vehicle.time, target, down)
-        if followed is not None:
-            self._request(vehicle, followed, frame)
+            target, acceleration_down = _command_of(answer)
+        self._record_input(vehicle.time, target, acceleration_down)
+        if followed_trajectory is not None:
+            self._request(vehicle, followed_trajectory, frame)
         if answer is None:
             return linear_command
         target = target._replace(heading=frame.heading(target.heading))
-        return LinearCommand(target, target, down)
+        return LinearCommand(target, target, acceleration_down)
 
     def _answer(self, now: float) -> Answer | None:
         if self._vehicle_waits:
@@ -118,32 +118,36 @@ class PredictiveControl:
         return answer
 
     def _request(
-        self, vehicle: VehicleSnapshot, followed: FollowedTrajectory, frame: HeadingFrame
+        self, vehicle: VehicleSnapshot, followed_trajectory: FollowedTrajectory, frame: HeadingFrame
     ) -> None:
-        maneuver, pose = followed.maneuver, followed.pose
-        trajectory_time = followed.time - maneuver.turn_duration
+        maneuver, pose = followed_trajectory.maneuver, followed_trajectory.pose
+        trajectory_time = followed_trajectory.time - maneuver.turn_duration
         if trajectory_time < 0.0:
             return
         self._request_number += 1
         heading = pose.heading if maneuver.trajectory.holds_heading else 0.0
-        inputs = tuple(self._inputs)
+        control_inputs = tuple(self._control_inputs)
         start = Start(pose.position_ned, frame.estimated_heading(heading))
-        self._solver.request(Request(self._request_number, vehicle, trajectory_time, start, inputs))
+        self._solver.request(
+            Request(self._request_number, vehicle, trajectory_time, start, control_inputs)
+        )
 
-    def _record_input(self, now: float, target: Target, down: float) -> None:
-        lift = GRAVITY - down
-        thrust = lift / max(0.2, sqrt(max(0.0, 1.0 - target.north**2 - target.east**2)))
-        self._inputs.append(ControlInput(now, target.north, target.east, target.heading, thrust))
+    def _record_input(self, now: float, target: Target, acceleration_down: float) -> None:
+        vertical_thrust = GRAVITY - acceleration_down
+        thrust = vertical_thrust / max(0.2, sqrt(max(0.0, 1.0 - target.north**2 - target.east**2)))
+        self._control_inputs.append(
+            ControlInput(now, target.north, target.east, target.heading, thrust)
+        )
 
     def _wait_until_ready(self) -> None:
-        until = monotonic() + _LONGEST_SOLVER_START
-        while self._solver.alive and not self._solver.ready and monotonic() < until:
+        deadline = monotonic() + _LONGEST_SOLVER_START
+        while self._solver.alive and not self._solver.ready and monotonic() < deadline:
             sleep(0.01)
 
-    def _report(self, trouble: Trouble, words: str) -> None:
+    def _report(self, trouble: Trouble, message: str) -> None:
         self.record.troubles[trouble] += 1
         if self.record.troubles[trouble] == 1:
-            self._note(f"predictive control: {words}; linear guidance flies on")
+            self._note(f"predictive control: {message}; linear guidance flies on")
 
 
 def _command_of(answer: Answer) -> tuple[Target, float]:

@@ -11,7 +11,7 @@ from companion.guidance.reference import Vector
 
 _LARGEST_LAG = 0.03
 """Largest lag that is learned, s; a low-pass filter of 20 Hz has 11 ms."""
-_HALF_LEARNED_SQUARES = 0.01
+_HALF_LEARNED_SQUARE_SUM = 0.01
 """Sum of squared rate changes, rad²/s², after which half of the lag is learned."""
 
 
@@ -29,39 +29,43 @@ class RateLag:
     0.05°.
 
     Attributes:
-        seconds: the learned lag, s; about 0 before the first fast rotation.
+        lag: the learned lag, s; about 0 before the first fast rotation.
     """
 
     def __init__(self) -> None:
-        self.seconds = 0.0
-        self._products = 0.0
-        self._squares = _HALF_LEARNED_SQUARES
+        self.lag = 0.0
+        self._product_sum = 0.0
+        self._square_sum = _HALF_LEARNED_SQUARE_SUM
 
-    def mean(self, before: Vector, after: Vector, dt: float) -> Vector:
+    def mean(self, rates_before: Vector, rates_after: Vector, dt: float) -> Vector:
         """The mean body rates between two samples `dt` s apart, corrected for the lag, rad/s."""
-        ahead = self.seconds / dt
-        p, q, r = before
-        new_p, new_q, new_r = after
+        lag_share = self.lag / dt
+        p, q, r = rates_before
+        new_p, new_q, new_r = rates_after
         return (
-            0.5 * (p + new_p) + ahead * (new_p - p),
-            0.5 * (q + new_q) + ahead * (new_q - q),
-            0.5 * (r + new_r) + ahead * (new_r - r),
+            0.5 * (p + new_p) + lag_share * (new_p - p),
+            0.5 * (q + new_q) + lag_share * (new_q - q),
+            0.5 * (r + new_r) + lag_share * (new_r - r),
         )
 
     def learn(
-        self, before: Vector, after: Vector, predicted: Quaternion, measured: Quaternion
+        self,
+        rates_before: Vector,
+        rates_after: Vector,
+        predicted_q: Quaternion,
+        measured_q: Quaternion,
     ) -> None:
         """Learn from the difference between a measured attitude and the predicted one.
 
         Args:
-            before: body rates of the previous sample, rad/s.
-            after: body rates of this sample, rad/s.
-            predicted: attitude of this sample, predicted from the previous one with `mean`.
-            measured: measured attitude of this sample.
+            rates_before: body rates of the previous sample, rad/s.
+            rates_after: body rates of this sample, rad/s.
+            predicted_q: attitude of this sample, predicted from the previous one with `mean`.
+            measured_q: measured attitude of this sample.
         """
-        _, x, y, _ = body_error(predicted, measured)
-        p, q = after[0] - before[0], after[1] - before[1]
-        square = p * p + q * q
-        self._products += 2.0 * (x * p + y * q) + self.seconds * square
-        self._squares += square
-        self.seconds = clamp(self._products / self._squares, _LARGEST_LAG)
+        _, x, y, _ = body_error(predicted_q, measured_q)
+        p, q = rates_after[0] - rates_before[0], rates_after[1] - rates_before[1]
+        change_squared = p * p + q * q
+        self._product_sum += 2.0 * (x * p + y * q) + self.lag * change_squared
+        self._square_sum += change_squared
+        self.lag = clamp(self._product_sum / self._square_sum, _LARGEST_LAG)

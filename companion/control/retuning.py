@@ -19,7 +19,7 @@ from companion.guidance.position_correction import CorrectionSettings
 
 SLEW_TIME = 0.7
 """Time over which a change takes effect, s."""
-_SHORTEST_STEP = 0.035
+_SHORTEST_STEP_PERIOD = 0.035
 """Shortest time between two steps of a change, s: each step computes the gains again."""
 
 
@@ -71,20 +71,20 @@ class Retuning:
         finally:
             self._guidance_loop.before_step = lambda _: None
 
-    def apply(self, values: LoopSettings) -> None:
+    def apply(self, settings: LoopSettings) -> None:
         """Use these values from the next sample and the next step on.
 
         Raises:
             TypeError: planner or guidance comes from another package and cannot change.
         """
         guidance_loop = self._guidance_loop
-        guidance = guidance_loop.maker.guidance
+        guidance = guidance_loop.command_maker.guidance
         if not isinstance(guidance, LinearGuidance):
             raise TypeError(f"the values of {type(guidance).__name__} cannot be changed in flight")
-        self._loop.retune(values.constants, values.limits)
-        guidance.retune(values.guidance)
-        guidance_loop.estimate.retune(values.observer, values.correction)
-        guidance_loop.hold.max_tilt = values.max_tilt
+        self._loop.retune(settings.constants, settings.limits)
+        guidance.retune(settings.guidance)
+        guidance_loop.estimate.retune(settings.observer, settings.correction)
+        guidance_loop.hold.max_tilt = settings.max_tilt
 
 
 def reason_against_changes(config: Config) -> str | None:
@@ -96,43 +96,45 @@ def reason_against_changes(config: Config) -> str | None:
     return None
 
 
-def interpolated_config(before: Config, after: Config, share: float) -> Config:
+def interpolated_config(config_before: Config, config_after: Config, share: float) -> Config:
     """A configuration between two others; only keys that differ are interpolated.
 
     Positive values are interpolated geometrically, others linearly. A value that is null is first
     replaced by the value that the program computes for it (`value_in_effect`).
 
     Args:
-        before: configuration at share 0; only keys that may change in flight differ from `after`.
-        after: configuration at share 1.
+        config_before: configuration at share 0; it differs from `config_after` only in keys that
+            may change in flight.
+        config_after: configuration at share 1.
         share: 0..1.
     """
     if share >= 1.0:
-        return after
-    middle: dict[str, dict[str, Any]] = {}
-    for each in differences(before, after):
-        first = value_in_effect(before, each, each.before)
-        last = value_in_effect(after, each, each.after)
-        if first > 0.0 and last > 0.0:
-            value = exp((1.0 - share) * log(first) + share * log(last))
+        return config_after
+    changed_values: dict[str, dict[str, Any]] = {}
+    for difference in differences(config_before, config_after):
+        value_before = value_in_effect(config_before, difference, difference.before)
+        value_after = value_in_effect(config_after, difference, difference.after)
+        if value_before > 0.0 and value_after > 0.0:
+            value = exp((1.0 - share) * log(value_before) + share * log(value_after))
         else:
-            value = (1.0 - share) * first + share * last
-        middle.setdefault(each.section, {})[each.key] = value
+            value = (1.0 - share) * value_before + share * value_after
+        changed_values.setdefault(difference.section, {})[difference.key] = value
     sections = {
-        name: getattr(after, name).model_copy(update=values) for name, values in middle.items()
+        name: getattr(config_after, name).model_copy(update=values)
+        for name, values in changed_values.items()
     }
-    return after.model_copy(update=sections)
+    return config_after.model_copy(update=sections)
 
 
 def value_in_effect(config: Config, difference: Difference, value: float | None) -> float:
     """`value`, or for null the value that the program computes from `config`."""
     if value is not None:
         return value
-    computed = {
+    functions_by_key = {
         "guidance.position_weight_per_s4": lambda: hold_weights(config).position,
         "guidance.velocity_weight_per_s2": lambda: hold_weights(config).velocity,
     }
-    return computed[difference.name]()
+    return functions_by_key[difference.name]()
 
 
 class Slew:
@@ -148,22 +150,22 @@ class Slew:
     def __init__(self, config: Config) -> None:
         self._present_config = self._start_config = self._wanted_config = config
         self.settled_config = config
-        self._began_at: float | None = None
-        self._stepped_at = 0.0
+        self._start_time: float | None = None
+        self._last_step_time = 0.0
 
-    def jump(self, wanted: Config) -> None:
+    def jump(self, wanted_config: Config) -> None:
         """Take the wanted values at once, because control has not begun yet or has ended."""
-        self._present_config = self._wanted_config = self.settled_config = wanted
-        self._began_at = None
+        self._present_config = self._wanted_config = self.settled_config = wanted_config
+        self._start_time = None
 
-    def begin(self, wanted: Config, now: float) -> None:
+    def begin(self, wanted_config: Config, now: float) -> None:
         """Begin to move from the present values to the wanted ones."""
-        self._start_config, self._wanted_config = self._present_config, wanted
-        self._began_at = now
+        self._start_config, self._wanted_config = self._present_config, wanted_config
+        self._start_time = now
 
     def stop(self) -> None:
         """Stay at the present values."""
-        self._began_at = None
+        self._start_time = None
 
     def step(self, now: float) -> LoopSettings | None:
         """The values to use from now on; None: no change.
@@ -171,12 +173,12 @@ class Slew:
         Raises:
             ValueError: gains cannot be computed from the new values.
         """
-        if self._began_at is None or now - self._stepped_at < _SHORTEST_STEP:
+        if self._start_time is None or now - self._last_step_time < _SHORTEST_STEP_PERIOD:
             return None
-        self._stepped_at = now
-        share = (now - self._began_at) / SLEW_TIME
+        self._last_step_time = now
+        share = (now - self._start_time) / SLEW_TIME
         self._present_config = interpolated_config(self._start_config, self._wanted_config, share)
-        values = loop_settings(self._present_config)
+        settings = loop_settings(self._present_config)
         if share >= 1.0:
-            self._began_at, self.settled_config = None, self._wanted_config
-        return values
+            self._start_time, self.settled_config = None, self._wanted_config
+        return settings

@@ -9,7 +9,7 @@ from math import nan
 
 from companion.attitude import BodyRates, Limits
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import UnansweredReason
 from companion.control.planner_runner import PlannerRunner
 from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
 from companion.recording.trace import FlightTrace
@@ -48,7 +48,7 @@ class SampleRecorder:
         self._answer: Answer | None = None
         self.retune(limits)
         if self.on:
-            planner.on_attitude_target = self._attitude_target
+            planner.on_attitude_target = self._record_attitude_target
 
     def retune(self, limits: Limits) -> None:
         """Use other limits of the body rates from the next sample on."""
@@ -89,14 +89,16 @@ class SampleRecorder:
             trace.response.add([time, *q, target.north, target.east])
         if not self.on:
             return
-        asked_planner = not command.idle and command.body_rates is None
-        inputs = self._planner.planner_input if asked_planner else None
-        plan = self._planner.planned_tilt if asked_planner else None
+        planner_was_asked = not command.idle and command.body_rates is None
+        planner_input = self._planner.planner_input if planner_was_asked else None
+        planned_tilt = self._planner.planned_tilt if planner_was_asked else None
         self._answer = Answer(
-            rates, thrust, latency_ns, inputs, plan, command.is_step, command.idle
+            rates, thrust, latency_ns, planner_input, planned_tilt, command.is_step, command.idle
         )
 
-    def end(self, sample: AttitudeSample, flags: LoopFlags, reason: Unanswered | None) -> None:
+    def end(
+        self, sample: AttitudeSample, flags: LoopFlags, reason: UnansweredReason | None
+    ) -> None:
         """Record the sample and its answer.
 
         Args:
@@ -114,6 +116,6 @@ class SampleRecorder:
         if self._recorder is not None:
             self._recorder.action(self._clock(), name)
 
-    def _attitude_target(self, target: AttitudeTarget) -> None:
+    def _record_attitude_target(self, target: AttitudeTarget) -> None:
         if self._recorder is not None:
             self._recorder.add(self._clock(), self._rows.attitude_target, target)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from companion.attitude import BodyRates, Limits, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.kinematics import half_tilt_products
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import UnansweredReason
 from companion.recording.mcap_file.loop_channels import (
     ATTITUDE_TARGET,
     SAMPLE,
@@ -22,8 +22,8 @@ from companion.recording.mcap_file.writer import McapWriter
 from companion.vehicle.clock_jumps import Misfit
 from companion.vehicle.records import AttitudeSample, AttitudeTarget
 
-_REASON_CODES: dict[Unanswered | None, int] = {None: 0}
-_REASON_CODES.update({reason: UNANSWERED_CODES.index(reason.value) for reason in Unanswered})
+_REASON_CODES: dict[UnansweredReason | None, int] = {None: 0}
+_REASON_CODES.update({reason: UNANSWERED_CODES.index(reason.value) for reason in UnansweredReason})
 _CONTROL_OFF = UNANSWERED_CODES.index("control_off")
 _MISFIT_CODES = {None: 0, Misfit.NOT_NEWER: 1, Misfit.AHEAD: 2}
 _LIMIT_REACHED_SHARE = 1.0 - 1e-9
@@ -68,7 +68,7 @@ class SampleEntry(NamedTuple):
     """A sample that reached the control loop."""
 
     sample: AttitudeSample
-    reason: Unanswered | None
+    reason: UnansweredReason | None
     """Why the newest sample is unanswered, or None; ignored if the loop was off."""
     flags: LoopFlags
     """State of the loop before the answer."""
@@ -93,7 +93,7 @@ class SampleRows:
     def sample(self, writer: McapWriter, time_ns: int, entry: SampleEntry) -> None:
         """Write a sample, and the setpoint that answers it."""
         sample, reason, flags, checked_at, answer = entry
-        code = _REASON_CODES[reason] if flags.on else _CONTROL_OFF
+        reason_code = _REASON_CODES[reason] if flags.on else _CONTROL_OFF
         row = (
             sample.received,
             sample.vehicle_time,
@@ -102,7 +102,7 @@ class SampleRows:
             *sample.q,
             *sample.body_rates,
             checked_at,
-            code,
+            reason_code,
             _MISFIT_CODES[sample.misfit],
             sample.age_known,
             *flags,

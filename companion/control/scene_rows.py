@@ -24,18 +24,18 @@ from companion.recording.mcap_file.scene import (
 )
 from companion.recording.mcap_file.writer import McapWriter
 
-_HALF_ROOT = sqrt(0.5)
+_SQRT_HALF = sqrt(0.5)
 _MAX_PATH_POINTS = 100
 """Number of points in a path: 20 s with guidance at 50 Hz."""
-_POINT_EVERY, _PATHS_EVERY, _BODY_EVERY = 2, 5, 10
+_DRAWINGS_PER_POINT, _DRAWINGS_PER_PATHS, _DRAWINGS_PER_BODY = 2, 5, 10
 """Each 2nd drawing adds a point to the paths, each 5th sends the paths, each 10th sends the body.
 With guidance at 50 Hz there are ten drawings a second; each sends the thrust arrows. Paths and body
 are repeated, because a viewer may join late or jump in the recording."""
-_GAP_NS = 1_000_000_000
+_LONGEST_PAUSE_NS = 1_000_000_000
 """Shortest pause between two drawings after which new paths begin, ns."""
 _METRES_PER_M_S2 = 0.1
 """Length of a thrust arrow, m per m/s²."""
-_LEAST_COS = 0.2
+_LEAST_COS_TILT = 0.2
 """Lower bound of cos(tilt) in the length of an arrow."""
 _GREY_COLOR: Color = (0.25, 0.25, 0.28, 1.0)
 _FRONT_COLOR: Color = (0.85, 0.35, 0.1, 0.8)
@@ -91,17 +91,17 @@ class SceneRows:
             reference: position of the reference, m ENU.
         """
         thrust = Entity("thrust", "vehicle", follows_frame=True, arrows=self._arrows(q))
-        scene = (thrust,) if self._count % _BODY_EVERY else (_BODY_ENTITY, thrust)
+        scene = (thrust,) if self._count % _DRAWINGS_PER_BODY else (_BODY_ENTITY, thrust)
         writer.message("/scene", time_ns, scene_message(time_ns, scene))
-        if time_ns - self._newest_ns > _GAP_NS:
+        if time_ns - self._newest_ns > _LONGEST_PAUSE_NS:
             self._flown_path.clear()
             self._reference_path.clear()
         self._newest_ns = time_ns
-        if self._count % _POINT_EVERY == 0:
+        if self._count % _DRAWINGS_PER_POINT == 0:
             self._flown_path.append(position)
             self._reference_path.append(reference)
         self._count += 1
-        if self._count % _PATHS_EVERY == 0:
+        if self._count % _DRAWINGS_PER_PATHS == 0:
             lines = (
                 Line(self._reference_path, _REFERENCE_PATH_COLOR),
                 Line(self._flown_path, _FLOWN_PATH_COLOR),
@@ -116,9 +116,9 @@ class SceneRows:
             return ()
         lift = GRAVITY - (command.acceleration_down if command.thrust is None else 0.0)
         arrows = [_arrow(q, q, lift, _THRUST_COLOR)]
-        wanted = _wanted_attitude(command)
-        if wanted is not None:
-            arrows.append(_arrow(q, wanted, lift, _COMMANDED_THRUST_COLOR))
+        wanted_q = _wanted_attitude(command)
+        if wanted_q is not None:
+            arrows.append(_arrow(q, wanted_q, lift, _COMMANDED_THRUST_COLOR))
         return tuple(arrows)
 
 
@@ -140,10 +140,10 @@ def _thrust_arrow_pose(rotation: Quaternion) -> Pose:
         0.0,
         0.0,
         0.08,
-        _HALF_ROOT * (x - z),
-        _HALF_ROOT * (-y - w),
-        _HALF_ROOT * (-z - x),
-        _HALF_ROOT * (w - y),
+        _SQRT_HALF * (x - z),
+        _SQRT_HALF * (-y - w),
+        _SQRT_HALF * (-z - x),
+        _SQRT_HALF * (w - y),
     )
 
 
@@ -152,12 +152,12 @@ def _arrow(q: Quaternion, thrust_attitude: Quaternion, lift: float, color: Color
 
     The length of the arrow shows the specific thrust whose vertical part is `lift`, m/s².
     """
-    cosine = max(cos_tilt(thrust_attitude[1], thrust_attitude[2]), _LEAST_COS)
-    length = max(_METRES_PER_M_S2 * lift / cosine, 0.01)
-    head_length = min(0.15, 0.4 * length)
+    cosine = max(cos_tilt(thrust_attitude[1], thrust_attitude[2]), _LEAST_COS_TILT)
+    arrow_length = max(_METRES_PER_M_S2 * lift / cosine, 0.01)
+    head_length = min(0.15, 0.4 * arrow_length)
     return Arrow(
         _thrust_arrow_pose(body_error(q, thrust_attitude)),
-        length - head_length,
+        arrow_length - head_length,
         0.03,
         head_length,
         0.07,

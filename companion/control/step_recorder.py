@@ -27,7 +27,7 @@ class StepRecorder:
         self.note: Callable[[str], None] = lambda _: None
         self._trace, self._recorder = trace, trace.recorder
         self._flown_source = flown_source
-        self._recorded_part: object = None
+        self._recorded_maneuver: object = None
         self._vehicle = vehicle
         self._rows = StepRows()
 
@@ -47,7 +47,7 @@ class StepRecorder:
             command: the command for the control loop; None: no new command.
         """
         if output is not None and flags.offboard_active:
-            self._track(now, output)
+            self._record_tracking(now, output)
         if self._recorder is None:
             return
         state = self._vehicle.state
@@ -68,13 +68,13 @@ class StepRecorder:
         if self._recorder is not None:
             self._recorder.action(now, name, self._vehicle.clock.offset)
 
-    def _track(self, now: float, output: StepOutput) -> None:
+    def _record_tracking(self, now: float, output: StepOutput) -> None:
         """Write reference and position of a step under control, and note a maneuver that begins."""
-        flown = self._flown_source.part(now)
-        part = None if flown is None else flown.part
-        if part is not self._recorded_part:
-            self._recorded_part = part
-            name = None if flown is None else flown.name
+        flown_part = self._flown_source.part(now)
+        maneuver = None if flown_part is None else flown_part.part
+        if maneuver is not self._recorded_maneuver:
+            self._recorded_maneuver = maneuver
+            name = None if flown_part is None else flown_part.name
             self._trace.begin_maneuver(now, output.vehicle_time, name)
             if name is not None:
                 self.note(f"maneuver: {name}")
@@ -84,5 +84,5 @@ class StepRecorder:
             north = east = nan  # only the height is a reference
         if not reference.holds_height:
             down = nan
-        estimated = output.inputs.now.position_ned
-        self._trace.tracking.add([output.vehicle_time, north, east, down, *estimated])
+        estimated_position = output.inputs.now.position_ned
+        self._trace.tracking.add([output.vehicle_time, north, east, down, *estimated_position])

@@ -18,8 +18,8 @@ from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPositi
 
 _NO_VECTOR = (nan, nan, nan)
 _NO_TARGET = Target(nan, nan, nan, nan)
-_HALF_ROOT = sqrt(0.5)
-_POSE_EVERY, _SCENE_EVERY = 2, 5
+_SQRT_HALF = sqrt(0.5)
+_STEPS_PER_POSE, _STEPS_PER_DRAWING = 2, 5
 """Number of guidance steps per recorded pose, and per drawing of the vehicle."""
 
 
@@ -64,7 +64,7 @@ class StepOutput(NamedTuple):
     inputs: GuidanceInput
     """Motion, wind and drag at the step."""
     reference: Reference
-    error: float | None
+    tracking_error: float | None
     """Distance from the reference, m; None as in `FlownSource.tracking_error`."""
 
 
@@ -97,9 +97,9 @@ class StepRows:
             active = inputs.flags.offboard_active
             writer.row(GUIDANCE, time_ns, (inputs.time, *_guidance_row(output), active))
             self._count += 1
-            if self._count % _POSE_EVERY == 0:
+            if self._count % _STEPS_PER_POSE == 0:
                 self._draw(writer, time_ns, output)
-            if self._count % _SCENE_EVERY == 0:
+            if self._count % _STEPS_PER_DRAWING == 0:
                 position = _east_north_up(output.inputs.now.position_ned)
                 reference = _east_north_up(output.reference.position_ned)
                 self._scene.draw(writer, time_ns, output.q, position, reference)
@@ -162,7 +162,7 @@ def _guidance_row(output: StepOutput) -> tuple[float, ...]:
         reference.heading,
         *inputs.now.position_ned,
         *inputs.now.velocity_ned,
-        _nan_if_none(output.error),
+        _nan_if_none(output.tracking_error),
         *inputs.disturbance,
         *inputs.drag,
         reference.holds_position,
@@ -187,8 +187,8 @@ def _enu_from_flu(q: Quaternion) -> Quaternion:
     """
     w, x, y, z = q
     return (
-        _HALF_ROOT * (x + y),
-        _HALF_ROOT * (x - y),
-        _HALF_ROOT * (w - z),
-        _HALF_ROOT * (w + z),
+        _SQRT_HALF * (x + y),
+        _SQRT_HALF * (x - y),
+        _SQRT_HALF * (w - z),
+        _SQRT_HALF * (w + z),
     )

@@ -28,25 +28,26 @@ _REPLACEMENTS = {
 
 def ascii_for(text: str) -> str:
     """A readable ASCII form of a text: m/s² as m/s^2, ω as omega, ċ as c."""
-    out: list[str] = []
+    ascii_characters: list[str] = []
     is_super = False
     for char in text:
         was_super, is_super = is_super, unicodedata.decomposition(char).startswith("<super>")
         if is_super and not was_super:
-            out.append("^")
-        out.append(char if char.isascii() else _ascii_for_char(char))
-    return "".join(out)
+            ascii_characters.append("^")
+        ascii_characters.append(char if char.isascii() else _ascii_for_char(char))
+    return "".join(ascii_characters)
 
 
 def _ascii_for_char(char: str) -> str:
     """ASCII for one non-ASCII character: a replacement, else its base letter or `_ascii_name`."""
     if char in _REPLACEMENTS:
         return _REPLACEMENTS[char]
-    parts = [
-        part for part in unicodedata.normalize("NFKD", char) if not unicodedata.combining(part)
+    base_characters = [
+        base for base in unicodedata.normalize("NFKD", char) if not unicodedata.combining(base)
     ]
     return "".join(
-        part if part.isascii() else _REPLACEMENTS.get(part) or _ascii_name(part) for part in parts
+        base if base.isascii() else _REPLACEMENTS.get(base) or _ascii_name(base)
+        for base in base_characters
     )
 
 

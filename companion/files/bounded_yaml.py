@@ -83,8 +83,8 @@ def read(text: str) -> Document:
         composer = _Composer(text)
         root = composer.get_node() if composer.check_node() else None
         if composer.check_node():
-            second: Any = composer.peek_event()  # type: ignore[no-untyped-call]
-            raise YamlError("not valid YAML: more than one document", _line(second))
+            second_document: Any = composer.peek_event()  # type: ignore[no-untyped-call]
+            raise YamlError("not valid YAML: more than one document", _line(second_document))
         value = None if root is None else _value(root, (), lines)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else None
@@ -165,23 +165,27 @@ class _Composer(yaml.BaseLoader):
         return node
 
 
-def _line(at: Any) -> int:
+def _line(node_or_event: Any) -> int:
     """The line, from 1, on which an event or a node begins."""
-    return int(at.start_mark.line) + 1
+    return int(node_or_event.start_mark.line) + 1
 
 
-def _value(node: yaml.Node, where: KeyPath, lines: dict[KeyPath, int]) -> Any:
+def _value(node: yaml.Node, key_path: KeyPath, lines: dict[KeyPath, int]) -> Any:
     """The value of the node at a path; adds the lines of all keys and items in it to `lines`."""
     if isinstance(node, yaml.ScalarNode):
         return _scalar(node)
     if isinstance(node, yaml.SequenceNode):
-        lines.update({(*where, place): _line(item) for place, item in enumerate(node.value)})
-        return [_value(item, (*where, place), lines) for place, item in enumerate(node.value)]
+        lines.update(
+            {(*key_path, position): _line(item) for position, item in enumerate(node.value)}
+        )
+        return [
+            _value(item, (*key_path, position), lines) for position, item in enumerate(node.value)
+        ]
     section: dict[str, Any] = {}
     for key_node, value_node in node.value:
-        key = _new_key(_value(key_node, where, {}), section, _line(key_node))
-        lines[(*where, key)] = _line(key_node)
-        section[key] = _value(value_node, (*where, key), lines)
+        key = _new_key(_value(key_node, key_path, {}), section, _line(key_node))
+        lines[(*key_path, key)] = _line(key_node)
+        section[key] = _value(value_node, (*key_path, key), lines)
     return section
 
 
@@ -209,11 +213,11 @@ def _unquoted_value(text: str, line: int) -> Any:
     """The value of an unquoted text by the core schema of YAML 1.2."""
     if text in _CONSTANTS:
         return _CONSTANTS[text]
-    whole = _INTEGER.fullmatch(text)
-    if not whole and not _FLOAT.fullmatch(text):
+    integer_match = _INTEGER.fullmatch(text)
+    if not integer_match and not _FLOAT.fullmatch(text):
         return text
     if len(text) > LONGEST_NUMBER:
         raise YamlError(f"a number is longer than {LONGEST_NUMBER} characters", line)
-    if whole:
+    if integer_match:
         return int(text, {"0o": 8, "0x": 16}.get(text[:2], 10))
     return float(text.replace(".", "", 1) if text.lstrip("+-")[1:2].isalpha() else text)

@@ -8,8 +8,8 @@ from typing import Any
 
 from companion.files.similar_names import name_hint
 
-_LONGEST_SHOWN = 60
-_LARGEST_HINTED = 1e12
+_LONGEST_SHOWN_TEXT = 60
+_LARGEST_HINTED_VALUE = 1e12
 """Larger values get no hint of a mistaken unit; they may be too large for a float."""
 
 _NUMBER_AND_UNIT = re.compile(r"([-+]?[0-9]+(?:[.,][0-9]+)?(?:[eE][-+]?[0-9]+)?)\s*(\D*)")
@@ -57,7 +57,7 @@ _REQUIREMENTS: Mapping[str, str] = {
 def shortened_text(value: Any) -> str:
     """A value as shown in an error message."""
     text = repr(value)
-    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}..."
+    return text if len(text) <= _LONGEST_SHOWN_TEXT else f"{text[:_LONGEST_SHOWN_TEXT]}..."
 
 
 def mistaken_unit(key: str, value: float) -> tuple[str, float]:
@@ -68,53 +68,59 @@ def mistaken_unit(key: str, value: float) -> tuple[str, float]:
     return unit, convert(value)
 
 
-def value_fault(detail: Any, key: str | int) -> str:
+def value_fault(error: Any, key: str | int) -> str:
     """What is wrong with a value, as the end of a sentence that begins with its key.
 
-    `detail` is pydantic's error about the value, not about its key. `key` is the last key that
+    `error` is pydantic's error about the value, not about its key. `key` is the last key that
     leads to the value, or its place in a list.
     """
-    if remedy := _remedy(detail, key):
+    if remedy := _remedy(error, key):
         return remedy
-    kind, value, context = detail["type"], detail["input"], detail.get("ctx", {})
-    got = f" (got {'a section' if isinstance(value, dict) else shortened_text(value)})"
-    if kind == "value_error":  # from one of our validators, whose message says what must be
-        got = "" if isinstance(value, dict) else got
-        return f": {_own_message(detail)}{got}"
-    if kind == "literal_error":
-        choices = re.findall(r"'([^']*)'", context["expected"])
-        return f" must be {_alternatives(choices)}{got}{name_hint(value, choices)}"
-    must = _REQUIREMENTS.get(kind, "has a value that cannot be used here").format(**context)
-    return f" {must}{got}{_unit_hint(detail, str(key))}"
+    error_type, value, limits = error["type"], error["input"], error.get("ctx", {})
+    got_text = f" (got {'a section' if isinstance(value, dict) else shortened_text(value)})"
+    if error_type == "value_error":  # from one of our validators, whose message says what must be
+        got_text = "" if isinstance(value, dict) else got_text
+        return f": {_validator_message(error)}{got_text}"
+    if error_type == "literal_error":
+        choices = re.findall(r"'([^']*)'", limits["expected"])
+        return f" must be {_alternatives(choices)}{got_text}{name_hint(value, choices)}"
+    requirement = _REQUIREMENTS.get(error_type, "has a value that cannot be used here").format(
+        **limits
+    )
+    return f" {requirement}{got_text}{_unit_hint(error, str(key))}"
 
 
-def _own_message(detail: Any) -> str:
+def _validator_message(error: Any) -> str:
     """The message of one of our validators, with a small first letter."""
-    message: str = detail["msg"].removeprefix("Value error, ")
+    message: str = error["msg"].removeprefix("Value error, ")
     return f"{message[:1].lower()}{message[1:]}"
 
 
 def _alternatives(choices: list[str]) -> str:
-    *others, last = choices
-    return f"{', '.join(others)} or {last}" if others else last
+    *first_choices, last_choice = choices
+    return f"{', '.join(first_choices)} or {last_choice}" if first_choices else last_choice
 
 
-def _remedy(detail: Any, key: str | int) -> str:
+def _remedy(error: Any, key: str | int) -> str:
     """What to write instead of a value of the wrong type; empty if that is not known."""
-    kind, value = detail["type"], detail["input"]
-    must_be_number = kind == "value_error" and _own_message(detail).startswith("must be a number")
-    if kind in ("float_parsing", "int_parsing") or (must_be_number and isinstance(value, str)):
+    error_type, value = error["type"], error["input"]
+    must_be_number = error_type == "value_error" and _validator_message(error).startswith(
+        "must be a number"
+    )
+    if error_type in ("float_parsing", "int_parsing") or (
+        must_be_number and isinstance(value, str)
+    ):
         text = value if isinstance(value, str) else str(value)
         return f" must be a number: {_number_advice(str(key), text)} (got {shortened_text(value)})"
-    if value is None and kind in ("float_type", "int_type", "string_type", "tuple_type"):
+    if value is None and error_type in ("float_type", "int_type", "string_type", "tuple_type"):
         return " has no value; write one, or take the key out"
-    if kind in ("model_type", "dict_type", "model_attributes_type"):
+    if error_type in ("model_type", "dict_type", "model_attributes_type"):
         return (
             " is a section: write its keys on the lines below it, indented by two spaces, each as "
             f"`key: value` (got {shortened_text(value)})"
         )
-    one_value = kind == "tuple_type" and isinstance(value, str | int | float)
-    if not one_value or len(str(value)) > _LONGEST_SHOWN:
+    is_single_value = error_type == "tuple_type" and isinstance(value, str | int | float)
+    if not is_single_value or len(str(value)) > _LONGEST_SHOWN_TEXT:
         return ""
     return f" is a list: write `[{value}]`"
 
@@ -135,16 +141,16 @@ def _number_advice(key: str, text: str) -> str:
     return f"write {number} without quotation marks"
 
 
-def _unit_hint(detail: Any, key: str) -> str:
+def _unit_hint(error: Any, key: str) -> str:
     """A hint if the value is in range when it is taken as radians for degrees, or the like."""
-    bound = detail.get("ctx", {})
-    value = detail["input"]
-    if not isinstance(value, int | float) or not 0.0 < abs(value) < _LARGEST_HINTED:
+    limits = error.get("ctx", {})
+    value = error["input"]
+    if not isinstance(value, int | float) or not 0.0 < abs(value) < _LARGEST_HINTED_VALUE:
         return ""
     unit, converted = mistaken_unit(key, value)
-    if unit == "%" and (value <= 1.0 or bound.get("le", bound.get("lt", inf)) > 1.0):
+    if unit == "%" and (value <= 1.0 or limits.get("le", limits.get("lt", inf)) > 1.0):
         return ""  # only a share of 1 is confused with a percentage
-    in_range = [
-        satisfies(converted, bound[name]) for name, satisfies in _BOUNDS.items() if name in bound
+    bounds_met = [
+        satisfies(converted, limits[name]) for name, satisfies in _BOUNDS.items() if name in limits
     ]
-    return f"; if it is in {unit}, write {converted:.4g}" if in_range and all(in_range) else ""
+    return f"; if it is in {unit}, write {converted:.4g}" if bounds_met and all(bounds_met) else ""

@@ -53,20 +53,20 @@ def write_with_timeout(path: Path, text: str) -> str | None:
     Returns:
         None if the file is on the disk; else the reason why not, in words.
     """
-    outcome: list[str | None] = [DISK_HANGS]
+    failure_reason: list[str | None] = [DISK_HANGS]
 
     def write() -> None:
         try:
             write_whole(path, text)
         except OSError as error:
-            outcome[0] = reason_of(error)
+            failure_reason[0] = reason_of(error)
         else:
-            outcome[0] = None
+            failure_reason[0] = None
 
     thread = threading.Thread(target=write, name=path.name, daemon=True)
     thread.start()
     thread.join(DISK_TIMEOUT)
-    return outcome[0]
+    return failure_reason[0]
 
 
 def write_whole(path: Path, content: str | bytes, mode: int = 0o666) -> None:
@@ -85,21 +85,21 @@ def write_whole(path: Path, content: str | bytes, mode: int = 0o666) -> None:
     """
     if not path.name:  # `.` and `/`
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary_path = path.with_name(f".{path.name}.{os.getpid()}")
     data = content.encode("utf-8", "replace") if isinstance(content, str) else content
     try:
-        descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode)
+        descriptor = os.open(temporary_path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, mode)
         with os.fdopen(descriptor, "wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(path)
+        temporary_path.replace(path)
         _sync_folder(path.parent)
     except OSError as error:  # it names the temporary file, or no file
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         with suppress(OSError):  # after a success it no longer exists
-            temporary.unlink()
+            temporary_path.unlink()
 
 
 def _sync_folder(folder: Path) -> None:

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from companion.files.similar_names import (
     MIN_SIMILARITY,
-    MIN_SIMILARITY_ELSEWHERE,
+    MIN_SIMILARITY_IN_OTHER_SECTION,
     most_similar_name,
     similarity,
 )
@@ -34,43 +34,43 @@ def _types_in(annotation: Any) -> frozenset[Any]:
     return frozenset({annotation}).union(*(types_in(part) for part in get_args(annotation)))
 
 
-def essential_details(details: list[Any]) -> list[Any]:
+def essential_errors(errors: list[Any]) -> list[Any]:
     """The errors that a user needs, without those that follow from others.
 
     The function drops "too short" for a list that is short only because an item was refused,
     further missing items of a list, and the errors of all members of a union but one.
     """
     essential: list[Any] = []
-    for detail in details:
-        kind, location = detail["type"], detail["loc"]
-        deeper_locations = [d["loc"] for d in details if len(d["loc"]) > len(location)]
-        if kind == "too_short" and any(
+    for error in errors:
+        error_type, location = error["type"], error["loc"]
+        deeper_locations = [other["loc"] for other in errors if len(other["loc"]) > len(location)]
+        if error_type == "too_short" and any(
             each[: len(location)] == location for each in deeper_locations
         ):
             continue
-        if _is_missing_item(detail) and any(
+        if _is_missing_item(error) and any(
             _is_missing_item(each) and each["loc"][:-1] == location[:-1] for each in essential
         ):
             continue
-        essential.append(detail)
+        essential.append(error)
     return _one_member(essential)
 
 
-def _one_member(details: list[Any]) -> list[Any]:
+def _one_member(errors: list[Any]) -> list[Any]:
     """Keep only the errors of one member of each union: the one whose type fits the value."""
-    chosen: dict[Location, Location] = {}
-    for fits in (True, False):
-        for detail in details:
-            location = detail["loc"]
-            at = next((k for k, part in enumerate(location) if _is_member(part)), None)
-            if at is not None and (len(location) > at + 1 or not fits):
-                chosen.setdefault(location[:at], location[: at + 1])
+    member_by_union: dict[Location, Location] = {}
+    for fits_value in (True, False):
+        for error in errors:
+            location = error["loc"]
+            member_index = next((k for k, part in enumerate(location) if _is_member(part)), None)
+            if member_index is not None and (len(location) > member_index + 1 or not fits_value):
+                member_by_union.setdefault(location[:member_index], location[: member_index + 1])
     return [
-        detail
-        for detail in details
+        error
+        for error in errors
         if all(
-            detail["loc"][: len(union)] != union or detail["loc"][: len(member)] == member
-            for union, member in chosen.items()
+            error["loc"][: len(union)] != union or error["loc"][: len(member)] == member
+            for union, member in member_by_union.items()
         )
     ]
 
@@ -79,38 +79,40 @@ def _is_member(part: int | str) -> bool:
     return isinstance(part, str) and _UNION_MEMBER.fullmatch(part) is not None
 
 
-def _is_missing_item(detail: Any) -> bool:
-    return detail["type"] == "missing" and isinstance(detail["input"], list | tuple)
+def _is_missing_item(error: Any) -> bool:
+    return error["type"] == "missing" and isinstance(error["input"], list | tuple)
 
 
-def error_sentence(detail: Any, model: type[BaseModel], former: Mapping[str, str]) -> str:
+def error_sentence(error: Any, model: type[BaseModel], former_keys: Mapping[str, str]) -> str:
     """The message about an error that pydantic reports, as one sentence.
 
-    `former` has, for each renamed or removed key, what replaces it.
+    `former_keys` has, for each renamed or removed key, what replaces it.
     """
-    kind, value = detail["type"], detail["input"]
-    location = tuple(part for part in detail["loc"] if not _is_member(part))
-    where = ".".join(str(part) for part in location)
-    if kind == "extra_forbidden":
-        advice = former.get(where)
+    error_type, value = error["type"], error["input"]
+    location = tuple(part for part in error["loc"] if not _is_member(part))
+    dotted_key = ".".join(str(part) for part in location)
+    if error_type == "extra_forbidden":
+        replacement = former_keys.get(dotted_key)
         return (
-            f"`{where}` {advice}" if advice else f"`{where}` {_unknown_key(location, value, model)}"
+            f"`{dotted_key}` {replacement}"
+            if replacement
+            else f"`{dotted_key}` {_unknown_key(location, value, model)}"
         )
-    if not where:
-        return str(detail["msg"]).removeprefix("Value error, ")
-    if _is_missing_item(detail):
+    if not dotted_key:
+        return str(error["msg"]).removeprefix("Value error, ")
+    if _is_missing_item(error):
         location = location[:-1]
-        where = ".".join(str(part) for part in location)
-    if _is_missing_item(detail) or kind in ("too_short", "too_long"):
-        return f"`{where}` {_length_fault(detail, _types_at(location, model))}"
-    if kind == "missing":
-        return f"`{where}` is missing"
-    return f"`{where}`{value_fault(detail, location[-1])}"
+        dotted_key = ".".join(str(part) for part in location)
+    if _is_missing_item(error) or error_type in ("too_short", "too_long"):
+        return f"`{dotted_key}` {_length_fault(error, _types_at(location, model))}"
+    if error_type == "missing":
+        return f"`{dotted_key}` is missing"
+    return f"`{dotted_key}`{value_fault(error, location[-1])}"
 
 
-def _length_fault(detail: Any, types: list[Any]) -> str:
+def _length_fault(error: Any, types: list[Any]) -> str:
     """How many values a list has, and how many it needs; `types`: types that the list may have."""
-    value, bounds = detail["input"], detail.get("ctx", {})
+    value, bounds = error["input"], error.get("ctx", {})
     count = f"has {len(value)} {'value' if len(value) == 1 else 'values'}"
     lengths = [
         len(get_args(kind))
@@ -119,7 +121,7 @@ def _length_fault(detail: Any, types: list[Any]) -> str:
     ]
     if lengths:
         return f"{count}; it needs {lengths[0]} (got {shortened_text(value)})"
-    if detail["type"] == "too_short":
+    if error["type"] == "too_short":
         return f"{count}; it needs at least {bounds['min_length']}"
     return f"{count}; it takes at most {bounds['max_length']}"
 
@@ -128,8 +130,8 @@ def _types_at(location: Location, model: type[BaseModel]) -> list[Any]:
     """The types that the value at a location may have."""
     types: list[Any] = [model]
     for part in location:
-        inner = [_type_inside(kind, part) for kind in types]
-        types = [member for each in inner if each is not None for member in _members(each)]
+        part_types = [_type_inside(kind, part) for kind in types]
+        types = [member for each in part_types if each is not None for member in _members(each)]
     return types
 
 
@@ -168,17 +170,21 @@ def _unknown_key(location: Location, value: Any, model: type[BaseModel]) -> str:
     section_keys = [key for kind in section_types for key in getattr(kind, "model_fields", ())]
     other_keys = [(key, place) for place, key in _keys(model) if place != location[:-1]]
     if not isinstance(value, dict) and not any(key.startswith(f"{name}_") for key in section_keys):
-        same_name = [".".join((*place, key)) for key, place in other_keys if key == name]
-        if same_name:
-            here = [f", or here `{key}`" for key in section_keys if key.endswith(f"_{name}")][:1]
-            return f"is in the wrong section; write {_joined_by_or(same_name)}{''.join(here)}"
-    near = most_similar_name(name, section_keys, MIN_SIMILARITY)
+        same_name_keys = [".".join((*place, key)) for key, place in other_keys if key == name]
+        if same_name_keys:
+            or_here = [f", or here `{key}`" for key in section_keys if key.endswith(f"_{name}")][:1]
+            return (
+                f"is in the wrong section; write {_joined_by_or(same_name_keys)}{''.join(or_here)}"
+            )
+    near_key = most_similar_name(name, section_keys, MIN_SIMILARITY)
     if not isinstance(value, dict):
-        far = most_similar_name(name, [key for key, _ in other_keys], MIN_SIMILARITY_ELSEWHERE)
-        if far and (not near or similarity(name, far) > similarity(name, near)):
-            places = [".".join((*place, key)) for key, place in other_keys if key == far]
-            return f"is not a known key; did you mean {_joined_by_or(places)}?"
-    hint = f"did you mean `{near}`?" if near else f"known here: {', '.join(section_keys)}"
+        far_key = most_similar_name(
+            name, [key for key, _ in other_keys], MIN_SIMILARITY_IN_OTHER_SECTION
+        )
+        if far_key and (not near_key or similarity(name, far_key) > similarity(name, near_key)):
+            far_keys = [".".join((*place, key)) for key, place in other_keys if key == far_key]
+            return f"is not a known key; did you mean {_joined_by_or(far_keys)}?"
+    hint = f"did you mean `{near_key}`?" if near_key else f"known here: {', '.join(section_keys)}"
     return f"is not a known key; {hint}"
 
 
@@ -187,9 +193,9 @@ def dotted_keys(name: str, model: type[BaseModel]) -> str:
     return _joined_by_or([".".join((*place, key)) for place, key in _keys(model) if key == name])
 
 
-def _joined_by_or(places: list[str]) -> str:
+def _joined_by_or(dotted_keys: list[str]) -> str:
     """The first three of some dotted keys, joined by "or"."""
-    return " or ".join(f"`{place}`" for place in places[:_MOST_SUGGESTIONS])
+    return " or ".join(f"`{key}`" for key in dotted_keys[:_MOST_SUGGESTIONS])
 
 
 def _keys(model: type[BaseModel]) -> Iterator[tuple[tuple[str, ...], str]]:

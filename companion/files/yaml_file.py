@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 from companion.files import bounded_yaml
 from companion.files.bounded_file import FileRefusedError, read_text
 from companion.files.bounded_yaml import MOST_BYTES, KeyPath, YamlError
-from companion.files.yaml_faults import error_sentence, essential_details, types_in
+from companion.files.yaml_faults import error_sentence, essential_errors, types_in
 
 Model = TypeVar("Model", bound="Section")
 
@@ -204,7 +204,7 @@ def _config_error(
     places: Mapping[KeyPath, SourceLocation],
 ) -> ConfigError:
     """The `ConfigError` for a pydantic error: up to five faults with file and line."""
-    details = essential_details(error.errors(include_url=False))
+    details = essential_errors(error.errors(include_url=False))
     faults, previous_place = [], SourceLocation("")
     for detail in details[:_MOST_FAULTS_SHOWN]:
         place = nearest_place(detail["loc"], places, name)

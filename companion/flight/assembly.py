@@ -49,7 +49,7 @@ class AssembledFlight:
 
     def close(self) -> None:
         """End the solver's process, if the flight uses predictive control."""
-        predictive_control = self.context.guidance_loop.maker.predictive_control
+        predictive_control = self.context.guidance_loop.command_maker.predictive_control
         if predictive_control is not None:
             predictive_control.close()
 
@@ -76,7 +76,7 @@ def assemble(
     ladder = SafetyLadder(monitors(config), config.safety.hold_s)
     rate_requester = RateRequester(link, config.link)
     watch = Watch(context, ladder, rate_requester, clock)
-    context.loop.ask_mode = watch.ask_mode
+    context.loop.request_mode = watch.request_mode
     flight = Flight(context, plan, watch, recorder, ask_landing)
     ladder.note = context.note = context.preflight.note = flight.note
     context.guidance_loop.recorder.note = rate_requester.note = recorder.note = flight.note
@@ -154,7 +154,7 @@ def _prepare_trajectories(
             for text in maneuver.notes:
                 note(text)
             if context.config.guidance.kind == "nmpc":
-                context.guidance_loop.maker.predictive_control = make_predictive_control(
+                context.guidance_loop.command_maker.predictive_control = make_predictive_control(
                     context.config, maneuver, note, vehicle_waits=not real_time
                 )
 

@@ -163,7 +163,7 @@ async def land(context: FlightContext) -> None:
         )
         _require_landing(context)
         _require_not_falling(context)
-        return context.ground.touched_down
+        return context.ground.has_touched_down
 
     try:
         async with asyncio.timeout(timeout):
@@ -189,7 +189,7 @@ async def disarm(context: FlightContext) -> None:
 
     def require_control() -> None:
         require_role(context.link, {Role.LAND})
-        if not context.ground.touched_down:  # the autopilot's flag may have been wrong before
+        if not context.ground.has_touched_down:  # the autopilot's flag may have been wrong before
             raise FlightEnded("the vehicle reports that it flies again, so it is not disarmed")
 
     try:
@@ -197,7 +197,7 @@ async def disarm(context: FlightContext) -> None:
             await context.until(disarmed)
     except TimeoutError:
         await context.until(
-            lambda: disarmed() or context.ground.touched_down,
+            lambda: disarmed() or context.ground.has_touched_down,
             "the autopilot to report that the vehicle stands on the ground",
         )
         if context.armed():

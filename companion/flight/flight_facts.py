@@ -26,7 +26,7 @@ def loop_counts(context: FlightContext) -> LoopCounts:
 
 def predictive_figures(context: FlightContext) -> PredictiveFigures | None:
     """The figures of predictive control; None if the flight did not use it."""
-    predictive_control = context.guidance_loop.maker.predictive_control
+    predictive_control = context.guidance_loop.command_maker.predictive_control
     if predictive_control is None:
         return None
     record = predictive_control.record

@@ -46,7 +46,7 @@ def require_flyable(config: Config, maneuver: Maneuver, drag: KnownDrag) -> None
         ConfigError: the maneuver cannot be flown within the limits and the fence.
     """
     with naming_trajectory_errors(maneuver.name):
-        motions = list(_predicted_motions(maneuver, drag.least))
+        motions = list(_predicted_motions(maneuver, drag.lower_bound))
         _require_motions_inside(config, maneuver, motions, None)
     if isinstance(maneuver, HeldHeadingManeuver):
         envelope = replace(envelope_of(config, drag), max_tilt_rate=None, fence=None)
@@ -65,7 +65,9 @@ def require_inside(
         ConfigError: a maneuver leaves the fence, or could not stop inside it.
     """
     for maneuver in maneuvers:
-        _require_motions_inside(config, maneuver, _predicted_motions(maneuver, drag.least), origin)
+        _require_motions_inside(
+            config, maneuver, _predicted_motions(maneuver, drag.lower_bound), origin
+        )
 
 
 def require_followable(config: Config, maneuver: Maneuver, begin: Vector, drag: KnownDrag) -> None:
@@ -197,7 +199,7 @@ def envelope_of(config: Config, drag: KnownDrag) -> Envelope:
         max_descent=limits.max_descent_m_s,
         max_speed=config.safety.max_speed_m_s,
         fence=_fence_check(config, None),
-        drag=drag.most,
+        drag=drag.upper_bound,
         gravity=GRAVITY,
     )
 

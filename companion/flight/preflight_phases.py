@@ -114,7 +114,7 @@ async def undo_arming(context: FlightContext) -> None:
 
     def require_control() -> None:
         require_role(context.link, {Role.READY, Role.TAKEOFF})
-        if context.ground.lifted:  # earlier tries may have been lost
+        if context.ground.has_lifted_off:  # earlier tries may have been lost
             raise FlightEnded("the vehicle has left the ground, so it is not disarmed", Exit.LAND)
 
     # Sent even if the newest heartbeat says disarmed: it may be older than our arming.

@@ -94,7 +94,7 @@ class Watch:
             self._heartbeat_requested_at = now
             self._heartbeat_request = asyncio.create_task(self._context.fresh_heartbeat())
 
-    def ask_mode(self) -> None:
+    def request_mode(self) -> None:
         """After a gap in the setpoints, request a heartbeat to decide whether to resume them."""
         # Without an answer the silence monitor ends the flight.
         self._mode_request = asyncio.create_task(self._confirm_control())
@@ -113,7 +113,7 @@ class Watch:
         may_enter = loop.taking_over and Role.READY in roles and not state.failsafe
         if loop.awaiting_mode and (Role.OFFBOARD in roles or may_enter):
             # Only in a phase that is not monitored: the vehicle has moved away from its hold.
-            if self._clock() - loop.record.gap_from > self._context.config.deadman.silence_limit:
+            if self._clock() - loop.record.gap_start > self._context.config.deadman.silence_limit:
                 stop_moving(self._context)
                 self._context.guidance_loop.step()  # the newest command leads to the old place
             loop.resume()

@@ -62,7 +62,7 @@ class Key(StrEnum):
     IDENTIFIED_ON = "vehicle.autopilot"
     UNITS = "configuration.units"
     RESPONSE = "planner.gain_per_s"
-    BODY_RATE = "safety.max_body_rate_deg_s"
+    BODY_RATE_KEY = "safety.max_body_rate_deg_s"
 
 
 class ParameterChange(NamedTuple):

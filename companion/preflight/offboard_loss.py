@@ -58,7 +58,7 @@ def offboard_loss(config: Config, evidence: Evidence) -> Iterator[Finding]:
     hold_time = evidence.survey.values.get(failsafe.parameter)
     if maneuvers is None or hold_time is None or not 0.0 <= hold_time <= MAX_RATE_HOLD_TIME:
         return  # an unknown or longer time is unsafe, whatever is flown
-    drag = evidence.known_drag.least
+    drag = evidence.known_drag.lower_bound
     worst = worst_reach(config, maneuvers, hold_time, drag, brakes=failsafe.brakes)
     reach_text = (
         f"if our setpoints stop, the autopilot holds the last rates for {hold_time:g} s "

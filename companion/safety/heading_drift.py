@@ -27,9 +27,9 @@ class HeadingDrift:
         What a scale error of the gyro can explain is subtracted.
         """
         history, resets = self._history, self._resets
-        history.append((now, resets.heading_corrections, resets.turned))
+        history.append((now, resets.heading_corrections, resets.total_turn))
         while now - history[0][0] > _DRIFT_WINDOW:
             history.popleft()
         _, corrections_before, turned_before = history[0]
         unexplained = abs(resets.heading_corrections - corrections_before)
-        return max(0.0, unexplained - _SCALE_ERROR * (resets.turned - turned_before))
+        return max(0.0, unexplained - _SCALE_ERROR * (resets.total_turn - turned_before))

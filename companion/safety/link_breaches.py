@@ -3,7 +3,7 @@
 The docstring of each check states its breach.
 """
 
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import UnansweredReason
 from companion.safety.monitor import BreachCheck, above, below
 from companion.safety.snapshot import HEARD_TIMEOUT_S, Control, Snapshot
 
@@ -46,14 +46,14 @@ def _silence_cause(now: float, control: Control, limit: float, planner: str, gui
             return "the vehicle's attitude is not finite (NaN or infinity)"
         return f"no attitude from the vehicle for {now - control.last_sample_arrival:.1f} s"
     reason = control.reason
-    if reason in (Unanswered.NO_TARGET, Unanswered.OLD_TARGET):
+    if reason in (UnansweredReason.NO_TARGET, UnansweredReason.OLD_TARGET):
         return _missing_command_cause(now, control, limit, guidance)
-    if reason is Unanswered.INVALID_RATES:
+    if reason is UnansweredReason.INVALID_RATES:
         return (
             f"the planner (planner.name: {planner}) gives no body rates: they are NaN or "
             "infinite, or it refuses the target"
         )
-    return "no setpoint was sent" if reason is None else reason.words
+    return "no setpoint was sent" if reason is None else reason.text
 
 
 def _missing_command_cause(now: float, control: Control, limit: float, guidance: str) -> str:
@@ -65,7 +65,7 @@ def _missing_command_cause(now: float, control: Control, limit: float, guidance:
         return "positions arrive, but older than deadman.position_stale_ms"
     if control.command_not_finite:
         return f"the commands of guidance (guidance.kind: {guidance}) are NaN or infinite"
-    return Unanswered.OLD_TARGET.words
+    return UnansweredReason.OLD_TARGET.text
 
 
 def clock_changed(snapshot: Snapshot, _: bool) -> str | None:

@@ -4,7 +4,7 @@ from math import inf
 from typing import NamedTuple
 
 from companion.attitude import Quaternion
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import UnansweredReason
 from companion.guidance.fence import Place
 from companion.guidance.reference import NorthEast, Vector
 from companion.vehicle.records import Battery, EstimatorStatus, Gps
@@ -65,7 +65,7 @@ class Control(NamedTuple):
     """Arrival of the last usable attitude sample."""
     attitude_not_finite: bool = False
     """Whether the newest attitude was refused for a NaN or infinity."""
-    reason: Unanswered | None = None
+    reason: UnansweredReason | None = None
     """Why the newest sample is unanswered, or None."""
     last_position_arrival: float = inf
     """Arrival of the last position that was newer than all before."""

@@ -2,13 +2,13 @@
 
 import pytest
 
-from companion.attitude.history import PlannedTilt, PlannedYaw, RowHistory
+from companion.attitude.history import PlannedTilt, PlannedYaw, PlanSeries
 
 MOTION = PlannedYaw(-1.0, 4.0, 0.5)
 
 
 def test_before_its_start_and_beyond_its_end_it_moves_evenly():
-    past = RowHistory(0.1)
+    past = PlanSeries(0.1)
     past.start(0.0, PlannedYaw(2.0, 0.0, 3.0), MOTION)
     assert past.at(-0.05) == pytest.approx((2.05, -0.2, 2.975))
     assert past.at(-0.2) == pytest.approx((2.2, -0.8, 2.9))
@@ -16,7 +16,7 @@ def test_before_its_start_and_beyond_its_end_it_moves_evenly():
 
 
 def test_it_is_linear_between_its_rows_and_beyond_the_newest():
-    past = RowHistory(0.1)
+    past = PlanSeries(0.1)
     past.start(0.0, PlannedYaw(0.0, 1.0, 2.0), MOTION)
     for n in range(1, 301):
         past.add(0.01 * n, PlannedYaw(1.0 + n, 2.0 - n, 3.0 + n * n))
@@ -28,16 +28,16 @@ def test_it_is_linear_between_its_rows_and_beyond_the_newest():
 
 
 def test_it_remembers_its_span_and_not_much_more():
-    past = RowHistory(0.1)
+    past = PlanSeries(0.1)
     past.start(0.0, PlannedTilt(*[0.0] * 8), PlannedTilt(*[1.0] * 8))
     for n in range(1, 10_001):
         past.add(0.001 * n, PlannedTilt(*[float(n)] * 8))
     assert past.at(10.0 - 0.1).north == pytest.approx(9900.0)
-    assert len(past._rows) == len(past._times) < 300
+    assert len(past._plans) == len(past._times) < 300
 
 
 def test_starting_again_forgets():
-    past = RowHistory(0.1)
+    past = PlanSeries(0.1)
     past.start(0.0, PlannedYaw(*[9.0] * 3), MOTION)
     past.add(0.01, PlannedYaw(*[9.0] * 3))
     past.start(0.0, PlannedYaw(*[1.0] * 3), PlannedYaw(*[0.0] * 3))

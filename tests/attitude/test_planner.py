@@ -76,10 +76,10 @@ def test_a_limit_that_is_not_set_is_infinite():
     free = make_constants(5.0, 2.0, Limits())
     assert free.max_tilt_rate == free.max_yaw_rate == free.max_speed == math.inf
     assert free.tilt_rate_weight == free.speed_weight == 0.0
-    assert free.longest_target == pytest.approx(math.sin(math.radians(75)))
+    assert free.max_target_norm == pytest.approx(math.sin(math.radians(75)))
     paper = make_constants(5.0, 2.0, Limits(math.radians(60), 1.6, shape="paper"))
     assert paper.max_speed == pytest.approx(0.8)
-    assert paper.longest_target == pytest.approx(math.sqrt(0.75))
+    assert paper.max_target_norm == pytest.approx(math.sqrt(0.75))
     tight = make_constants(5.0, 2.0, Limits(math.radians(60), 1.6))
     assert tight.max_speed == math.inf
 

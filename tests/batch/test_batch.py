@@ -179,7 +179,7 @@ def test_only_large_work_is_compiled(monkeypatch):
     q, targets = anywhere(5)
     batch.advance(FIRST_ORDER, q, targets, DT, 19)
     assert used == []
-    monkeypatch.setattr("companion.batch.batch.COMPILE_FROM", 100)
+    monkeypatch.setattr("companion.batch.batch.MIN_STEPS_TO_COMPILE", 100)
     batch.advance(FIRST_ORDER, q, targets, DT, 19)
     assert used == []
     batch.advance(FIRST_ORDER, q, targets, DT, 20)
@@ -188,7 +188,7 @@ def test_only_large_work_is_compiled(monkeypatch):
 
 def test_without_numba_it_works_and_says_what_is_missing(monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    monkeypatch.setattr("companion.batch.batch.COMPILE_FROM", 0)
+    monkeypatch.setattr("companion.batch.batch.MIN_STEPS_TO_COMPILE", 0)
     q, targets = anywhere(5)
     assert not batch.can_compile()
     flown = in_flight("first-order", Limits(), q, targets, DT)
@@ -209,7 +209,7 @@ def test_the_loop_over_first_order_is_vectorised():
     """Losing this costs a factor of five and changes no result, so nothing else would tell."""
     q, targets = anywhere(8)
     batch.rates(FIRST_ORDER, q, targets, DT, compiled=True)
-    (code,) = compiled_loops(FIRST_ORDER.law).apply.inspect_asm().values()
+    (code,) = compiled_loops(FIRST_ORDER.law).apply_law.inspect_asm().values()
     assert "divpd" in code
     assert "sqrtpd" in code
     assert "atan" not in code
@@ -274,6 +274,6 @@ def test_a_law_that_cannot_be_compiled_is_named_and_is_mapped_in_python(law):
 
 
 def test_a_large_batch_maps_a_law_that_cannot_be_compiled_in_python(monkeypatch):
-    monkeypatch.setattr("companion.batch.batch.COMPILE_FROM", 1)
+    monkeypatch.setattr("companion.batch.batch.MIN_STEPS_TO_COMPILE", 1)
     planner = make_planner(law_with_a_closure(1.0))
     assert batch.rates(planner, [[1.0], [0.0], [0.0], [0.0]], np.zeros((4, 1)), 0.01)[0] == 1.0

@@ -187,7 +187,7 @@ def test_a_fault_of_the_stream_begins_in_the_first_of_its_phases_once(phases):
     begun = []
     for phase in phases:
         injector.phase(phase, "")
-        begun.append(injector.begun)
+        begun.append(injector.has_begun)
     assert begun[0] is False
     assert vehicle.injected == [{"kind": "gps_loss", "at_s": 7.5}]
 

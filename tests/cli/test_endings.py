@@ -268,7 +268,7 @@ class Pages:
 
 
 def test_a_second_ctrl_c_leaves_but_not_one_of_a_bouncing_key(monkeypatch):
-    monkeypatch.setattr(serving, "SECOND_CTRL_C_AFTER", 0.2)
+    monkeypatch.setattr(serving, "MIN_CTRL_C_INTERVAL", 0.2)
     told = []
     session = Session(told)
     session.signals = ((0.05, signal.SIGINT), (0.1, signal.SIGINT), (0.4, signal.SIGINT))

@@ -10,7 +10,7 @@ from companion.attitude import BodyRates, Limits, Target, make_planner
 from companion.control.control_loop import ControlLoop
 from companion.control.estimator_resets import EstimatorResets
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.loop_record import Deadlines, Unanswered
+from companion.control.loop_record import Deadlines, UnansweredReason
 from companion.control.planner_runner import PlannerRunner
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.mavlink.codec import SetpointEncoder
@@ -41,7 +41,7 @@ class Bench:
             LIMITS,
             lambda: self.time,
         )
-        self.loop.ask_mode = self.ask
+        self.loop.request_mode = self.ask
         self.loop.on = True
         self.refresh()
 
@@ -104,7 +104,7 @@ def test_a_process_that_is_stopped_while_it_answers_does_not_send():
     bench.run(10)
     away = 3.0
     bench.run(1)
-    assert (len(bench.sent), bench.loop.record.reason) == (10, Unanswered.LATE)
+    assert (len(bench.sent), bench.loop.record.reason) == (10, UnansweredReason.LATE)
 
 
 def test_nothing_is_sent_while_off_or_before_the_first_target():
@@ -254,16 +254,16 @@ def test_each_unanswered_sample_has_one_reason_which_is_counted():
     bench.loop._send = refuse_setpoint
     bench.run(1)
     assert {reason: n for reason, n in bench.loop.record.unanswered.items() if n} == {
-        Unanswered.ANOTHER_VEHICLE: 3,
-        Unanswered.INVALID_SETPOINT: 1,
-        Unanswered.NOT_NEWER: 1,
-        Unanswered.AHEAD: 1,
-        Unanswered.LATE: 1,
-        Unanswered.OLD_TARGET: 1,
-        Unanswered.AWAITING_MODE: 1,
-        Unanswered.INVALID_ATTITUDE: 1,
-        Unanswered.NOT_SENT: 2,
-        Unanswered.NO_TARGET: 1,
+        UnansweredReason.ANOTHER_VEHICLE: 3,
+        UnansweredReason.INVALID_SETPOINT: 1,
+        UnansweredReason.NOT_NEWER: 1,
+        UnansweredReason.STAMPED_AHEAD: 1,
+        UnansweredReason.LATE: 1,
+        UnansweredReason.OLD_TARGET: 1,
+        UnansweredReason.AWAITING_MODE: 1,
+        UnansweredReason.INVALID_ATTITUDE: 1,
+        UnansweredReason.NOT_SENT: 2,
+        UnansweredReason.NO_TARGET: 1,
     }
     loop = bench.loop
     assert (loop.record.stale_count, loop.record.refused_count) == (9, 4)
@@ -271,8 +271,8 @@ def test_each_unanswered_sample_has_one_reason_which_is_counted():
         loop.record.samples
         == loop.record.setpoints + loop.record.stale_count + loop.record.refused_count
     )
-    assert loop.record.reason is Unanswered.INVALID_SETPOINT
-    assert all(reason.words for reason in Unanswered)
+    assert loop.record.reason is UnansweredReason.INVALID_SETPOINT
+    assert all(reason.text for reason in UnansweredReason)
 
 
 def refuse_setpoint(*_):

@@ -66,7 +66,7 @@ def test_the_time_constant_is_that_of_a_simulated_step(name, rate, gain):
 def test_what_limits_the_response_is_what_makes_it_quicker_when_changed(gain, rate, vehicle, limit):
     config = configured("model-following", gain, rate, **vehicle)
     found = expected_response(config)
-    assert found.limited_by == limit
+    assert found.main_cause == limit
     assert f"{limit} lengthens the time constant most (" in found.sentence()
     changes = {
         "planner.gain_per_s": {"planner": {"gain_per_s": 2.0 * gain}},
@@ -76,7 +76,7 @@ def test_what_limits_the_response_is_what_makes_it_quicker_when_changed(gain, ra
     }
     for name, change in changes.items():
         now = expected_response(changed(config, change, "test")).time_constant
-        assert now == pytest.approx(found.time_constants_without[name], abs=0.004)
+        assert now == pytest.approx(found.time_constants_without_cause[name], abs=0.004)
 
 
 def test_the_largest_sensible_gain_and_a_warning_above_it():
@@ -102,12 +102,12 @@ def test_the_largest_sensible_gain_and_a_warning_above_it():
 
 
 def test_the_words_about_a_response():
-    time_constants_without = {
+    time_constants_without_cause = {
         "planner.gain_per_s": 0.4,
         "limits.max_tilt_rate_deg_s": 0.3,
         "the vehicle's lag": 0.495,  # 1 % less is not told
     }
-    found = ExpectedResponse(0.25, 0.5, time_constants_without, 5.0, 5.0)
+    found = ExpectedResponse(0.25, 0.5, time_constants_without_cause, 5.0, 5.0)
     assert found.sentence() == (
         "a step from -0.25 to 0.25 (±14° of tilt) is expected to have a time constant of 0.50 s; "
         "limits.max_tilt_rate_deg_s lengthens the time constant most (0.30 s without "

@@ -68,11 +68,11 @@ def test_a_takeoff_that_was_refused_leaves_it_standing():
 def test_it_touched_down_when_the_flag_lasts_and_nothing_sinks():
     vehicle = Vehicle()
     vehicle.tell(landed=False, height=5.0, sinks=1.0)
-    assert not vehicle.tell(height=4.0, sinks=1.0).touched_down
-    assert not vehicle.tell(height=3.5, sinks=1.0, after=0.6).touched_down
-    assert not vehicle.tell(landed=False, height=3.0, sinks=1.0).touched_down
-    assert not vehicle.tell(height=0.0).touched_down  # only just
-    assert vehicle.tell(height=0.0, after=0.6).touched_down
+    assert not vehicle.tell(height=4.0, sinks=1.0).has_touched_down
+    assert not vehicle.tell(height=3.5, sinks=1.0, after=0.6).has_touched_down
+    assert not vehicle.tell(landed=False, height=3.0, sinks=1.0).has_touched_down
+    assert not vehicle.tell(height=0.0).has_touched_down  # only just
+    assert vehicle.tell(height=0.0, after=0.6).has_touched_down
 
 
 def test_without_a_position_the_flag_alone_tells_a_landing():
@@ -82,7 +82,7 @@ def test_without_a_position_the_flag_alone_tells_a_landing():
     for _ in range(3):
         vehicle.now += 0.4
         vehicle.ground.update()
-    assert vehicle.ground.touched_down
+    assert vehicle.ground.has_touched_down
 
 
 @pytest.mark.parametrize(
@@ -109,13 +109,13 @@ def test_it_has_lifted_off_once_it_is_a_metre_higher_than_at_the_command():
 
 def test_one_sign_is_enough_to_have_lifted_off():
     vehicle = Vehicle()
-    assert not vehicle.tell(sinks=-1.0).lifted, "nothing was commanded: the estimate drifts"
+    assert not vehicle.tell(sinks=-1.0).has_lifted_off, "nothing was commanded: the estimate drifts"
     vehicle.ground.command_takeoff()
-    assert not vehicle.tell(sinks=-0.4).lifted
-    assert vehicle.tell(sinks=-0.6).lifted
-    assert not vehicle.tell(sinks=0.0).lifted
-    assert vehicle.tell(height=2.0).lifted
-    assert vehicle.tell(height=0.0).lifted, "it has been in the air"
+    assert not vehicle.tell(sinks=-0.4).has_lifted_off
+    assert vehicle.tell(sinks=-0.6).has_lifted_off
+    assert not vehicle.tell(sinks=0.0).has_lifted_off
+    assert vehicle.tell(height=2.0).has_lifted_off
+    assert vehicle.tell(height=0.0).has_lifted_off, "it has been in the air"
 
 
 def test_a_vertical_speed_lasts_half_a_second():
@@ -129,7 +129,7 @@ def test_a_vertical_speed_lasts_half_a_second():
 
 def test_a_vehicle_that_already_flew_neither_stands_nor_idles():
     vehicle = Vehicle()
-    assert (vehicle.ground.takeoff_commanded, vehicle.ground.touched_down) == (False, False)
+    assert (vehicle.ground.takeoff_commanded, vehicle.ground.has_touched_down) == (False, False)
     vehicle.ground.note_flying()
     assert vehicle.ground.takeoff_commanded is True
     assert not vehicle.tell().standing

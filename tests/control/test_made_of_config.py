@@ -83,7 +83,7 @@ def retuned(values):
     seen = {}
     guidance = LinearGuidance(linear_settings(CONFIG))
     guidance_loop = SimpleNamespace(
-        maker=SimpleNamespace(guidance=guidance),
+        command_maker=SimpleNamespace(guidance=guidance),
         estimate=SimpleNamespace(retune=lambda *settings: seen.update(estimate=settings)),
         hold=SimpleNamespace(),
     )
@@ -101,7 +101,7 @@ def test_a_change_of_values_reaches_both_loops():
         "guidance": values.guidance,
         "max_tilt": pytest.approx(radians(20.0)),
     }
-    others = SimpleNamespace(maker=SimpleNamespace(guidance="another package's"))
+    others = SimpleNamespace(command_maker=SimpleNamespace(guidance="another package's"))
     with pytest.raises(TypeError, match="values of str cannot be changed in flight"):
         Retuning(SimpleNamespace(), others).apply(values)
 

@@ -53,7 +53,7 @@ def tumbled(lag, *, steps=(0.004, 0.008), seconds=4.0, noise=0.0, correction_deg
 @pytest.mark.parametrize("steps", [(0.004,), (0.004, 0.008), (0.002, 0.003, 0.005, 0.005)])
 def test_the_lag_is_learned_from_the_rotations(lag, steps):
     resets, _ = tumbled(lag, steps=steps, noise=0.002)
-    assert resets.rate_lag.seconds == pytest.approx(lag, abs=0.0005)
+    assert resets.rate_lag.lag == pytest.approx(lag, abs=0.0005)
 
 
 def test_late_rates_correct_no_heading_once_their_lag_is_known():
@@ -65,7 +65,7 @@ def test_late_rates_correct_no_heading_once_their_lag_is_known():
 
 def test_corrections_of_the_heading_are_still_found_and_are_no_lag():
     resets, history = tumbled(0.005, correction_deg_s=2.0)
-    assert resets.rate_lag.seconds == pytest.approx(0.005, abs=0.001)
+    assert resets.rate_lag.lag == pytest.approx(0.005, abs=0.001)
     assert history[-1] - history[len(history) // 4] == pytest.approx(6.0, abs=0.2)
 
 
@@ -73,7 +73,7 @@ def test_corrections_of_the_heading_are_still_found_and_are_no_lag():
 def test_a_change_of_the_rates_counts_by_its_size_about_whichever_axis(change):
     lag, learned = 0.004, RateLag()
     for _ in range(3):  # corrected by what is known already
-        p, q = ((lag - learned.seconds) * rate for rate in change)
+        p, q = ((lag - learned.lag) * rate for rate in change)
         x, y, z, w = Rotation.from_rotvec((p, q, 0.1)).as_quat()
         learned.learn((0.0, 0.0, 0.0), (*change, 9.0), (1.0, 0.0, 0.0, 0.0), (w, x, y, z))
-    assert learned.seconds == pytest.approx(lag, rel=0.01)
+    assert learned.lag == pytest.approx(lag, rel=0.01)

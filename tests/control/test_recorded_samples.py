@@ -8,7 +8,7 @@ from companion.attitude import BodyRates, Limits, Target, make_planner
 from companion.attitude.history import PlannedTilt
 from companion.control.control_loop import ControlLoop
 from companion.control.guidance_command import GuidanceCommand
-from companion.control.loop_record import Deadlines, Unanswered
+from companion.control.loop_record import Deadlines, UnansweredReason
 from companion.control.sample_rows import Answer, LoopFlags, SampleEntry, SampleRows
 from companion.guidance import HoverThrust, ThrustSettings
 from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
@@ -127,7 +127,7 @@ def test_rates_of_guidance_have_no_target_and_no_plan():
     assert (row["thrust_limited"], row["idle"]) == (0, 1)
 
 
-@pytest.mark.parametrize("reason", Unanswered)
+@pytest.mark.parametrize("reason", UnansweredReason)
 def test_why_a_sample_is_unanswered_has_a_number(reason):
     kept = recorded(SampleEntry(SAMPLE, reason, FLAGS, nan, None))
     assert list(kept.messages) == ["/sample"]

@@ -138,7 +138,7 @@ def test_what_a_step_does_not_know_is_nan():
     assert all(isnan(value) for value in list(row.values())[1:-5])
     assert (row["time_s"], row["armed"]) == (20.0, 0)
     plain = GuidanceCommand(Target(0.1, 0.2, 0.3), -0.5, 20.0)
-    rows.step(kept, 88, StepEntry(READ, MADE._replace(error=None), plain))
+    rows.step(kept, 88, StepEntry(READ, MADE._replace(tracking_error=None), plain))
     (row,) = kept.rows("/target")
     assert [name for name, value in row.items() if isnan(value)] == [
         "later_north",

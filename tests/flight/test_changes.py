@@ -189,7 +189,7 @@ def test_changes_in_flight_are_slewed_recorded_and_undone(autopilot, vehicle, tm
                 (
                     degrees(guidance_loop.hold.max_tilt),
                     _constants(planner).gain,
-                    guidance_loop.maker.guidance._settings.gains.position,
+                    guidance_loop.command_maker.guidance._settings.gains.position,
                     degrees(loop.planner._limits.tilt_rate),
                 )
             )

@@ -122,7 +122,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
         awaiting_mode=True,
         offboard_active=False,
         taking_over=taking_over,
-        record=SimpleNamespace(gap_from=0.0),
+        record=SimpleNamespace(gap_start=0.0),
         resume=lambda: resumed.append(1),
     )
     state = SimpleNamespace(mode=Role.OFFBOARD, failsafe=False, mode_not_intended=False)
@@ -139,7 +139,7 @@ def test_after_a_gap_only_a_fresh_heartbeat_lets_us_go_on(mode, failsafe, taking
 
     async def run():
         watch = Watch(context, None, None, lambda: 0.0)
-        watch.ask_mode()
+        watch.request_mode()
         await asyncio.sleep(0)
         watch.check(PHASE)  # the one that waited to be read
         assert resumed == []

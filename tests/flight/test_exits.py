@@ -17,7 +17,7 @@ from typing import NamedTuple
 import pytest
 import yaml
 
-from companion.cli.signals import HOW_TO_LEAVE, SECOND_CTRL_C_AFTER
+from companion.cli.signals import HOW_TO_LEAVE, MIN_CTRL_C_INTERVAL
 from companion.control.guidance_loop import GuidanceLoop
 from tests.flight import fly as memory
 from tests.flight import sockets, tlog
@@ -157,7 +157,7 @@ def test_a_second_ctrl_c_leaves_at_once_and_keeps_the_record(tmp_path, ways):
         for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             process.send_signal(number)  # none of these leaves
             time.sleep(0.1)
-        time.sleep(SECOND_CTRL_C_AFTER)
+        time.sleep(MIN_CTRL_C_INTERVAL)
         assert process.poll() is None
         process.send_signal(signal.SIGINT)
         result = finish(process, 1)

@@ -52,7 +52,7 @@ def test_errors_of_a_gyro_are_no_drift(drift, turn, seconds, counted):
     heading, steps = HeadingDrift(resets), 100
     for k in range(steps + 1):
         resets.heading_corrections = radians(drift) * k / steps
-        resets.turned = radians(turn) * k / steps
+        resets.total_turn = radians(turn) * k / steps
         newest = heading.drift(seconds * k / steps)
     assert degrees(newest) == pytest.approx(counted, abs=1e-6)
     heading.begin()

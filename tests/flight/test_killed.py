@@ -104,7 +104,7 @@ def worst(autopilot, speed, held, *, all_of_them):
 def bound(autopilot, speed, held):
     """What the doctor's model says of the same flight."""
     config = quick_flight(autopilot, flight(autopilot, speed))
-    drag = drag_before_connecting(config).least
+    drag = drag_before_connecting(config).lower_bound
     flown = configured_maneuvers(config)
     return worst_reach(config, flown, held, drag, brakes=autopilot == "px4")
 

@@ -47,7 +47,9 @@ def test_from_standing_into_the_circle_it_neither_swings_nor_leaves(tmp_path):
     async def note_pid(session):
         while session._assembled is None:  # noqa: ASYNC110
             await asyncio.sleep(0.1)
-        pids.append(session._assembled.context.guidance_loop.maker.predictive_control._solver.pid)
+        pids.append(
+            session._assembled.context.guidance_loop.command_maker.predictive_control._solver.pid
+        )
 
     summary = flown(tmp_path, "circle5.yaml", note_pid)
     assert not Path(f"/proc/{pids[0]}").exists()  # the process ends with the flight
@@ -74,7 +76,7 @@ def test_the_solvers_death_is_reported_and_costs_little(tmp_path):
             await asyncio.sleep(0.1)
         await asyncio.sleep(7.0)  # in the middle of the eight, at 5 m/s
         os.kill(
-            session._assembled.context.guidance_loop.maker.predictive_control._solver.pid,
+            session._assembled.context.guidance_loop.command_maker.predictive_control._solver.pid,
             signal.SIGKILL,
         )
 

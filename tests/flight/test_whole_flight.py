@@ -3,7 +3,7 @@
 import pytest
 from pymavlink import mavutil
 
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import UnansweredReason
 from tests.flight.fly import fly, mock_vehicle
 
 HOVER = {"hover": {"duration_s": 1.0}}
@@ -34,7 +34,7 @@ def test_it_flies_lands_and_disarms(twice):
     assert summary.events[-1][1] == "disarmed"
     assert summary.counts.setpoints == summary.counts.samples > 4000
     assert summary.counts.rate_hz == pytest.approx(250.0, abs=1.0)
-    assert summary.as_dict()["unanswered"] == {reason.value: 0 for reason in Unanswered}
+    assert summary.as_dict()["unanswered"] == {reason.value: 0 for reason in UnansweredReason}
 
 
 def test_the_response_is_what_the_rate_loop_allows(twice):

@@ -477,7 +477,7 @@ def test_times_that_are_not_the_vehicles_own_and_units_mistaken_are_told():
     }
     config = changed(CONFIG, wrong, "test")
     found = {one.key: one for one in configuration_checks.doubtful_values(config, GOOD)}
-    assert set(found) == {Key.IDENTIFIED, Key.UNITS, Key.BODY_RATE}
+    assert set(found) == {Key.IDENTIFIED, Key.UNITS, Key.BODY_RATE_KEY}
     assert all(one.result is CheckResult.INEFFECTIVE for one in found.values())
     assert found[Key.UNITS].source == "limits.max_tilt_rate_deg_s"
     assert list(configuration_checks.doubtful_values(CONFIG, GOOD)) == []

@@ -10,7 +10,7 @@ from mcap_ros2.decoder import DecoderFactory
 from zstandard import ZstdError
 
 from companion.cli.main import main
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import UnansweredReason
 from companion.files.yaml_file import ConfigError
 from companion.recording.flight_record import RECORD_FILE, RecordError, read_flight
 from companion.recording.folder import flight_folder, make_named_folder
@@ -39,7 +39,7 @@ ROWS = 50
 
 
 def test_the_reasons_are_those_of_the_control_loop():
-    assert UNANSWERED_CODES[2:] == tuple(reason.value for reason in Unanswered)
+    assert UNANSWERED_CODES[2:] == tuple(reason.value for reason in UnansweredReason)
 
 
 def write(folder):

@@ -5,7 +5,7 @@ from math import cos, inf, sin
 import pytest
 
 from companion.config import Config
-from companion.control.loop_record import Unanswered
+from companion.control.loop_record import UnansweredReason
 from companion.guidance.fence import Fence, Place
 from companion.safety import (
     Action,
@@ -226,23 +226,27 @@ def silent(reason=None, **changes):
     ("snapshot", "words"),
     [
         (silent(), "no setpoint was sent"),
-        (silent(Unanswered.LATE), Unanswered.LATE.words),
-        (silent(Unanswered.LATE, stall_time=0.375), Unanswered.LATE.words),
-        (silent(Unanswered.OLD_TARGET), Unanswered.OLD_TARGET.words),
+        (silent(UnansweredReason.LATE), UnansweredReason.LATE.text),
+        (silent(UnansweredReason.LATE, stall_time=0.375), UnansweredReason.LATE.text),
+        (silent(UnansweredReason.OLD_TARGET), UnansweredReason.OLD_TARGET.text),
         (
             silent(last_sample_arrival=NOW - 0.6, attitude_not_finite=True),
             "the vehicle's attitude is not finite (NaN or infinity)",
         ),
         (
-            silent(Unanswered.NO_TARGET, last_position_arrival=NOW - 0.6),
+            silent(UnansweredReason.NO_TARGET, last_position_arrival=NOW - 0.6),
             "no position from the vehicle",
         ),
         (
-            silent(Unanswered.NO_TARGET, last_position_arrival=NOW - 0.6, position_not_finite=True),
+            silent(
+                UnansweredReason.NO_TARGET,
+                last_position_arrival=NOW - 0.6,
+                position_not_finite=True,
+            ),
             "the vehicle's position is not finite (NaN or infinity)",
         ),
         (
-            silent(Unanswered.OLD_TARGET, position_fresh=False),
+            silent(UnansweredReason.OLD_TARGET, position_fresh=False),
             "positions arrive, but older than deadman.position_stale_ms",
         ),
     ],

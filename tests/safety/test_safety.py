@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from companion.config import Config
-from companion.control.loop_record import LoopRecord, Unanswered
+from companion.control.loop_record import LoopRecord, UnansweredReason
 from companion.guidance.fence import Place, inside, local_polygon
 from companion.safety import Action, SafetyLadder, monitors
 from companion.safety.actions import StreamEffect
@@ -85,31 +85,37 @@ BREACHES = [
         "no attitude from the vehicle for 0.6",
     ),
     ("silence", control(**SILENT), HAND_BACK, 0.0, "no attitude"),
-    ("silence", unanswered(Unanswered.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
-    ("silence", unanswered(Unanswered.AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
-    ("silence", unanswered(Unanswered.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stall_time=0.2), HAND_BACK, 0.0, "stale_ms"),
-    ("silence", unanswered(Unanswered.LATE, stall_time=0.4), HAND_BACK, 0.0, STALLED),
-    ("silence", unanswered(Unanswered.AWAITING_MODE, stall_time=0.4), HAND_BACK, 0.0, STALLED),
+    ("silence", unanswered(UnansweredReason.NOT_NEWER), HAND_BACK, 0.0, "clock stands still"),
+    ("silence", unanswered(UnansweredReason.STAMPED_AHEAD), HAND_BACK, 0.0, "stamped far ahead"),
+    ("silence", unanswered(UnansweredReason.LATE), HAND_BACK, 0.0, "telemetry_stale_ms"),
+    ("silence", unanswered(UnansweredReason.LATE, stall_time=0.2), HAND_BACK, 0.0, "stale_ms"),
+    ("silence", unanswered(UnansweredReason.LATE, stall_time=0.4), HAND_BACK, 0.0, STALLED),
+    (
+        "silence",
+        unanswered(UnansweredReason.AWAITING_MODE, stall_time=0.4),
+        HAND_BACK,
+        0.0,
+        STALLED,
+    ),
     ("unheard", control(**SILENT, last_frame_noticed=OLD, stall_time=0.4), LISTEN, 0.0, STALLED),
     (
         "silence",
-        unanswered(Unanswered.OLD_TARGET, last_position_arrival=OLD),
+        unanswered(UnansweredReason.OLD_TARGET, last_position_arrival=OLD),
         HAND_BACK,
         0.0,
         "no position",
     ),
     (
         "silence",
-        unanswered(Unanswered.OLD_TARGET, position_fresh=False),
+        unanswered(UnansweredReason.OLD_TARGET, position_fresh=False),
         HAND_BACK,
         0.0,
         "position_stale_ms",
     ),
-    ("silence", unanswered(Unanswered.OLD_TARGET), HAND_BACK, 0.0, "guidance makes no"),
-    ("silence", unanswered(Unanswered.AWAITING_MODE), HAND_BACK, 0.0, "did not confirm"),
-    ("silence", unanswered(Unanswered.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
-    ("silence", unanswered(Unanswered.NOT_SENT), HAND_BACK, 0.0, "cannot be sent"),
+    ("silence", unanswered(UnansweredReason.OLD_TARGET), HAND_BACK, 0.0, "guidance makes no"),
+    ("silence", unanswered(UnansweredReason.AWAITING_MODE), HAND_BACK, 0.0, "did not confirm"),
+    ("silence", unanswered(UnansweredReason.INVALID_ATTITUDE), HAND_BACK, 0.0, "cannot be used"),
+    ("silence", unanswered(UnansweredReason.NOT_SENT), HAND_BACK, 0.0, "cannot be sent"),
     ("frozen", health(frozen="it repeats"), HAND_BACK, 0.0, "frozen telemetry: it repeats"),
     ("clock", control(clock_change="the vehicle's clock jumped"), HAND_BACK, 0.0, "jumped"),
     ("disarmed", autopilot(armed=False), RELEASE, 0.0, "disarmed in flight"),

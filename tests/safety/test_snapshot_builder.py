@@ -8,7 +8,7 @@ import pytest
 
 from companion.attitude import BodyRates
 from companion.control.heading_frame import HeadingFrame
-from companion.control.loop_record import LoopRecord, Unanswered
+from companion.control.loop_record import LoopRecord, UnansweredReason
 from companion.guidance.fence import FenceCentre, Place
 from companion.safety.snapshot import AutopilotStatus, Health, Motion, Resets
 from companion.safety.snapshot_builder import SnapshotBuilder
@@ -53,7 +53,7 @@ class Flight:
             frame=HeadingFrame(3.0),
             largest_tilt_jump=0.7,
             heading_corrections=0.0,
-            turned=0.0,
+            total_turn=0.0,
             on_counter=lambda *seen: self.counted.append(seen),
         )
         self.record = LoopRecord(sent_setpoints=deque([(BodyRates(0.0, 0.0, 0.0), 0.45)]))
@@ -188,7 +188,7 @@ def test_the_newest_attitude_or_position_with_a_nan_is_known(flight):
 
 def test_every_stage_of_a_samples_way_has_its_time(flight):
     flight.record.last_answered_arrival, flight.record.last_sample_arrival = 9.9, 9.95
-    flight.record.reason = Unanswered.LATE
+    flight.record.reason = UnansweredReason.LATE
     flight.stats.frames = 1
     flight.listen(10.02)
     flight.listen(10.04)
@@ -197,7 +197,7 @@ def test_every_stage_of_a_samples_way_has_its_time(flight):
     assert (told.last_answered_arrival, told.last_sample_arrival, told.reason) == (
         9.9,
         9.95,
-        Unanswered.LATE,
+        UnansweredReason.LATE,
     )
     assert (told.last_position_arrival, told.last_frame_noticed) == (9.75, 10.02)
     assert (told.position_fresh, told.clock_change) == (True, None)

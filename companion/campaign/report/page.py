@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 PARQUET, CSV = "results.parquet", "results.csv"
-_DONE = 0  # exit code
+_EXIT_OK = 0  # exit code
 _MOST_GRID_VALUES = 12
 """Largest number of different values with which a sampled factor counts as a grid."""
 _ENOUGH_SAMPLES = 60
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> int:
     for line in missing_cases_note(results):
         console.print(line)
     console.print(f"Open {page}")
-    return _DONE
+    return _EXIT_OK
 
 
 def write_tables(table: "pa.Table", folder: Path) -> None:
@@ -82,24 +82,24 @@ def write_tables(table: "pa.Table", folder: Path) -> None:
 
 def page_text(results: Results, campaign: Campaign) -> str:
     """The HTML of the page about a campaign as stored in its folder."""
-    by_outcome = {
+    influences_by_outcome = {
         name: found_influences
         for name in (results.error_outcome, RATE_OUTCOME, "ok")
         if name == "ok" or results.is_measured(name)
         if (found_influences := influences(results, name))
     }
-    order = _factors_by_influence(results, by_outcome)
+    factor_order = _factors_by_influence(results, influences_by_outcome)
     shown_plots = [
-        *plots.success(results, order),
-        *plots.sensitivity(by_outcome),
+        *plots.success(results, factor_order),
+        *plots.sensitivity(influences_by_outcome),
         *plots.pareto(results),
         *plots.distributions(results),
     ]
     first_tables = [tables.worst_cases(results), tables.two_factors(results)]
-    if order:
-        first_tables.append(tables.success_by_factor(results, order))
-    if by_outcome:
-        first_tables.append(tables.sensitivity(by_outcome))
+    if factor_order:
+        first_tables.append(tables.success_by_factor(results, factor_order))
+    if influences_by_outcome:
+        first_tables.append(tables.sensitivity(influences_by_outcome))
     return rendered_page(
         "companion.campaign.report",
         "campaign.html.j2",
@@ -107,7 +107,7 @@ def page_text(results: Results, campaign: Campaign) -> str:
         shown_plots,
         headline=headline(results),
         good=not results.crashed_count and bool(_successes(results).all()),
-        lines=[*missing_cases_note(results), *summary_sentences(results, by_outcome)],
+        lines=[*missing_cases_note(results), *summary_sentences(results, influences_by_outcome)],
         tables=[table for table in first_tables if table is not None],
         last=[tables.configuration(campaign), tables.all_cases(results)],
     )
@@ -130,19 +130,21 @@ def _successes(results: Results) -> NDArray[np.bool_]:
 
 def missing_cases_note(results: Results) -> list[str]:
     """One sentence: how many cases are missing and how to continue; empty if all are flown."""
-    unflown = results.planned_count - results.count
-    if not unflown:
+    unflown_count = results.planned_count - results.count
+    if not unflown_count:
         return []
     return [
-        f"{unflown} of {results.planned_count} {results.noun} are missing. "
+        f"{unflown_count} of {results.planned_count} {results.noun} are missing. "
         f"`{program_command('campaign', results.folder)}` goes on with them."
     ]
 
 
-def summary_sentences(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
+def summary_sentences(
+    results: Results, influences_by_outcome: dict[str, list[Influence]]
+) -> Iterator[str]:
     """The sentences at the head of the page: what was swept, and the most important results.
 
-    `by_outcome` holds the influences of the factors on each outcome, the largest first.
+    `influences_by_outcome` holds the influences of the factors on each outcome, the largest first.
     """
     yield f"Swept: {', '.join(results.factors) or 'nothing but noise and gusts'}."
     if crashed_count := results.crashed_count:
@@ -158,7 +160,7 @@ def summary_sentences(results: Results, by_outcome: dict[str, list[Influence]]) 
     if reasons:
         (reason, count) = reasons.most_common(1)[0]
         yield f"Most frequent reason why a case was not good, {count} times: {reason}."
-    yield from _influence_sentences(results, by_outcome)
+    yield from _influence_sentences(results, influences_by_outcome)
     if results.error_outcome == TRUE_ERROR:
         yield (
             "Errors are distances of the true vehicle from the reference. A flight knows only the "
@@ -166,16 +168,21 @@ def summary_sentences(results: Results, by_outcome: dict[str, list[Influence]]) 
         )
 
 
-def _influence_sentences(results: Results, by_outcome: dict[str, list[Influence]]) -> Iterator[str]:
-    if results.error_outcome in by_outcome:
-        first = by_outcome[results.error_outcome][0]
+def _influence_sentences(
+    results: Results, influences_by_outcome: dict[str, list[Influence]]
+) -> Iterator[str]:
+    if results.error_outcome in influences_by_outcome:
+        strongest = influences_by_outcome[results.error_outcome][0]
         error = label(results.error_outcome).partition(",")[0]
-        share = f"{first.sobol_index:.0%} ± {first.confidence:.0%}"
-        yield f"{first.factor} explains {share} of the variance of the {error} by itself."
+        variance_share = f"{strongest.sobol_index:.0%} ± {strongest.confidence:.0%}"
+        yield (
+            f"{strongest.factor} explains {variance_share} of the variance of the {error} by "
+            "itself."
+        )
         yield from _few_samples_warning(results)
     elif results.factors:
         yield f"Sensitivity needs at least {FEWEST_CASES} {results.noun} with different outcomes."
-    worst = min(
+    lowest_success = min(
         (
             (share_of(results.good[level.cases]), name, level.name)
             for name in results.factors
@@ -185,31 +192,33 @@ def _influence_sentences(results: Results, by_outcome: dict[str, list[Influence]
         default=None,
         key=lambda item: item[0].high,
     )
-    if worst is not None and worst[0].share < np.mean(results.good):
-        lowest, name, value = worst
-        yield f"Success is lowest with {name} = {value}: {lowest}."
+    if lowest_success is not None and lowest_success[0].share < np.mean(results.good):
+        success_share, name, value = lowest_success
+        yield f"Success is lowest with {name} = {value}: {success_share}."
 
 
 def _few_samples_warning(results: Results) -> Iterator[str]:
     """A warning if the sampled factors took few different values."""
-    distinct = [
+    distinct_counts = [
         len(np.unique(column))
         for name, factor in results.factors.items()
         if factor["sampled"] and (column := results.columns[name]).dtype == float
     ]
-    largest = max(distinct, default=0)
-    if _MOST_GRID_VALUES < largest < _ENOUGH_SAMPLES:
+    largest_count = max(distinct_counts, default=0)
+    if _MOST_GRID_VALUES < largest_count < _ENOUGH_SAMPLES:
         yield (
-            f"Only {largest} different samples of the distributions were flown, too few to tell "
-            "the influences of the sampled factors apart; raise `samples`."
+            f"Only {largest_count} different samples of the distributions were flown, too few to "
+            "tell the influences of the sampled factors apart; raise `samples`."
         )
 
 
-def _factors_by_influence(results: Results, by_outcome: dict[str, list[Influence]]) -> list[str]:
+def _factors_by_influence(
+    results: Results, influences_by_outcome: dict[str, list[Influence]]
+) -> list[str]:
     """The factors by influence on success, then on the error; those without influence last."""
     influential = [
         influence.factor
         for name in ("ok", results.error_outcome)
-        for influence in by_outcome.get(name, ())
+        for influence in influences_by_outcome.get(name, ())
     ]
     return list(dict.fromkeys([*influential, *results.factors]))

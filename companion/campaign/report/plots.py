@@ -36,21 +36,21 @@ _DISTRIBUTIONS = (
     "rate_rms_rad_s",
     "saturated_share",
 )
-_SHOWN_SHARE = 0.995
+_SHOWN_QUANTILE = 0.995
 """Quantile at which the axis of a histogram ends; its last bin also holds all larger values."""
 _BIN_COUNT = 40
 """Number of bins of a histogram."""
 
 
-def success(results: Results, order: Sequence[str]) -> Iterator[Plot]:
-    """Success rate at each level of a factor; `order` names the most influential factors first."""
-    for name in order[:_MOST_FACTORS]:
-        groups = levels(results.columns[name])
-        shares = [share_of(results.good[level.cases]) for level in groups]
+def success(results: Results, factor_order: Sequence[str]) -> Iterator[Plot]:
+    """Success rate at each level of a factor; `factor_order`: the most influential first."""
+    for name in factor_order[:_MOST_FACTORS]:
+        factor_levels = levels(results.columns[name])
+        shares = [share_of(results.good[level.cases]) for level in factor_levels]
         trace: dict[str, Any] = {
             "type": "scatter",
             "mode": "markers",
-            "x": [level.name for level in groups],
+            "x": [level.name for level in factor_levels],
             "y": [_percent(share.share) for share in shares],
             "error_y": {
                 "type": "data",
@@ -76,19 +76,21 @@ def _percent(share: float) -> float | None:
 def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
     """The first-order Sobol indices of each outcome as bars, a bar for each factor."""
     traces = []
-    for (outcome, found), colour in zip(
+    for (outcome, factor_influences), colour in zip(
         influences.items(), (MEASURED_COLOUR, NEAREST_COLOUR, REFERENCE_COLOUR), strict=False
     ):
         traces.append(
             {
                 "type": "bar",
                 "name": "good" if outcome == "ok" else label(outcome),
-                "x": [influence.factor for influence in found],
-                "y": numbers(np.array([100.0 * influence.sobol_index for influence in found])),
+                "x": [influence.factor for influence in factor_influences],
+                "y": numbers(
+                    np.array([100.0 * influence.sobol_index for influence in factor_influences])
+                ),
                 "error_y": {
                     "type": "data",
                     "array": numbers(
-                        np.array([100.0 * influence.confidence for influence in found])
+                        np.array([100.0 * influence.confidence for influence in factor_influences])
                     ),
                 },
                 "marker": {"color": colour},
@@ -107,45 +109,45 @@ def sensitivity(influences: dict[str, list[Influence]]) -> Iterator[Plot]:
 def pareto(results: Results) -> Iterator[Plot]:
     """Error against commanded rate, coloured by thrust deviation; the Pareto front is marked."""
     columns = results.columns
-    names = [
+    objective_names = [
         results.error_outcome,
         RATE_OUTCOME,
         *([THRUST_OUTCOME] if results.is_measured(THRUST_OUTCOME) else []),
     ]
-    points, titles = [], []
+    objective_rows, titles = [], []
     for choice in choice_groups(results):
-        part = choice.cases
-        values = np.array([median(columns[name][part]) for name in names])
-        if np.isfinite(values).all():
-            points.append(values)
-            good = share_of(results.good[part]).share
-            titles.append(f"{choice.name}<br>good: {100.0 * good:.1f} %")
-    if len(points) < 2:
+        mask = choice.cases
+        medians = np.array([median(columns[name][mask]) for name in objective_names])
+        if np.isfinite(medians).all():
+            objective_rows.append(medians)
+            good_share = share_of(results.good[mask]).share
+            titles.append(f"{choice.name}<br>good: {100.0 * good_share:.1f} %")
+    if len(objective_rows) < 2:
         return
-    goals = np.array(points)
-    front = pareto_front(goals)
-    thrust = len(names) > 2
+    objectives = np.array(objective_rows)
+    on_front = pareto_front(objectives)
+    has_thrust = len(objective_names) > 2
     traces = []
-    for name, part in (("on the front", front), ("others", ~front)):
-        marker: dict[str, Any] = {"size": 11 if part is front else 6}
-        if part is front:
+    for name, mask in (("on the front", on_front), ("others", ~on_front)):
+        marker: dict[str, Any] = {"size": 11 if mask is on_front else 6}
+        if mask is on_front:
             marker["line"] = {"color": REFERENCE_COLOUR, "width": 2}
-        if thrust:
-            marker |= _colour_scale(goals[part, 2], goals[:, 2], shown=part is front)
+        if has_thrust:
+            marker |= _colour_scale(objectives[mask, 2], objectives[:, 2], shown=mask is on_front)
         else:
-            marker["color"] = MEASURED_COLOUR if part is front else IDEAL_COLOUR
-        if part.any():
-            shown = [titles[k] for k in np.flatnonzero(part)]
+            marker["color"] = MEASURED_COLOUR if mask is on_front else IDEAL_COLOUR
+        if mask.any():
+            selected_titles = [titles[k] for k in np.flatnonzero(mask)]
             traces.append(
                 line(
-                    *(name, goals[part, 1], goals[part, 0], MEASURED_COLOUR),
+                    *(name, objectives[mask, 1], objectives[mask, 0], MEASURED_COLOUR),
                     mode="markers",
-                    text=shown,
+                    text=selected_titles,
                     hovertemplate="%{text}<br>%{y:.3g}, %{x:.3g}<extra></extra>",
                     marker=marker,
                 )
             )
-    criteria = "error, rate use and thrust use" if thrust else "error and rate use"
+    criteria = "error, rate use and thrust use" if has_thrust else "error and rate use"
     note = (
         "Each point is one choice of the program's own keys: the medians over all other factors, "
         "and the success rate. If no choice was flown twice, or there are very many, each point is "
@@ -178,17 +180,17 @@ def distributions(results: Results) -> Iterator[Plot]:
         values = results.columns[name]
         is_finite = np.isfinite(values)
         low = float(values[is_finite].min())
-        high = float(np.quantile(values[is_finite], _SHOWN_SHARE))
+        high = float(np.quantile(values[is_finite], _SHOWN_QUANTILE))
         if high <= low:
             continue
         edges = np.linspace(low, high, _BIN_COUNT + 1)
         traces = []
-        for good, title, colour in (
+        for is_good, title, colour in (
             (True, "good", MEASURED_COLOUR),
             (False, "not good", REFERENCE_COLOUR),
         ):
-            selected = values[is_finite & (results.good == good)]
-            counts, _ = np.histogram(np.clip(selected, low, high), edges)
+            selected_values = values[is_finite & (results.good == is_good)]
+            counts, _ = np.histogram(np.clip(selected_values, low, high), edges)
             traces.append(
                 {
                     "type": "bar",

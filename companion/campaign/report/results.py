@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.campaign import store
-from companion.campaign.campaign_file import NOUNS
+from companion.campaign.campaign_file import CASE_NOUNS
 from companion.campaign.folder import read_description
 from companion.campaign.outcomes import OUTCOME_LABELS
 from companion.config.units import unit_of
@@ -114,7 +114,7 @@ class Results:
     @property
     def noun(self) -> str:
         """Plural noun for the cases, such as `flights`."""
-        return NOUNS[self.kind]
+        return CASE_NOUNS[self.kind]
 
     @property
     def error_outcome(self) -> str:

@@ -73,6 +73,8 @@ def _as_numbers(column: Column, values: Floats) -> Floats:
     """
     if column.dtype == float:
         return np.where(np.isfinite(column), column, np.nanmin(column, initial=0.0) - 1.0)
-    words = np.array([str(value) for value in column])
-    ordered = sorted(set(words), key=lambda word: float(values[words == word].mean()))
-    return np.array([float(ordered.index(word)) for word in words])
+    value_texts = np.array([str(value) for value in column])
+    ordered_texts = sorted(
+        set(value_texts), key=lambda text: float(values[value_texts == text].mean())
+    )
+    return np.array([float(ordered_texts.index(text)) for text in value_texts])

@@ -16,7 +16,7 @@ _RANGE_COUNT = 5
 """Number of ranges that divide a factor with more than `_MOST_LEVELS` different values."""
 _MOST_GROUPS = 300
 """Largest number of groups of equal values; with more, `choice_groups` returns single cases."""
-_UNCHOSEN_PREFIXES = ("mock.", "fault", "flight.", "vehicle.")
+_NOT_CHOSEN_PREFIXES = ("mock.", "fault", "flight.", "vehicle.")
 """Prefixes of the factors that a user does not choose."""
 
 
@@ -75,14 +75,18 @@ def levels(column: Column) -> list[Group]:
     divided into `_RANGE_COUNT` ranges with about equally many cases, and null is a level of its
     own. Of texts, the first `_MOST_LEVELS` − 1 are levels, and all others form the last level.
     """
-    distinct = sorted({_sort_key(value) for value in column})
-    if column.dtype != float or len(distinct) <= _MOST_LEVELS:
-        shown_keys = distinct if len(distinct) <= _MOST_LEVELS else distinct[: _MOST_LEVELS - 1]
+    distinct_keys = sorted({_sort_key(value) for value in column})
+    if column.dtype != float or len(distinct_keys) <= _MOST_LEVELS:
+        shown_keys = (
+            distinct_keys
+            if len(distinct_keys) <= _MOST_LEVELS
+            else distinct_keys[: _MOST_LEVELS - 1]
+        )
         keys = [_sort_key(value) for value in column]
         groups = [
             Group(key[1], np.array([key == value_key for value_key in keys])) for key in shown_keys
         ]
-        other_count = len(distinct) - len(shown_keys)
+        other_count = len(distinct_keys) - len(shown_keys)
         if other_count:
             groups.append(
                 Group(f"{other_count} others", np.array([key not in shown_keys for key in keys]))
@@ -134,28 +138,28 @@ def worst_rows(results: Results, count: int) -> list[int]:
     return sorted(range(results.count), key=rank)[:count]
 
 
-def pareto_front(goals: Floats) -> NDArray[np.bool_]:
+def pareto_front(objectives: Floats) -> NDArray[np.bool_]:
     """(n,): which of the (n, goals) points are Pareto-optimal; smaller is better in every goal."""
-    front = np.ones(len(goals), dtype=bool)
-    for number, point in enumerate(goals):
-        as_good = np.all(goals <= point, axis=1)
-        better = np.any(goals < point, axis=1)
-        front[number] = not np.any(as_good & better)
-    return front
+    is_optimal = np.ones(len(objectives), dtype=bool)
+    for number, point in enumerate(objectives):
+        at_least_as_good = np.all(objectives <= point, axis=1)
+        better_in_one = np.any(objectives < point, axis=1)
+        is_optimal[number] = not np.any(at_least_as_good & better_in_one)
+    return is_optimal
 
 
 def choice_groups(results: Results) -> list[Group]:
     """The cases grouped by equal values of the swept keys that a user chooses.
 
-    The user chooses the keys outside `_UNCHOSEN_PREFIXES`. If no two cases have equal values, or
+    The user chooses the keys outside `_NOT_CHOSEN_PREFIXES`. If no two cases have equal values, or
     there are more than `_MOST_GROUPS` groups, each group is a single case. If there are many cases,
     only every k-th is returned, so that there are fewer than 2·`_MOST_GROUPS`.
     """
-    chosen_keys = [name for name in results.factors if not name.startswith(_UNCHOSEN_PREFIXES)]
+    chosen_keys = [name for name in results.factors if not name.startswith(_NOT_CHOSEN_PREFIXES)]
     rows = range(results.count)
     keys = [tuple(_sort_key(results.columns[name][row]) for name in chosen_keys) for row in rows]
-    distinct = sorted(set(keys))
-    if len(distinct) > _MOST_GROUPS or len(distinct) == len(keys):
+    distinct_keys = sorted(set(keys))
+    if len(distinct_keys) > _MOST_GROUPS or len(distinct_keys) == len(keys):
         stride = max(1, len(keys) // _MOST_GROUPS)
         return [
             Group(f"case {results.columns['case'][row]}", np.arange(results.count) == row)
@@ -167,11 +171,11 @@ def choice_groups(results: Results) -> list[Group]:
             or "all cases",
             np.array([key == row_key for row_key in keys]),
         )
-        for key in distinct
+        for key in distinct_keys
     ]
 
 
 def median(values: Floats) -> float:
     """The median of the finite values; NaN if there are none."""
-    finite = values[np.isfinite(values)]
-    return float(np.median(finite)) if len(finite) else np.nan
+    finite_values = values[np.isfinite(values)]
+    return float(np.median(finite_values)) if len(finite_values) else np.nan

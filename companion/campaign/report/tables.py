@@ -20,7 +20,7 @@ from companion.report.tables import Table
 from companion.testing.settings import complete_mock
 
 EMPTY = "–"
-_WORST_SHOWN = 10  # cases in the table of worst cases
+_MOST_WORST_CASES = 10  # cases in the table of worst cases
 _MOST_ROWS = 200  # of the table of all cases
 _MOST_FACTORS = 12  # in the table of success by factor
 _MOST_LEVELS = 12
@@ -30,17 +30,23 @@ _MOST_LEVELS = 12
 def worst_cases(results: Results) -> Table:
     """The worst cases, each with the command that flies it again with full recording."""
     columns = results.columns
-    shown = [name for name in ("result", "failed_checks") if name in columns]
+    text_columns = [name for name in ("result", "failed_checks") if name in columns]
     rows = [
         (
             str(columns["case"][row]),
             _rerun_command(results, int(columns["case"][row])),
-            *(_cell(columns[name][row]) for name in (results.error_outcome, *shown)),
+            *(_cell(columns[name][row]) for name in (results.error_outcome, *text_columns)),
             ", ".join(f"{name} = {_cell(columns[name][row])}" for name in results.factors),
         )
-        for row in worst_rows(results, _WORST_SHOWN)
+        for row in worst_rows(results, _MOST_WORST_CASES)
     ]
-    header = ("case", "fly it again, recorded", label(results.error_outcome), *shown, "factors")
+    header = (
+        "case",
+        "fly it again, recorded",
+        label(results.error_outcome),
+        *text_columns,
+        "factors",
+    )
     return Table("Worst cases", tuple(title.replace("_", " ") for title in header), rows)
 
 
@@ -73,9 +79,9 @@ def configuration(campaign: Campaign) -> Table:
     return Table(title, header, [row for row in rows if row[0] not in swept_keys])
 
 
-def success_by_factor(results: Results, order: Sequence[str]) -> Table:
+def success_by_factor(results: Results, factor_order: Sequence[str]) -> Table:
     """Success rate, median error and median body rate by level of the most influential factors."""
-    rows = [row for name in order[:_MOST_FACTORS] for row in _level_rows(results, name)]
+    rows = [row for name in factor_order[:_MOST_FACTORS] for row in _level_rows(results, name)]
     return Table("Success by factor", tuple(rows[0]), [tuple(row.values()) for row in rows])
 
 
@@ -95,21 +101,23 @@ def _level_rows(results: Results, name: str) -> Iterator[dict[str, str]]:
 
 
 def _median_text(values: Floats) -> str:
-    middle = median(values)
-    return f"{middle:.3g}" if isfinite(middle) else EMPTY
+    median_value = median(values)
+    return f"{median_value:.3g}" if isfinite(median_value) else EMPTY
 
 
 def sensitivity(influences: dict[str, list[Influence]]) -> Table:
     """The first-order Sobol indices of each outcome, with their intervals."""
     factors = dict.fromkeys(
-        influence.factor for found in influences.values() for influence in found
+        influence.factor
+        for factor_influences in influences.values()
+        for influence in factor_influences
     )
     index_texts = {
         outcome: {
             influence.factor: f"{influence.sobol_index:.0%} ± {influence.confidence:.0%}"
-            for influence in found
+            for influence in factor_influences
         }
-        for outcome, found in influences.items()
+        for outcome, factor_influences in influences.items()
     }
     rows = [
         (factor, *(index_texts[outcome].get(factor, EMPTY) for outcome in influences))
@@ -133,30 +141,35 @@ def two_factors(results: Results) -> Table | None:
     ]
     if len(factors_with_few_values) < 2:
         return None
-    first, second = factors_with_few_values[0], factors_with_few_values[1]
-    second_levels = levels(columns[second])
+    first_factor, second_factor = factors_with_few_values[0], factors_with_few_values[1]
+    second_levels = levels(columns[second_factor])
     rows = []
-    for level in levels(columns[first]):
+    for level in levels(columns[first_factor]):
         cells = []
-        for other in second_levels:
-            in_both = level.cases & other.cases
-            good = share_of(results.good[in_both]).share
-            cells.append(f"{_median_text(columns[results.error_outcome][in_both])} ({good:.0%})")
+        for second_level in second_levels:
+            in_both_levels = level.cases & second_level.cases
+            good_share = share_of(results.good[in_both_levels]).share
+            median_error = _median_text(columns[results.error_outcome][in_both_levels])
+            cells.append(f"{median_error} ({good_share:.0%})")
         rows.append((level.name, *cells))
     error = label(results.error_outcome)
-    title = f"Median {error} and share of good {results.noun}: {first} × {second}"
-    return Table(title, (first, *(level.name for level in second_levels)), rows)
+    title = f"Median {error} and share of good {results.noun}: {first_factor} × {second_factor}"
+    return Table(title, (first_factor, *(level.name for level in second_levels)), rows)
 
 
 def all_cases(results: Results) -> Table:
     """All cases; if there are more than `_MOST_ROWS`, evenly spaced cases."""
-    shown = [name for name in results.columns if name not in ("seed", "digest")]
+    shown_columns = [name for name in results.columns if name not in ("seed", "digest")]
     count = results.count
     shown_rows = even_indices(count, _MOST_ROWS)
-    rows = [tuple(_cell(results.columns[name][row]) for name in shown) for row in shown_rows]
-    part = "" if len(shown_rows) == count else f", {len(shown_rows)} of {count}"
+    rows = [
+        tuple(_cell(results.columns[name][row]) for name in shown_columns) for row in shown_rows
+    ]
+    count_note = "" if len(shown_rows) == count else f", {len(shown_rows)} of {count}"
     return Table(
-        f"Cases{part} (all of them are in results.csv and results.parquet)", tuple(shown), rows
+        f"Cases{count_note} (all of them are in results.csv and results.parquet)",
+        tuple(shown_columns),
+        rows,
     )
 
 

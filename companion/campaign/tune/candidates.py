@@ -165,11 +165,11 @@ def _present_values(config: Config, keys: Collection[str]) -> dict[str, Any]:
         "guidance.quadratic_drag_per_m": drag.quadratic,
         "thrust.lag_ms": 1e3 * config.thrust.lag,
     }
-    configured = configured_values(config, keys)
+    configured_by_key = configured_values(config, keys)
     return {
         key: value
         for key in keys
-        if (value := configured.get(key, derived_values.get(key))) is not None
+        if (value := configured_by_key.get(key, derived_values.get(key))) is not None
     }
 
 
@@ -194,6 +194,10 @@ def clamped_to_search(values: Values, search: Mapping[str, SweptValues]) -> dict
         swept = search.get(key)
         if swept is None or (swept.choice is not None and value not in swept.choice):
             continue
-        pair = swept.uniform or swept.loguniform
-        clamped_values[key] = value if pair is None else min(max(float(value), pair[0]), pair[1])
+        search_range = swept.uniform or swept.loguniform
+        clamped_values[key] = (
+            value
+            if search_range is None
+            else min(max(float(value), search_range[0]), search_range[1])
+        )
     return clamped_values

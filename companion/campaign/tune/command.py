@@ -77,13 +77,13 @@ def run(options: argparse.Namespace) -> int:
                 results = _run_search(search, options.trials or tune.trials, console)
                 return _check_and_write(campaign, tune, search_folder, fly, results, console)
         except (KeyboardInterrupt, ClusterError, StorageError) as error:
-            why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
+            reason = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
             command = program_command(
                 *("campaign", "tune", options.file, "--out", search_folder),
                 *(("--trials", str(options.trials)) if options.trials else ()),
                 *(("--scheduler", options.scheduler) if options.scheduler else ()),
             )
-            console.print(f"{why}; the candidates so far are kept. Continue with\n  {command}")
+            console.print(f"{reason}; the candidates so far are kept. Continue with\n  {command}")
             return FAILED
 
 
@@ -112,13 +112,13 @@ def _run_search(search: Search, trials: int, console: Console) -> SearchResults:
     `trials` includes the candidates of earlier runs.
     """
     results = SearchResults()
-    best_so_far = TextColumn("{task.description}")
+    best_column = TextColumn("{task.description}")
     try:
-        with progress_bar(console, TextColumn("candidates"), best_so_far) as bar:
+        with progress_bar(console, TextColumn("candidates"), best_column) as bar:
             task = bar.add_task("", total=trials)
             for results in search.run(trials):
-                best = "" if results.best is None else f"best {results.best.score.rms:.3f} m"
-                bar.update(task, completed=results.tried_count, description=best)
+                best_text = "" if results.best is None else f"best {results.best.score.rms:.3f} m"
+                bar.update(task, completed=results.tried_count, description=best_text)
     except (StorageError, OSError):
         if results.best is not None:
             console.print(best_so_far_text(results.best), end="")

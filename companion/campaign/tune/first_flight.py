@@ -52,13 +52,15 @@ def _with_rate_response(config: Config, case: Case, *, second_order: bool) -> Co
         folder, fragment = Path(parent_folder) / "flight", Path(parent_folder) / "vehicle.yaml"
         CaseFlight(replace(case, config=doublets, fault=None), Path(parent_folder)).fly(folder)
         try:
-            rows = read_flight_log(folder / TLOG_FILE)
-            vehicle = identify_vehicle(rows.setpoints, rows.rates, rows.specific_thrust)
+            log_data = read_flight_log(folder / TLOG_FILE)
+            vehicle = identify_vehicle(log_data.setpoints, log_data.rates, log_data.specific_thrust)
             axes = config.vehicle.axes
-            text = vehicle_fragment(vehicle, GRAVITY, axes, allow_second_order=second_order)
-            fragment.write_text(text, encoding="utf-8")
-            identified = load(fragment).model_dump(exclude_unset=True, include={"vehicle"})
-            return changed(config, identified, "the identified vehicle")
+            fragment_text = vehicle_fragment(
+                vehicle, GRAVITY, axes, allow_second_order=second_order
+            )
+            fragment.write_text(fragment_text, encoding="utf-8")
+            identified_keys = load(fragment).model_dump(exclude_unset=True, include={"vehicle"})
+            return changed(config, identified_keys, "the identified vehicle")
         except (LogError, BadFitError, ConfigError):
             return config
 

@@ -40,13 +40,16 @@ class Score(NamedTuple):
         """Share of the cases inside the envelope."""
         return sum(self.is_inside) / len(self.is_inside)
 
-    def first(self, count: int) -> "Score":
+    def first_cases(self, count: int) -> "Score":
         """The score on the first `count` cases alone."""
         return Score._make(values[:count] for values in self)
 
-    def combined_with(self, rest: "Score") -> "Score":
-        """The score on the cases of this score and of `rest` together."""
-        return Score._make(ours + theirs for ours, theirs in zip(self, rest, strict=True))
+    def combined_with(self, other_score: "Score") -> "Score":
+        """The score on the cases of this score and of `other_score` together."""
+        return Score._make(
+            own_values + other_values
+            for own_values, other_values in zip(self, other_score, strict=True)
+        )
 
 
 @dataclass(frozen=True)

@@ -149,11 +149,14 @@ class Search:
             for trial in complete_trials
             if trial.user_attrs[_VIOLATION_KEY] <= 0.0
         ]
-        good = sorted(candidates, key=lambda candidate: candidate.score.rms)
+        candidates_by_rms = sorted(candidates, key=lambda candidate: candidate.score.rms)
         tried_count = len(self._ended_trials())
-        near_best = good[: max(3, len(good) // 10)]
+        near_best = candidates_by_rms[: max(3, len(candidates_by_rms) // 10)]
         return SearchResults(
-            tried_count, tried_count - len(complete_trials), good[0] if good else None, near_best
+            tried_count,
+            tried_count - len(complete_trials),
+            candidates_by_rms[0] if candidates_by_rms else None,
+            near_best,
         )
 
     @property
@@ -161,9 +164,9 @@ class Search:
         """Number of candidates tried near the last start candidate before Optuna suggests any."""
         return max(_FEWEST_NEIGHBOURS, len(self._tune.search))
 
-    def _sampler(self, number: int) -> Any:
+    def _sampler(self, tried_count: int) -> Any:
         return self._optuna.samplers.TPESampler(
-            seed=self._campaign.file.seed + number,
+            seed=self._campaign.file.seed + tried_count,
             multivariate=True,
             n_startup_trials=_MOST_STARTS + self._neighbour_count,
         )
@@ -171,9 +174,9 @@ class Search:
     def _enqueue_starts(self) -> None:
         """Enqueue the start candidates of a new search, and candidates near the last of them."""
         config, search = learned_config(self._campaign), self._tune.search
-        initial = list(start_candidates(self._campaign, self._tune, config))
+        start_list = list(start_candidates(self._campaign, self._tune, config))
         count, seed = self._neighbour_count, self._campaign.file.seed
-        for start in (*initial, *candidates_near(initial[-1], search, count, seed)):
+        for start in (*start_list, *candidates_near(start_list[-1], search, count, seed)):
             self._study.enqueue_trial(dict(start.values), user_attrs={"start": start.name})
 
     def _interrupted_trial(self) -> "Trial | None":
@@ -234,7 +237,7 @@ class Search:
         best = self.results().best
         return (
             best is not None
-            and score.rms > _HOPELESS_FACTOR * best.score.first(len(score.true_errors)).rms
+            and score.rms > _HOPELESS_FACTOR * best.score.first_cases(len(score.true_errors)).rms
         )
 
 

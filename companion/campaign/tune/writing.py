@@ -11,7 +11,7 @@ from companion.campaign.tune.certainty import Comparison
 from companion.campaign.tune.scores import Candidate, Score, SearchResults
 from companion.files import bounded_yaml
 
-_EDGE_SHARE = 0.02
+_RANGE_END_SHARE = 0.02
 """A value nearer to an end of its range than this share of the range counts as at the end."""
 
 
@@ -36,13 +36,15 @@ def summary_lines(result: CheckedResult) -> list[str]:
     results, best, tune = result.results, result.best, result.campaign.file.tune
     assert tune is not None
     cases = len(best.score.true_errors)
-    bound = "reach their end" if tune.envelope_m is None else f"stay within {tune.envelope_m:g} m"
+    constraint = (
+        "reach their end" if tune.envelope_m is None else f"stay within {tune.envelope_m:g} m"
+    )
     lines = [
         f"{results.tried_count} candidates over {cases} flights each,"
         f" {results.stopped_early_count} of them refused or stopped early; candidate"
         f" {best.number} is the best.",
-        f"Constraint: at least {tune.inside_share:.1%} of the flights must {bound}; in the search "
-        f"{best.score.inside_share:.1%} did.",
+        f"Constraint: at least {tune.inside_share:.1%} of the flights must {constraint}; in the "
+        f"search {best.score.inside_share:.1%} did.",
         f"RMS of the true horizontal error in the search: {best.score.rms:.3f} m.",
     ]
     return [*lines, *_certainty_lines(result)]
@@ -122,32 +124,34 @@ def _values_lines(values: Values, reasons: Mapping[str, str]) -> Iterator[str]:
     """Values of dotted keys as lines of YAML, each after a comment with its reason, if any."""
     sections: dict[str, list[str]] = {}
     for key, value in values.items():
-        section, _, short = key.partition(".")
+        section, _, name = key.partition(".")
         lines = sections.setdefault(section, [])
         if key in reasons:
             lines.append(f"  # {reasons[key]}")
-        lines.append(f"  {short}: {bounded_yaml.dump_value(value)}")
+        lines.append(f"  {name}: {bounded_yaml.dump_value(value)}")
     for section, lines in sections.items():
         yield from ("", f"{section}:", *lines)
 
 
-def _reason(key: str, swept: SweptValues, result: CheckedResult, before: Any) -> str:
-    """Text about a key: the value `before` the search (None: unset), and the best values found."""
-    before_text = "not set before" if before is None else f"before {_value_text(before)}"
+def _reason(key: str, swept: SweptValues, result: CheckedResult, value_before: Any) -> str:
+    """Text about a key: its value before the search (None: unset), and the best values found."""
+    before_text = (
+        "not set before" if value_before is None else f"before {_value_text(value_before)}"
+    )
     near_values = [
         candidate.values[key] for candidate in result.results.near_best if key in candidate.values
     ]
-    pair = swept.uniform or swept.loguniform
-    if pair is None:
+    search_range = swept.uniform or swept.loguniform
+    if search_range is None:
         same_count = sum(value == result.best.values[key] for value in near_values)
         return (
             f"{before_text}; {same_count} of the best {len(near_values)} candidates have this value"
         )
-    low, high = pair
+    low, high = search_range
     text = f"{before_text}; the best {len(near_values)} candidates have {min(near_values):.3g}"
     text += f" to {max(near_values):.3g}, searched from {low:g} to {high:g}"
     value = float(result.best.values[key])
-    if min(value - low, high - value) < _EDGE_SHARE * (high - low):
+    if min(value - low, high - value) < _RANGE_END_SHARE * (high - low):
         return f"{text}; this value lies at an end of the searched range: widen the range"
     is_wide = max(near_values) - min(near_values) > 0.5 * (high - low)
     return f"{text}; this key matters little here" if is_wide else text

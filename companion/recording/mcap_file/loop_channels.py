@@ -25,7 +25,7 @@ UNANSWERED_CODES = (
     "invalid_rates",
 )
 """Names of the codes in the column "unanswered"; from "another_vehicle" on, the values of
-`Unanswered`."""
+`UnansweredReason`."""
 ACTION_NAMES = (
     "stand_by",
     "hold_here",
