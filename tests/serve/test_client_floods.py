@@ -186,7 +186,7 @@ def test_of_a_client_with_thousands_of_addresses_only_some_are_learned():
     for number in range(5000):
         sender = Frame(0, 2 + number % 200, number // 200, 0, b"", number.to_bytes(4), signed=False)
         routing.forward_from_client(client, sender)
-    assert len(routing._heard[client]) == _MAX_ADDRESSES
+    assert len(routing._heard_addresses[client]) == _MAX_ADDRESSES
 
 
 def test_more_programs_than_are_remembered_do_not_end_control_for_ever():

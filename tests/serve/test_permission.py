@@ -23,7 +23,7 @@ def packed(message, *, signed=False):
     mav = dialect.MAVLink(None, 255, 190)
     if signed:
         mav.signing.secret_key, mav.signing.sign_outgoing = KEY, True
-        mav.signing.timestamp = Signing(KEY)._judge.date()
+        mav.signing.timestamp = Signing(KEY)._stamp_checker.program_date()
     return FrameScanner().feed(message.pack(mav))[0]
 
 
