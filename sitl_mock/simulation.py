@@ -100,7 +100,7 @@ class Simulation:
 
     @property
     def next_us(self) -> int:
-        """Vehicle time of the next slot, us, rounded down to a whole ms."""
+        """Vehicle time after the next simulation step, us, rounded down to a whole ms."""
         next_us = (self._slot_count + 1) * self._slot_us
         return next_us - next_us % 1000
 
@@ -145,7 +145,7 @@ class Simulation:
         self._send_due_messages(0)
 
     def beacon(self) -> bytes:
-        """Return the lockstep beacon of the present time, unsigned; faults do not affect it."""
+        """Return the SYSTEM_TIME frame that tells the present time in lockstep, free of faults."""
         payload = _SYSTEM_TIME.unpacker.pack(0, self.state.time_us // 1000)
         return self._beacon_framer.frame_raw(_SYSTEM_TIME.id, _SYSTEM_TIME.crc_extra, payload)
 

@@ -45,7 +45,7 @@ def on_ctrl_c(loop: FlightLoop, interrupt: Callable[[str], object]) -> Iterator[
 
 
 class _Handler:
-    """Handler of SIGINT during one flight, above the handler before it.
+    """Handler of SIGINT during one flight; it also calls the handler installed before.
 
     Attributes:
         ended: whether the flight has ended.

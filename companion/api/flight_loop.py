@@ -189,7 +189,7 @@ async def call_in_thread(function: Callable[[*Arguments], T], *arguments: *Argum
 
 
 def _vehicle_waits() -> bool:
-    """Whether the vehicle's time waits for the running loop.
+    """Whether the vehicle's time stands still while the event loop works, as in lockstep.
 
     If it waits, a thread would only make the order of events random.
     """

@@ -89,8 +89,8 @@ class Vehicle:
         `flight.takeoff_height_m` or higher. The wait is limited by `flight.arming_timeout_s`.
 
         Raises:
-            FlightEnded: the flight has ended early, or the vehicle is under the program's control;
-                it flies on.
+            FlightEnded: the flight has ended early, or the program controls the vehicle already
+                (the vehicle then flies on).
         """
         self._flight.program.require_flight()
         if self._flight.context.loop.offboard_active:

@@ -42,7 +42,7 @@ class Limits:
                 f"shape of the rate limit must be 'tight' or 'paper', not {self.shape!r}"
             )
         if self.shape == "paper" and self.max_tilt_rate is not None and self.max_tilt is None:
-            raise ValueError("shape 'paper' needs max_tilt to limit the tilt rate (equation 33)")
+            raise ValueError("the rate limit's shape 'paper' needs max_tilt (equation 33)")
 
     @property
     def tilt_rate(self) -> float:

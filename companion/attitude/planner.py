@@ -140,9 +140,9 @@ def make_planner(
             the response of the rate loop (`AxisResponse`): `lag` and `dead_time`, s (0.0 for an
             immediate one). Optional are `damping` (default None: first order), `acceleration`,
             rad/s² (default None: no limit), and `RateLoopResponse.frame_lead`, s. With the prefix
-            `pitch_` or `yaw_` the four values of a response can be given for that axis (default
-            None: the value of roll). There is no `yaw_damping`. If `pitch_lag` is given without
-            `pitch_damping`, pitch is of first order.
+            `pitch_` or `yaw_`, `lag`, `dead_time`, `damping` and `acceleration` can be given for
+            that axis (default None: the value of roll); there is no `yaw_damping`. If `pitch_lag`
+            is given without `pitch_damping`, pitch is of first order.
 
     Raises:
         TypeError: the planner does not take an option, the law does not return three numbers, or

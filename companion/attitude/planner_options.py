@@ -12,7 +12,7 @@ from companion.attitude.rate_response import AxisResponse, RateLoopResponse
 def constants_of(
     name: str, gain: float, yaw_gain: float, limits: Limits, options: Mapping[str, Any]
 ) -> Constants:
-    """The constants of the planner `name`; the only option here is `recovery_angle`.
+    """The constants of the planner `name`, whose only option is `recovery_angle`.
 
     Raises:
         TypeError: there is an option that the planner `name` does not take.

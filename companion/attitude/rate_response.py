@@ -73,7 +73,7 @@ class RateLoopResponse:
 
     @property
     def lead_time(self) -> float:
-        """`frame_lead`, or an estimate if that is None, s.
+        """How far the attitude target leads the body in yaw: `frame_lead` or an estimate, s.
 
         An autopilot with a slew limit in yaw is assumed to behave like ArduPilot: its attitude
         target turns as soon as roll and pitch begin to respond, and the body follows after the dead

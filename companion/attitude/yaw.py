@@ -1,4 +1,4 @@
-"""Yaw in `model-following`: planned heading, predicted yaw of the body, ArduPilot's target axes."""
+"""Yaw in `model-following`: the planned heading, and the yaw of the body and ArduPilot's target."""
 
 from math import inf, radians
 
@@ -172,7 +172,7 @@ class TargetFrame:
         return self._heading_offset + self._target_turns[-1]
 
     def _turn_until(self, time: float) -> float:
-        """Turn of the attitude target by the rates sent until `time`, rad; linear interpolation."""
+        """Angle, rad, by which rates sent before `time` turn the attitude target; interpolated."""
         times, turns = self._times, self._target_turns
         if time < times[0]:
             return turns[0]

@@ -161,9 +161,9 @@ def _checked_arguments(
     """Check the arguments; return planner, normalised attitudes, limited targets and loops."""
     if not isinstance(planner, LawPlanner):
         raise TypeError(
-            f"a batch maps planners without memory ({', '.join(LAW_NAMES)}, or a law of your own, "
-            f"each made by make_planner), not {type(planner).__name__}; make one planner for each "
-            "vehicle, and call its rates() for each sample"
+            f"a batch cannot use {type(planner).__name__}, only a planner without memory, made by "
+            f"make_planner ({', '.join(LAW_NAMES)}, or a law of your own); make one planner for "
+            "each vehicle, and call its rates() for each sample"
         )
     q, targets = as_float_array(q, "q"), as_float_array(targets, "targets")
     if q.shape != targets.shape:

@@ -89,7 +89,7 @@ def _compiled_rotation(any_angle: bool) -> _RotateAll:
 
 @cache
 def plain_loops(law: Law) -> Loops:
-    """Loops that call `law` for one vehicle after the other, on floats as in flight."""
+    """Loops that call `law` for one vehicle after the other with Python floats, uncompiled."""
     vehicle_law: Any = law
     rotate: Any = rotation.after_constant_rates
 

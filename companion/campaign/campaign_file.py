@@ -119,7 +119,7 @@ class Tune(Section):
             if not (swept.uniform or swept.loguniform or swept.choice):
                 raise ValueError(f"{key}: give uniform, loguniform or choice")
             if swept.times_base or swept.keys:
-                raise ValueError(f"{key}: times_base and keys work only in `sweep`")
+                raise ValueError(f"{key}: `times_base` and `keys` are allowed only in `sweep`")
             if key.startswith("mock."):
                 raise ValueError(
                     f"{key}: keys of the mock vehicle cannot be searched; name keys of the program"

@@ -38,7 +38,9 @@ def rerun(campaign_folder: Path, index: int) -> Rerun:
     description = folder.read_description(campaign_folder)
     campaign = load(campaign_folder / folder.CAMPAIGN_FILE_NAME)
     if campaign.file.kind != "flights":
-        raise ConfigError(f"{campaign_folder}: a batch has no flights to record")
+        raise ConfigError(
+            f"{campaign_folder}: a campaign of the kind `batch` has no flights to record"
+        )
     if not 0 <= index < description.cases:
         raise ConfigError(
             f"{campaign_folder}: its cases are 0 to {description.cases - 1}, not {index}"

@@ -93,7 +93,9 @@ class SweptValues(Section):
         if self.within is not None and self.normal is None:
             raise ValueError("`within` needs `normal`")
         if self.times_base and not self.is_number:
-            raise ValueError("`times_base` needs numbers")
+            raise ValueError(
+                "`times_base` multiplies the base value, so the values must be numbers"
+            )
         return self
 
     @property

@@ -144,7 +144,7 @@ class ControlLoop:
             self.release()
 
     def _after_gap(self, now: float) -> bool:
-        """Whether setpoints wait for `resume` after a gap; at a new gap, ask for the mode."""
+        """Whether nothing is sent until `resume`; at a new gap in telemetry, request the mode."""
         if not (self.offboard_active or self.taking_over):
             return False
         gap = now - self.record.gap_start

@@ -170,7 +170,7 @@ class GuidanceLoop:
         self._ticker.trigger()
 
     def motion_now(self) -> VehicleMotion:
-        """The estimated motion now, in the frame without estimator resets.
+        """The estimated motion now, in the frame that the estimator's resets do not move.
 
         Raises:
             RuntimeError: no position has come yet.
@@ -178,7 +178,7 @@ class GuidanceLoop:
         return self.command_maker.guidance_input(self._clock()).now
 
     def attitude(self) -> Quaternion:
-        """The newest attitude, in the frame without estimator resets."""
+        """The newest attitude, in the frame that the estimator's resets do not move."""
         return self._loop.resets.frame.attitude(self._q)
 
     def step(self) -> None:

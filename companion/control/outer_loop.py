@@ -92,8 +92,8 @@ def _require_command(kind: str, guidance: Guidance, thrust_limits: tuple[float, 
         ) from error
     if not is_finite:
         raise ConfigError(
-            f"guidance.kind: {kind} cannot be flown: at rest its command must be finite, and it is "
-            f"{command} with acts_after {guidance.acts_after} s"
+            f"guidance.kind: {kind} cannot be flown: for a vehicle at rest its command and "
+            f"`acts_after` must be finite, but they are {command} and {guidance.acts_after} s"
         )
 
 

@@ -56,7 +56,7 @@ class FlightFiles:
         flies_maneuvers: bool,
     ) -> None:
         self._config, self.folder, self._note = config, folder, note
-        self._counts_before: dict[str, int] = {}
+        self._link_counters_at_start: dict[str, int] = {}
         self._ended_at = 0.0
         self._failure_reported = self._is_open = False
         self.tap: TlogWriter | None = None
@@ -133,7 +133,7 @@ class FlightFiles:
 
     def begin_counting(self, stats: LinkStats) -> None:
         """Count only frames after this call, because the link may have been open before."""
-        self._counts_before = _counters(stats)
+        self._link_counters_at_start = _counters(stats)
 
     def summary(
         self,
@@ -163,7 +163,7 @@ class FlightFiles:
             gain=self._config.planner.gain_per_s,
             counts=loop_counts(assembled.context),
             link={
-                name: value - self._counts_before.get(name, 0)
+                name: value - self._link_counters_at_start.get(name, 0)
                 for name, value in _counters(assembled.context.link.stats).items()
             },
             trace=trace,

@@ -131,9 +131,9 @@ class _LandingTimeLimit:
         if not self._extension_noted:
             self._extension_noted = True
             context.note(
-                f"the vehicle has not begun to land for {timeout:g} s, and would drift without "
-                "setpoints, so the program holds it and asks it to land; switch its mode by "
-                "transmitter"
+                f"the vehicle has not begun to land within {timeout:g} s. Without setpoints it "
+                "would drift, so the program keeps it in place and goes on asking it to land; "
+                "switch its mode by transmitter"
             )
 
 

@@ -172,7 +172,7 @@ async def _wait_until_held(context: FlightContext) -> None:
     except TimeoutError:
         raise FlightEnded(
             f"not taken over: waited {_BRAKING_TIME:g} s for {context.waiting_for}; fly in less "
-            "wind, check the compass if it flew in circles, or take over a vehicle that hovers"
+            "wind, check the compass if the vehicle circled, or take over a vehicle that hovers"
         ) from None
 
 

@@ -28,9 +28,13 @@ class Weights:
 
     def __post_init__(self) -> None:
         if not (isfinite(self.position) and self.position > 0.0):
-            raise ValueError(f"the position's weight must be positive, not {self.position}")
+            raise ValueError(
+                f"the weight of the position error must be positive, not {self.position}"
+            )
         if not (isfinite(self.velocity) and self.velocity >= 0.0):
-            raise ValueError(f"the velocity's weight must not be negative, not {self.velocity}")
+            raise ValueError(
+                f"the weight of the velocity error must be 0 or more, not {self.velocity}"
+            )
 
 
 @dataclass(frozen=True, slots=True)

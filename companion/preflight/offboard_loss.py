@@ -114,10 +114,10 @@ def worst_reach(
 
 
 def _breach(config: Config, offset: Vector, reached: Reach, fence: Fence) -> str | None:
-    """The breach of the fence where the vehicle can be carried, as the end of a sentence, or None.
+    """How the vehicle may breach the fence without setpoints: the end of a sentence, or None.
 
     `offset`: position when the setpoints stop, relative to where control began, m NED. `reached`:
-    how far the vehicle can be carried from there.
+    how far the vehicle can move from there.
     """
     north, east = offset[0] + reached.place[0], offset[1] + reached.place[1]
     distance = hypot(north, east)

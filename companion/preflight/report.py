@@ -43,7 +43,7 @@ def findings_lists(config: Config, findings: Sequence[Finding]) -> RenderableTyp
 
 
 def _entries(findings: Iterable[Finding], accepted: Sequence[str]) -> RenderableType:
-    """One entry for each finding; if it is not safe, remedy and source have their own lines."""
+    """One entry for each finding; unless its result is SAFE, remedy and source follow it."""
     table = Table.grid(padding=(0, 1))
     table.add_column()
     table.add_column()

@@ -32,8 +32,8 @@ def flight_folder(directory: Path) -> Path:
             ) from error
         return folder
     raise ConfigError(
-        f"recording.directory: {base} and 98 more folders of this second exist already; start the "
-        "flight again"
+        f"recording.directory: {base} and 98 more folders with the same time exist already; start "
+        "the flight again"
     )
 
 

@@ -116,7 +116,7 @@ class GuardedCheck:
             self._check_duration = perf_counter() - start_time
 
     def breach_of_fault(self, snapshot: Snapshot, raised: bool) -> str | None:
-        """The fault of the check as a breach."""
+        """A breach if the check itself has failed."""
         return None if self.fault is None else f"{self.fault}; the vehicle is handed back"
 
     def breach_of_time(self, snapshot: Snapshot, raised: bool) -> str | None:

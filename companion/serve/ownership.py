@@ -111,7 +111,7 @@ class Ownership:
         self.owner = None
 
     def state(self, now: float) -> ControlState:
-        """State of the control at the event-loop time `now`, s."""
+        """Whether control is free, live, held or expired at the event-loop time `now`, s."""
         if self.owner is None:
             return ControlState.FREE
         overdue_time = (

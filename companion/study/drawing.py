@@ -80,7 +80,7 @@ def draw_reference(
 
 
 def draw_plane(axes: Axes, curves: Iterable[tuple[Method, str, Floats]], step: Step) -> None:
-    """Draw paths in the plane of the acceleration coefficients, and the straight line of the step.
+    """Draw paths of the coefficients, north over east, and the straight line of the step.
 
     Args:
         axes: the panel.

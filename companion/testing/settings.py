@@ -58,7 +58,8 @@ def _set_nested(section: dict[str, Any], path: list[str], value: Any) -> None:
         if name in section and not isinstance(subsection, dict):
             section_key = ".".join(["mock", *path[: depth + 1]])
             raise ConfigError(
-                f"{section_key} is {subsection!r:.40}, so there is no mock.{'.'.join(path)}"
+                f"mock.{'.'.join(path)} cannot be set: {section_key} is {subsection!r:.40}, "
+                "not a section"
             )
         section = section.setdefault(name, {})
     section[path[-1]] = value

@@ -102,7 +102,7 @@ def _telemetry(log: Path, on_damage: Callable[[str], object] | None) -> tuple[Fl
 
 
 def _integral(time: Floats, thrust_slopes: Floats) -> Floats:
-    """(n, 2), integral of the slopes from their first time to each of the times, s.
+    """Integral of the thrust slopes from their first time to each `time`, (n, 2), s.
 
     `time`: (n,), s. `thrust_slopes`: (m, 3), time (s) and slopes, as from `_telemetry`.
     """

@@ -213,9 +213,9 @@ class VehicleClock:
         return None
 
     def _end_misfits(self, time_boot_ms: int, lateness: float) -> None:
-        """End the misfits with a sample that fits the clock and came `lateness` seconds late.
+        """Forget the misfits: a sample fits the clock again, and came `lateness` seconds late.
 
-        If all misfits repeated the newest stamp that fitted the clock, the clock stood still.
+        If all misfits repeated the newest stamp that fitted, the vehicle's clock stood still.
         """
         if not self._misfits.stamps:
             return

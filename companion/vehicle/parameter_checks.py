@@ -61,7 +61,7 @@ def safe_action(
 
 
 def _problem_unless(is_good: Callable[[float], bool], problem: Problem) -> Check:
-    """A check that finds the same problem in each value that is not good."""
+    """A check that returns `problem` for every value for which `is_good` is false."""
     return lambda value, _values, _settings: None if is_good(value) else problem
 
 

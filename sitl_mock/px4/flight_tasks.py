@@ -75,7 +75,7 @@ class FlightTasks:
         return mode is Mode.LAND or (mode is Mode.RTL and self._descending)
 
     def demand(self) -> PositionDemand:
-        """Return the demand of the present mode."""
+        """Return what the present mode demands of the position controller."""
         mode = self._state.mode
         if mode is Mode.TAKEOFF:
             return self._takeoff()

@@ -94,7 +94,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         return self._sys_status(_SENSORS_PRESENT, _SENSORS_ENABLED, _SENSORS_HEALTHY, 100)
 
     def battery_status(self) -> Message:
-        """Return BATTERY_STATUS, with 0 mAh used and no used energy."""
+        """Return BATTERY_STATUS: 0 mAh consumed, the consumed energy not provided (-1)."""
         return self._battery_status(
             dialect.MAV_BATTERY_FUNCTION_ALL, dialect.MAV_BATTERY_TYPE_LIPO, 0, -1
         )

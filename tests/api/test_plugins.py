@@ -318,7 +318,10 @@ def test_a_plug_in_that_cannot_be_loaded_is_one_sentence():
         ("guidance: {kind: number}", "guidance.kind: number cannot be made: TypeError"),
         ("guidance: {kind: half}", "half cannot be flown: AttributeError.*linear.Guidance"),
         ("guidance: {kind: empty}", "empty cannot be flown: TypeError.*NoneType.*linear.Guidance"),
-        ("guidance: {kind: nowhere}", "nowhere .*: at rest its command must be finite.*down=nan"),
+        (
+            "guidance: {kind: nowhere}",
+            "nowhere .*its command and `acts_after` must be finite.*down=nan",
+        ),
     ],
 )
 def test_what_cannot_fly_is_found_before_the_vehicle_is_asked(text, why, tmp_path, capsys):

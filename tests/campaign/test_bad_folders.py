@@ -227,7 +227,7 @@ def test_a_batch_has_no_flight_to_repeat(tmp_path):
     campaign = load(tmp_path, kind="batch", set=steps, sweep=TILT)
     out = tmp_path / "out"
     folder.make(out, campaign, folder.describe(campaign, 1, None))
-    with pytest.raises(ConfigError, match="a batch has no flights to record"):
+    with pytest.raises(ConfigError, match="the kind `batch` has no flights to record"):
         again.rerun(out, 0)
     shutil.rmtree(out)
     with pytest.raises(ConfigError, match="no campaign was begun here"):

@@ -23,7 +23,7 @@ SILENCE = {"inject": [{"kind": "stop_telemetry"}], "ends": ["held"]}
         ({"normal": [4, 0]}, "normal: the standard deviation must be above 0"),
         ({"range": [0, 8]}, "range and count go together"),
         ({"uniform": [0, 8], "within": [1, 2]}, "`within` needs `normal`"),
-        ({"values": ["a", "b"], "times_base": True}, "`times_base` needs numbers"),
+        ({"values": ["a", "b"], "times_base": True}, "`times_base` multiplies the base value"),
     ],
 )
 def test_a_swept_key_that_is_none(tmp_path, told, words):

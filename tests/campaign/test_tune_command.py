@@ -109,7 +109,7 @@ def test_a_campaign_that_cannot_be_searched_is_refused(tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match="`tune` needs `kind: flights`"):
         tune_section(campaign(tmp_path, **batch))
     several = {"a": {"uniform": [1, 2], "keys": ["planner.gain_per_s"]}}
-    with pytest.raises(ConfigError, match="times_base and keys work only in `sweep`"):
+    with pytest.raises(ConfigError, match="`times_base` and `keys` are allowed only in `sweep`"):
         tune_section(campaign(tmp_path, tune={"search": several}))
     monkeypatch.delitem(FILE, "tune")
     with pytest.raises(ConfigError, match="there is no section `tune`"):

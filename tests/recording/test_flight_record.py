@@ -314,7 +314,7 @@ def test_a_folder_of_a_flight_is_a_new_one_or_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr("companion.recording.folder.datetime", Still)
     assert flight_folder(tmp_path).name == "2026-01-02T00-00-00Z"
     assert flight_folder(tmp_path).name == "2026-01-02T00-00-00Z-2"
-    with pytest.raises(ConfigError, match="98 more folders of this second exist already"):
+    with pytest.raises(ConfigError, match="98 more folders with the same time exist already"):
         flight_folder(tmp_path)
 
 

@@ -66,7 +66,7 @@ def test_tables_that_are_none_are_refused(table, words):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (SampleOptions(frame="ned"), r"is a Frame, as Frame\.NED"),
+        (SampleOptions(frame="ned"), r"must be a Frame, such as Frame\.NED"),
         (SampleOptions(cutoff=0.0), "must be positive"),
         (SampleOptions(cutoff=np.nan), "must be positive"),
         (SampleOptions(acceleration=np.nan), "must be positive"),

@@ -156,9 +156,7 @@ def from_samples(table: Table, options: SampleOptions, name: str = "csv") -> Tim
 def _require_options(table: Table, options: SampleOptions) -> None:
     """Check options from a user's program; those from YAML files are checked when they are read."""
     if not isinstance(options.frame, Frame):
-        raise TrajectoryError(
-            f"the frame of samples is a Frame, as Frame.NED, not {options.frame!r}"
-        )
+        raise TrajectoryError(f"`frame` must be a Frame, such as Frame.NED, not {options.frame!r}")
     if table.frame not in (None, options.frame.value):
         raise TrajectoryError(
             f"the table is in the frame {table.frame}, and the options say {options.frame.value}; "

@@ -66,7 +66,7 @@ class SepticSpline:
         return self._knots[-1]
 
     def at(self, time: float) -> list[tuple[float, float, float, float]]:
-        """Value, first, second and third derivative of each series; plain floats, for flight."""
+        """Value, first, second and third derivative of each series, as Python floats."""
         index = min(max(bisect_right(self._knots, time) - 1, 0), len(self._pieces) - 1)
         u = time - self._knots[index]
         return [_horner(piece, u) for piece in self._pieces[index]]

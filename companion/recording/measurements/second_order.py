@@ -36,7 +36,7 @@ class StepRun(NamedTuple):
 
     @property
     def changes(self) -> Floats:
-        """(n, 2), targets minus the coefficients at the beginning, which are not 0 in wind."""
+        """(n, 2), targets minus the coefficients measured first, which are not 0 in wind."""
         from_start: Floats = self.target - self.measured[0]
         return from_start
 
@@ -70,7 +70,7 @@ def largest_norm(coefficients: Floats) -> float:
 
 
 def step_runs(rows: Floats) -> list[StepRun]:
-    """The runs in rows (N, 7) of `FlightTrace.response`, without those too short to measure."""
+    """Rows (N, 7) of `FlightTrace.response`, split at gaps in time, without too short parts."""
     if len(rows) == 0:
         return []
     parts = np.split(rows, np.flatnonzero(np.diff(rows[:, 0]) > _LONGEST_GAP) + 1)

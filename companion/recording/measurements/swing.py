@@ -3,7 +3,7 @@
 Body rates are integrated to angles. The moving mean is subtracted, because wind and slow
 corrections are not a swing. The autocorrelation of the remaining fast motion is high if the motion
 is periodic. In hovers of 3 to 8 s of the mock vehicles, gusts of 1 to 2 m/s gave an autocorrelation
-of at most 0.71, mostly less than 0.4. Position-hold weights 2.5 times too large gave 0.8 to 1.
+of at most 0.71, mostly less than 0.4. Gains of the position hold 2.5 times too large gave 0.8 to 1.
 """
 
 from math import nan

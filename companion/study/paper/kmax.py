@@ -59,7 +59,7 @@ def k_max(max_tilt: float) -> float:
 
 
 def run(tick: Tick) -> Outcome:
-    """Compute K over tilts and directions, with the formulas used in flight."""
+    """Compute the scaling factor K over tilts and directions, with the formulas used in flight."""
     tick("tilts")
     directions = np.linspace(0.0, 2.0 * pi, _DIRECTIONS, endpoint=False)
     by_tilt = {
