@@ -193,9 +193,7 @@ def changed(config: Config, changes: Mapping[str, Mapping[str, Any]], name: str)
         if isinstance(present_section, dict) and isinstance(values, Mapping):
             present_section.update(values)
         elif section == "include":
-            raise ConfigError(
-                f"{name}: `include` works only in a configuration file; load such a file"
-            )
+            raise ConfigError(f"{name}: `include` works only in a YAML file; load such a file")
         else:  # `validated` refuses it, and names the key that was probably meant
             data[section] = values
     return yaml_file.validated(data, name, Config)

@@ -326,7 +326,7 @@ def test_what_is_no_program_no_configuration_or_no_fault_is_refused_in_a_sentenc
         run(mock, main({"limit": {"max_tilt_deg": 20.0}}))
     with pytest.raises(ConfigError, match="`flight` is a section"):
         run(mock, main({"flight": 5}))
-    with pytest.raises(ConfigError, match="`include` works only in a configuration file"):
+    with pytest.raises(ConfigError, match="`include` works only in a YAML file"):
         run(mock, main({"include": "px4.yaml"}))
     with pytest.raises(RuntimeError, match=r"call `connect` inside `run\(vehicle, main\(\)\)`"):
         asyncio.run(main({}))
