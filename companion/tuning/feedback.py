@@ -111,8 +111,4 @@ def _observer_responses(
     resolvent = np.linalg.inv(z[:, None, None] * np.eye(3) - i_minus_kc @ a) * z[:, None, None]
     to_acceleration = (resolvent @ (i_minus_kc @ b)) * hold_element(s, period)[:, None]
     to_measurements = resolvent @ k
-    return (
-        to_acceleration,
-        to_measurements[:, :, 0],
-        to_measurements[:, :, 1],
-    )
+    return to_acceleration, to_measurements[:, :, 0], to_measurements[:, :, 1]

@@ -57,9 +57,7 @@ class Proposal:
 
 
 def propose(
-    config: Config,
-    disturbances: Disturbances | None = None,
-    aims: Aims | None = None,
+    config: Config, disturbances: Disturbances | None = None, aims: Aims | None = None
 ) -> Proposal:
     """Propose values with the smallest expected position error within the stability margins.
 
