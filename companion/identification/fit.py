@@ -13,7 +13,6 @@ import numpy as np
 from companion.identification.delayed_model import (
     DelayedModel,
     FirstOrder,
-    Model,
     SecondOrder,
     SecondOrderFit,
     frequency_damping,
@@ -68,7 +67,6 @@ class LagFit:
     slew: float | None
     """Slew limit of the command, before the lag, per second; None: no limit was found."""
     fit: FitQuality
-    """Quality of the fit."""
     second_order: SecondOrderFit | None = None
     """Second-order fit; None if it is not clearly better."""
     offset: float = nan
@@ -129,17 +127,13 @@ def _slewed_start(best: Solution, coarse_model: DelayedModel) -> Floats:
     A slew limit delays too, so smaller lags and dead times than without it are tried.
     """
     lag, dead_time = exp(best.unknowns[0]), float(best.unknowns[1])
-    tried_values = product(_TRIED_RAMP_TIMES, _LAG_SHARES, _DEAD_TIME_SHARES)
+    log_slews = [log(coarse_model.largest_change / ramp_time) for ramp_time in _TRIED_RAMP_TIMES]
     return coarse_model.best_of(
         [
-            np.array(
-                [
-                    log(lag_share * lag),
-                    dead_time_share * dead_time,
-                    log(coarse_model.largest_change / ramp_time),
-                ]
+            np.array([log(lag_share * lag), dead_time_share * dead_time, log_slew])
+            for log_slew, lag_share, dead_time_share in product(
+                log_slews, _LAG_SHARES, _DEAD_TIME_SHARES
             )
-            for ramp_time, lag_share, dead_time_share in tried_values
         ]
     )
 
@@ -150,7 +144,7 @@ def _second_order_fit(
     """The best second-order fit, gain included; None: not clearly better than first order."""
     lag, dead_time, *slew = first_order.unknowns.tolist()
     delay = exp(lag) + dead_time
-    model: Model = SecondOrder()
+    model = SecondOrder()
     start = DelayedModel(record, model, None, thinning).best_of(
         [
             np.array(

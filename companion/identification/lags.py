@@ -128,8 +128,7 @@ def _transients_at_knots(scaled_times: Numbers, jumps: Numbers) -> Numbers:
 def value_at(commands: Knots, times: Floats) -> Floats:
     """(m,), values of the commands at `times` (m,), s; none may be before the first knot."""
     piece = np.searchsorted(commands.time, times, side="right") - 1
-    values: Floats = commands.value[piece] + commands.slope[piece] * (times - commands.time[piece])
-    return values
+    return commands.value[piece] + commands.slope[piece] * (times - commands.time[piece])
 
 
 _NEARLY_CRITICAL = 1e-6
@@ -149,10 +148,9 @@ def second_order_response(
     """
     first_lag, second_lag = _two_lags(frequency, damping)
     if first_lag.imag:
-        response: Floats = (
+        return (
             np.imag(first_lag * complex_lag_response(commands, first_lag, times)) / first_lag.imag
         )
-        return response
     slow_lag, quick_lag = first_lag.real, second_lag.real
     slow_response = first_order_response(commands, slow_lag, times)
     quick_response = first_order_response(commands, quick_lag, times)

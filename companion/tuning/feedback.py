@@ -29,8 +29,7 @@ class Feedback(NamedTuple):
 
 def hold_element(s: Complex, period: float) -> Complex:
     """(n,), frequency response of a zero-order hold of `period` s at the frequencies `s`, rad/s."""
-    response: Complex = (1.0 - np.exp(-s * period)) / (s * period)
-    return response
+    return (1.0 - np.exp(-s * period)) / (s * period)
 
 
 def guidance_feedback(
