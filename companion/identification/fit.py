@@ -90,7 +90,9 @@ def fit_lag(
     fine_thinning, coarse_thinning = 1 + count // _MOST_SAMPLES, 1 + count // _COARSE_SAMPLES
     fine_model = DelayedModel(record, FirstOrder(), gain, fine_thinning)
     coarse_model = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
-    best = _best_without_slew(fine_model, _grid_start(coarse_model))
+    grid = product(_TRIED_LAGS, _TRIED_DEAD_TIMES)
+    start = coarse_model.best_of([np.array([log(lag), dead_time]) for lag, dead_time in grid])
+    best = _best_without_slew(fine_model, start)
     if search_slew_limit:
         best = _with_slew_if_better(best, fine_model, coarse_model)
     free_gain_model, free_gain_solution = fine_model, best
@@ -212,10 +214,3 @@ def _best_without_slew(delayed_model: DelayedModel, start: Floats) -> Solution:
         if lag > shift
     ]
     return min(solution, *neighbours, key=lambda each: each.rss)
-
-
-def _grid_start(delayed_model: DelayedModel) -> Floats:
-    """(2,), start of the search (log lag, dead time): the best point of a coarse grid."""
-    return delayed_model.best_of(
-        [np.array([log(lag), dead_time]) for lag in _TRIED_LAGS for dead_time in _TRIED_DEAD_TIMES]
-    )

@@ -78,19 +78,13 @@ def _start_values(commands: Knots, slew: float) -> Floats:
     return np.array(outputs)
 
 
-def first_order_response(commands: Knots, lag: float, times: Floats) -> Floats:
+def first_order_response(commands: Knots, lag: complex, times: Floats) -> Numbers:
     """(m,), response of a first-order lag of `lag` > 0 s to the commands, at `times`, s.
 
     The response starts in the steady state of the first command. No time may be before it.
-    """
-    return np.asarray(complex_lag_response(commands, lag, times), dtype=np.float64)
 
-
-def complex_lag_response(commands: Knots, lag: complex, times: Floats) -> Numbers:
-    """Like `first_order_response`, for a complex lag, s.
-
-    An underdamped second-order response is a weighted sum of two such responses with complex
-    conjugate lags.
+    The lag may be complex: an underdamped second-order response is a weighted sum of two such
+    responses with complex conjugate lags.
     """
     steady_output = commands.value - commands.slope * lag
     steady_at_ends = steady_output[:-1] + commands.slope[:-1] * np.diff(commands.time)
@@ -149,7 +143,7 @@ def second_order_response(
     first_lag, second_lag = _two_lags(frequency, damping)
     if first_lag.imag:
         return (
-            np.imag(first_lag * complex_lag_response(commands, first_lag, times)) / first_lag.imag
+            np.imag(first_lag * first_order_response(commands, first_lag, times)) / first_lag.imag
         )
     slow_lag, quick_lag = first_lag.real, second_lag.real
     slow_response = first_order_response(commands, slow_lag, times)

@@ -54,13 +54,11 @@ def early_end(
     early_end_figures = figures["early_end"]
     if early_end_figures is None:
         return None
-    reason, limit = figures["result"], None
-    if config is not None:
-        limit = (
-            _fence_side(config, reason, record)
-            if early_end_figures["monitor"] in ("fence", "braking")
-            else _constant_limits(config).get(early_end_figures["monitor"])
-        )
+    reason, monitor, limit = figures["result"], early_end_figures["monitor"], None
+    if config is not None and monitor in ("fence", "braking"):
+        limit = _fence_side(config, reason, record)
+    elif config is not None:
+        limit = _constant_limits(config).get(monitor)
     return EarlyEndMark(early_end_figures["time_s"], reason, limit)
 
 

@@ -30,7 +30,6 @@ class Plot:
     """One plot of the page."""
 
     title: str
-    """Title above the plot."""
     note: str
     """Text above the plot: the quantities shown, and how a good flight looks."""
     traces: list[dict[str, Any]]
