@@ -10,7 +10,7 @@ from companion.campaign import store
 from companion.campaign.campaign import Campaign
 from companion.campaign.campaign_file import CampaignFile
 from companion.campaign.case import Case
-from companion.campaign.cluster import ClusterError, EndedUnit, number_of_workers, run_tasks
+from companion.campaign.cluster import ClusterError, number_of_workers, run_tasks
 from companion.campaign.flight import INTERNAL_ERROR
 from companion.campaign.folder import Description
 from companion.campaign.unit import Row, cases_per_unit, fly_cases, fly_planned_cases, unit_ranges
@@ -31,10 +31,7 @@ class Progress:
 
 
 def run(
-    client: "Client",
-    campaign: Campaign,
-    description: Description,
-    folder: Path,
+    client: "Client", campaign: Campaign, description: Description, folder: Path
 ) -> Iterator[Progress]:
     """Run the units of work whose results are missing in the folder, which exists and is locked.
 
@@ -60,25 +57,18 @@ def run(
         number: (fly_planned_cases, campaign, [planned_cases[index] for index in unit], versions())
         for number, unit in missing_units.items()
     }
-    for ended_unit in run_tasks(client, tasks):
-        _store_unit(ended_unit, units[ended_unit.number], campaign, folder, progress)
+    for number, result, reason in run_tasks(client, tasks):
+        first_case, last_case = units[number][0], units[number][-1]
+        if result is None:
+            progress.given_up_units.append(
+                f"unit {number} (cases {first_case} to {last_case}): {reason}"
+            )
+        else:
+            rows, wall_s, worker = result
+            timing = {"first": first_case, "last": last_case, "wall_s": wall_s, "worker": worker}
+            store.write_unit(folder, campaign.file, number, rows, timing)
+            progress.flown_cases += len(units[number])
         yield progress
-
-
-def _store_unit(
-    ended_unit: EndedUnit, unit: range, campaign: Campaign, folder: Path, progress: Progress
-) -> None:
-    """Store the result of a unit, or note in `progress` that it was given up."""
-    first_case, last_case = unit[0], unit[-1]
-    if ended_unit.result is None:
-        progress.given_up_units.append(
-            f"unit {ended_unit.number} (cases {first_case} to {last_case}): {ended_unit.reason}"
-        )
-        return
-    rows, wall_s, worker = ended_unit.result
-    timing = {"first": first_case, "last": last_case, "wall_s": wall_s, "worker": worker}
-    store.write_unit(folder, campaign.file, ended_unit.number, rows, timing)
-    progress.flown_cases += len(unit)
 
 
 def internal_errors(folder: Path, file: CampaignFile) -> Counter[str]:
@@ -107,8 +97,8 @@ def run_on_cluster(
         for number, unit in enumerate(units)
     }
     rows: dict[int, list[Row]] = {}
-    for ended_unit in run_tasks(client, tasks):
-        if ended_unit.result is None:
-            raise ClusterError(f"some cases could not be flown: {ended_unit.reason}")
-        rows[ended_unit.number] = ended_unit.result.rows
+    for number, result, reason in run_tasks(client, tasks):
+        if result is None:
+            raise ClusterError(f"some cases could not be flown: {reason}")
+        rows[number] = result.rows
     return [row for number in range(len(units)) for row in rows[number]]

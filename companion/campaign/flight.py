@@ -1,20 +1,23 @@
 """One whole flight of a campaign, in this process on one virtual clock."""
 
+import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from companion.batch import can_compile
 from companion.campaign import outcomes
 from companion.campaign.case import Case, Fault
 from companion.campaign.keys import replace_unchecked
 from companion.campaign.swept import Value
-from companion.campaign.worker import running_worker
 from companion.config import Config
 from companion.files.yaml_file import ConfigError
 from companion.flight.observer import SilentObserver
-from companion.recording.measurements.summary import Summary
 from companion.testing import MockVehicle, Truth, run, session
 from companion.testing.truth import TruthRecorder
+
+if TYPE_CHECKING:
+    from distributed import Worker
 
 DATAGRAM_DELAY_S = 0.0005
 """Delay of a datagram between program and mock vehicle, as over UDP, s."""
@@ -48,7 +51,7 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
     parent = None if worker is None else worker.local_directory
     with tempfile.TemporaryDirectory(prefix="companion-case-", dir=parent) as files_folder:
         try:
-            return row | CaseFlight(case, Path(files_folder)).fly(folder)
+            return row | fly_in(Path(files_folder), case, folder)
         except ConfigError as error:  # such as a trajectory that the limits do not allow
             reason = str(error)
         except Exception as error:
@@ -56,90 +59,67 @@ def fly_case(case: Case, folder: Path | None = None) -> dict[str, Value]:
         return row | outcomes.error_outcomes(reason.replace(f"{files_folder}/", ""))
 
 
-class CaseFlight:
-    """The flight of one case; the files that it reads are written into a new folder.
+def fly_in(files_folder: Path, case: Case, folder: Path | None) -> dict[str, Value]:
+    """Fly one case; return its outcomes.
+
+    The files that the flight reads are written into `files_folder`. `folder`: see `fly_case`.
 
     Raises:
         ConfigError: the configuration cannot be flown.
     """
+    config = _with_files_in(files_folder, case)
+    settings = {**case.mock, "lockstep": False}
+    vehicle = MockVehicle(delay_s=DATAGRAM_DELAY_S, compiled=can_compile(), **settings)
+    truth, injector = TruthRecorder(vehicle), _FaultInjector(vehicle, case.fault)
+    flight = session(config, vehicle, folder, injector)
+    time_limit_reached = False
 
-    def __init__(self, case: Case, files_folder: Path) -> None:
-        for name, text in case.files.items():
-            path = files_folder / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
-        self._case, self._files_folder = case, files_folder
-        self._config = _with_paths_in(case.config, files_folder)
-        settings = {**case.mock, "lockstep": False}
-        self._vehicle = MockVehicle(delay_s=DATAGRAM_DELAY_S, compiled=can_compile(), **settings)
-        self._truth = TruthRecorder(self._vehicle)
-        self._time_limit_reached = False
+    def end() -> None:
+        nonlocal time_limit_reached
+        time_limit_reached = True
+        flight.leave()
 
-    def fly(self, folder: Path | None) -> dict[str, Value]:
-        """Fly the case; return its outcomes. `folder`: see `fly_case`."""
-        vehicle, case = self._vehicle, self._case
-        injector = _FaultInjector(vehicle, case.fault)
-        flight = session(self._config, vehicle, folder, injector)
+    vehicle.at(case.flight_s, end)
+    summary = run(vehicle, flight.fly())
+    result, truth_at_end, flight_s = summary.result, vehicle.state(), vehicle.time
+    vehicle.after_step.clear()
+    while vehicle.state()["armed"] and vehicle.time < flight_s + _MAX_TIME_AFTER_END_S:
+        vehicle.step()
+    crashed, as_documented = vehicle.state()["crashed"], None
+    if case.fault is not None and injector.has_begun and case.fault.ends:
+        as_documented = not crashed and _ending(truth_at_end, result) in case.fault.ends
+    if time_limit_reached:
+        result = f"ended by limits.flight_s after {case.flight_s:g} s of vehicle time"
+    failed_checks = outcomes.failed_checks(summary.as_dict())
+    measured_outcomes = {
+        **outcomes.tracking(summary, truth.rows()),
+        **outcomes.response(summary),
+        **outcomes.control_effort(vehicle.setpoints, summary, config),
+        "flight_s": flight_s,
+    }
+    return {
+        "ok": result == "ok" and not failed_checks and not crashed,
+        "result": result.replace(f"{files_folder}/", ""),
+        "failed_checks": failed_checks,
+        "phase": summary.phase,
+        "crashed": crashed,
+        "as_documented": as_documented,
+        **outcomes.without_nan(measured_outcomes),
+        "setpoints": len(vehicle.setpoints),
+        "digest": outcomes.digest(vehicle.setpoints, vehicle.state()),
+    }
 
-        def end() -> None:
-            self._time_limit_reached = True
-            flight.leave()
 
-        vehicle.at(case.flight_s, end)
-        summary = run(vehicle, flight.fly())
-        truth_at_end = vehicle.state()
-        flight_s = vehicle.time
-        vehicle.after_step.clear()
-        while vehicle.state()["armed"] and vehicle.time < flight_s + _MAX_TIME_AFTER_END_S:
-            vehicle.step()
-        truth_afterwards = vehicle.state()
-        return self._outcomes(
-            summary, truth_at_end, truth_afterwards, flight_s, fault_has_begun=injector.has_begun
-        )
+def running_worker() -> "Worker | None":
+    """The Dask worker that runs this code; None: no worker does."""
+    if "distributed" not in sys.modules:  # a worker has imported it; the import takes 0.6 s
+        return None
+    from distributed import get_worker  # noqa: PLC0415  an extra
 
-    def _outcomes(
-        self,
-        summary: Summary,
-        truth_at_end: Truth,
-        truth_afterwards: Truth,
-        flight_s: float,
-        *,
-        fault_has_begun: bool,
-    ) -> dict[str, Value]:
-        """The outcomes of the flight.
-
-        `truth_at_end` is the true state when the program ended, `flight_s` s after boot.
-        `truth_afterwards` is the true state when the vehicle disarmed, or `_MAX_TIME_AFTER_END_S`
-        after the program's end. `fault_has_begun`: whether the phase in which the fault begins was
-        reached.
-        """
-        figures, setpoints = summary.as_dict(), self._vehicle.setpoints
-        crashed, fault = truth_afterwards["crashed"], self._case.fault
-        measured_outcomes = {
-            **outcomes.tracking(summary, self._truth.rows()),
-            **outcomes.response(summary),
-            **outcomes.control_effort(setpoints, summary, self._config),
-            "flight_s": flight_s,
-        }
-        as_documented = None
-        if fault is not None and fault_has_begun and fault.ends:
-            as_documented = not crashed and _ending(truth_at_end, summary.result) in fault.ends
-        result = summary.result
-        if self._time_limit_reached:
-            result = f"ended by limits.flight_s after {self._case.flight_s:g} s of vehicle time"
-        failed_checks = outcomes.failed_checks(figures)
-        is_good = result == "ok" and not failed_checks and not crashed
-        return {
-            "ok": is_good,
-            "result": result.replace(f"{self._files_folder}/", ""),
-            "failed_checks": failed_checks,
-            "phase": summary.phase,
-            "crashed": crashed,
-            "as_documented": as_documented,
-            **outcomes.without_nan(measured_outcomes),
-            "setpoints": len(setpoints),
-            "digest": outcomes.digest(setpoints, truth_afterwards),
-        }
+    try:
+        return get_worker()
+    except ValueError:
+        return None
 
 
 class _FaultInjector(SilentObserver):
@@ -181,14 +161,18 @@ def _ending(state: Truth, result: str) -> str:
     return "ground" if state["touchdown_speed"] is None else "landed"
 
 
-def _with_paths_in(config: Config, files_folder: Path) -> Config:
-    """The configuration with its trajectory and its `recording.directory` in `files_folder`.
+def _with_files_in(files_folder: Path, case: Case) -> Config:
+    """Write the files that the flight reads into `files_folder`; return the configuration.
 
     `recording.directory` is a new folder there, so no values learned in earlier flights are used.
     """
-    path = config.flight.trajectory
+    for name, text in case.files.items():
+        path = files_folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    trajectory = case.config.flight.trajectory
     return replace_unchecked(
-        config,
+        case.config,
         recording={"directory": files_folder / "learned"},
-        flight={"trajectory": None if path is None else files_folder / path},
+        flight={"trajectory": None if trajectory is None else files_folder / trajectory},
     )

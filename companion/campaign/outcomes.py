@@ -8,16 +8,13 @@ from statistics import fmean
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.campaign.swept import Value
 from companion.config import Config
-from companion.recording.measurements.maneuver_figures import settled_maneuver_rows
+from companion.recording.measurements.maneuver_figures import Floats, settled_maneuver_rows
 from companion.recording.measurements.summary import Summary, tracking_errors
 from companion.testing import ReceivedSetpoint, Truth
 from companion.testing.truth import true_positions
-
-Floats = NDArray[np.float64]
 
 OUTCOME_LABELS = {
     "position_rms_m": "true position error, RMS",
@@ -128,11 +125,8 @@ def control_effort(
     ).reshape(-1, 4)
     if not len(setpoint_rows):
         return {}
-    rates, thrust, limits = (
-        np.hypot(setpoint_rows[:, 0], setpoint_rows[:, 1]),
-        setpoint_rows[:, 3],
-        config.limits,
-    )
+    rates = np.hypot(setpoint_rows[:, 0], setpoint_rows[:, 1])
+    thrust, limits = setpoint_rows[:, 3], config.limits
     is_saturated = (
         (rates >= _SATURATION_SHARE * limits.max_tilt_rate)
         | (thrust >= _SATURATION_SHARE * limits.max_thrust)
@@ -150,15 +144,8 @@ def digest(setpoints: Sequence[ReceivedSetpoint], state: Truth) -> str:
     """SHA-256 of all setpoints that the autopilot received, and of the final true state."""
     sha256 = hashlib.sha256()
     for setpoint in setpoints:
-        sha256.update(
-            struct.pack(
-                "<dq4d",
-                setpoint.time,
-                setpoint.sample_time_boot_ms,
-                *setpoint.rates,
-                setpoint.thrust,
-            )
-        )
+        times = setpoint.time, setpoint.sample_time_boot_ms
+        sha256.update(struct.pack("<dq4d", *times, *setpoint.rates, setpoint.thrust))
     motion = (*state["position"], *state["velocity"], *state["q"], *state["rates"])
     sha256.update(struct.pack(f"<{len(motion)}d", *motion))
     return sha256.hexdigest()

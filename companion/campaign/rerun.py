@@ -74,5 +74,4 @@ def _stored_row(
     if unit not in store.finished_units(campaign_folder):
         return None
     rows = store.read_unit(campaign_folder, unit).to_pylist()
-    stored_row: dict[str, Any] | None = next((row for row in rows if row["case"] == index), None)
-    return stored_row
+    return next((row for row in rows if row["case"] == index), None)

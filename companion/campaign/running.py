@@ -66,23 +66,17 @@ def run(options: argparse.Namespace) -> int:
             )
         path, out = path / folder.CAMPAIGN_FILE_NAME, path
     campaign = load(path)
-    campaign_folder = out or folder.new_path(campaign)
-    console = Console(highlight=False, soft_wrap=True, markup=False)
-    return _Run(campaign, campaign_folder, options, console).run()
+    return _Run(campaign, out or folder.new_path(campaign), options).run()
 
 
 class _Run:
     """One run of a campaign."""
 
     def __init__(
-        self,
-        campaign: Campaign,
-        campaign_folder: Path,
-        options: argparse.Namespace,
-        console: Console,
+        self, campaign: Campaign, campaign_folder: Path, options: argparse.Namespace
     ) -> None:
-        self._campaign, self._folder, self._console = campaign, campaign_folder, console
-        self._options = options
+        self._campaign, self._folder, self._options = campaign, campaign_folder, options
+        self._console = Console(highlight=False, soft_wrap=True, markup=False)
         self._noun = CASE_NOUNS[campaign.file.kind]
 
     def run(self) -> int:

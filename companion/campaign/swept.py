@@ -14,8 +14,8 @@ Value = float | int | str | bool | None
 TwoNumbers = tuple[float, float]
 KeyName = Annotated[str, Field(max_length=100)]
 
-_GRID = ("values", "range")
 _DISTRIBUTIONS = ("uniform", "loguniform", "normal", "choice")
+_KINDS = ("values", "range", *_DISTRIBUTIONS)
 _MOST_VALUES = 1000
 
 
@@ -75,11 +75,8 @@ class SweptValues(Section):
 
     @model_validator(mode="after")
     def _check_consistency(self) -> "SweptValues":
-        given_kinds = [
-            kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None
-        ]
-        if len(given_kinds) != 1:
-            raise ValueError(f"give exactly one of {', '.join((*_GRID, *_DISTRIBUTIONS))}")
+        if sum(getattr(self, kind) is not None for kind in _KINDS) != 1:
+            raise ValueError(f"give exactly one of {', '.join(_KINDS)}")
         for kind in ("range", "uniform", "loguniform", "within"):
             bounds = getattr(self, kind)
             if bounds is not None and not bounds[0] < bounds[1]:
@@ -101,7 +98,7 @@ class SweptValues(Section):
     @property
     def kind(self) -> str:
         """`values`, `range`, `uniform`, `loguniform`, `normal` or `choice`."""
-        return next(kind for kind in (*_GRID, *_DISTRIBUTIONS) if getattr(self, kind) is not None)
+        return next(kind for kind in _KINDS if getattr(self, kind) is not None)
 
     @property
     def is_sampled(self) -> bool:

@@ -1,16 +1,15 @@
 """A unit of work: cases that one worker flies one after the other."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from time import perf_counter
 from typing import NamedTuple
 
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
 from companion.campaign.design import PlannedCase
-from companion.campaign.flight import fly_case
+from companion.campaign.flight import fly_case, running_worker
 from companion.campaign.swept import Value
 from companion.campaign.versions import Versions, require_equal, versions
-from companion.campaign.worker import running_worker
 
 Row = dict[str, Value]
 LONGEST_UNIT_S = 2.5
@@ -44,16 +43,26 @@ def fly_planned_cases(
         ConfigError: a case is refused.
         VersionError: the versions of this process differ from the client's.
     """
-    require_equal(client_versions, versions(), f"the worker {_worker_address()}")
-    return _run_timed(
-        campaign.file.kind, [campaign.case(planned_case) for planned_case in planned_cases]
-    )
+    return fly_cases(campaign.file.kind, map(campaign.case, planned_cases), client_versions)
 
 
-def fly_cases(kind: str, cases: Sequence[Case], client_versions: Versions) -> UnitResult:
-    """Fly cases that the client has built; see `fly_planned_cases`."""
-    require_equal(client_versions, versions(), f"the worker {_worker_address()}")
-    return _run_timed(kind, cases)
+def fly_cases(kind: str, cases: Iterable[Case], client_versions: Versions) -> UnitResult:
+    """Fly cases, and measure the wall time of each flight, or of a batch as a whole.
+
+    Raises:
+        VersionError: the versions of this process differ from the client's.
+    """
+    worker = running_worker()
+    address = "this process" if worker is None else str(worker.address)
+    require_equal(client_versions, versions(), f"the worker {address}")
+    built_cases = list(cases)
+    rows: list[Row] = []
+    wall_s: list[float] = []
+    for group in [built_cases] if kind == "batch" else [[case] for case in built_cases]:
+        start_time = perf_counter()
+        rows += run_cases(kind, group)
+        wall_s.append(round(perf_counter() - start_time, 4))
+    return UnitResult(rows, wall_s, address)
 
 
 def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
@@ -63,17 +72,6 @@ def run_cases(kind: str, cases: Sequence[Case]) -> list[Row]:
     from companion.campaign import kinematics  # noqa: PLC0415  imports much
 
     return [kinematics.run_case(case) for case in cases]
-
-
-def _run_timed(kind: str, cases: Sequence[Case]) -> UnitResult:
-    """Run cases and measure their wall time: of each flight, or of a batch as a whole."""
-    rows: list[Row] = []
-    wall_s: list[float] = []
-    for group in [cases] if kind == "batch" else [[case] for case in cases]:
-        start_time = perf_counter()
-        rows += run_cases(kind, group)
-        wall_s.append(round(perf_counter() - start_time, 4))
-    return UnitResult(rows, wall_s, _worker_address())
 
 
 def check_cases(kind: str, cases: Sequence[Case]) -> None:
@@ -87,12 +85,6 @@ def check_cases(kind: str, cases: Sequence[Case]) -> None:
 
         for case in cases:
             kinematics.check_case(case)
-
-
-def _worker_address() -> str:
-    """The address of the Dask worker that runs this code, or "this process" without one."""
-    worker = running_worker()
-    return "this process" if worker is None else str(worker.address)
 
 
 def cases_per_unit(cases: int, seconds_per_case: float, workers: int) -> int:

@@ -12,15 +12,10 @@ _SUB_COMMANDS = (_RUN, "report", "rerun", "tune", "-h", "--help")
 def with_campaign_run(arguments: Sequence[str]) -> list[str]:
     """The arguments, with `campaign FILE` expanded to `campaign run FILE`."""
     words = list(arguments)
-    command_position = next(
-        (n for n, word in enumerate(words) if not word.startswith("-")), len(words)
-    )
-    command, next_word = (
-        words[command_position : command_position + 1],
-        words[command_position + 1 : command_position + 2],
-    )
+    position = next((n for n, word in enumerate(words) if not word.startswith("-")), len(words))
+    command, next_word = words[position : position + 1], words[position + 1 : position + 2]
     if command == [_CAMPAIGN] and not set(next_word).intersection(_SUB_COMMANDS):
-        words.insert(command_position + 1, _RUN)
+        words.insert(position + 1, _RUN)
     return words
 
 

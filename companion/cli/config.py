@@ -48,12 +48,9 @@ def _named_keys(config: Config, name: str) -> list[ConfigKey]:
     known_keys = list(keys(config))
     matching = [key for key in known_keys if name in (key.section, f"{key.section}.{key.name}")]
     if not matching:
-        similar_names = _suggestions(known_keys, name)
-        hint = (
-            f"did you mean {', '.join(similar_names)}?"
-            if similar_names
-            else "`companion config` prints them all"
-        )
+        hint = "`companion config` prints them all"
+        if similar_names := _suggestions(known_keys, name):
+            hint = f"did you mean {', '.join(similar_names)}?"
         raise ConfigError(f"--get: there is no key `{name}`; {hint}")
     return matching
 

@@ -186,12 +186,10 @@ def _how_to_include(out: Path, config: Path | None) -> str:
     include_path = out.resolve()
     if config is not None:
         include_path = Path(os.path.relpath(include_path, config.resolve().parent))
-    return "\n".join(
-        (
-            f"Written to {out}. Remove `vehicle` and `thrust.hover_thrust` from your configuration",
-            "(its keys override those of an included file), and add this line to it:",
-            f"  include: {include_path}",
-        )
+    return (
+        f"Written to {out}. Remove `vehicle` and `thrust.hover_thrust` from your configuration\n"
+        f"(its keys override those of an included file), and add this line to it:\n"
+        f"  include: {include_path}"
     )
 
 

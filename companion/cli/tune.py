@@ -27,8 +27,8 @@ from companion.tuning.writing import proposal_text, summary_lines, worse_flights
 
 _VEHICLE, _CONFIG = "vehicle.yaml", "config.yaml"
 _OUTPUT_NAME = "tuned.yaml"
-_VEHICLE_SECTIONS = ("vehicle", "thrust")
-"""The sections in a vehicle file."""
+_VEHICLE_SECTIONS = {"vehicle", "thrust"}
+"""The sections that `companion identify` writes."""
 
 
 def tune(options: argparse.Namespace) -> int:
@@ -60,16 +60,11 @@ def tune(options: argparse.Namespace) -> int:
     write_whole(output, proposal_text(proposal, vehicle_source, flights, source.name))
     load(output)
     keys = [f"{section}.{key}" for section, keys in proposal.changes.items() for key in keys]
-    user_config = vehicle_file if has_vehicle_file and not _is_vehicle_file(vehicle_file) else None
-    console.print(_next_step(output, keys, user_config))
+    is_own = has_vehicle_file and not load(vehicle_file).model_fields_set <= _VEHICLE_SECTIONS
+    console.print(_next_step(output, keys, vehicle_file if is_own else None))
     if options.json:
         print(json.dumps(_figures(proposal, flights, output), allow_nan=False))
     return EXIT_OK if worse_flights_warning(flights) is None else EXIT_FAILURE
-
-
-def _is_vehicle_file(path: Path) -> bool:
-    """Whether a file has only the sections that `companion identify` writes."""
-    return load(path).model_fields_set <= set(_VEHICLE_SECTIONS)
 
 
 def _next_step(output: Path, keys: Sequence[str], user_config: Path | None) -> str:
@@ -100,9 +95,7 @@ def _configuration(source: Path, vehicle_file: Path, base: Path | None) -> tuple
     identified_config = load(vehicle_file)
     if base is None:  # a file with a mock vehicle cannot be included
         return _with_hover(identified_config), identified_config.mock is None
-    identified_keys = identified_config.model_dump(
-        exclude_unset=True, include=set(_VEHICLE_SECTIONS)
-    )
+    identified_keys = identified_config.model_dump(exclude_unset=True, include=_VEHICLE_SECTIONS)
     return _with_hover(changed(load(base), identified_keys, str(vehicle_file))), True
 
 

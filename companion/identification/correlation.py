@@ -98,10 +98,7 @@ def _correlation(pairs: list[tuple[Floats, Floats]]) -> Floats | None:
     least_energy = count * _LEAST_EXCITATION**2
     if count == 0 or command_energy.max() < least_energy or response_energy == 0.0:
         return None
-    correlation: Floats = products / np.sqrt(
-        np.maximum(command_energy, least_energy) * response_energy
-    )
-    return correlation
+    return products / np.sqrt(np.maximum(command_energy, least_energy) * response_energy)
 
 
 def _centre_frequency(lag: float, damping: float) -> float:

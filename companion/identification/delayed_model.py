@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import exp, log, nan
-from typing import Protocol
 
 import numpy as np
 
@@ -21,40 +20,20 @@ from companion.identification.residual_analysis import FitQuality
 from companion.least_squares import Floats, Solution, minimise, project
 
 
-class Model(Protocol):
-    """A linear response of gain 1 with k parameters; `log_params` are their logarithms, (k,).
-
-    Attributes:
-        lower_bounds: (k,), lower bounds of `log_params`.
-        upper_bounds: (k,), upper bounds of `log_params`.
-    """
-
-    lower_bounds: Floats
-    upper_bounds: Floats
-
-    def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
-        """(m,), response at `times` (m,), s, from the steady state of the first command."""
-        ...
-
-    def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
-        """(m, k), k independent free responses at (m,) times after the start, s.
-
-        The effect of any initial state is a weighted sum of the free responses.
-        """
-        ...
-
-
 class FirstOrder:
     """A first-order lag; its `log_params` are (log lag), lag in s."""
 
     lower_bounds, upper_bounds = np.log([0.001]), np.log([1.0])
 
     def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
-        """The response of this lag; see `Model.response`."""
+        """(m,), response at `times` (m,), s, from the steady state of the first command."""
         return first_order_response(commands, exp(log_params[0]), times)
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
-        """The free responses of this lag; see `Model.free_responses`."""
+        """(m, number of `log_params`), independent free responses at (m,) times after the start, s.
+
+        The effect of any initial state is a weighted sum of the free responses.
+        """
         return np.asarray(np.exp(-elapsed / exp(log_params[0])))[:, np.newaxis]
 
 
@@ -68,12 +47,16 @@ class SecondOrder:
     lower_bounds, upper_bounds = np.log([0.002, 0.2]), np.log([1.0, 4.0])
 
     def response(self, log_params: Floats, commands: Knots, times: Floats) -> Floats:
-        """The response of this lag; see `Model.response`."""
+        """See `FirstOrder.response`."""
         return second_order_response(commands, *frequency_damping(log_params), times)
 
     def free_responses(self, log_params: Floats, elapsed: Floats) -> Floats:
-        """The free responses of this lag; see `Model.free_responses`."""
+        """See `FirstOrder.free_responses`."""
         return second_order_free_responses(elapsed, *frequency_damping(log_params))
+
+
+Model = FirstOrder | SecondOrder
+"""A linear response of gain 1, whose parameters are searched as logarithms, `log_params`."""
 
 
 def frequency_damping(log_params: Floats) -> tuple[float, float]:
@@ -97,7 +80,6 @@ class SecondOrderFit:
     slew: float | None
     """Slew limit of the command, rad/s²; None: no limit was found."""
     fit: FitQuality
-    """Quality of the fit."""
 
     @property
     def lag(self) -> float:
@@ -221,12 +203,8 @@ class DelayedModel:
         free_responses = [
             self.model.free_responses(log_params, times - times[0]) for times in self.times
         ]
-        columns = np.zeros(
-            (
-                self.measured.size,
-                1 + sum(free_response.shape[1] for free_response in free_responses),
-            )
-        )
+        state_count = sum(free_response.shape[1] for free_response in free_responses)
+        columns = np.zeros((self.measured.size, 1 + state_count))
         columns[:, 0] = 1.0
         row, column = 0, 1
         for free_response in free_responses:

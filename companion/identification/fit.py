@@ -13,7 +13,6 @@ import numpy as np
 from companion.identification.delayed_model import (
     DelayedModel,
     FirstOrder,
-    Model,
     SecondOrder,
     SecondOrderFit,
     frequency_damping,
@@ -68,7 +67,6 @@ class LagFit:
     slew: float | None
     """Slew limit of the command, before the lag, per second; None: no limit was found."""
     fit: FitQuality
-    """Quality of the fit."""
     second_order: SecondOrderFit | None = None
     """Second-order fit; None if it is not clearly better."""
     offset: float = nan
@@ -92,7 +90,9 @@ def fit_lag(
     fine_thinning, coarse_thinning = 1 + count // _MOST_SAMPLES, 1 + count // _COARSE_SAMPLES
     fine_model = DelayedModel(record, FirstOrder(), gain, fine_thinning)
     coarse_model = DelayedModel(record, FirstOrder(), gain, coarse_thinning)
-    best = _best_without_slew(fine_model, _grid_start(coarse_model))
+    grid = product(_TRIED_LAGS, _TRIED_DEAD_TIMES)
+    start = coarse_model.best_of([np.array([log(lag), dead_time]) for lag, dead_time in grid])
+    best = _best_without_slew(fine_model, start)
     if search_slew_limit:
         best = _with_slew_if_better(best, fine_model, coarse_model)
     free_gain_model, free_gain_solution = fine_model, best
@@ -129,17 +129,13 @@ def _slewed_start(best: Solution, coarse_model: DelayedModel) -> Floats:
     A slew limit delays too, so smaller lags and dead times than without it are tried.
     """
     lag, dead_time = exp(best.unknowns[0]), float(best.unknowns[1])
-    tried_values = product(_TRIED_RAMP_TIMES, _LAG_SHARES, _DEAD_TIME_SHARES)
+    log_slews = [log(coarse_model.largest_change / ramp_time) for ramp_time in _TRIED_RAMP_TIMES]
     return coarse_model.best_of(
         [
-            np.array(
-                [
-                    log(lag_share * lag),
-                    dead_time_share * dead_time,
-                    log(coarse_model.largest_change / ramp_time),
-                ]
+            np.array([log(lag_share * lag), dead_time_share * dead_time, log_slew])
+            for log_slew, lag_share, dead_time_share in product(
+                log_slews, _LAG_SHARES, _DEAD_TIME_SHARES
             )
-            for ramp_time, lag_share, dead_time_share in tried_values
         ]
     )
 
@@ -150,7 +146,7 @@ def _second_order_fit(
     """The best second-order fit, gain included; None: not clearly better than first order."""
     lag, dead_time, *slew = first_order.unknowns.tolist()
     delay = exp(lag) + dead_time
-    model: Model = SecondOrder()
+    model = SecondOrder()
     start = DelayedModel(record, model, None, thinning).best_of(
         [
             np.array(
@@ -218,10 +214,3 @@ def _best_without_slew(delayed_model: DelayedModel, start: Floats) -> Solution:
         if lag > shift
     ]
     return min(solution, *neighbours, key=lambda each: each.rss)
-
-
-def _grid_start(delayed_model: DelayedModel) -> Floats:
-    """(2,), start of the search (log lag, dead time): the best point of a coarse grid."""
-    return delayed_model.best_of(
-        [np.array([log(lag), dead_time]) for lag in _TRIED_LAGS for dead_time in _TRIED_DEAD_TIMES]
-    )

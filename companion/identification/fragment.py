@@ -30,9 +30,7 @@ class AxisValues(NamedTuple):
     """The configuration values of one axis."""
 
     lag_ms: float
-    """Lag, ms."""
     dead_time_ms: float
-    """Dead time, ms."""
     slew_deg_s2: float | None
     """Slew limit, °/s²; None: no limit."""
     damping: float | None = None

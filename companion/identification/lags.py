@@ -78,19 +78,13 @@ def _start_values(commands: Knots, slew: float) -> Floats:
     return np.array(outputs)
 
 
-def first_order_response(commands: Knots, lag: float, times: Floats) -> Floats:
+def first_order_response(commands: Knots, lag: complex, times: Floats) -> Numbers:
     """(m,), response of a first-order lag of `lag` > 0 s to the commands, at `times`, s.
 
     The response starts in the steady state of the first command. No time may be before it.
-    """
-    return np.asarray(complex_lag_response(commands, lag, times), dtype=np.float64)
 
-
-def complex_lag_response(commands: Knots, lag: complex, times: Floats) -> Numbers:
-    """Like `first_order_response`, for a complex lag, s.
-
-    An underdamped second-order response is a weighted sum of two such responses with complex
-    conjugate lags.
+    The lag may be complex: an underdamped second-order response is a weighted sum of two such
+    responses with complex conjugate lags.
     """
     steady_output = commands.value - commands.slope * lag
     steady_at_ends = steady_output[:-1] + commands.slope[:-1] * np.diff(commands.time)
@@ -128,8 +122,7 @@ def _transients_at_knots(scaled_times: Numbers, jumps: Numbers) -> Numbers:
 def value_at(commands: Knots, times: Floats) -> Floats:
     """(m,), values of the commands at `times` (m,), s; none may be before the first knot."""
     piece = np.searchsorted(commands.time, times, side="right") - 1
-    values: Floats = commands.value[piece] + commands.slope[piece] * (times - commands.time[piece])
-    return values
+    return commands.value[piece] + commands.slope[piece] * (times - commands.time[piece])
 
 
 _NEARLY_CRITICAL = 1e-6
@@ -149,10 +142,9 @@ def second_order_response(
     """
     first_lag, second_lag = _two_lags(frequency, damping)
     if first_lag.imag:
-        response: Floats = (
-            np.imag(first_lag * complex_lag_response(commands, first_lag, times)) / first_lag.imag
+        return (
+            np.imag(first_lag * first_order_response(commands, first_lag, times)) / first_lag.imag
         )
-        return response
     slow_lag, quick_lag = first_lag.real, second_lag.real
     slow_response = first_order_response(commands, slow_lag, times)
     quick_response = first_order_response(commands, quick_lag, times)

@@ -93,14 +93,9 @@ def _windows(segment: Segment) -> list[Segment]:
         first_command, end_command = np.searchsorted(segment.time, (start - _WINDOW_LEAD, end))
         commands = slice(max(int(first_command) - 1, 0), end_command)
         if segment.measured_time[samples].size:
-            windows.append(
-                Segment(
-                    segment.time[commands],
-                    segment.commanded[commands],
-                    segment.measured_time[samples],
-                    segment.measured[samples],
-                )
-            )
+            commanded = segment.time[commands], segment.commanded[commands]
+            measured = segment.measured_time[samples], segment.measured[samples]
+            windows.append(Segment(*commanded, *measured))
     return windows
 
 

@@ -11,7 +11,6 @@ from companion.least_squares import Floats
 
 _ASSUMED_GAIN = 1.0
 """Gain of the rate loop that the planners assume."""
-
 AXES = ("roll", "pitch", "yaw")
 
 
@@ -20,11 +19,8 @@ class IdentifiedVehicle:
     """The fitted response of a vehicle; each fit says whether it may be used."""
 
     roll: RateResponse
-    """Response of the roll rate."""
     pitch: RateResponse
-    """Response of the pitch rate."""
     yaw: RateResponse
-    """Response of the yaw rate."""
     thrust: ThrustMap | None
     """The thrust map; None if thrust never changed or was hardly measured."""
 

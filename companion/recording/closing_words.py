@@ -177,11 +177,9 @@ def _next_command(figures: Figures, invocation: Invocation) -> str | None:
         return f"{invocation.program} {shlex.join(words)}"
 
     arguments = invocation.arguments
-    config_options = (
-        None
-        if invocation.config is None
-        else ["--config", invocation.config, *_shared_options(arguments)]
-    )
+    config_options = None
+    if invocation.config is not None:
+        config_options = ["--config", invocation.config, *_shared_options(arguments)]
     if figures["result"].startswith(_INTERRUPTED) or _repetition_is_better(figures):
         return command(*arguments)
     early_end = figures["early_end"]

@@ -17,8 +17,6 @@ from companion.recording.mcap_file.channels import CHANNELS
 from companion.recording.measurements.recorded_summary import trace_of
 
 _JOINED_TABLES = ("tracking", "rates", "response")
-
-
 Columns = dict[str, NDArray[np.generic]]
 """The columns of a table, by name."""
 

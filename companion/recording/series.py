@@ -78,13 +78,8 @@ class Spool:
             return False
         if not self._has_started:
             self._has_started = True
-            thread_arguments = (
-                self._queue,
-                self._failures,
-            )  # not self, which the thread would keep alive
-            threading.Thread(
-                target=_append_chunks, args=thread_arguments, name="spool", daemon=True
-            ).start()
+            own = self._queue, self._failures  # not self, which the thread would keep alive
+            threading.Thread(target=_append_chunks, args=own, name="spool", daemon=True).start()
             weakref.finalize(self, self._queue.put, None)
         self._queue.put((file, chunk))
         return True
@@ -168,9 +163,8 @@ class Series:
         if self._file is not None and count_in_memory < wanted_count and self._spool.flush():
             values = np.concatenate([self._file.read(len(self.columns)), self._chunk])
         else:  # in memory, or all that there is while the disk does not answer
-            self.lost_count = max(
-                self.lost_count, (wanted_count - count_in_memory) // len(self.columns)
-            )
+            missing_count = (wanted_count - count_in_memory) // len(self.columns)
+            self.lost_count = max(self.lost_count, missing_count)
             values = np.concatenate(chunks)
         return values[max(0, len(values) - wanted_count) :].reshape(-1, len(self.columns))
 

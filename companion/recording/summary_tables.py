@@ -81,19 +81,14 @@ def _dead_times(summary: Summary) -> RenderableType:
     """Measured and configured dead times."""
     dead_times = summary.dead_times
     if not dead_times.lag_known:
-        closing_words = (
-            "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
-        )
-        return Text(closing_words, style="dim")
+        words = "dead time not measured: vehicle.lag_ms is not set (`companion identify` finds it)"
+        return Text(words, style="dim")
     table = _empty_table(
         "Dead time, from a sample to the effect of its setpoint", "measured", "configured"
     )
     for name, axis in dead_times.axes.items():
-        is_unmeasured = axis.measured is None
-        time_text = (
-            "not enough rotation to measure" if is_unmeasured else _milliseconds(axis.measured)
-        )
-        table.add_row(name, time_text, _milliseconds(axis.configured))
+        unknown = "not enough rotation to measure" if axis.measured is None else ""
+        table.add_row(name, unknown or _milliseconds(axis.measured), _milliseconds(axis.configured))
     age = dead_times.sample_age
     if not isnan(age.p50):
         table.add_row(
@@ -112,14 +107,10 @@ def _tracking(summary: Summary) -> RenderableType:
         "Tracking by maneuver", "horizontal RMS", "largest", "height RMS", "largest"
     )
     for maneuver in summary.maneuvers():
-        level = (
-            ("open loop", f"{maneuver.drift:.2f} m away")
-            if maneuver.open_loop
-            else (
-                _with_unit(maneuver.horizontal_rms, "m", 2),
-                _with_unit(maneuver.horizontal_max, "m", 2),
-            )
-        )
+        errors = maneuver.horizontal_rms, maneuver.horizontal_max
+        level = [_with_unit(error, "m", 2) for error in errors]
+        if maneuver.open_loop:
+            level = ["open loop", f"{maneuver.drift:.2f} m away"]
         heights = _with_unit(maneuver.height_rms, "m", 2), _with_unit(maneuver.height_max, "m", 2)
         table.add_row(maneuver.name, *level, *heights)
     return table

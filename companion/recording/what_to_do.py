@@ -40,7 +40,6 @@ ADVICE_BY_MONITOR: Mapping[str, str] = {
     "deadlines": "end other programs on this computer, or set realtime.scheduler: fifo",
     "starvation": "end other programs on this computer, or set realtime.scheduler: fifo",
 }
-"""Advice by the name of the monitor."""
 
 ADVICE_BY_PHASE: Mapping[str, str] = {
     "connect": "check power, cable and link.endpoint; nothing else may use the same port",
@@ -57,7 +56,6 @@ ADVICE_BY_PHASE: Mapping[str, str] = {
     "disarm": "if the vehicle is still armed, disarm it by the pilot's switch; read the events "
     "before the end",
 }
-"""Advice by the name of the phase."""
 
 _USER_CODE = "fix the code named above, and fly it on the mock vehicle (`companion demo`) first"
 

@@ -122,11 +122,9 @@ def recorded_sample(row: Row, setpoint_row: Row | None) -> RecordedSample:
         _MISFIT_BY_CODE[row["misfit"]],
         bool(row["age_known"]),
     )
-    setpoint = (
-        None
-        if setpoint_row is None
-        else Setpoint(_rates(setpoint_row, "commanded"), setpoint_row["thrust"])
-    )
+    setpoint = None
+    if setpoint_row is not None:
+        setpoint = Setpoint(_rates(setpoint_row, "commanded"), setpoint_row["thrust"])
     flags = LoopFlags(*(bool(row[name]) for name in LoopFlags._fields))
     return RecordedSample(
         sample, flags, row["checked_s"], UNANSWERED_CODES[row["unanswered"]], setpoint

@@ -14,12 +14,7 @@ from companion.config import Config
 from companion.config.files import changed
 from companion.config.known_drag import KnownDrag, prior_of
 from companion.control.loops import make_loops
-from companion.control.retuning import (
-    Retuning,
-    Slew,
-    loop_settings,
-    reason_against_changes,
-)
+from companion.control.retuning import Retuning, Slew, loop_settings, reason_against_changes
 from companion.control.telemetry import GuidedVehicle
 from companion.drag import Drag
 from companion.flight.maneuvers import configured_maneuvers

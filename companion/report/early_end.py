@@ -5,13 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.config import Config
 from companion.guidance.fence import circle_corners
 from companion.recording.flight_record import FlightRecord
-
-Floats = NDArray[np.float64]
 
 _CORNERS_OF_CIRCLE = 72
 
@@ -57,23 +54,19 @@ def early_end(
     early_end_figures = figures["early_end"]
     if early_end_figures is None:
         return None
-    reason, limit = figures["result"], None
-    if config is not None:
-        limit = (
-            _fence_side(config, reason, record)
-            if early_end_figures["monitor"] in ("fence", "braking")
-            else _constant_limits(config).get(early_end_figures["monitor"])
-        )
+    reason, monitor, limit = figures["result"], early_end_figures["monitor"], None
+    if config is not None and monitor in ("fence", "braking"):
+        limit = _fence_side(config, reason, record)
+    elif config is not None:
+        limit = _constant_limits(config).get(monitor)
     return EarlyEndMark(early_end_figures["time_s"], reason, limit)
 
 
 def _constant_limits(config: Config) -> dict[str, CrossedLimit]:
     """The limits that are constant over the flight, by the monitor's name."""
     limits, safety = config.limits, config.safety
-    max_tilt_deg, max_rate_deg_s = (
-        limits.max_tilt_deg + safety.tilt_margin_deg,
-        safety.max_body_rate_deg_s,
-    )
+    max_tilt_deg = limits.max_tilt_deg + safety.tilt_margin_deg
+    max_rate_deg_s = safety.max_body_rate_deg_s
     return {
         "tilt": CrossedLimit(
             "tilt", "limits.max_tilt_deg + safety.tilt_margin_deg", (max_tilt_deg,)
@@ -102,10 +95,8 @@ def _fence_side(config: Config, reason: str, record: FlightRecord) -> CrossedLim
     controlled_rows = guidance[guidance["offboard_active"] == 1]
     if len(controlled_rows) == 0:
         return None
-    north, east = (
-        float(controlled_rows["estimated_north_m"][0]),
-        float(controlled_rows["estimated_east_m"][0]),
-    )
+    north = float(controlled_rows["estimated_north_m"][0])
+    east = float(controlled_rows["estimated_east_m"][0])
     if "fence_ceiling_m" in reason or "fence_floor_m" in reason:
         motion = record.rows("motion")
         start_time = record.since_start(controlled_rows["time_s"][:1])

@@ -1,6 +1,5 @@
 """Renders a page with plots as one HTML file that needs no network."""
 
-import json
 import re
 from base64 import b64encode
 from collections.abc import Sequence
@@ -47,15 +46,16 @@ def rendered_page(
     environment = jinja2.Environment(
         loader=jinja2.ChoiceLoader(folders), autoescape=True, trim_blocks=True, lstrip_blocks=True
     )
+    environment.policies["json.dumps_kwargs"] = {"allow_nan": False}
     environment.filters["with_code"] = _with_code
     plotly = files("plotly") / "package_data" / "plotly.min.js"
-    plots_data: list[dict[str, Any]] = [
-        {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}} for plot in plots
-    ]
     return environment.get_template(template).render(
         title=title,
         plots=plots,
-        plots_json=_script_safe(plots_data),
+        plots_data=[
+            {"traces": plot.traces, "layout": {**plot.layout, "height": plot.height}}
+            for plot in plots
+        ],
         # Browsers since 2023 can unpack gzip.
         plotly=b64encode(compress(plotly.read_bytes(), mtime=0)).decode("ascii"),
         version=version("mavlink-companion"),
@@ -68,8 +68,3 @@ def _with_code(text: str) -> "Markup":
     from markupsafe import Markup, escape  # noqa: PLC0415  comes with jinja2
 
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
-
-
-def _script_safe(data: Any) -> str:
-    """JSON for a script element, without `<`, which could begin a tag."""
-    return json.dumps(data, allow_nan=False).replace("<", "\\u003c")

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from companion.files.write_whole import write_whole
-from companion.recording.closing_words import ClosingWords, closing_words
+from companion.recording.closing_words import closing_words
 from companion.recording.flight_record import RECORD_FILE
 from companion.report import PAGE
 from companion.report.control_plots import compared_steps, control_plots
@@ -57,10 +57,9 @@ def write_report(
         out = path.with_suffix(".html") if path.is_file() else path / PAGE
     with explain_other_version(path):
         flight = _read_all([path], on_fault)[0]
-        words = None if flight.figures is None else closing_words(flight.figures, None)
         plots = [*timeline(flight), *motion_plots([flight]), *control_plots(flight)]
         tables = [*events_at_end(flight), *flight_tables(flight)]
-        page = _page(flight.name, words, [flight], tables, plots, configuration_table(flight))
+        page = _page(flight.name, [flight], tables, plots, configuration_table(flight))
     write_whole(out, page)
     return out
 
@@ -78,7 +77,7 @@ def write_comparison(
         flights = _read_all(paths, on_fault)
         title = " and ".join(flight.name for flight in flights)
         plots = [*compared_steps(flights), *motion_plots(flights)]
-        page = _page(title, None, flights, comparison_tables(flights), plots, None)
+        page = _page(title, flights, comparison_tables(flights), plots)
     write_whole(out, page)
     return out
 
@@ -94,23 +93,23 @@ def _read_all(paths: Sequence[Path], on_fault: Callable[[str], object] | None) -
 
 def _page(
     title: str,
-    words: ClosingWords | None,
     flights: Sequence[FlightData],
     tables: Sequence[Table],
     plots: Sequence[Plot],
-    settings: Table | None,
+    settings: Table | None = None,
 ) -> str:
+    words_by_flight = [
+        (flight.name, closing_words(flight.figures, None))
+        for flight in flights
+        if flight.figures is not None  # else it is a .tlog
+    ]
     return rendered_page(
         "companion.report",
         "page.html.j2",
         title,
         plots,
-        words=words,
-        words_by_flight=[
-            (flight.name, closing_words(flight.figures, None))
-            for flight in flights
-            if flight.figures is not None  # else it is a .tlog
-        ],
+        words=words_by_flight[0][1] if len(flights) == len(words_by_flight) == 1 else None,
+        words_by_flight=words_by_flight,
         flights=flights,
         tables=tables,
         settings=settings,

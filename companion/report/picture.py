@@ -1,6 +1,7 @@
 """A flight as a picture: response, straightness, ground track, history. Needs the extra `plot`."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,12 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Readable by the colour-blind.
-_MEASURED_COLOUR, _IDEAL_COLOUR, _NEAREST_COLOUR, _TARGET_COLOUR = (
-    "#0072b2",
-    "#d55e00",
-    "#009e73",
-    "#999999",
-)
+_MEASURED_COLOUR, _IDEAL_COLOUR = "#0072b2", "#d55e00"
+_NEAREST_COLOUR, _TARGET_COLOUR = "#009e73", "#999999"
 _LINE_STYLES = ("-", "--", ":")
 _WIDTH, _HEIGHT, _HISTORY_HEIGHT = 13.5, 4.4, 7.6
 """Width of the picture, height of its upper panels and of its history, inches."""
@@ -96,13 +93,10 @@ def _panels(flight: FlightData) -> "list[Callable[[Axes], None]]":
     """Functions that draw the upper panels."""
     panels: list[Callable[[Axes], None]] = []
     if flight.step_runs:
-        ideal = 1.0 / flight.gain
-        panels += [
-            lambda axes: _draw_steps(axes, flight, ideal),
-            lambda axes: _draw_plane(axes, flight),
-        ]
+        draw_steps = partial(_draw_steps, flight=flight, ideal=1.0 / flight.gain)
+        panels += [draw_steps, partial(_draw_plane, flight=flight)]
     if "position" in flight.curves:
-        panels.append(lambda axes: _draw_ground(axes, flight))
+        panels.append(partial(_draw_ground, flight=flight))
     return panels
 
 
@@ -148,12 +142,9 @@ def _draw_ground(axes: "Axes", flight: FlightData) -> None:
     position, reference = flight.curves["position"].values, flight.curves["reference"].values
     if not np.isnan(reference[:, 0]).all():
         # Drawn on top, because a good flight would cover the reference.
+        north, east = reference[:, 0], reference[:, 1]
         axes.plot(
-            *(reference[:, 1], reference[:, 0], "--"),
-            color=_IDEAL_COLOUR,
-            linewidth=1.0,
-            zorder=3,
-            label="reference",
+            east, north, "--", color=_IDEAL_COLOUR, linewidth=1.0, zorder=3, label="reference"
         )
     axes.plot(position[:, 1], position[:, 0], color=_MEASURED_COLOUR, label="flown")
     axes.set(title="Ground track", xlabel="east, m", ylabel="north, m")

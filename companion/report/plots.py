@@ -30,7 +30,6 @@ class Plot:
     """One plot of the page."""
 
     title: str
-    """Title above the plot."""
     note: str
     """Text above the plot: the quantities shown, and how a good flight looks."""
     traces: list[dict[str, Any]]
@@ -40,9 +39,10 @@ class Plot:
     """Height, px."""
 
 
-def line(name: str, x: Floats, y: Floats, colour: str, **options: Any) -> dict[str, Any]:
+def line(
+    name: str, x: Floats, y: Floats, colour: str, dash: str = "solid", **options: Any
+) -> dict[str, Any]:
     """A line through all points; for many points use `line_over_time`, which thins them."""
-    dash = options.pop("dash", "solid")
     return {
         "type": "scatter",
         "mode": "lines",
@@ -154,10 +154,8 @@ def limit_lines(flights: Sequence[FlightData], curve: str, **options: Any) -> li
     early_end = flights[0].early_end if len(flights) == 1 else None
     if early_end is None or early_end.limit is None or early_end.limit.curve != curve:
         return []
-    limit, last_time = (
-        early_end.limit,
-        early_end.time if flights[0].end_time is None else flights[0].end_time,
-    )
+    limit, end_time = early_end.limit, flights[0].end_time
+    last_time = early_end.time if end_time is None else end_time
     if limit.outline:
         north, east = np.array(limit.outline).T
         return [line(f"limit: {limit.key}", east, north, CROSSED_COLOUR, dash="dash", **options)]

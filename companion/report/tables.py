@@ -21,7 +21,6 @@ class Table(NamedTuple):
     """A table of texts."""
 
     title: str
-    """Title above the table."""
     header: tuple[str, ...]
     rows: Sequence[tuple[str, ...]]
     """Rows, each with one text for each column."""

@@ -160,8 +160,7 @@ def _slow_density(omega: Floats, sigma: float, correlation_time: float) -> Float
         sigma: standard deviation of the noise.
         correlation_time: correlation time of the noise, s.
     """
-    density: Floats = 4.0 * sigma**2 * correlation_time / (1.0 + (omega * correlation_time) ** 2)
-    return density
+    return 4.0 * sigma**2 * correlation_time / (1.0 + (omega * correlation_time) ** 2)
 
 
 def expectation(config: Config, disturbances: Disturbances) -> Expectation:

@@ -29,8 +29,7 @@ class Feedback(NamedTuple):
 
 def hold_element(s: Complex, period: float) -> Complex:
     """(n,), frequency response of a zero-order hold of `period` s at the frequencies `s`, rad/s."""
-    response: Complex = (1.0 - np.exp(-s * period)) / (s * period)
-    return response
+    return (1.0 - np.exp(-s * period)) / (s * period)
 
 
 def guidance_feedback(
@@ -111,8 +110,4 @@ def _observer_responses(
     resolvent = np.linalg.inv(z[:, None, None] * np.eye(3) - i_minus_kc @ a) * z[:, None, None]
     to_acceleration = (resolvent @ (i_minus_kc @ b)) * hold_element(s, period)[:, None]
     to_measurements = resolvent @ k
-    return (
-        to_acceleration,
-        to_measurements[:, :, 0],
-        to_measurements[:, :, 1],
-    )
+    return to_acceleration, to_measurements[:, :, 0], to_measurements[:, :, 1]

@@ -148,8 +148,7 @@ def _rate_response(axis: AxisResponse, s: Complex, mismatch: ModelMismatch) -> C
     time_factor = mismatch.time_factor
     dead_time = np.exp(-s * (time_factor * axis.dead_time + mismatch.delay))
     lag = 1.0 + time_factor * s * (axis.lag + time_factor * s * axis.sigma)
-    response: Complex = mismatch.gain * dead_time / lag / s
-    return response
+    return mismatch.gain * dead_time / lag / s
 
 
 def _slower_axis(config: Config) -> AxisResponse:

@@ -25,10 +25,7 @@ _AUTOPILOT_NUMBERS = {autopilot.mav_autopilot for autopilot in AUTOPILOTS}
 
 
 def measured_disturbances(
-    log: Path,
-    drag: float,
-    default: Disturbances,
-    on_damage: Callable[[str], object] | None = None,
+    log: Path, drag: float, default: Disturbances, on_damage: Callable[[str], object] | None = None
 ) -> Disturbances:
     """The disturbances in flight, measured in a `.tlog`.
 

@@ -22,7 +22,6 @@ class Proposal:
     tuned: Config
     """The configuration with the proposed values."""
     design: Design
-    """The proposed values."""
     before: Expectation
     """Expected behaviour of `untuned`."""
     after: Expectation
@@ -30,7 +29,6 @@ class Proposal:
     margins_with_mismatches: tuple[tuple[ModelMismatch, Margins], ...]
     """Errors of lag and dead time, and the margins of `tuned` with each of these errors."""
     disturbances: Disturbances
-    """Disturbances of the vehicle."""
     aims: Aims
     """Requirements of the search. The margins without model error are at least 95 % of the required
     margins; the other requirements may be missed by a little."""
@@ -57,9 +55,7 @@ class Proposal:
 
 
 def propose(
-    config: Config,
-    disturbances: Disturbances | None = None,
-    aims: Aims | None = None,
+    config: Config, disturbances: Disturbances | None = None, aims: Aims | None = None
 ) -> Proposal:
     """Propose values with the smallest expected position error within the stability margins.
 

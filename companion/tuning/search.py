@@ -65,10 +65,8 @@ class Design(NamedTuple):
         return Design(*(float(f"{value:.3g}") for value in self))
 
 
-_UPPER_BOUNDS = Design(20.0, 10000.0, 10000.0, 14.0)
-"""Upper bounds of the search."""
 _LOWER_BOUNDS = Design(1.0, 0.01, 0.01, 0.3)
-"""Lower bounds of the search."""
+_UPPER_BOUNDS = Design(20.0, 10000.0, 10000.0, 14.0)
 _MAX_BANDWIDTH_WITH_SLEW_LIMIT = 8.0
 """Largest bandwidth for a rate loop with a slew limit (ArduPilot), rad/s.
 

@@ -10,20 +10,15 @@ import pyarrow
 import pyarrow.parquet
 import pytest
 
-from companion.campaign import folder, outcomes, store
+from companion.campaign import folder, store
 from companion.campaign import rerun as again
 from companion.campaign.report.results import Results
 from companion.campaign.versions import versions
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError
-from tests.campaign.test_campaign_file import load
+from tests.campaign.test_campaign_file import load, row_of
 
 TILT = {"limits.max_tilt_deg": [20, 25, 30]}
-
-
-def row_of(case):
-    row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.error_outcomes("ok") | {"ok": True, "digest": f"d{case.index}"}
 
 
 @pytest.fixture

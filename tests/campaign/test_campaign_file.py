@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.campaign import estimate, folder, loading
+from companion.campaign import estimate, folder, loading, outcomes
 from companion.campaign.design import few_samples_warning, planned_cases, seed_of
 from companion.campaign.estimate import duration_text
 from companion.campaign.swept import SweptValues
@@ -26,6 +26,13 @@ def written(tmp_path, **told):
 
 def load(tmp_path, **told):
     return loading.load(written(tmp_path, **told))
+
+
+def row_of(case, result="ok"):
+    """The row of a case whose flight took no time."""
+    row = {"case": case.index, "seed": case.seed, **case.factors}
+    outcome = {"ok": result == "ok", "digest": f"d{case.index}"}
+    return row | outcomes.error_outcomes(result) | outcome
 
 
 def refusal(tmp_path, **told):

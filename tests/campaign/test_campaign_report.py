@@ -5,7 +5,6 @@ import json
 import re
 from math import isnan
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pyarrow
@@ -15,7 +14,7 @@ import pytest
 
 from companion.campaign import folder, loading, store
 from companion.campaign.report import page
-from companion.campaign.report.page import _few_samples_warning, run
+from companion.campaign.report.page import run
 from companion.campaign.report.results import Results
 from companion.campaign.report.statistics import levels, pareto_front, share_of
 from companion.files.yaml_file import ConfigError
@@ -172,14 +171,6 @@ def test_the_levels_of_a_factor_hold_each_case_once():
 def test_the_pareto_front_holds_what_nothing_beats():
     goals = np.array([[1.0, 3.0], [2.0, 2.0], [3.0, 1.0], [3.0, 3.0], [2.0, 2.0]])
     assert pareto_front(goals).tolist() == [True, True, True, False, True]
-
-
-@pytest.mark.parametrize(("sampled", "warnings"), [(True, 1), (False, 0)])
-def test_only_sampled_factors_can_have_too_few_samples(sampled, warnings):
-    """A grid of 20 values is no sample, whatever its length."""
-    factors, columns = {"a": {"sampled": sampled}}, {"a": np.arange(20.0)}
-    results = SimpleNamespace(factors=factors, columns=columns)
-    assert len(list(_few_samples_warning(results))) == warnings
 
 
 def test_reasons_are_counted_whatever_numbers_are_in_them():

@@ -1,12 +1,11 @@
 """A case flown to its row, a campaign run, stopped, gone on with, and a case of it flown again."""
 
 import json
-from contextlib import contextmanager
 from dataclasses import replace
 
 import pytest
 
-from companion.campaign import flight, folder, outcomes, running, store, unit
+from companion.campaign import flight, folder, running, store, unit
 from companion.campaign.case import Fault
 from companion.campaign.cluster import ClusterError
 from companion.campaign.unit import cases_per_unit, unit_ranges
@@ -16,7 +15,7 @@ from companion.cli.main import main
 from companion.config.files import load as load_config
 from companion.files import bounded_yaml
 from companion.files.yaml_file import ConfigError
-from tests.campaign.test_campaign_file import CONFIGS, load
+from tests.campaign.test_campaign_file import CONFIGS, load, row_of
 from tests.flight.fly import LOOP_HZ, QUICK_PARAMETERS
 
 QUICK = {
@@ -133,24 +132,12 @@ def quick(tmp_path):
 
 
 @pytest.fixture
-def threads(monkeypatch):
-    """Lets campaigns run on Dask workers in this process, which begin at once."""
-
-    @contextmanager
-    def connected(_scheduler, _workers):
-        from distributed import Client, LocalCluster  # noqa: PLC0415  slow to import
-
-        options = {"processes": False, "dashboard_address": "127.0.0.1:0", "protocol": "inproc://"}
-        with (
-            LocalCluster(n_workers=1, threads_per_worker=1, **options) as cluster,
-            Client(cluster) as client,
-        ):
-            yield client
-
+def on_dask(connected, monkeypatch):
+    """Lets campaigns run on a Dask worker in this process, which begins at once."""
     monkeypatch.setattr(running, "cluster_client", connected)
 
 
-def test_a_campaign_is_run_resumed_and_one_case_is_flown_again(quick, threads, capsys, monkeypatch):
+def test_a_campaign_is_run_resumed_and_one_case_is_flown_again(quick, on_dask, capsys, monkeypatch):
     file, out = quick
     assert main(["campaign", str(file), "--out", str(out), "--workers", "2"]) == 0
     assert f"companion campaign report {out}" in capsys.readouterr().out
@@ -203,7 +190,7 @@ def _refusals(file, out, capsys):
         pass
 
 
-def test_what_ends_a_run_early_loses_no_finished_unit(quick, threads, capsys, monkeypatch):
+def test_what_ends_a_run_early_loses_no_finished_unit(quick, on_dask, capsys, monkeypatch):
     file, out = quick
     monkeypatch.setattr(unit, "fly_case", quick_row)
     units = []
@@ -234,8 +221,7 @@ def test_what_ends_a_run_early_loses_no_finished_unit(quick, threads, capsys, mo
 
 
 def quick_row(case):
-    row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.error_outcomes("internal error: oops" if case.index == 0 else "ok")
+    return row_of(case, "internal error: oops" if case.index == 0 else "ok")
 
 
 def test_units_take_seconds_and_leave_work_for_all():

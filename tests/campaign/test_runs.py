@@ -17,7 +17,6 @@ from companion.campaign import (
     estimate,
     flight,
     folder,
-    outcomes,
     running,
     store,
     unit,
@@ -28,14 +27,9 @@ from companion.campaign.versions import VersionError, _version, versions
 from companion.cli.main import main
 from companion.files.yaml_file import ConfigError
 from companion.program_command import program_command
-from tests.campaign.test_campaign_file import load, written
+from tests.campaign.test_campaign_file import load, row_of, written
 
 TILT = {"limits.max_tilt_deg": [20, 25, 30]}
-
-
-def row_of(case):
-    row = {"case": case.index, "seed": case.seed, **case.factors}
-    return row | outcomes.error_outcomes("ok") | {"ok": True}
 
 
 @pytest.fixture
@@ -373,14 +367,7 @@ def test_a_case_keeps_its_files_where_dask_removes_those_of_a_killed_worker(
 ):
     """Each worker that was killed or interrupted in a flight left a folder in /tmp."""
 
-    class Flight:
-        def __init__(self, _, files_folder):
-            self._row = {"folder": str(files_folder.parent)}
-
-        def fly(self, _):
-            return self._row
-
-    monkeypatch.setattr(flight, "CaseFlight", Flight)
+    monkeypatch.setattr(flight, "fly_in", lambda place, *_: {"folder": str(place.parent)})
     case = next(load(tmp_path, sweep=TILT).cases())
     row = dask.submit(flight.fly_case, case, pure=False).result()
     [worker_folder] = dask.run(lambda dask_worker: dask_worker.local_directory).values()

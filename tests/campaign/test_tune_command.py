@@ -309,26 +309,20 @@ def test_flights_that_ended_early_are_told_and_with_too_few_nothing_is_compared(
 
 
 class Flights:
-    """Stands for the flights: `fly` writes what a flight of the vehicle leaves behind."""
+    """Stands for the flights: `leaves` writes what a flight of the vehicle leaves behind."""
 
-    def __init__(self, leaves):
+    def __init__(self, leaves=lambda _: None):
         self.leaves, self.flown = leaves, []
 
-    def __call__(self, case, place):
+    def __call__(self, place, case, _):
         self.flown.append(case)
-        outer = self
-
-        class CaseFlight:
-            def fly(self, folder):
-                outer.leaves(place, folder)
-
-        return CaseFlight()
+        self.leaves(place)
 
 
 def test_first_flights_without_data_leave_the_configuration_as_it_is(tmp_path, monkeypatch):
     made = campaign(tmp_path)
-    flights = Flights(lambda *_: None)
-    monkeypatch.setattr(first_flight, "CaseFlight", flights)
+    flights = Flights()
+    monkeypatch.setattr(first_flight, "fly_in", flights)
     assert first_flight.learned_config(made) == made.base
     doublets, course = flights.flown
     assert doublets.config.flight.maneuvers == ("identify",)
@@ -338,8 +332,8 @@ def test_first_flights_without_data_leave_the_configuration_as_it_is(tmp_path, m
 
 def test_first_flights_teach_the_drag(tmp_path, monkeypatch):
     made = campaign(tmp_path)
-    flights = Flights(lambda place, _: LearnedFile(place, "aa").save(Drag(0.4, 0.03), 5.0))
-    monkeypatch.setattr(first_flight, "CaseFlight", flights)
+    flights = Flights(lambda place: LearnedFile(place, "aa").save(Drag(0.4, 0.03), 5.0))
+    monkeypatch.setattr(first_flight, "fly_in", flights)
     known = first_flight.learned_config(made)
     assert (known.guidance.drag_per_s, known.guidance.quadratic_drag_per_m) == (0.4, 0.03)
 
@@ -353,7 +347,7 @@ def test_first_flights_teach_the_response(tmp_path, monkeypatch, damped):
         VEHICLE, roll=replace(ROLL, second_order=nearer), pitch=replace(PITCH, second_order=nearer)
     )
     rows = SimpleNamespace(setpoints=1, rates=2, specific_thrust=3)
-    monkeypatch.setattr(first_flight, "CaseFlight", Flights(lambda *_: None))
+    monkeypatch.setattr(first_flight, "fly_in", Flights())
     monkeypatch.setattr(first_flight, "read_flight_log", lambda _: rows)
     monkeypatch.setattr(first_flight, "identify_vehicle", lambda *told: seen)
     search = TUNE["search"] | ({"vehicle.damping": {"uniform": [0.5, 1]}} if damped else {})
@@ -370,7 +364,7 @@ def test_a_response_that_cannot_be_fitted_is_not_learned(tmp_path, monkeypatch):
         raise BadFitError("all axes are bad")
 
     rows = SimpleNamespace(setpoints=1, rates=2, specific_thrust=3)
-    monkeypatch.setattr(first_flight, "CaseFlight", Flights(lambda *_: None))
+    monkeypatch.setattr(first_flight, "fly_in", Flights())
     monkeypatch.setattr(first_flight, "read_flight_log", lambda _: rows)
     monkeypatch.setattr(first_flight, "identify_vehicle", fail)
     made = campaign(tmp_path)

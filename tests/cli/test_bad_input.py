@@ -240,12 +240,6 @@ def test_what_realtime_requires_and_is_refused_is_named_and_nothing_is_flown(cap
     assert list((tmp_path / "flights").iterdir()) == []
 
 
-def test_a_folder_without_a_flight_cannot_be_drawn(capsys, tmp_path):
-    code, _, err = run(capsys, "plot", tmp_path)
-    assert code == 2
-    assert "is this the folder of a flight?" in err
-
-
 @pytest.mark.parametrize(
     "arguments", [(), ("fly",), ("bench",), ("check-config",), ("identify",), ("hover",)]
 )

@@ -3,7 +3,6 @@
 import errno
 import os
 import shlex
-import signal
 from pathlib import Path
 
 import pytest
@@ -267,11 +266,3 @@ def test_a_path_that_is_not_flown_and_a_table_for_a_configuration_are_told(tmp_p
     assert "not flown" not in capsys.readouterr().out
     assert main(["check-config", str(table)]) == 2
     assert "is a table of a trajectory, not a configuration" in capsys.readouterr().err
-
-
-def test_help_leaves_the_keyboard_interrupt_as_it_was():
-    before = signal.getsignal(signal.SIGINT)
-    for arguments in (["--help"], ["no-such-command"]):
-        with pytest.raises(SystemExit):
-            main(arguments)
-    assert signal.getsignal(signal.SIGINT) is before

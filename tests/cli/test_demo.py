@@ -10,11 +10,9 @@ import pytest
 import yaml
 
 from companion import demo
-from companion.cli.flying import write_flight_page
 from companion.cli.main import main
 from companion.config.files import shipped
 from companion.mavlink.transport.free_port import free_port
-from companion.program_command import program_command
 from tests.flight.fly import LOOP_HZ, QUICK_MOCK, QUICK_PARAMETERS, merged
 from tests.flight.programs import Program
 
@@ -82,23 +80,6 @@ def test_lockstep_with_a_vehicle_that_is_not_in_lockstep_is_refused(folder, caps
         code = main(["fly", "--config", "mine.yaml", "--lockstep", "--arm"])
     assert code == 1
     assert "no lockstep beacon" in " ".join(capsys.readouterr().err.split())
-
-
-@pytest.mark.parametrize(
-    ("error", "words"),
-    [
-        (KeyboardInterrupt(), "interrupted"),
-        (MemoryError(), "MemoryError"),
-        (OSError(28, "No space left on device", "report.html"), "No space left on device"),
-    ],
-)
-def test_a_page_that_is_not_written_is_said_with_the_reason(tmp_path, monkeypatch, error, words):
-    def fails(*_):
-        raise error
-
-    monkeypatch.setattr("companion.report.page.write_report", fails)
-    again = program_command("report", tmp_path)
-    assert write_flight_page(tmp_path) == f"No report: {words}; `{again}` tries again"
 
 
 def test_a_mock_vehicle_without_a_word_points_at_the_disk(tmp_path):

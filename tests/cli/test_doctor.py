@@ -27,6 +27,7 @@ from companion.mavlink.transport.free_port import free_port
 from companion.preflight.finding import Finding, Key
 from companion.preflight.parameter_fixes import Answer
 from companion.vehicle.parameter_rules import CheckResult
+from tests.cli.test_bad_input import run
 from tests.mavlink.fakes import frames_of
 from tests.preflight.vehicles import FAMILIES, config_file, configured, met, shipped_vehicle
 
@@ -44,13 +45,7 @@ NO_POSITION_YET = ("LOCAL_POSITION_NED", "GLOBAL_POSITION_INT", "HOME_POSITION",
 
 
 def doctor(capsys, *arguments):
-    try:
-        code = main(["doctor", *map(str, arguments)])
-    except SystemExit as exit_:  # argparse's own way
-        code = exit_.code
-    captured = capsys.readouterr()
-    assert "Traceback" not in captured.err
-    return code, captured.out, " ".join(captured.err.split())
+    return run(capsys, "doctor", *arguments)
 
 
 def found(out):

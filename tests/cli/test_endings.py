@@ -34,6 +34,7 @@ from companion.mavlink.loop import run as run_loop
 from companion.program_command import program_command
 
 ENOSPC = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+AGAIN = f"`{program_command()} report 'a b'` tries again"
 
 FIGURE8 = shipped("trajectories/figure8.yaml")
 
@@ -186,9 +187,11 @@ def test_the_next_command_names_the_program_as_it_was_called(monkeypatch, progra
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (MissingExtraError("needs plotly"), "No report: needs plotly"),
-        (ValueError("x"), f"No report: x; `{program_command()} report 'a b'` tries again"),
-        (ValueError(), f"No report: ValueError; `{program_command()} report 'a b'` tries again"),
+        (MissingExtraError("needs plotly"), "needs plotly"),
+        (ValueError("x"), f"x; {AGAIN}"),
+        (MemoryError(), f"MemoryError; {AGAIN}"),
+        (KeyboardInterrupt(), f"interrupted; {AGAIN}"),
+        (ENOSPC, f"No space left on device; {AGAIN}"),
     ],
 )
 def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, error, said):
@@ -196,7 +199,7 @@ def test_a_page_that_cannot_be_written_does_not_fail_the_flight(monkeypatch, err
         raise error
 
     monkeypatch.setattr("companion.report.page.write_report", write)
-    assert write_flight_page("a b") == said
+    assert write_flight_page("a b") == f"No report: {said}"
 
 
 def test_a_flight_whose_console_is_closed_gets_its_page(monkeypatch, tmp_path):
@@ -308,9 +311,10 @@ def test_a_count_of_workers_that_is_none_is_wrong_usage(capsys, count):
 
 def test_the_handlers_are_those_of_before_after_a_command():
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    assert {number: signal.getsignal(number) for number in before} == before
+    for argument in ("--help", "no-such-command"):
+        with pytest.raises(SystemExit):
+            main([argument])
+        assert {number: signal.getsignal(number) for number in before} == before
 
 
 class Beside:

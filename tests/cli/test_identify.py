@@ -14,23 +14,20 @@ import yaml
 from companion.cli import identify
 from companion.cli.main import main
 from companion.config.files import load
-from companion.identification import FitQuality, IdentifiedVehicle, RateResponse
+from companion.identification import IdentifiedVehicle, RateResponse
 from companion.mavlink.transport.free_port import free_port
+from tests.cli.test_bad_input import run as run_command
 from tests.flight.fly import QUICK_FLIGHT, merged
 from tests.flight.programs import Program
 from tests.flight.sockets import mock_vehicle
+from tests.identification.test_fragment import GOOD
 
 RECORDINGS = Path(__file__).parents[1] / "mavlink" / "recordings"
 
 
 def run(capsys, *arguments):
-    try:
-        code = main(["identify", *(str(a) for a in arguments)])
-    except SystemExit as exit_:  # argparse's own way
-        code = exit_.code
-    captured = capsys.readouterr()
-    assert "Traceback" not in captured.err
-    return code, " ".join(captured.out.split()), " ".join(captured.err.split())
+    code, out, err = run_command(capsys, "identify", *arguments)
+    return code, " ".join(out.split()), err
 
 
 def config_for(folder, endpoint, **changes):
@@ -210,14 +207,6 @@ def test_a_log_in_a_folder_that_is_not_there_is_what_is_blamed(capsys, tmp_path)
     assert f"{tmp_path}/no/x.tlog does not exist: {TAKES}" in err
 
 
-GOOD = FitQuality(
-    explained=0.99,
-    misfit=0.08,
-    dead_time_error=0.001,
-    lag_error=0.002,
-    span=2.0,
-    excited_samples=200,
-)
 TILT = RateResponse(0.018, 0.020, 1.0, None, GOOD)
 YAW = RateResponse(0.06, 0.158, 1.0, 4.7, GOOD)
 

@@ -106,12 +106,6 @@ def test_the_noise_of_the_flight_in_the_folder_counts(vehicle, capsys):
     assert noise[1] > 20.0 * noise[0]
 
 
-def test_a_folder_is_no_file_to_write(vehicle, tmp_path, capsys):
-    code, _, error = run(capsys, vehicle, "--output", tmp_path, "--no-flights")
-    assert code == 2
-    assert f"{tmp_path} is a folder; choose a file in it with --out" in error
-
-
 def test_what_is_no_flight_folder_needs_a_vehicle_file(tmp_path, capsys):
     for source in (tmp_path, tmp_path / "nowhere"):
         code, _, error = run(capsys, source, "--config", shipped("px4.yaml"), "--no-flights")

@@ -289,14 +289,6 @@ def test_a_vehicle_is_identified_axis_by_axis_for_a_gain_of_one():
     assert vehicle.thrust is None
 
 
-@pytest.mark.parametrize("wrong", range(3))
-def test_rows_with_another_number_of_columns_are_refused(wrong):
-    columns = [5, 4, 2]
-    columns[wrong] += 1
-    with pytest.raises(ValueError, match=r"must have the shape \(n, \d\), not"):
-        identify_vehicle(*(np.zeros((20, count)).tolist() for count in columns))
-
-
 def test_the_thrust_map_comes_back_through_the_rotors_lag():
     times = regular(8.0, 100)
     thrust = 0.49 + 0.08 * np.sign(np.sin(4.0 * times))

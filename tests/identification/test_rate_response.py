@@ -189,7 +189,3 @@ def test_times_that_do_not_meet_are_named_as_the_reason():
 def test_rows_of_another_shape_are_named(name, shapes):
     with pytest.raises(ValueError, match=rf"{name} must have the shape \(n, \d\), not \("):
         identify_vehicle(*map(np.zeros, shapes))
-
-
-def test_no_rows_are_no_thrust_map():
-    assert identify_vehicle([], [], []).thrust is None

@@ -128,13 +128,6 @@ def test_each_figure_beyond_its_limit_is_told_first_with_what_to_do(what):
     assert remedy in told.lines[0]
 
 
-def test_only_another_planner_is_told_to_fly_model_following():
-    bent = changed(["response", "cross_axis_max"], 0.01)
-    assert "fly planner.name: model-following" not in words(bent)[0].lines[0]
-    bent["planner"] = "quaternion"
-    assert "fly planner.name: model-following" in words(bent)[0].lines[0]
-
-
 @pytest.mark.parametrize("what", BEYOND)
 def test_a_figure_that_was_not_measured_is_no_fault(what):
     path, _, _ = BEYOND[what]

@@ -115,10 +115,7 @@ def test_each_maneuver_has_its_row():
 def test_in_lockstep_no_latency_and_no_deadline_is_shown():
     def words(lockstep):
         facts = FlightFacts(lockstep=lockstep)
-        summary = Summary("ok", "disarm", "exact", 5.0, COUNTS, {}, FlightTrace(), facts=facts)
-        out = io.StringIO()
-        Console(file=out, width=80).print(flight_table(summary))
-        return out.getvalue()
+        return text_of(Summary("ok", "", "exact", 5.0, COUNTS, {}, FlightTrace(), facts=facts))
 
     for sign in ("sample in → setpoint out", "deadline", "Control loop"):
         assert sign in words(False)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from companion.cli.main import main
-from companion.extras import MissingExtraError
 from companion.recording.flight_record import RecordError
 from companion.recording.mcap_file.channels import MOTION
 from companion.recording.mcap_file.fields import CDR_HEADER
@@ -140,22 +139,6 @@ def test_the_drawing_has_the_name_it_is_given_also_without_a_suffix(tmp_path, ca
     assert out.read_bytes()[:4] == b"\x89PNG"
     assert main(["plot", str(tmp_path), "--out", str(tmp_path)]) == 2  # it was `FOLDER.png`
     assert f"{tmp_path}: cannot write it: Is a directory" in capsys.readouterr().err
-
-
-def test_a_missing_folder_for_the_drawing_is_one_sentence(tmp_path, capsys):
-    record(tmp_path, motion=True, summary=WHOLE)
-    out = tmp_path / "missing" / "out.png"
-    assert main(["plot", str(tmp_path), "--out", str(out)]) == 2
-    assert f"{out}: cannot write it: No such file" in capsys.readouterr().err.replace("\n", "")
-
-
-def test_a_missing_extra_is_one_clear_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr("importlib.util.find_spec", lambda *_: None)
-    with pytest.raises(MissingExtraError) as told:
-        draw_flight(tmp_path, tmp_path / "out.png")
-    assert "drawing" in str(told.value)
-    assert "[plot]" in str(told.value)
-    assert "\n" not in str(told.value)
 
 
 def test_a_reason_that_is_too_long_is_cut():

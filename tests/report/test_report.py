@@ -15,12 +15,13 @@ from hypothesis import strategies as st
 from companion.cli.main import main
 from companion.config import Config
 from companion.recording.flight_record import read_flight
-from companion.report import PAGE, flight_data, html_page, page
+from companion.report import PAGE, flight_data, page
 from companion.report.control_plots import control_plots
 from companion.report.early_end import early_end
 from companion.report.flight_data import recorded_flight
+from companion.report.html_page import rendered_page
 from companion.report.motion_plots import motion_plots
-from companion.report.plots import drawn_indices
+from companion.report.plots import Plot, drawn_indices
 from tests.flight.fly import fly, mock_vehicle
 
 FLIGHT = {
@@ -286,7 +287,8 @@ def test_what_is_marked_as_code_is_shown_as_code(failed):
 
 
 def test_text_of_a_log_cannot_become_a_tag():
-    assert "</script>" not in html_page._script_safe({"text": "</script><script>alert(1)"})
+    plot = Plot("", "", [{"text": "</script><script>alert(1)"}])
+    assert "<script>alert" not in rendered_page("companion.report", "base.html.j2", "", [plot])
 
 
 @settings(max_examples=30)

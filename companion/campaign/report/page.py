@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 PARQUET, CSV = "results.parquet", "results.csv"
-_EXIT_OK = 0  # exit code
 _MOST_GRID_VALUES = 12
 """Largest number of different values with which a sampled factor counts as a grid."""
 _ENOUGH_SAMPLES = 60
@@ -62,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
     for line in missing_cases_note(results):
         console.print(line)
     console.print(f"Open {page}")
-    return _EXIT_OK
+    return 0
 
 
 def write_tables(table: "pa.Table", folder: Path) -> None:
@@ -158,7 +157,7 @@ def summary_sentences(
         yield f"{documented_count} of {faulty_count} flights with a fault ended as documented."
     reasons = Counter(results.reason(row) for row in range(results.count) if not results.good[row])
     if reasons:
-        (reason, count) = reasons.most_common(1)[0]
+        reason, count = reasons.most_common(1)[0]
         yield f"Most frequent reason why a case was not good, {count} times: {reason}."
     yield from _influence_sentences(results, influences_by_outcome)
     if results.error_outcome == TRUE_ERROR:

@@ -77,20 +77,15 @@ def levels(column: Column) -> list[Group]:
     """
     distinct_keys = sorted({_sort_key(value) for value in column})
     if column.dtype != float or len(distinct_keys) <= _MOST_LEVELS:
-        shown_keys = (
-            distinct_keys
-            if len(distinct_keys) <= _MOST_LEVELS
-            else distinct_keys[: _MOST_LEVELS - 1]
-        )
+        all_fit = len(distinct_keys) <= _MOST_LEVELS
+        shown_keys = distinct_keys if all_fit else distinct_keys[: _MOST_LEVELS - 1]
         keys = [_sort_key(value) for value in column]
         groups = [
             Group(key[1], np.array([key == value_key for value_key in keys])) for key in shown_keys
         ]
-        other_count = len(distinct_keys) - len(shown_keys)
-        if other_count:
-            groups.append(
-                Group(f"{other_count} others", np.array([key not in shown_keys for key in keys]))
-            )
+        if not all_fit:
+            others = np.array([key not in shown_keys for key in keys])
+            groups.append(Group(f"{len(distinct_keys) - len(shown_keys)} others", others))
         return groups
     edges = np.nanquantile(column, np.linspace(0.0, 1.0, _RANGE_COUNT + 1))
     groups = []

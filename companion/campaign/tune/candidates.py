@@ -142,12 +142,10 @@ def candidates_near(
             swept = search[key]
             if swept.loguniform is not None:
                 low, high = swept.loguniform
-                moved_values[key] = value * (high / low) ** float(
-                    rng.normal(0.0, _NEARBY_DEVIATION)
-                )
+                moved_values[key] = value * (high / low) ** rng.normal(0.0, _NEARBY_DEVIATION)
             elif swept.uniform is not None:
                 low, high = swept.uniform
-                moved_values[key] = value + (high - low) * float(rng.normal(0.0, _NEARBY_DEVIATION))
+                moved_values[key] = value + (high - low) * rng.normal(0.0, _NEARBY_DEVIATION)
         yield StartCandidate(f"near {start.name}", clamped_to_search(moved_values, search))
 
 
@@ -195,9 +193,7 @@ def clamped_to_search(values: Values, search: Mapping[str, SweptValues]) -> dict
         if swept is None or (swept.choice is not None and value not in swept.choice):
             continue
         search_range = swept.uniform or swept.loguniform
-        clamped_values[key] = (
-            value
-            if search_range is None
-            else min(max(float(value), search_range[0]), search_range[1])
-        )
+        clamped_values[key] = value
+        if search_range is not None:
+            clamped_values[key] = min(max(float(value), search_range[0]), search_range[1])
     return clamped_values

@@ -157,10 +157,8 @@ def _check_and_write(
     after = score_of(fly(cases(check_campaign, results.best.values)), tune.envelope_m)
     comparison = compare(before, after, tune.check_samples)
     result = CheckedResult(campaign, results, results.best, before, after, comparison)
-    path, text = (
-        search_folder / RESULT_FILE_NAME,
-        result_text(result, configured_values(campaign.base, tune.search)),
-    )
+    path = search_folder / RESULT_FILE_NAME
+    text = result_text(result, configured_values(campaign.base, tune.search))
     for line in summary_lines(result):
         console.print(line)
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 from companion.attitude.planner import FIRST_ORDER
 from companion.campaign.campaign import Campaign
 from companion.campaign.case import Case
-from companion.campaign.flight import CaseFlight
+from companion.campaign.flight import fly_in
 from companion.campaign.keys import replace_unchecked
 from companion.config import Config
 from companion.config.files import changed, load
@@ -50,7 +50,7 @@ def _with_rate_response(config: Config, case: Case, *, second_order: bool) -> Co
     )
     with tempfile.TemporaryDirectory(prefix="companion-identify-") as parent_folder:
         folder, fragment = Path(parent_folder) / "flight", Path(parent_folder) / "vehicle.yaml"
-        CaseFlight(replace(case, config=doublets, fault=None), Path(parent_folder)).fly(folder)
+        fly_in(Path(parent_folder), replace(case, config=doublets, fault=None), folder)
         try:
             log_data = read_flight_log(folder / TLOG_FILE)
             vehicle = identify_vehicle(log_data.setpoints, log_data.rates, log_data.specific_thrust)
@@ -69,9 +69,7 @@ def _with_drag(config: Config, case: Case) -> Config:
     """The configuration with the drag measured in a flight of the case, if drag was measured."""
     with tempfile.TemporaryDirectory(prefix="companion-drag-") as parent_folder:
         # A recorded flight writes its learned file beside its folder.
-        CaseFlight(replace(case, fault=None), Path(parent_folder)).fly(
-            Path(parent_folder) / "flight"
-        )
+        fly_in(Path(parent_folder), replace(case, fault=None), Path(parent_folder) / "flight")
         learned_file = newest_learned(Path(parent_folder))
     if learned_file is None:
         return config

@@ -57,7 +57,6 @@ class Candidate:
     """A candidate that has flown all its cases."""
 
     number: int
-    """Number of the trial."""
     values: Values
     score: Score
     """Score on the cases of the search."""

@@ -95,13 +95,7 @@ class Search:
         path: file of the storage.
     """
 
-    def __init__(
-        self,
-        campaign: Campaign,
-        tune: Tune,
-        folder: Path,
-        fly: Fly,
-    ) -> None:
+    def __init__(self, campaign: Campaign, tune: Tune, folder: Path, fly: Fly) -> None:
         import optuna  # noqa: PLC0415  an extra
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)

@@ -78,10 +78,8 @@ def _certainty_lines(result: CheckedResult) -> Iterator[str]:
         f"{comparison.ratio.low:.2f} to {comparison.ratio.high:.2f}; better in "
         f"{comparison.better_samples} of {comparison.samples} samples."
     )
-    (before, after), (estimate_before, estimate_after) = (
-        comparison.estimated_errors,
-        comparison.estimator_errors,
-    )
+    before, after = comparison.estimated_errors
+    estimate_before, estimate_after = comparison.estimator_errors
     yield (
         f"On the same flights the estimated position was {before:.3f} -> {after:.3f} m from the "
         f"reference, and {estimate_before:.3f} -> {estimate_after:.3f} m from the true position."

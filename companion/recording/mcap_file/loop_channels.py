@@ -39,10 +39,9 @@ ACTION_NAMES = (
     "move_upwind",
 )
 """Names of the codes in the column "action": how a phase controls guidance or the control loop."""
-
-
 QUATERNION = ("q_w", "q_x", "q_y", "q_z")
 """Names of the columns of an attitude."""
+_NED, _AXES = ("north", "east", "down"), ("roll", "pitch", "yaw")
 
 
 def vector_names(prefix: str, unit: str) -> tuple[str, ...]:
@@ -53,9 +52,6 @@ def vector_names(prefix: str, unit: str) -> tuple[str, ...]:
 def rate_names(prefix: str) -> tuple[str, ...]:
     """Names of the columns of body rates: roll, pitch, yaw."""
     return tuple(f"{prefix}_{axis}_rad_s" for axis in _AXES)
-
-
-_NED, _AXES = ("north", "east", "down"), ("roll", "pitch", "yaw")
 
 
 def _vector_fields(prefix: str, unit: str, meaning: str) -> tuple[Field, ...]:

@@ -61,6 +61,8 @@ def derived_summary(record: FlightRecord) -> dict[str, Any]:
 def _summary_from_record(record: FlightRecord) -> Summary:
     flight_metadata = record.metadata["flight"]
     reason = f"the record ends {record.duration:.1f} s after the flight began, before it was over"
+    deadline = float(flight_metadata.get("deadline_s", "0.004"))
+    max_tilt = flight_metadata.get("max_tilt_rad")
     phase = record.phases[-1].name if record.phases else "connect"
     resources, thrust = record.rows("resources"), record.rows("thrust")
     takeoff_time = _takeoff_time(record)
@@ -69,7 +71,7 @@ def _summary_from_record(record: FlightRecord) -> Summary:
         phase=phase,
         planner=flight_metadata.get("planner", ""),
         gain=float(flight_metadata.get("gain_per_s", "0")),
-        counts=_loop_counts(record, float(flight_metadata.get("deadline_s", "0.004"))),
+        counts=_loop_counts(record, deadline),
         link={
             name: int(resources[column][-1]) if len(resources) else 0
             for name, column in (("frames", "frames"), ("lost", "frames_lost"), ("sent", "sent"))
@@ -84,10 +86,8 @@ def _summary_from_record(record: FlightRecord) -> Summary:
             early_end=_early_end(record, phase, takeoff_time),
             battery=(None, _last_known(thrust["battery_remaining"])),
             min_battery=float(flight_metadata.get("min_battery", "0")),
-            max_tilt=float(flight_metadata["max_tilt_rad"])
-            if "max_tilt_rad" in flight_metadata
-            else None,
-            deadline=float(flight_metadata.get("deadline_s", "0.004")),
+            max_tilt=None if max_tilt is None else float(max_tilt),
+            deadline=deadline,
             lockstep=flight_metadata.get("real_time") == "no",
         ),
     )
@@ -119,12 +119,8 @@ def _rates(sample: Rows, setpoint: Rows) -> NDArray[np.float64]:
     _, sample_indices, setpoint_indices = np.intersect1d(
         sample["vehicle_time_s"], setpoint["vehicle_time_s"], return_indices=True
     )
-    rows = np.hstack(
-        [
-            matrix(setpoint[setpoint_indices], SENT_COLUMNS),
-            matrix(sample[sample_indices], ANSWERED_COLUMNS),
-        ]
-    )
+    sent = matrix(setpoint[setpoint_indices], SENT_COLUMNS)
+    rows = np.hstack([sent, matrix(sample[sample_indices], ANSWERED_COLUMNS)])
     rows[sample["age_known"][sample_indices] == 0, -1] = np.nan
     return rows
 

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from companion.least_squares import minimise
+from companion.least_squares import Floats, minimise
 from companion.recording.measurements.maneuver_figures import without_nan
 from companion.recording.measurements.second_order import (
-    Floats,
     SecondOrderModel,
     StepRun,
     largest_norm,

@@ -5,19 +5,14 @@ from math import exp, log
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from companion.attitude import coefficients
-from companion.least_squares import minimise, project
-
-Floats = NDArray[np.float64]
+from companion.least_squares import Floats, minimise, project
 
 _LONGEST_GAP = 0.5
 """Rows further apart than this belong to different runs, s."""
 _MAX_ROWS_OF_SHORT_RUN = 10
 """Largest number of rows of a run that is too short to measure."""
-
-
 _COMPASS = (
     *("north", "north-east", "east", "south-east"),
     *("south", "south-west", "west", "north-west"),
@@ -166,12 +161,8 @@ class RunForModel(NamedTuple):
         )
         start, _ = project(line_columns, run.measured[is_before_effect])
         change_times = np.array([step.time[0] for step in steps]) - run.time[0]
-        return cls(
-            time_in_run[::thinning],
-            start,
-            change_times,
-            np.array([step.target[0] for step in steps]),
-        )
+        targets = np.array([step.target[0] for step in steps])
+        return cls(time_in_run[::thinning], start, change_times, targets)
 
 
 def nearest_second_order(runs: list[StepRun]) -> SecondOrderModel:

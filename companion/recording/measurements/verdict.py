@@ -57,13 +57,8 @@ class Check(NamedTuple):
 
 def checks(figures: Figures) -> list[Check]:
     """All checks whose figures were measured in the flight; empty if nothing was measured."""
-    return [
-        *_maneuvers(figures),
-        *_steps(figures),
-        *_answers(figures),
-        *_latency(figures),
-        *_battery(figures),
-    ]
+    subjects = _maneuvers, _steps, _answers, _latency, _battery
+    return [check for checks_of in subjects for check in checks_of(figures)]
 
 
 def is_good(figures: Figures) -> bool:
