@@ -91,13 +91,9 @@ class ProgramPlan:
     async def request(
         self, phases: Callable[[FlightContext], Sequence[Phase]], *, ends_flight: bool = False
     ) -> None:
-        """Run phases, and wait until they have ended.
+        """Run phases, given as in `PhaseRequest`, and wait until they have ended.
 
         Cancelling this call ends the flight, whether the phases run already or not.
-
-        Args:
-            phases: function that returns the phases for the flight's context.
-            ends_flight: whether the flight ends after these phases.
 
         Raises:
             FlightEnded: the flight has ended; the program does not control the vehicle any more.

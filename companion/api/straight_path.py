@@ -24,13 +24,8 @@ def straight_path(
 ) -> Trajectory:
     """A straight line, from rest to rest; for a distance of nearly 0, a hover.
 
-    Args:
-        config: configuration whose limits bound `_usual_speed`.
-        displacement_ned: end of the line relative to its start, m NED.
-        heading: rad; None: the vehicle keeps its heading.
-        speed: largest speed, m/s; None: `_usual_speed`.
-        acceleration: largest acceleration, m/s².
-        jerk: largest jerk, m/s³.
+    `displacement_ned`: end of the line relative to its start, m. The other arguments are those of
+    `Vehicle.go_to`, with the `config` whose limits bound `_usual_speed`.
 
     Raises:
         TrajectoryError: a limit is not positive.

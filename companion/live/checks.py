@@ -39,9 +39,8 @@ class ChangeChecks:
         self._maneuvers: ManeuverSequence | None = None
         self._maneuvers_error: ConfigError | None = None
         try:
-            self._maneuvers = (
-                configured_maneuvers(start_config, self._drag) if flies_maneuvers else None
-            )
+            if flies_maneuvers:
+                self._maneuvers = configured_maneuvers(start_config, self._drag)
         except ConfigError as error:  # a file has changed since the flight read it
             self._maneuvers_error = error
 

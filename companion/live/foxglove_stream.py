@@ -26,19 +26,15 @@ class _Subscriptions(ServerListener):
     """Tracks whether somebody has the stream open. The library calls it in its own threads."""
 
     def __init__(self) -> None:
-        self._active_subscriptions: set[tuple[int, int]] = set()
+        self.active: set[tuple[int, int]] = set()
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
         """Count a subscription."""
-        self._active_subscriptions.add((client.id, channel.id))
+        self.active.add((client.id, channel.id))
 
     def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:
         """End a subscription; a client that leaves also unsubscribes."""
-        self._active_subscriptions.discard((client.id, channel.id))
-
-    def exist(self) -> bool:
-        """Whether a client has subscribed to a channel."""
-        return bool(self._active_subscriptions)
+        self.active.discard((client.id, channel.id))
 
 
 class LiveStream:
@@ -90,7 +86,7 @@ class LiveStream:
 
     def is_open(self) -> bool:
         """Whether somebody has the stream open."""
-        return self._subscriptions.exist()
+        return bool(self._subscriptions.active)
 
     def close(self) -> None:
         """Stop serving."""

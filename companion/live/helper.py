@@ -215,7 +215,6 @@ def _first_message(tasks: HelperTasks, config: Config) -> Message:
         "watched_file": None if tasks.watched_file is None else str(tasks.watched_file.absolute()),
         "folder": None if tasks.folder is None else str(tasks.folder.absolute()),
         "token": None if page is None else page.token,
-        "host": None if page is None else page.host,
         "port": None if page is None else page.port,
         "stream_host": None if stream is None else stream.host,
         "stream_port": None if stream is None else stream.port,

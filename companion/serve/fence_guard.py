@@ -87,12 +87,12 @@ class FenceGuard:
         states = flown_state, _MotionState(*actual, (0.0, 0.0))
         horizontal_breach = self._horizontal_part.breach(
             [each.horizontal() for each in states],
-            _destination(request, flown_state, (True, False)),
+            _destination(request.horizontal, flown_state.position, 0),
             frame,
         )
         vertical_breach = self._vertical_part.breach(
             [each.vertical() for each in states],
-            _destination(request, flown_state, (False, True)),
+            _destination(request.vertical, flown_state.position, 2),
             frame,
         )
         breach = horizontal_breach or vertical_breach
@@ -218,20 +218,12 @@ def _worsened_breach(
     return breach_after_step
 
 
-def _destination(
-    request: MotionRequest, flown_state: _MotionState, axes: tuple[bool, bool]
-) -> _Destination:
-    """Position to which a request leads; `axes`: whether (horizontal, vertical) motion counts."""
-    position, is_commanded = list(flown_state.position), False
-    for demand, first_axis, is_used in zip(request[:2], (0, 2), axes, strict=True):
-        if not is_used:
-            continue
-        if demand.position is not None:
-            position[first_axis : first_axis + len(demand.position)], is_commanded = (
-                demand.position,
-                True,
-            )
-            continue
-        for axis, value in enumerate(demand.velocity or demand.acceleration or ()):
-            position[first_axis + axis] += _LOOKAHEAD * value
-    return _Destination((position[0], position[1], position[2]), is_commanded)
+def _destination(demand: AxisDemand, flown_position: Vector, first_axis: int) -> _Destination:
+    """Position to which a demand leads along its axes, from `first_axis` (0: north, 2: down) on."""
+    position = list(flown_position)
+    if demand.position is not None:
+        position[first_axis : first_axis + len(demand.position)] = demand.position
+    else:
+        for axis, value in enumerate(demand.velocity or demand.acceleration or (), first_axis):
+            position[axis] += _LOOKAHEAD * value
+    return _Destination((position[0], position[1], position[2]), demand.position is not None)

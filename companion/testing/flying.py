@@ -139,11 +139,7 @@ async def connect(
 ) -> AsyncGenerator[Vehicle, None]:
     """Like `companion.connect`, for a mock vehicle in memory, inside `run`.
 
-    Args:
-        config: configuration of the flight.
-        vehicle: vehicle that was passed to `run`.
-        folder: folder for the files of the flight; None: nothing is written.
-        observer: receives phases and events as they happen.
+    `vehicle` was passed to `run`; the other arguments are those of `fly`.
 
     Raises:
         ConfigError: the configuration is wrong.

@@ -6,9 +6,6 @@ from typing import NamedTuple
 from companion.mavlink.framing import Frame
 from companion.mavlink.messages import dialect
 
-_MANUAL_CONTROL = 69
-"""Message id of MANUAL_CONTROL, whose field `target` is a system id."""
-
 
 class Address(NamedTuple):
     """A system id and a component id; in a target, 0 means all systems or all components."""
@@ -53,7 +50,8 @@ def _target_fields() -> dict[int, tuple[int, int | None]]:
         ):
             offsets[name] = offset
             offset += struct.calcsize(f"<{code}") * max(1, count)
-        system_at = offsets.get("target" if message_id == _MANUAL_CONTROL else "target_system")
+        is_manual_control = message_id == dialect.MAVLINK_MSG_ID_MANUAL_CONTROL
+        system_at = offsets.get("target" if is_manual_control else "target_system")
         if system_at is not None:
             fields_by_id[message_id] = system_at, offsets.get("target_component")
     return fields_by_id

@@ -112,9 +112,8 @@ class Network:
         for port in self.ports:
             port.close()
         self.ports.clear()
-        for handle in (self._timer, self._flush_handle):
-            if handle is not None:
-                handle.cancel()
+        if self._timer is not None:
+            self._timer.cancel()
         await asyncio.sleep(0)  # lets closed connections end
 
     @property

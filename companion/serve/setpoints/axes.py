@@ -191,30 +191,24 @@ class CommandFollower:
         A derivative that is not commanded is estimated from the last two demands if they are a
         stream of positions and velocities; otherwise it is 0.
         """
-        demand_before, interval = self._newest_demand, now - self._commanded_at
+        before, interval = self._newest_demand, now - self._commanded_at
         commanded = demand.acceleration
-        is_stream = (
-            demand_before is not None
-            and demand_before.position is not None
-            and 0.0 < interval <= MAX_STREAM_PERIOD
-        )
         if (
-            not is_stream
-            or demand_before is None
+            before is None
+            or before.position is None
+            or before.velocity is None
             or demand.velocity is None
-            or demand_before.velocity is None
+            or not 0.0 < interval <= MAX_STREAM_PERIOD
         ):
             return commanded or self._zero, self._zero
         if commanded is None:
-            rate = change_rate(
-                demand_before.velocity, demand.velocity, interval, _LARGEST_ACCELERATION
-            )
+            rate = change_rate(before.velocity, demand.velocity, interval, _LARGEST_ACCELERATION)
             if rate is None:
                 return self._zero, self._zero
             return _blend(self._commanded_state.acceleration, rate), self._zero
-        if demand_before.acceleration is None:
+        if before.acceleration is None:
             return commanded, self._zero
-        jerk = change_rate(demand_before.acceleration, commanded, interval, LARGEST_JERK)
+        jerk = change_rate(before.acceleration, commanded, interval, LARGEST_JERK)
         return commanded, self._zero if jerk is None else _blend(self._commanded_state.jerk, jerk)
 
     def _is_within_jump_limits(self, error: AxisState) -> bool:

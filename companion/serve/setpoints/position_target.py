@@ -37,14 +37,12 @@ class _Frame(NamedTuple):
     """Whether positions are relative to the vehicle."""
     is_body: bool
     """Whether directions are relative to the vehicle's heading."""
-    has_same_position: bool = True
-    """Whether a position in this frame means the same to PX4 and ArduPilot."""
 
 
 _LOCAL_FRAMES = {
     dialect.MAV_FRAME_LOCAL_NED: _Frame(is_offset=False, is_body=False),
     dialect.MAV_FRAME_LOCAL_OFFSET_NED: _Frame(is_offset=True, is_body=False),
-    dialect.MAV_FRAME_BODY_NED: _Frame(is_offset=False, is_body=True, has_same_position=False),
+    dialect.MAV_FRAME_BODY_NED: _Frame(is_offset=False, is_body=True),
     dialect.MAV_FRAME_BODY_OFFSET_NED: _Frame(is_offset=True, is_body=True),
     dialect.MAV_FRAME_BODY_FRD: _Frame(is_offset=True, is_body=True),
 }
@@ -71,9 +69,9 @@ def decode_local_target(
     frame = _LOCAL_FRAMES.get(message.coordinate_frame)
     if frame is None:
         raise RefusedSetpoint(f"coordinate_frame {message.coordinate_frame} is not supported")
-    groups = _groups(message, (message.x, message.y, message.z))
-    position, velocity, acceleration = groups
-    if not frame.has_same_position and any(value is not None for value in position):
+    position, velocity, acceleration = _groups(message, (message.x, message.y, message.z))
+    is_body_ned = message.coordinate_frame == dialect.MAV_FRAME_BODY_NED
+    if is_body_ned and any(value is not None for value in position):
         raise RefusedSetpoint("position in BODY_NED is ambiguous: use LOCAL_NED or BODY_OFFSET_NED")
     frame_yaw = pose.yaw if frame.is_body else 0.0
     frame_origin = pose.position_ned if frame.is_offset else (0.0, 0.0, 0.0)
@@ -120,18 +118,12 @@ def _groups(message: Message, position: Vector) -> tuple[_Values, _Values, _Valu
         raise RefusedSetpoint("forces are not supported: clear FORCE_SET")
     if mask & ~_DEFINED_BITS:
         raise RefusedSetpoint(f"type_mask {mask} has bits that mean nothing to a multirotor")
+    velocity = message.vx, message.vy, message.vz
+    acceleration = message.afx, message.afy, message.afz
     return (
         _used_values(mask, _POSITION_BITS, position, _MAX_POSITION, "position"),
-        _used_values(
-            mask, _VELOCITY_BITS, (message.vx, message.vy, message.vz), _MAX_SPEED, "velocity"
-        ),
-        _used_values(
-            mask,
-            _ACCELERATION_BITS,
-            (message.afx, message.afy, message.afz),
-            _MAX_ACCELERATION,
-            "acceleration",
-        ),
+        _used_values(mask, _VELOCITY_BITS, velocity, _MAX_SPEED, "velocity"),
+        _used_values(mask, _ACCELERATION_BITS, acceleration, _MAX_ACCELERATION, "acceleration"),
     )
 
 
