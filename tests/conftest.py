@@ -1,8 +1,10 @@
 """Property tests try the same cases on every machine, however slow it is just now."""
 
+import asyncio
 import gc
 import os
 import signal
+from inspect import iscoroutinefunction
 
 import pytest
 from hypothesis import settings
@@ -36,6 +38,16 @@ def empty_working_folder(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("here"))
         yield
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """A test that is a coroutine function runs in an event loop, by its fixture `run` if any."""
+    if not iscoroutinefunction(pyfuncitem.obj):
+        return None
+    arguments = {name: pyfuncitem.funcargs[name] for name in pyfuncitem._fixtureinfo.argnames}
+    pyfuncitem.funcargs.get("run", asyncio.run)(pyfuncitem.obj(**arguments))
+    return True
 
 
 def pytest_collection_finish():

@@ -188,11 +188,7 @@ def test_a_connection_that_is_dropped_in_flight_is_told_in_words():
     assert mock.state()["mode"] == "LOITER"
 
 
-def test_run_in_a_running_loop_says_what_to_write_instead():
+async def test_run_in_a_running_loop_says_what_to_write_instead():
     """Python spoke of loops and left "coroutine was never awaited" behind."""
-
-    async def main():
-        with pytest.raises(RuntimeError, match=r"write `await main\(\)`"):
-            companion.run(asyncio.sleep(0))
-
-    asyncio.run(main())
+    with pytest.raises(RuntimeError, match=r"write `await main\(\)`"):
+        companion.run(asyncio.sleep(0))

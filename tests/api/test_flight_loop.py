@@ -27,7 +27,7 @@ async def where():
     return threading.current_thread().name
 
 
-def test_results_errors_and_cancellation_cross_the_threads():
+async def test_results_errors_and_cancellation_cross_the_threads():
     cancelled = threading.Event()
 
     async def fails():
@@ -39,39 +39,33 @@ def test_results_errors_and_cancellation_cross_the_threads():
         finally:
             cancelled.set()
 
-    async def main():
-        loop = flight_loop()
-        assert isinstance(loop, OwnThreadLoop)
-        assert await loop.start(where()) == "flight"
-        with pytest.raises(ZeroDivisionError):
-            await loop.start(fails())
-        waiting = loop.start(waits())
-        await asyncio.sleep(0.05)
-        waiting.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await waiting
-        await asyncio.sleep(0)
-        assert cancelled.wait(5.0)
-        told = asyncio.get_running_loop().create_future()
-        loop.post(loop.post_to_program, told.set_result, "back")
-        assert await told == "back"
-        loop.close(wait=True)
-
-    asyncio.run(main())
+    loop = flight_loop()
+    assert isinstance(loop, OwnThreadLoop)
+    assert await loop.start(where()) == "flight"
+    with pytest.raises(ZeroDivisionError):
+        await loop.start(fails())
+    waiting = loop.start(waits())
+    await asyncio.sleep(0.05)
+    waiting.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
+    await asyncio.sleep(0)
+    assert cancelled.wait(5.0)
+    told = asyncio.get_running_loop().create_future()
+    loop.post(loop.post_to_program, told.set_result, "back")
+    assert await told == "back"
+    loop.close(wait=True)
 
 
-def test_after_its_end_nothing_is_started_and_nobody_waits_for_ever():
-    async def main():
-        loop = flight_loop()
-        waiting = loop.start(asyncio.sleep(60.0))
-        loop.close(wait=True)
-        with pytest.raises(asyncio.CancelledError):
-            await waiting
-        loop.post(print, "nobody hears it")
-        with pytest.raises(FlightEnded, match="the flight is over"):
-            await loop.start(where())
-
-    asyncio.run(main())
+async def test_after_its_end_nothing_is_started_and_nobody_waits_for_ever():
+    loop = flight_loop()
+    waiting = loop.start(asyncio.sleep(60.0))
+    loop.close(wait=True)
+    with pytest.raises(asyncio.CancelledError):
+        await waiting
+    loop.post(print, "nobody hears it")
+    with pytest.raises(FlightEnded, match="the flight is over"):
+        await loop.start(where())
 
 
 def test_the_flight_runs_while_the_program_blocks():
@@ -148,23 +142,20 @@ def test_a_handler_of_ctrl_c_that_does_not_wake_the_loop_is_heard():
     assert asyncio.run(main()) < 5.0
 
 
-def test_news_do_not_queue_up_while_the_program_does_not_run():
+async def test_news_do_not_queue_up_while_the_program_does_not_run():
     queued, heard = [], []
 
     class Blocked(SharedLoop):
         def post_to_program(self, callback, *args):
             queued.append(callback)
 
-    async def main():
-        wake = _PendingCall(Blocked(), lambda: heard.append(1))
-        for _ in range(1000):
-            wake()
-        assert len(queued) == 1
-        queued.pop()()
+    wake = _PendingCall(Blocked(), lambda: heard.append(1))
+    for _ in range(1000):
         wake()
-        assert (len(queued), len(heard)) == (1, 1)
-
-    asyncio.run(main())
+    assert len(queued) == 1
+    queued.pop()()
+    wake()
+    assert (len(queued), len(heard)) == (1, 1)
 
 
 def test_two_flights_that_overlap_leave_ctrl_c_as_it_was():

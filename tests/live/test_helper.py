@@ -68,19 +68,15 @@ def test_edits_of_the_file_reach_the_flight(tmp_path):
     assert helper._process.wait(30.0) == 0
 
 
-def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
+async def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
     monkeypatch.setattr(helper_process, "_ANSWER_TIMEOUT", 0.02)
-
-    async def ask():
-        ours, theirs = Channel.pair()
-        first = {"config": Config().model_dump(mode="json"), "flies_maneuvers": False}
-        connection = helper_process.FlightConnection(Channel(theirs), first)
-        try:
-            with pytest.raises(NoAnswerError, match="the change may have been applied"):
-                await connection.undo("a test")
-        finally:
-            asyncio.get_running_loop().remove_reader(theirs.fileno())
-            theirs.close()
-            ours.close()
-
-    asyncio.run(ask())
+    ours, theirs = Channel.pair()
+    first = {"config": Config().model_dump(mode="json"), "flies_maneuvers": False}
+    connection = helper_process.FlightConnection(Channel(theirs), first)
+    try:
+        with pytest.raises(NoAnswerError, match="the change may have been applied"):
+            await connection.undo("a test")
+    finally:
+        asyncio.get_running_loop().remove_reader(theirs.fileno())
+        theirs.close()
+        ours.close()

@@ -5,6 +5,8 @@ import socket
 from contextlib import suppress
 from types import SimpleNamespace
 
+import pytest
+
 from companion import testing
 from companion.mavlink.framing import Frame
 from companion.mavlink.settings import LinkSettings
@@ -26,6 +28,7 @@ from tests.serve.virtual import (
     stream,
 )
 
+BOTH_LOOPS = pytest.mark.usefixtures("run")
 REJECTED = 1
 
 
@@ -37,40 +40,38 @@ def frame(number, system=255):
     return Frame(84, system, 190, number & 255, b"", number.to_bytes(4, "little"), signed=False)
 
 
-def test_noise_of_a_tcp_client_does_not_keep_samples_from_being_answered(run):
+@BOTH_LOOPS
+async def test_noise_of_a_tcp_client_does_not_keep_samples_from_being_answered():
     """asyncio reads 256 KiB at once, and a search for frames in them took a third of a second."""
-
-    async def scene():
-        async with network("tcpin://127.0.0.1:0") as (net, link, vehicle):
-            flood = await tcp_client(net.ports[0].local[1])
-            await until(lambda: net.clients)
-            (ours,) = net.clients
-            reads, scan = [], ours.scan
-            ours.scan = lambda data: [reads.append((net.now(), len(data))), scan(data)][1]
-            answered = []
-            link.on_attitude = lambda sample: answered.append(sample.time_boot_ms)
-            noise = b"\xfe" * 65536
-            for number in range(10):
-                with suppress(BlockingIOError):  # it is not read any faster
-                    flood.socket.send(noise)
-                vehicle.send(attitude(4 * number + 4))
-                await until(lambda number=number: len(answered) == number + 1)
-            await until(lambda: len(reads) >= 12)
-            flood.close()
-        assert max(size for _, size in reads) == 4096
-        full = [
-            (first, third)
-            for (first, a), (_, b), (third, c) in zip(reads, reads[1:], reads[2:], strict=False)
-            if a == b == c == 4096
-        ]
-        assert full
-        # 5 ms less than the pause: uvloop's clock counts whole milliseconds
-        assert all(third - first > FloodDetector.WINDOW - 0.005 for first, third in full)
-
-    run(scene())
+    async with network("tcpin://127.0.0.1:0") as (net, link, vehicle):
+        flood = await tcp_client(net.ports[0].local[1])
+        await until(lambda: net.clients)
+        (ours,) = net.clients
+        reads, scan = [], ours.scan
+        ours.scan = lambda data: [reads.append((net.now(), len(data))), scan(data)][1]
+        answered = []
+        link.on_attitude = lambda sample: answered.append(sample.time_boot_ms)
+        noise = b"\xfe" * 65536
+        for number in range(10):
+            with suppress(BlockingIOError):  # it is not read any faster
+                flood.socket.send(noise)
+            vehicle.send(attitude(4 * number + 4))
+            await until(lambda number=number: len(answered) == number + 1)
+        await until(lambda: len(reads) >= 12)
+        flood.close()
+    assert max(size for _, size in reads) == 4096
+    full = [
+        (first, third)
+        for (first, a), (_, b), (third, c) in zip(reads, reads[1:], reads[2:], strict=False)
+        if a == b == c == 4096
+    ]
+    assert full
+    # 5 ms less than the pause: uvloop's clock counts whole milliseconds
+    assert all(third - first > FloodDetector.WINDOW - 0.005 for first, third in full)
 
 
-def test_a_tcp_client_whose_network_is_gone_keeps_its_place_for_a_minute_only(run, monkeypatch):
+@BOTH_LOOPS
+async def test_a_tcp_client_whose_network_is_gone_keeps_its_place_for_a_minute_only(monkeypatch):
     accepted, attach = [], tcp.TcpClient.__init__
 
     def init(self, name, host, transport):
@@ -78,100 +79,82 @@ def test_a_tcp_client_whose_network_is_gone_keeps_its_place_for_a_minute_only(ru
         accepted.append(transport.get_extra_info("socket"))
 
     monkeypatch.setattr(tcp.TcpClient, "__init__", init)
-
-    async def scene():
-        async with network("tcpin://127.0.0.1:0") as (net, _, _):
-            client = await tcp_client(net.ports[0].local[1])
-            await until(lambda: net.clients)
-            (connection,) = accepted
-            timeout = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
-            assert timeout == 60_000
-            client.close()
-
-    run(scene())
+    async with network("tcpin://127.0.0.1:0") as (net, _, _):
+        client = await tcp_client(net.ports[0].local[1])
+        await until(lambda: net.clients)
+        (connection,) = accepted
+        timeout = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
+        assert timeout == 60_000
+        client.close()
 
 
-def test_a_udp_client_that_floods_loses_datagrams_and_its_neighbour_at_the_port_does_not(run):
-    async def scene():
-        async with network() as (net, _, _):
-            port = net.ports[0].local[1]
-            flood, other = await udp_client(port, (254, 1)), await udp_client(port, (255, 1))
-            flood.send(heartbeat())
-            other.send(heartbeat())
-            await until(lambda: len(net.clients) == 2)
-            ours = {client.name: client for client in net.clients}
-            flooding, calm = (
-                ours[f"udp 127.0.0.1:{each.socket.getsockname()[1]}"] for each in (flood, other)
-            )
-            many = b"".join(heartbeat().pack(flood.mav) for _ in range(70))
-            for _ in range(20):
-                flood.socket.send(many)
-            other.send(heartbeat(), heartbeat())
-            await until(lambda: calm.stats.received == 3)
-            assert flooding.stats.received <= 1 + 2 * 70
-            assert flooding.stats.flooded >= 18
-            flood.close()
-            other.close()
-
-    run(scene())
+@BOTH_LOOPS
+async def test_a_udp_client_that_floods_loses_datagrams_and_its_neighbour_at_the_port_does_not():
+    async with network() as (net, _, _):
+        port = net.ports[0].local[1]
+        flood, other = await udp_client(port, (254, 1)), await udp_client(port, (255, 1))
+        flood.send(heartbeat())
+        other.send(heartbeat())
+        await until(lambda: len(net.clients) == 2)
+        ours = {client.name: client for client in net.clients}
+        flooding, calm = (
+            ours[f"udp 127.0.0.1:{each.socket.getsockname()[1]}"] for each in (flood, other)
+        )
+        many = b"".join(heartbeat().pack(flood.mav) for _ in range(70))
+        for _ in range(20):
+            flood.socket.send(many)
+        other.send(heartbeat(), heartbeat())
+        await until(lambda: calm.stats.received == 3)
+        assert flooding.stats.received <= 1 + 2 * 70
+        assert flooding.stats.flooded >= 18
+        flood.close()
+        other.close()
 
 
-def test_of_a_flood_of_setpoints_some_are_handled_and_always_the_newest():
+async def test_of_a_flood_of_setpoints_some_are_handled_and_always_the_newest():
     client, another, taken = Somebody(), Somebody(), []
-
-    async def scene():
-        limit = SetpointLimit(lambda *each: taken.append(each))
-        admitted = [number for number in range(100) if limit.admits(client, frame(number))]
-        assert admitted == list(range(10))
-        assert limit.admits(another, frame(7)), "each client has its own"
-        assert taken == []
-        await asyncio.sleep(0.03)
-        assert taken == [(client, frame(99))]
-        assert limit.admits(client, frame(100))
-        for number in range(101, 130):
-            limit.admits(client, frame(number))
-        limit.forget(client)
-        await asyncio.sleep(0.03)
-        assert len(taken) == 1, "a client that has gone is not heard any more"
-
-    asyncio.run(scene())
+    limit = SetpointLimit(lambda *each: taken.append(each))
+    admitted = [number for number in range(100) if limit.admits(client, frame(number))]
+    assert admitted == list(range(10))
+    assert limit.admits(another, frame(7)), "each client has its own"
+    assert taken == []
+    await asyncio.sleep(0.03)
+    assert taken == [(client, frame(99))]
+    assert limit.admits(client, frame(100))
+    for number in range(101, 130):
+        limit.admits(client, frame(number))
+    limit.forget(client)
+    await asyncio.sleep(0.03)
+    assert len(taken) == 1, "a client that has gone is not heard any more"
 
 
-def test_a_kept_setpoint_never_comes_after_a_newer_one(monkeypatch):
+async def test_a_kept_setpoint_never_comes_after_a_newer_one(monkeypatch):
     """The loop may be late: then the kept one is older than what is read first."""
     taken = []
-
-    async def scene():
-        limit, client = SetpointLimit(lambda *each: taken.append(each)), Somebody()
-        loop = asyncio.get_running_loop()
-        now = loop.time()
-        for number in range(20):
-            limit.admits(client, frame(number))
-        monkeypatch.setattr(loop, "time", lambda: now + 0.05)
-        assert limit.admits(client, frame(20))
-        monkeypatch.undo()
-        await asyncio.sleep(0.05)
-        assert taken == []
-
-    asyncio.run(scene())
+    limit, client = SetpointLimit(lambda *each: taken.append(each)), Somebody()
+    loop = asyncio.get_running_loop()
+    now = loop.time()
+    for number in range(20):
+        limit.admits(client, frame(number))
+    monkeypatch.setattr(loop, "time", lambda: now + 0.05)
+    assert limit.admits(client, frame(20))
+    monkeypatch.undo()
+    await asyncio.sleep(0.05)
+    assert taken == []
 
 
-def test_a_client_whose_refusals_all_differ_is_told_ten_times_in_5_s():
+async def test_a_client_whose_refusals_all_differ_is_told_ten_times_in_5_s():
     """Their reasons contain its numbers; a list of them all grew, and slowed each next refusal."""
-
-    async def scene():
-        sent = []
-        net = SimpleNamespace(send_to=lambda *each: sent.append(each), send=sent.append)
-        component = Component(LinkSettings("udpin://127.0.0.1:0"), net, lambda _: True)
-        client, other = object(), object()
-        for number in range(5000):
-            component.answer(client, f"refused: {number}")
-        assert len(sent) == 10
-        component.answer(other, "refused")
-        component.tell("control has ended")
-        assert len(sent) == 12
-
-    asyncio.run(scene())
+    sent = []
+    net = SimpleNamespace(send_to=lambda *each: sent.append(each), send=sent.append)
+    component = Component(LinkSettings("udpin://127.0.0.1:0"), net, lambda _: True)
+    client, other = object(), object()
+    for number in range(5000):
+        component.answer(client, f"refused: {number}")
+    assert len(sent) == 10
+    component.answer(other, "refused")
+    component.tell("control has ended")
+    assert len(sent) == 12
 
 
 def test_of_a_client_with_thousands_of_addresses_only_some_are_learned():

@@ -117,34 +117,31 @@ def test_a_frame_that_causes_a_fault_is_dropped_and_told_once():
     assert "a fault" in told
 
 
-def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path, monkeypatch):
+async def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp_path, monkeypatch):
     def full(*_):
         raise OSError("No space left on device")
 
-    async def scene():
-        notes = []
-        records = FlightRecords(tmp_path, THIS_COMPUTER, notes.append)
-        with monkeypatch.context() as patched:
-            patched.setattr(recorder, "McapWriter", full)
-            record = records.new_record(Config())
-        assert record.folder is None
-        with records.recording(record):
-            pass
-        (told,) = notes
-        assert "this flight is not recorded: No space left on device" in told
-        assert list(tmp_path.iterdir()) == []
+    notes = []
+    records = FlightRecords(tmp_path, THIS_COMPUTER, notes.append)
+    with monkeypatch.context() as patched:
+        patched.setattr(recorder, "McapWriter", full)
+        record = records.new_record(Config())
+    assert record.folder is None
+    with records.recording(record):
+        pass
+    (told,) = notes
+    assert "this flight is not recorded: No space left on device" in told
+    assert list(tmp_path.iterdir()) == []
 
-        changes = Changes(Config())
-        changes.change({"planner": {"gain_per_s": 4.9}}, "a test")
-        with records.recording(records.new_record(changes.begin_flight())) as _:
-            changes.change({"planner": {"gain_per_s": 4.8}}, "a test")
-        (folder,) = tmp_path.iterdir()
-        assert "gain_per_s: 4.9" in (folder / "config.yaml").read_text()
-        (change,) = changes.changes_in_flight
-        assert change.keys[0].after == 4.8
-        assert changes.config_at_flight_start.planner.gain_per_s == 4.9
-
-    asyncio.run(scene())
+    changes = Changes(Config())
+    changes.change({"planner": {"gain_per_s": 4.9}}, "a test")
+    with records.recording(records.new_record(changes.begin_flight())) as _:
+        changes.change({"planner": {"gain_per_s": 4.8}}, "a test")
+    (folder,) = tmp_path.iterdir()
+    assert "gain_per_s: 4.9" in (folder / "config.yaml").read_text()
+    (change,) = changes.changes_in_flight
+    assert change.keys[0].after == 4.8
+    assert changes.config_at_flight_start.planner.gain_per_s == 4.9
 
 
 def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monkeypatch):
