@@ -10,10 +10,11 @@ from companion.serve.network.network import Network
 from tests.mavlink.fakes import linked
 
 GROUND = 255, 190
+_open_clients = []
 
 
 class SocketClient:
-    """A UDP or TCP client that keeps what it hears."""
+    """A UDP or TCP client that keeps what it hears; it is closed with its `network`."""
 
     def __init__(self, opened, ids=GROUND):
         self.socket, self.heard, self.bytes = opened, [], b""
@@ -22,6 +23,7 @@ class SocketClient:
         self._parser.robust_parsing = True
         opened.setblocking(False)
         asyncio.get_running_loop().add_reader(opened, self._read)
+        _open_clients.append(self)
 
     def _read(self):
         try:
@@ -44,6 +46,7 @@ class SocketClient:
         asyncio.get_running_loop().remove_reader(self.socket)
 
     def close(self):
+        _open_clients.remove(self)
         asyncio.get_running_loop().remove_reader(self.socket)
         self.socket.close()
 
@@ -68,7 +71,11 @@ async def network(*endpoints, **settings):
     endpoints = endpoints or ("udpin://127.0.0.1:0",)
     async with linked(**settings) as (link, vehicle), Network(link, endpoints) as net:
         net.routing.intercept = lambda *_: False
-        yield net, link, vehicle
+        try:
+            yield net, link, vehicle
+        finally:
+            for client in tuple(_open_clients):
+                client.close()
 
 
 def heartbeat(kind=6):

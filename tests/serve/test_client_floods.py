@@ -58,7 +58,6 @@ async def test_noise_of_a_tcp_client_does_not_keep_samples_from_being_answered()
             vehicle.send(attitude(4 * number + 4))
             await until(lambda number=number: len(answered) == number + 1)
         await until(lambda: len(reads) >= 12)
-        flood.close()
     assert max(size for _, size in reads) == 4096
     full = [
         (first, third)
@@ -80,12 +79,11 @@ async def test_a_tcp_client_whose_network_is_gone_keeps_its_place_for_a_minute_o
 
     monkeypatch.setattr(tcp.TcpClient, "__init__", init)
     async with network("tcpin://127.0.0.1:0") as (net, _, _):
-        client = await tcp_client(net.ports[0].local[1])
+        await tcp_client(net.ports[0].local[1])
         await until(lambda: net.clients)
         (connection,) = accepted
         timeout = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
         assert timeout == 60_000
-        client.close()
 
 
 @BOTH_LOOPS
@@ -107,8 +105,6 @@ async def test_a_udp_client_that_floods_loses_datagrams_and_its_neighbour_at_the
         await until(lambda: calm.stats.received == 3)
         assert flooding.stats.received <= 1 + 2 * 70
         assert flooding.stats.flooded >= 18
-        flood.close()
-        other.close()
 
 
 async def test_of_a_flood_of_setpoints_some_are_handled_and_always_the_newest():

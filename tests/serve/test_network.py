@@ -28,7 +28,6 @@ async def test_a_udp_client_hears_the_vehicle_and_reaches_it():
         assert (got.get_srcSystem(), got.get_srcComponent(), got.param1) == (*GROUND, 1.0)
         vehicle.send(dialect.MAVLink_command_ack_message(400, 0, 0, 0, *GROUND))
         await until(lambda: client.of("COMMAND_ACK"))
-        client.close()
 
 
 async def test_several_clients_share_a_udp_port_and_do_not_hear_each_others_answers():
@@ -42,8 +41,6 @@ async def test_several_clients_share_a_udp_port_and_do_not_hear_each_others_answ
         await until(lambda: one.of("STATUSTEXT") and two.of("STATUSTEXT"))
         assert (len(one.of("COMMAND_ACK")), len(two.of("COMMAND_ACK"))) == (0, 1)
         assert len(one.of("HEARTBEAT")) == 1  # of the other client
-        for client in (one, two):
-            client.close()
 
 
 async def test_a_program_that_listens_is_called_and_heard():
@@ -63,7 +60,6 @@ async def test_a_program_that_listens_is_called_and_heard():
         client = SocketClient(opened)
         client.send(ARM)
         await vehicle.hears("COMMAND_LONG")
-        client.close()
 
 
 async def test_tcp_clients_come_and_go():
@@ -89,7 +85,6 @@ async def test_a_frame_in_pieces_over_tcp_arrives_whole():
             client.socket.send(raw[at : at + 7])
             await asyncio.sleep(0.002)
         await vehicle.hears("COMMAND_LONG")
-        client.close()
 
 
 async def test_a_listening_tcp_program_is_called_again_after_it_ended(monkeypatch):
@@ -144,7 +139,6 @@ async def test_samples_are_answered_before_anything_is_forwarded():
         )
         assert order == [4, 8]
         await until(lambda: order == [4, 8] + 4 * ["forwarded"])
-        client.close()
 
 
 async def test_the_attitude_of_another_vehicle_or_component_is_not_ours():
@@ -173,7 +167,6 @@ async def test_telemetry_waits_for_the_next_sample_or_4_ms():
         vehicle.send(*(TEXT(4, b"%d" % number) for number in range(20)))
         await until(lambda: len(client.of("STATUSTEXT")) == 20)
         assert [each.text for each in client.of("STATUSTEXT")] == [str(n) for n in range(20)]
-        client.close()
 
 
 async def test_a_tcp_client_that_stops_reading_loses_frames_and_costs_nobody_anything():
@@ -192,8 +185,6 @@ async def test_a_tcp_client_that_stops_reading_loses_frames_and_costs_nobody_any
         assert slow.stats.dropped > 0
         assert len(reading.of("STATUSTEXT")) == sent
         assert slow._transport.get_write_buffer_size() < 200_000
-        stopped.close()
-        reading.close()
 
 
 async def test_what_a_stopped_tcp_client_reads_later_are_whole_frames():
@@ -208,7 +199,6 @@ async def test_what_a_stopped_tcp_client_reads_later_are_whole_frames():
         asyncio.get_running_loop().add_reader(client.socket, client._read)
         await until(lambda: len(client.of("STATUSTEXT")) >= slow.stats.sent)
         assert not client.of("BAD_DATA")
-        client.close()
 
 
 async def test_a_flood_of_a_client_does_not_keep_samples_from_being_answered():
@@ -223,7 +213,6 @@ async def test_a_flood_of_a_client_does_not_keep_samples_from_being_answered():
             vehicle.send(attitude(4 * number + 4))
             await until(lambda number=number: len(answered) == number + 1)
         assert answered == [4 * number + 4 for number in range(30)]
-        flood.close()
 
 
 async def test_a_port_in_use_is_one_clear_error():
@@ -242,7 +231,6 @@ async def test_only_named_peers_are_let_in():
         client.send(heartbeat())
         await asyncio.sleep(0.05)
         assert net.clients == ()
-        client.close()
 
 
 async def test_our_component_speaks_and_refuses_commands_to_itself():
@@ -272,4 +260,3 @@ async def test_our_component_speaks_and_refuses_commands_to_itself():
         assert len(await vehicle.hears("STATUSTEXT")) == 1
         assert not vehicle.of("COMMAND_LONG")
         heartbeats.cancel()
-        client.close()
