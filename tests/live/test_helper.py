@@ -5,10 +5,8 @@ import time
 
 import pytest
 
-from companion.config import Config
 from companion.config.files import load
-from companion.live import helper_process
-from companion.live.channel import Channel, NoAnswerError
+from companion.live.channel import Channel
 from companion.live.helper import Helper, HelperTasks
 from tests.live.pages import status
 
@@ -66,17 +64,3 @@ def test_edits_of_the_file_reach_the_flight(tmp_path):
     ]
     helper.close("over")
     assert helper._process.wait(30.0) == 0
-
-
-async def test_without_an_answer_a_change_may_have_been_applied(monkeypatch):
-    monkeypatch.setattr(helper_process, "_ANSWER_TIMEOUT", 0.02)
-    ours, theirs = Channel.pair()
-    first = {"config": Config().model_dump(mode="json"), "flies_maneuvers": False}
-    connection = helper_process.FlightConnection(Channel(theirs), first)
-    try:
-        with pytest.raises(NoAnswerError, match="the change may have been applied"):
-            await connection.undo("a test")
-    finally:
-        asyncio.get_running_loop().remove_reader(theirs.fileno())
-        theirs.close()
-        ours.close()

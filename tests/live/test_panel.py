@@ -2,6 +2,7 @@
 
 import asyncio
 import sys
+from contextlib import asynccontextmanager
 from importlib.util import find_spec
 
 import pytest
@@ -104,29 +105,27 @@ class Page:
         raise AssertionError("not within 3 s")
 
 
-def used(use, folder=None, path="/"):
-    """Opens the page in this process and calls `use` with it."""
+@asynccontextmanager
+async def used(folder=None, path="/"):
+    """The page, opened in this process."""
     from nicegui.testing import user_simulation  # noqa: PLC0415  an extra
 
     from companion.live.page.layout import add_page  # noqa: PLC0415  needs it
 
-    async def serve():
+    ours = {name: each for name, each in sys.modules.items() if name.split(".")[0] == "companion"}
+    try:
         async with user_simulation() as user:
             page_data = PageData(Config())
             connection = FlightConnection(page_data, folder)
             add_page(connection, page_data, Guard(None, TOKEN))
             await user.open(path)
-            await use(Page(user, connection, page_data))
-
-    ours = {name: each for name, each in sys.modules.items() if name.split(".")[0] == "companion"}
-    try:
-        asyncio.run(serve())
+            yield Page(user, connection, page_data)
     finally:
         sys.modules.update(ours)  # the simulation takes out the module of the page and its parents
 
 
-def test_without_the_token_nothing_changes_and_nothing_is_saved_on_this_computer(tmp_path):
-    async def use(page):
+async def test_without_the_token_nothing_changes_and_nothing_is_saved_on_this_computer(tmp_path):
+    async with used(tmp_path) as page:
         page.type(CLIMB, "1.5")
         await page.click("apply", "refused: give the token first")
         await page.click("undo", "refused: give the token first")
@@ -139,13 +138,11 @@ def test_without_the_token_nothing_changes_and_nothing_is_saved_on_this_computer
         await page.click("unlock", "values can be changed in this tab now")
         await page.click("apply", "done 1")
         assert page.connection.asked == [{"limits": {"max_climb_m_s": 1.5}}]
-
-    used(use, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_only_the_edited_values_are_sent_and_never_twice():
-    async def use(page):
+async def test_only_the_edited_values_are_sent_and_never_twice():
+    async with used(path=f"/?token={TOKEN}") as page:
         before = page.value(CLIMB)
         await page.click("apply", "nothing to apply: no value was changed")
         page.type(CLIMB, "1.5")
@@ -168,11 +165,9 @@ def test_only_the_edited_values_are_sent_and_never_twice():
         await page.until(lambda: page.value(CLIMB) == before)
         assert not page.can_undo()
 
-    used(use, path=f"/?token={TOKEN}")
 
-
-def test_each_refusal_is_told():
-    async def use(page):
+async def test_each_refusal_is_told():
+    async with used(path=f"/?token={TOKEN}") as page:
         for refusal, said in (
             (ConfigError("the page: too steep"), "refused: the page: too steep"),
             (ChangeRefusedError("the flight has ended"), "refused: the flight has ended"),
@@ -183,11 +178,9 @@ def test_each_refusal_is_told():
             await page.click("apply", said)
         assert page.value(CLIMB) == "1.5"
 
-    used(use, path=f"/?token={TOKEN}")
 
-
-def test_another_tabs_change_is_shown_but_not_over_an_edited_field():
-    async def use(page):
+async def test_another_tabs_change_is_shown_but_not_over_an_edited_field():
+    async with used(path=f"/?token={TOKEN}") as page:
         page.type("limits.max_tilt_deg", "31")
         await page.connection.change(
             {"limits": {"max_climb_m_s": 1.5, "max_tilt_deg": 30.0}}, "the live page"
@@ -197,25 +190,21 @@ def test_another_tabs_change_is_shown_but_not_over_an_edited_field():
         page.page_data.take({"kind": "end", "text": "the flight is over"})
         await page.until(lambda: not page.can_undo())
 
-    used(use, path=f"/?token={TOKEN}")
 
-
-def test_changed_values_are_saved_in_the_folder_or_the_reason_is_told(tmp_path):
-    async def use(page):
+async def test_changed_values_are_saved_in_the_folder_or_the_reason_is_told(tmp_path):
+    async with used(tmp_path, path=f"/?token={TOKEN}") as page:
         page.type(CLIMB, "1.5")
         await page.click("apply", "done 1")
         await page.click("save", f"saved as {tmp_path / 'changed.yaml'}")
         page.connection.first_message["folder"] = str(tmp_path / "gone")
         await page.click("save", "changed.yaml was not written: No such file or directory")
-
-    used(use, tmp_path, path=f"/?token={TOKEN}")
     assert "  max_climb_m_s: 1.5  # was 2.0\n" in (tmp_path / "changed.yaml").read_text()
 
 
-def test_new_states_and_events_are_pushed_once(monkeypatch):
+async def test_new_states_and_events_are_pushed_once(monkeypatch):
     pushed = []
 
-    async def use(page):
+    async with used() as page:
         client = page.user.client
         client.run_javascript = pushed.append
         monkeypatch.setattr(type(client), "has_socket_connection", property(lambda _: True))
@@ -225,7 +214,5 @@ def test_new_states_and_events_are_pushed_once(monkeypatch):
         page.page_data.take({"kind": "end", "text": "the flight is over"})
         await page.until(lambda: '"over": "the flight is over"' in pushed[-1])
         monkeypatch.undo()
-
-    used(use)
     assert sum('"phase": "hover"' in each for each in pushed) == 1
     assert sum("maneuver: hover" in each for each in pushed) == 1
