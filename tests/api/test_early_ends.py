@@ -159,16 +159,12 @@ def test_a_program_that_raises_after_its_landing_has_flown_well(tmp_path):
     assert "the program raised ZeroDivisionError('mine')" in str(summary["events"])
 
 
-def test_a_program_cancelled_while_it_connects_leaves_no_warning():
+async def test_a_program_cancelled_while_it_connects_leaves_no_warning():
     """Python told of a "Future exception was never retrieved" after a Ctrl-C in `connect`."""
     told = []
-
-    async def main():
-        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
-        ProgramPlan().end(companion.FlightEnded("interrupted"))
-        gc.collect()
-
-    asyncio.run(main())
+    asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
+    ProgramPlan().end(companion.FlightEnded("interrupted"))
+    gc.collect()
     assert not told
 
 

@@ -68,23 +68,20 @@ async def test_after_its_end_nothing_is_started_and_nobody_waits_for_ever():
         await loop.start(where())
 
 
-def test_the_flight_runs_while_the_program_blocks():
+async def test_the_flight_runs_while_the_program_blocks():
     async def ticks():
         began = time.monotonic()
         for _ in range(10):
             await asyncio.sleep(0.01)
         return time.monotonic() - began
 
-    async def main():
-        loop = flight_loop()
-        flown = loop.start(ticks())
-        until = time.monotonic() + 0.4
-        while time.monotonic() < until:
-            pass
-        loop.close(wait=False)
-        return await flown
-
-    assert asyncio.run(main()) < 0.35
+    loop = flight_loop()
+    flown = loop.start(ticks())
+    until = time.monotonic() + 0.4
+    while time.monotonic() < until:
+        pass
+    loop.close(wait=False)
+    assert await flown < 0.35
 
 
 @pytest.mark.parametrize("lost", ["loop", "thread"])
@@ -110,36 +107,28 @@ def test_a_program_that_is_lost_has_its_flight_ended(lost):
     loop.close()
 
 
-def test_python_changes_threads_quickly_while_any_flight_runs():
+async def test_python_changes_threads_quickly_while_any_flight_runs():
     before = sys.getswitchinterval()
-
-    async def main():
-        first, second = flight_loop(), flight_loop()
-        await first.start(where())
-        await second.start(where())
-        first.close(wait=True)
-        assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL, abs=2e-6)
-        second.close(wait=True)
-
-    asyncio.run(main())
+    first, second = flight_loop(), flight_loop()
+    await first.start(where())
+    await second.start(where())
+    first.close(wait=True)
+    assert sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL, abs=2e-6)
+    second.close(wait=True)
     assert sys.getswitchinterval() == pytest.approx(before)
 
 
-def test_a_handler_of_ctrl_c_that_does_not_wake_the_loop_is_heard():
+async def test_a_handler_of_ctrl_c_that_does_not_wake_the_loop_is_heard():
     """Jupyter's handler calls `call_soon`; an interrupted cell went on until its call was done."""
-
-    async def main():
-        program, told = asyncio.get_running_loop(), asyncio.Event()
-        loop = flight_loop()
-        before = signal.signal(signal.SIGALRM, lambda *_: program.call_soon(told.set))
-        signal.setitimer(signal.ITIMER_REAL, 0.2)
-        began = time.monotonic()
-        await asyncio.wait_for(told.wait(), 10.0)
-        signal.signal(signal.SIGALRM, before)
-        loop.close(wait=True)
-        return time.monotonic() - began
-
-    assert asyncio.run(main()) < 5.0
+    program, told = asyncio.get_running_loop(), asyncio.Event()
+    loop = flight_loop()
+    before = signal.signal(signal.SIGALRM, lambda *_: program.call_soon(told.set))
+    signal.setitimer(signal.ITIMER_REAL, 0.2)
+    began = time.monotonic()
+    await asyncio.wait_for(told.wait(), 10.0)
+    signal.signal(signal.SIGALRM, before)
+    loop.close(wait=True)
+    assert time.monotonic() - began < 5.0
 
 
 async def test_news_do_not_queue_up_while_the_program_does_not_run():
@@ -158,18 +147,14 @@ async def test_news_do_not_queue_up_while_the_program_does_not_run():
     assert (len(queued), len(heard)) == (1, 1)
 
 
-def test_two_flights_that_overlap_leave_ctrl_c_as_it_was():
+async def test_two_flights_that_overlap_leave_ctrl_c_as_it_was():
     """The first to end left its handler, so a later `asyncio.run` was not cancelled by Ctrl-C."""
-
-    async def main():
-        before, flights = signal.getsignal(signal.SIGINT), [OwnThreadLoop(), OwnThreadLoop()]
-        first, second = (on_ctrl_c(loop, pytest.fail) for loop in flights)
-        first.__enter__()
-        second.__enter__()
-        assert signal.getsignal(signal.SIGINT) is not before
-        for each, loop in zip((first, second), flights, strict=True):
-            each.__exit__(None, None, None)
-            loop.close(wait=True)
-        return signal.getsignal(signal.SIGINT) is before
-
-    assert asyncio.run(main())
+    before, flights = signal.getsignal(signal.SIGINT), [OwnThreadLoop(), OwnThreadLoop()]
+    first, second = (on_ctrl_c(loop, pytest.fail) for loop in flights)
+    first.__enter__()
+    second.__enter__()
+    assert signal.getsignal(signal.SIGINT) is not before
+    for each, loop in zip((first, second), flights, strict=True):
+        each.__exit__(None, None, None)
+        loop.close(wait=True)
+    assert signal.getsignal(signal.SIGINT) is before

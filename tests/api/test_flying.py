@@ -11,6 +11,7 @@ import pytest
 import companion
 from companion.config.files import changed, load
 from companion.files.yaml_file import ConfigError
+from companion.flight.observer import SilentObserver
 from companion.guidance import GRAVITY, Pose, Reference, VehicleMotion
 from companion.guidance.follow import HeldHeadingManeuver
 from companion.guidance.source import CommandedSource
@@ -27,7 +28,7 @@ FAST_LINE = line((4.0, 0.0, 0.0), speed=3.0, acceleration=4.0, jerk=20.0)
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 
 
-class Told:
+class Told(SilentObserver):
     """An observer that keeps the events."""
 
     def __init__(self):
@@ -35,12 +36,6 @@ class Told:
 
     def phase(self, name, waits_for):
         self.events.append(f"phase {name}")
-
-    def waiting(self, *_):
-        pass
-
-    def status(self, _):
-        pass
 
     def event(self, _, text):
         self.events.append(text)

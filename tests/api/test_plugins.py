@@ -139,39 +139,21 @@ class Broken(LinearGuidance):
         moving = inputs.now.position_ned[0] > 0.5
         return (target, later, float("nan")) if moving else (target, later, down)
 """
-ENTRY_POINTS = """
-[companion.planners]
-mine = theirs:mine
-nothing = theirs:nothing
-pair = theirs:pair
-raising = theirs:raising
-later = theirs:later
-blank = theirs:blank
-refusing = theirs:refusing
-leaving = theirs:leaving
-number = theirs:number
-wild = theirs:wild
-lazy = theirs:lazy
-one-sided = theirs:one_sided
-remembering = theirs:Remembering
-forgetful = theirs:Forgetful
-missing = theirs:not_there
-
-[companion.guidance]
-calm = theirs:Calm
-drifting = theirs:Drifting
-number = theirs:number
-broken = theirs:Broken
-greedy = theirs:Greedy
-unset = theirs:Unset
-stumbling = theirs:Stumbling
-quitting = theirs:Quitting
-vanishing = theirs:Vanishing
-half = theirs:Half
-empty = theirs:Empty
-nowhere = theirs:Nowhere
-my-guidance = my_package:MyGuidance
-"""
+FUNCTIONS = "mine nothing pair raising later blank refusing leaving number wild lazy one_sided"
+GUIDANCES = "Calm Drifting Broken Greedy Unset Stumbling Quitting Vanishing Half Empty Nowhere"
+ENTRY_POINTS = "\n".join(
+    (
+        "[companion.planners]",
+        *(f"{name.replace('_', '-')} = theirs:{name}" for name in FUNCTIONS.split()),
+        "remembering = theirs:Remembering",
+        "forgetful = theirs:Forgetful",
+        "missing = theirs:not_there",
+        "[companion.guidance]",
+        *(f"{name.lower()} = theirs:{name}" for name in GUIDANCES.split()),
+        "number = theirs:number",
+        "my-guidance = my_package:MyGuidance",
+    )
+)
 PAGE = (CONFIGS.parent / "docs/extending.md").read_text("utf-8")
 (SHOWN,) = re.findall(r'^```python title="my_package\.py"\n(.*?)^```$', PAGE, re.M | re.S)
 

@@ -8,8 +8,7 @@ itself.
 import math
 import sys
 
-from companion import testing
-from tests.serve.test_control import circle
+from tests.serve.offboard_scene import on_circle
 from tests.serve.virtual import (
     ALL,
     POSITION,
@@ -17,7 +16,7 @@ from tests.serve.virtual import (
     airborne,
     begin_control,
     mock,
-    serving,
+    served,
     stream,
 )
 
@@ -35,24 +34,22 @@ def circle_rms(autopilot, *, control, wind, speed=5.0):
     vehicle = mock(autopilot, full_rate=True, wind=WINDS[wind])
     squares = []
 
-    async def whole():
-        async with serving(vehicle, autopilot, control=control) as session:
-            await airborne(session, vehicle, autopilot)
-            script = MemoryClient().connect(session)
-            start = vehicle.state()["position"]
-            await begin(session, script, autopilot, start, control)
-            centre = (start[0] - 5.0, start[1], start[2])
+    async def scene(session):
+        await airborne(session, vehicle, autopilot)
+        script = MemoryClient().connect(session)
+        start = vehicle.state()["position"]
+        await begin(session, script, autopilot, start, control)
 
-            def send(time):
-                commanded = circle(time, centre, speed=speed)
-                script.local(ALL, *commanded)
-                if time > _SETTLED:
-                    true = vehicle.state()["position"]
-                    squares.append(math.dist(true[:2], commanded[0][:2]) ** 2)
+        def send(time):
+            commanded = on_circle(time, start, speed)
+            script.local(ALL, *commanded)
+            if time > _SETTLED:
+                true = vehicle.state()["position"]
+                squares.append(math.dist(true[:2], commanded[0][:2]) ** 2)
 
-            await stream(_SECONDS, send)
+        await stream(_SECONDS, send)
 
-    testing.run(vehicle, whole())
+    served(vehicle, autopilot, scene, control=control)
     return math.sqrt(sum(squares) / len(squares))
 
 

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import socket
 
 from mavsdk_grpc import System
 from mavsdk_grpc.action import ActionError
@@ -15,6 +14,8 @@ from mavsdk_grpc.offboard import (
 )
 from mavsdk_grpc.telemetry import FlightMode
 from offboard_scene import Program, first, main
+
+from companion.mavlink.transport.free_port import free_port
 
 
 class Grpc(Program):
@@ -92,11 +93,6 @@ class Grpc(Program):
 
     async def attitude(self, thrust):
         await self._offboard.set_attitude(Attitude(0.0, 0.0, 0.0, thrust))
-
-
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as opened:
-        return opened.getsockname()[1]
 
 
 async def run(endpoint, fly):

@@ -11,6 +11,7 @@ from mavsdk.asyncio.plugins.offboard import OffboardAsync, VelocityBodyYawspeed
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import FlightMode, TelemetryAsync
 from mavsdk.component_type import ComponentType
+from offboard_scene import first
 
 
 def items():
@@ -24,14 +25,6 @@ def items():
         item.mission_type = 0
         found.append(item)
     return found
-
-
-async def first(stream, condition):
-    """Return the first item of a telemetry stream that meets a condition."""
-    async for item in stream:
-        if condition(item):
-            return item
-    raise RuntimeError("the stream ended")
 
 
 async def main(endpoint: str) -> dict[str, object]:

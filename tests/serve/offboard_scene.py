@@ -22,9 +22,9 @@ async def first(stream, condition):
     raise RuntimeError("the stream ended")
 
 
-def on_circle(now, start):
+def on_circle(now, start, speed=SPEED):
     """Position, velocity and acceleration NED on a circle that begins at rest at `start`."""
-    rate = SPEED / RADIUS
+    rate = speed / RADIUS
     if now < RAMP:
         angle, turning, change = 0.5 * rate * now**2 / RAMP, rate * now / RAMP, rate / RAMP
     else:

@@ -24,7 +24,7 @@ from tests.serve.virtual import (
     MemoryClient,
     airborne,
     begin_control,
-    serving,
+    served,
     stream,
 )
 
@@ -96,6 +96,19 @@ class Scene:
         assert self.flights.ownership.owner.client is self.script
         assert math.dist(self.place, self.home) < 0.4
         return FLOWN
+
+    async def is_refused(self, send, *words):
+        """What `send` sends between good setpoints changes nothing, and is answered by `words`."""
+
+        def both(_):
+            self.hover()
+            send()
+
+        await stream(0.5, both, 0.05)
+        for each in words:
+            self.is_said(each)
+        await self.is_flown()
+        return REFUSED
 
     def is_said(self, words, client=None):
         said = " ".join((client or self.script).texts())
@@ -176,8 +189,7 @@ async def not_finite(scene):
     """sends NaN or infinity in any field, between good setpoints"""
     bad = [(NAN, 0.0, 0.0), (0.0, math.inf, 0.0), (0.0, 0.0, -math.inf)]
 
-    def send(_):
-        scene.hover()
+    def send():
         for values in bad:
             scene.script.local(POSITION, values)
             scene.script.local(VELOCITY, velocity=values)
@@ -188,10 +200,7 @@ async def not_finite(scene):
         scene.script.attitude(7, (1.0, 0.0, 0.0, 0.0), NAN)
         scene.script.attitude(128, (1.0, 0.0, 0.0, 0.0), 0.5, (NAN, 0.0, 0.0))
 
-    await stream(0.5, send, 0.05)
-    scene.is_said("not finite")
-    await scene.is_flown()
-    return REFUSED
+    return await scene.is_refused(send, "not finite")
 
 
 async def only_not_finite(scene):
@@ -209,8 +218,7 @@ async def contradictions(scene):
     """sends masks that contradict themselves, between good setpoints"""
     away = (scene.home[0] + 20.0, *scene.home[1:])
 
-    def send(_):
-        scene.hover()
+    def send():
         scene.script.local(POSITION & ~(64 | 128 | 256), away)  # no velocity
         scene.script.local(POSITION | 1, away)  # x without y
         scene.script.local(0xFFFF, away)  # unknown bits
@@ -220,17 +228,13 @@ async def contradictions(scene):
         scene.script.attitude(7 | 128, (1.0, 0.0, 0.0, 0.0), 0.5)  # neither
         scene.script.attitude(7 | 64, (1.0, 0.0, 0.0, 0.0), 0.5)  # no thrust
 
-    await stream(0.5, send, 0.05)
-    scene.is_said("also needs a velocity")
-    await scene.is_flown()
-    return REFUSED
+    return await scene.is_refused(send, "also needs a velocity")
 
 
 async def no_place(scene):
     """sends a global position at latitude and longitude 0, or at a height that is no number"""
 
-    def send(_):
-        scene.hover()
+    def send():
         for place in ((0, 0, 5.0), (473977420, 85455940, NAN)):
             scene.script.send(
                 dialect.MAVLink_set_position_target_global_int_message(
@@ -238,11 +242,7 @@ async def no_place(scene):
                 )
             )
 
-    await stream(0.5, send, 0.05)
-    scene.is_said("the position is more than")
-    scene.is_said("position is not finite")
-    await scene.is_flown()
-    return REFUSED
+    return await scene.is_refused(send, "the position is more than", "position is not finite")
 
 
 async def clock_jumps(scene):
@@ -293,15 +293,11 @@ async def upside_down(scene):
     """commands an attitude beyond 90° of tilt"""
     side = math.sqrt(0.5)
 
-    def send(_):
-        scene.hover()
+    def send():
         scene.script.attitude(7, (0.0, 1.0, 0.0, 0.0), 0.5)
         scene.script.attitude(7, (side - 0.01, side, 0.0, 0.0), 0.5)
 
-    await stream(0.5, send, 0.05)
-    scene.is_said("90 degrees of tilt")
-    await scene.is_flown()
-    return REFUSED
+    return await scene.is_refused(send, "90 degrees of tilt")
 
 
 async def beyond_limits(scene):
@@ -374,20 +370,16 @@ async def wrong_ids(scene):
         MemoryClient(f"thief {ids}", ids).connect(scene.session) for ids in ((1, 1), (1, 191))
     ]
 
-    def send(_):
-        scene.hover()
+    def send():
         for target in ((2, 1), (1, 7), (7, 0)):
             scene.script.local(ALL, away, target=target)
         for thief in thieves:
             thief.local(ALL, away)
 
-    await stream(0.5, send)
-    scene.is_said("target_system is 2")
-    scene.is_said("target_component is 7")
-    await scene.is_flown()
+    state = await scene.is_refused(send, "target_system is 2", "target_component is 7")
     for thief in thieves:
         scene.session.network.detach(thief)
-    return REFUSED
+    return state
 
 
 async def damaged(scene):
@@ -505,16 +497,15 @@ def test_every_fault_of_a_client_ends_in_its_documented_state(autopilot):
     cells = [cell for cell in CELLS if autopilot == "px4" or cell not in ONE_VEHICLE]
     seen = {}
 
-    async def whole():
-        async with serving(vehicle, autopilot, hold_s=HOLD) as session:
-            ground = await airborne(session, vehicle, autopilot)
-            scene = Scene(vehicle, session, autopilot, ground, SetpointJudge(vehicle, autopilot))
-            for cell in cells:
-                await scene.recover()
-                seen[cell.__doc__] = await cell(scene)
-            scene.judge.ended()
+    async def whole(session):
+        ground = await airborne(session, vehicle, autopilot)
+        scene = Scene(vehicle, session, autopilot, ground, SetpointJudge(vehicle, autopilot))
+        for cell in cells:
+            await scene.recover()
+            seen[cell.__doc__] = await cell(scene)
+        scene.judge.ended()
 
-    testing.run(vehicle, whole())
+    served(vehicle, autopilot, whole, hold_s=HOLD)
     expected = documented()
     if autopilot == "px4":
         assert seen == expected

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from companion import testing
 from companion.mavlink.framing import Frame
 from companion.mavlink.settings import LinkSettings
 from companion.serve.component import Component
@@ -24,7 +23,8 @@ from tests.serve.virtual import (
     airborne,
     begin_control,
     mock,
-    serving,
+    place,
+    served,
     stream,
 )
 
@@ -172,46 +172,45 @@ def test_more_programs_than_are_remembered_do_not_end_control_for_ever():
     """The program that asked had been forgotten, and a flight that nobody flew stayed for ever."""
     vehicle = mock("px4")
 
-    async def whole():
-        notes = []
-        async with serving(vehicle, "px4", notes) as session:
-            await airborne(session, vehicle, "px4")
-            script, crowd = (MemoryClient(name).connect(session) for name in ("script", "crowd"))
-            home = session.network._link.state.position.position_ned
-            script.local(ALL, home)
-            for number in range(40):
-                crowd.packer.srcSystem = 100 + number
-                crowd.local(ALL, home)
-                await asyncio.sleep(0.003)
-            assert await script.offboard() == REJECTED
-            assert any("too many programs" in text for text in script.texts())
-            assert session.flights.ownership.owner is None
-            await begin_control(session, script, "px4", lambda *_: script.local(ALL, home))
-        assert not [text for text in notes if "internal error" in text]
+    notes = []
 
-    testing.run(vehicle, whole())
+    async def scene(session):
+        await airborne(session, vehicle, "px4")
+        script, crowd = (MemoryClient(name).connect(session) for name in ("script", "crowd"))
+        home = place(session)
+        script.local(ALL, home)
+        for number in range(40):
+            crowd.packer.srcSystem = 100 + number
+            crowd.local(ALL, home)
+            await asyncio.sleep(0.003)
+        assert await script.offboard() == REJECTED
+        assert any("too many programs" in text for text in script.texts())
+        assert session.flights.ownership.owner is None
+        await begin_control(session, script, "px4", lambda *_: script.local(ALL, home))
+
+    served(vehicle, "px4", scene, notes=notes)
+    assert not [text for text in notes if "internal error" in text]
 
 
 def test_a_client_that_goes_on_for_a_silent_one_is_named():
     """The pilot was told that the first one was in control, to the end."""
     vehicle = mock("px4")
 
-    async def whole():
-        async with serving(vehicle, "px4", hold_s=1.0) as session:
-            ground = await airborne(session, vehicle, "px4")
-            first, second = (
-                MemoryClient(name, ids).connect(session)
-                for name, ids in (("first", (245, 190)), ("second", (246, 190)))
-            )
-            home = session.network._link.state.position.position_ned
-            await begin_control(session, first, "px4", lambda *_: first.local(ALL, home))
-            await asyncio.sleep(0.7)
-            await stream(0.3, lambda _: second.local(ALL, home))
-            assert ground.texts()[-2:] == [
-                "first (245/190): the owner is silent, and the vehicle is held",
-                "second (246/190) is in control",
-            ]
-            await asyncio.sleep(2.5)
-            assert ground.texts()[-1] == "control by second (246/190) has ended: handed back"
+    async def scene(session):
+        ground = await airborne(session, vehicle, "px4")
+        first, second = (
+            MemoryClient(name, ids).connect(session)
+            for name, ids in (("first", (245, 190)), ("second", (246, 190)))
+        )
+        home = place(session)
+        await begin_control(session, first, "px4", lambda *_: first.local(ALL, home))
+        await asyncio.sleep(0.7)
+        await stream(0.3, lambda _: second.local(ALL, home))
+        assert ground.texts()[-2:] == [
+            "first (245/190): the owner is silent, and the vehicle is held",
+            "second (246/190) is in control",
+        ]
+        await asyncio.sleep(2.5)
+        assert ground.texts()[-1] == "control by second (246/190) has ended: handed back"
 
-    testing.run(vehicle, whole())
+    served(vehicle, "px4", scene, hold_s=1.0)

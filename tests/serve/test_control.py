@@ -8,11 +8,11 @@ import pytest
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from companion import testing
 from companion.config.files import load
 from companion.flight.changes import ChangeRefusedError
 from companion.recording.flight_record import read_flight
 from companion.replay.replay import Replay
+from tests.serve.offboard_scene import on_circle
 from tests.serve.virtual import (
     ALL,
     POSITION,
@@ -21,7 +21,8 @@ from tests.serve.virtual import (
     airborne,
     begin_control,
     mock,
-    serving,
+    place,
+    served,
     stream,
 )
 
@@ -32,29 +33,21 @@ REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
 OFFBOARD = 176, 1, 6
 
 
-def fly(autopilot, scene, **settings):
+def fly(autopilot, scene, directory=None):
     """Run a scene with an airborne vehicle and a connected script."""
-    serve = settings.pop("serve", {})
-    directory = settings.pop("directory", None)
-    vehicle = mock(autopilot, **settings)
+    vehicle = mock(autopilot)
 
-    async def whole():
-        async with serving(vehicle, autopilot, directory=directory, **serve) as session:
-            ground = await airborne(session, vehicle, autopilot)
-            script = MemoryClient().connect(session)
-            await scene(vehicle, session, script, ground)
+    async def whole(session):
+        ground = await airborne(session, vehicle, autopilot)
+        script = MemoryClient().connect(session)
+        await scene(vehicle, session, script, ground)
 
-    testing.run(vehicle, whole())
-    return vehicle
+    served(vehicle, autopilot, whole, directory=directory)
 
 
 def sent_rates(tlog):
     log = mavutil.mavlink_connection(str(tlog))
     return list(iter(lambda: log.recv_match(type="SET_ATTITUDE_TARGET"), None))
-
-
-def place(session):
-    return session.flights._vehicle.link.state.position.position_ned
 
 
 def velocity(session):
@@ -66,36 +59,18 @@ def heading(vehicle):
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def circle(time, centre, radius=5.0, speed=5.0, ramp=3.0):
-    """Position, velocity and acceleration on a circle that begins at rest north of `centre`."""
-    rate = speed / radius
-    if time < ramp:
-        angle, rate_now, change = 0.5 * rate * time**2 / ramp, rate * time / ramp, rate / ramp
-    else:
-        angle, rate_now, change = rate * (time - 0.5 * ramp), rate, 0.0
-    c, s = math.cos(angle), math.sin(angle)
-    north, east, down = centre
-    return (
-        (north + radius * c, east + radius * s, down),
-        (-radius * rate_now * s, radius * rate_now * c, 0.0),
-        (-radius * (rate_now**2 * c + change * s), radius * (change * c - rate_now**2 * s), 0.0),
-    )
-
-
 @BOTH
 def test_a_streamed_circle_is_flown_as_it_is(autopilot):
     """5 m at 5 m/s, 50 Hz: within 0.1 m RMS of the setpoints, by the vehicle's own estimate."""
 
     async def scene(_, session, script, __):
         start = place(session)
-        centre = (start[0] - 5.0, start[1], start[2])
         await begin_control(session, script, autopilot, lambda _: script.local(ALL, start))
         await stream(0.5, lambda _: script.local(ALL, start))
         errors = []
 
         def send(time):
-            commanded = circle(time, centre)
-            script.local(ALL, *commanded)
+            script.local(ALL, *on_circle(time, start))
             flight = session.flights.current_flight
             error = None if flight is None else flight.tracking_error
             errors.extend([error] if time > 4.0 else [])
@@ -249,16 +224,15 @@ def test_a_single_setpoint_in_guided_gives_no_control():
 def test_on_the_ground_ardupilot_s_setpoints_are_refused_in_words():
     vehicle = mock("ardupilot")
 
-    async def whole():
-        async with serving(vehicle, "ardupilot") as session:
-            script = MemoryClient().connect(session)
-            await asyncio.sleep(6.0)
-            script.command(176, 1, 4)
-            await stream(1.0, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
-            assert "take off first" in " ".join(script.texts())
-            assert not vehicle.setpoints
+    async def scene(session):
+        script = MemoryClient().connect(session)
+        await asyncio.sleep(6.0)
+        script.command(176, 1, 4)
+        await stream(1.0, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
+        assert "take off first" in " ".join(script.texts())
+        assert not vehicle.setpoints
 
-    testing.run(vehicle, whole())
+    served(vehicle, "ardupilot", scene)
 
 
 def test_px4_takes_off_for_a_client_that_asks_for_offboard_on_the_ground(tmp_path):
@@ -266,30 +240,29 @@ def test_px4_takes_off_for_a_client_that_asks_for_offboard_on_the_ground(tmp_pat
     vehicle = mock("px4")
     up = (0.0, 0.0, -5.0)
 
-    async def whole():
-        async with serving(vehicle, "px4", directory=tmp_path) as session:
-            script = MemoryClient().connect(session)
-            await asyncio.sleep(3.0)
-            await stream(0.5, lambda _: script.local(POSITION, up))
-            assert await script.offboard() == REJECTED
-            assert "arm it first" in " ".join(script.texts())
-            script.command(400, 1)
-            await stream(1.5, lambda _: script.local(POSITION, (0.0, 0.0, 0.0)))
-            assert await script.offboard() == REJECTED
-            assert "command a height" in " ".join(script.texts())
-            assert not vehicle.setpoints
-            await stream(0.3, lambda _: script.local(POSITION, up))
-            asked = asyncio.ensure_future(script.offboard())
-            await stream(3.0, lambda _: script.local(POSITION, up))
-            assert await asked == dialect.MAV_RESULT_ACCEPTED
-            assert vehicle.state()["mode"] == "OFFBOARD"
-            assert -vehicle.state()["position"][2] > 1.5, "no setpoint of ours on the ground"
-            await asyncio.sleep(1.0)
-            assert session.flights.in_control, "held until it goes on"
-            await stream(5.0, lambda _: script.local(POSITION, up), 0.1)
-            assert math.dist(vehicle.state()["position"], up) < 0.3
+    async def scene(session):
+        script = MemoryClient().connect(session)
+        await asyncio.sleep(3.0)
+        await stream(0.5, lambda _: script.local(POSITION, up))
+        assert await script.offboard() == REJECTED
+        assert "arm it first" in " ".join(script.texts())
+        script.command(400, 1)
+        await stream(1.5, lambda _: script.local(POSITION, (0.0, 0.0, 0.0)))
+        assert await script.offboard() == REJECTED
+        assert "command a height" in " ".join(script.texts())
+        assert not vehicle.setpoints
+        await stream(0.3, lambda _: script.local(POSITION, up))
+        asked = asyncio.ensure_future(script.offboard())
+        await stream(3.0, lambda _: script.local(POSITION, up))
+        assert await asked == dialect.MAV_RESULT_ACCEPTED
+        assert vehicle.state()["mode"] == "OFFBOARD"
+        assert -vehicle.state()["position"][2] > 1.5, "no setpoint of ours on the ground"
+        await asyncio.sleep(1.0)
+        assert session.flights.in_control, "held until it goes on"
+        await stream(5.0, lambda _: script.local(POSITION, up), 0.1)
+        assert math.dist(vehicle.state()["position"], up) < 0.3
 
-    testing.run(vehicle, whole())
+    served(vehicle, "px4", scene, directory=tmp_path)
     assert min(setpoint.thrust for setpoint in vehicle.setpoints) > 0.1, "none is idle"
     (folder,) = tmp_path.iterdir()
     phases = [one["name"] for one in json.loads((folder / "summary.json").read_text())["phases"]]
@@ -300,56 +273,53 @@ def test_what_stops_the_takeoff_for_a_client_ends_it():
     """A station that commands hold in the climb wins; a vehicle disarmed before it stays down."""
     vehicle = mock("px4")
 
-    async def whole():
-        async with serving(vehicle, "px4") as session:
-            script = MemoryClient().connect(session)
-            station = MemoryClient("station", (255, 190)).connect(session)
-            await asyncio.sleep(3.0)
-            hold = lambda _: script.local(POSITION, (0.0, 0.0, -8.0))  # noqa: E731
-            for stop, height in (((400, 0), 0.0), ((176, 1, 4, 3), 0.8)):
-                script.command(400, 1)
-                await stream(0.2, hold)
-                asked = asyncio.ensure_future(script.offboard())
-                await stream(1.5, hold)
-                while -vehicle.state()["position"][2] < height:
-                    await stream(0.1, hold)
-                station.command(*stop)
-                while not asked.done():
-                    await stream(0.1, hold)
-                assert asked.result() == REJECTED
-                await stream(1.0, hold)
-                assert not session.flights.in_control
-            assert vehicle.state()["mode"] == "LOITER"
+    async def scene(session):
+        script = MemoryClient().connect(session)
+        station = MemoryClient("station", (255, 190)).connect(session)
+        await asyncio.sleep(3.0)
+        hold = lambda _: script.local(POSITION, (0.0, 0.0, -8.0))  # noqa: E731
+        for stop, height in (((400, 0), 0.0), ((176, 1, 4, 3), 0.8)):
+            script.command(400, 1)
+            await stream(0.2, hold)
+            asked = asyncio.ensure_future(script.offboard())
+            await stream(1.5, hold)
+            while -vehicle.state()["position"][2] < height:
+                await stream(0.1, hold)
+            station.command(*stop)
+            while not asked.done():
+                await stream(0.1, hold)
+            assert asked.result() == REJECTED
+            await stream(1.0, hold)
+            assert not session.flights.in_control
+        assert vehicle.state()["mode"] == "LOITER"
 
-    testing.run(vehicle, whole())
+    served(vehicle, "px4", scene)
     assert not vehicle.setpoints
 
 
 def test_setpoints_for_another_vehicle_behind_a_client_are_passed_to_it():
     vehicle = mock("px4")
 
-    async def whole():
-        async with serving(vehicle, "px4") as session:
-            script = MemoryClient().connect(session)
-            other = MemoryClient("other vehicle", (2, 1)).connect(session)
-            other.send(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
-            script.local(ALL, (1.0, 2.0, -3.0), target=(2, 1))
-            await other.hears("SET_POSITION_TARGET_LOCAL_NED")
-            assert not script.texts()
+    async def scene(session):
+        script = MemoryClient().connect(session)
+        other = MemoryClient("other vehicle", (2, 1)).connect(session)
+        other.send(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+        script.local(ALL, (1.0, 2.0, -3.0), target=(2, 1))
+        await other.hears("SET_POSITION_TARGET_LOCAL_NED")
+        assert not script.texts()
 
-    testing.run(vehicle, whole())
+    served(vehicle, "px4", scene)
 
 
 def test_without_control_setpoints_are_passed_on_as_everything_else():
     vehicle = mock("px4")
 
-    async def whole():
-        async with serving(vehicle, "px4", control=False) as session:
-            script = MemoryClient().connect(session)
-            await asyncio.sleep(8.0)
-            await stream(1.5, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
-            assert await script.offboard() == dialect.MAV_RESULT_ACCEPTED
-            await script.hears("HEARTBEAT")
-            assert vehicle.state()["setpoints"] > 50
+    async def scene(session):
+        script = MemoryClient().connect(session)
+        await asyncio.sleep(8.0)
+        await stream(1.5, lambda _: script.local(POSITION, (0.0, 0.0, -5.0)))
+        assert await script.offboard() == dialect.MAV_RESULT_ACCEPTED
+        await script.hears("HEARTBEAT")
+        assert vehicle.state()["setpoints"] > 50
 
-    testing.run(vehicle, whole())
+    served(vehicle, "px4", scene, control=False)

@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from companion import testing
 from companion.config import Config
 from companion.config.files import changed
 from companion.guidance.fence import FenceCentre
@@ -18,7 +17,8 @@ from tests.serve.virtual import (
     airborne,
     begin_control,
     mock,
-    serving,
+    place,
+    served,
     stream,
 )
 
@@ -33,7 +33,7 @@ def test_a_client_that_flies_to_the_fence_is_stopped_and_stays_in_control(autopi
     async def scene(session):
         await airborne(session, vehicle, autopilot)
         script = MemoryClient().connect(session)
-        home = session.flights._vehicle.link.state.position.position_ned
+        home = place(session)
         await begin_control(session, script, autopilot, lambda _=0.0: script.local(POSITION, home))
 
         def look():
@@ -52,11 +52,7 @@ def test_a_client_that_flies_to_the_fence_is_stopped_and_stays_in_control(autopi
         seen["in control"] = session.flights.in_control
         seen["texts"] = " ".join(script.texts())
 
-    async def whole():
-        async with serving(vehicle, autopilot, limits={"fence_radius_m": RADIUS}) as session:
-            await scene(session)
-
-    testing.run(vehicle, whole())
+    served(vehicle, autopilot, scene, limits={"fence_radius_m": RADIUS})
     assert seen["in control"], seen["texts"]
     assert "safety:" not in seen["texts"]
     assert "stopped in front of the fence" in seen["texts"]

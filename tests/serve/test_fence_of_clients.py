@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from companion import testing
 from companion.config import Config
 from companion.config.files import changed
 from companion.guidance.fence import FenceCentre
@@ -22,7 +21,7 @@ from tests.serve.virtual import (
     airborne,
     begin_control,
     mock,
-    serving,
+    served,
     stream,
 )
 
@@ -41,66 +40,64 @@ def test_a_client_that_asks_again_does_not_take_the_fence_along(autopilot):
     """
     vehicle = mock(autopilot)
 
-    async def whole():
-        limits = {"fence_radius_m": RADIUS}
-        async with serving(vehicle, autopilot, limits=limits) as session:
-            ground = await airborne(session, vehicle, autopilot)
-            script = MemoryClient().connect(session)
-            north, east, down = vehicle.state()["position"]
+    async def scene(session):
+        ground = await airborne(session, vehicle, autopilot)
+        script = MemoryClient().connect(session)
+        north, east, down = vehicle.state()["position"]
 
-            def to(metres):
-                return lambda _: script.local(POSITION, (north + metres, east, down))
+        def to(metres):
+            return lambda _: script.local(POSITION, (north + metres, east, down))
 
-            def distance():
-                return math.dist(vehicle.state()["position"][:2], (north, east))
+        def distance():
+            return math.dist(vehicle.state()["position"][:2], (north, east))
 
-            sent = count()
+        sent = count()
 
-            def hold(_):
-                """A station asks for rare telemetry now and then, as MAVProxy does."""
-                if next(sent) % 10 == 0:
-                    ground.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
-                to(0.0)(0.0)
+        def hold(_):
+            """A station asks for rare telemetry now and then, as MAVProxy does."""
+            if next(sent) % 10 == 0:
+                ground.send(dialect.MAVLink_request_data_stream_message(1, 1, 0, 4, 1))
+            to(0.0)(0.0)
 
-            await begin_control(session, script, autopilot, hold)
-            assert "control was not given" not in " ".join(script.texts())
-            await stream(5.0, to(6.0), 0.1)
-            script.command(*HOLD[autopilot])
-            await asyncio.sleep(1.5)
-            assert not session.flights.in_control
-            assert distance() == pytest.approx(6.0, abs=0.4)
-            if autopilot == "ardupilot":
-                ground.command(*GUIDED)
-                await asyncio.sleep(0.5)
-            await begin_control(session, script, autopilot, to(6.0))
-            script.heard.clear()
-            controlled, landing = [0.0], [0.0]
+        await begin_control(session, script, autopilot, hold)
+        assert "control was not given" not in " ".join(script.texts())
+        await stream(5.0, to(6.0), 0.1)
+        script.command(*HOLD[autopilot])
+        await asyncio.sleep(1.5)
+        assert not session.flights.in_control
+        assert distance() == pytest.approx(6.0, abs=0.4)
+        if autopilot == "ardupilot":
+            ground.command(*GUIDED)
+            await asyncio.sleep(0.5)
+        await begin_control(session, script, autopilot, to(6.0))
+        script.heard.clear()
+        controlled, landing = [0.0], [0.0]
 
-            def note():
-                flown = landing if vehicle.state()["mode"] == "LAND" else controlled
-                flown.append(distance())
+        def note():
+            flown = landing if vehicle.state()["mode"] == "LAND" else controlled
+            flown.append(distance())
 
-            vehicle.after_step.append(note)
-            await stream(5.0, to(5000.0), 0.05)
-            assert session.flights.in_control
-            await stream(4.0, to(5.0), 0.05)
-            async with asyncio.timeout(20.0):
-                while session.flights.in_control:
-                    await stream(0.1, lambda _: script.attitude(7, NORTHWARD, HOVER[autopilot]))
-            if autopilot == "px4":
-                asked = asyncio.ensure_future(script.offboard())
-                await stream(0.5, to(0.0))
-                assert await asked == REJECTED
-            await stream(2.0, to(5000.0))
-            assert vehicle.state()["mode"] == "LAND"
-            said = " ".join(script.texts())
-            assert re.search("stopped in front of the fence.*safety: braking: braking", said), said
-            assert "control is ending and the vehicle is held" in said
-            # After a run-up of 4 m; without the acceleration it was up to 1.3 m outside, and
-            # without the lateness of ArduPilot's estimate up to 0.2 m.
-            assert max(*controlled, *landing) < RADIUS
+        vehicle.after_step.append(note)
+        await stream(5.0, to(5000.0), 0.05)
+        assert session.flights.in_control
+        await stream(4.0, to(5.0), 0.05)
+        async with asyncio.timeout(20.0):
+            while session.flights.in_control:
+                await stream(0.1, lambda _: script.attitude(7, NORTHWARD, HOVER[autopilot]))
+        if autopilot == "px4":
+            asked = asyncio.ensure_future(script.offboard())
+            await stream(0.5, to(0.0))
+            assert await asked == REJECTED
+        await stream(2.0, to(5000.0))
+        assert vehicle.state()["mode"] == "LAND"
+        said = " ".join(script.texts())
+        assert re.search("stopped in front of the fence.*safety: braking: braking", said), said
+        assert "control is ending and the vehicle is held" in said
+        # After a run-up of 4 m; without the acceleration it was up to 1.3 m outside, and
+        # without the lateness of ArduPilot's estimate up to 0.2 m.
+        assert max(*controlled, *landing) < RADIUS
 
-    testing.run(vehicle, whole())
+    served(vehicle, autopilot, scene, limits={"fence_radius_m": RADIUS})
 
 
 class FakeLink:

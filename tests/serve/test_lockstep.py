@@ -6,7 +6,6 @@ import math
 import pytest
 from pymavlink import mavutil
 
-from companion import testing
 from companion.config.files import load
 from companion.recording.flight_record import read_flight
 from companion.replay.replay import Replay
@@ -17,7 +16,8 @@ from tests.serve.virtual import (
     airborne,
     begin_control,
     mock,
-    serving,
+    place,
+    served,
     stream,
 )
 
@@ -29,24 +29,23 @@ def flown(folder):
     """A flight with a change of gains before it, one in it and its undoing; the setpoints."""
     vehicle = mock("px4", lockstep=True)
 
-    async def whole():
-        async with serving(vehicle, "px4", directory=folder) as session:
-            await airborne(session, vehicle, "px4", 2.5)
-            script = MemoryClient().connect(session)
-            start = session.flights._vehicle.link.state.position.position_ned
-            session.changes.change(BEFORE, "a test")
-            await begin_control(session, script, "px4", lambda _: script.local(ALL, start))
-            there = start[0] + 3.0, start[1] - 1.0, start[2]
-            await stream(0.5, lambda _: script.local(POSITION, there))
-            session.changes.change(IN_FLIGHT, "a test")
-            await stream(1.0, lambda _: script.local(POSITION, there))
-            session.changes.undo("a test")
-            await stream(2.0, lambda _: script.local(POSITION, there))
-            assert math.dist(session.flights._vehicle.link.state.position.position_ned, there) < 0.3
-            script.command(176, 1, 4, 3)
-            await stream(0.5, lambda _: script.local(POSITION, there))
+    async def scene(session):
+        await airborne(session, vehicle, "px4", 2.5)
+        script = MemoryClient().connect(session)
+        start = place(session)
+        session.changes.change(BEFORE, "a test")
+        await begin_control(session, script, "px4", lambda _: script.local(ALL, start))
+        there = start[0] + 3.0, start[1] - 1.0, start[2]
+        await stream(0.5, lambda _: script.local(POSITION, there))
+        session.changes.change(IN_FLIGHT, "a test")
+        await stream(1.0, lambda _: script.local(POSITION, there))
+        session.changes.undo("a test")
+        await stream(2.0, lambda _: script.local(POSITION, there))
+        assert math.dist(place(session), there) < 0.3
+        script.command(176, 1, 4, 3)
+        await stream(0.5, lambda _: script.local(POSITION, there))
 
-    testing.run(vehicle, whole())
+    served(vehicle, "px4", scene, directory=folder)
     return [(each.time, each.rates, each.thrust) for each in vehicle.setpoints]
 
 

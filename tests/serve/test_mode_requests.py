@@ -32,9 +32,12 @@ from companion.vehicle.ardupilot.autopilot import ArduPilot
 from companion.vehicle.px4.autopilot import Px4
 
 
-def command(number, *parameters):
-    message = dialect.MAVLink_command_long_message(1, 1, number, 0, *parameters, *[0.0] * 4)
+def framed(message):
     return FrameScanner().feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
+
+
+def command(number, *parameters):
+    return framed(dialect.MAVLink_command_long_message(1, 1, number, 0, *parameters, *[0.0] * 4))
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
@@ -43,10 +46,6 @@ def test_a_number_that_is_none_asks_for_nothing(number):
     assert not asks_for_control(command(176, number, 6.0, 0.0), Px4())
     assert reduces_telemetry(command(511, 31.0, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
     assert not reduces_telemetry(command(511, number, -1.0, 0.0), {"ATTITUDE_QUATERNION": 250.0})
-
-
-def framed(message):
-    return FrameScanner().feed(message.pack(dialect.MAVLink(None, 255, 190)))[0]
 
 
 @pytest.mark.parametrize(
@@ -144,7 +143,7 @@ async def test_a_record_that_cannot_be_opened_leaves_a_flight_without_record(tmp
     assert changes.config_at_flight_start.planner.gain_per_s == 4.9
 
 
-def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monkeypatch):
+async def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monkeypatch):
     """The record is written in a thread, beside the next flight."""
     told, here = [], threading.get_ident()
 
@@ -152,20 +151,17 @@ def test_what_is_to_be_told_of_a_record_is_told_in_the_event_loop(tmp_path, monk
         assert threading.get_ident() != here
         return "a page"
 
-    async def scene():
-        def note(text):
-            told.append((threading.get_ident(), text))
+    def note(text):
+        told.append((threading.get_ident(), text))
 
-        records = FlightRecords(tmp_path, THIS_COMPUTER, note)
-        records.on_recorded = page
-        record = records.new_record(Config())
-        with records.recording(record):
-            pass
-        monkeypatch.setattr(flight_files, "write_with_timeout", lambda *_: "the disk is full")
-        await records.keep(record, Summary("ok", "", "", 1.0, LoopCounts(), {}, FlightTrace()))
-        await asyncio.sleep(0.01)
-
-    asyncio.run(scene())
+    records = FlightRecords(tmp_path, THIS_COMPUTER, note)
+    records.on_recorded = page
+    record = records.new_record(Config())
+    with records.recording(record):
+        pass
+    monkeypatch.setattr(flight_files, "write_with_timeout", lambda *_: "the disk is full")
+    await records.keep(record, Summary("ok", "", "", 1.0, LoopCounts(), {}, FlightTrace()))
+    await asyncio.sleep(0.01)
     assert {thread for thread, _ in told} == {here}
     texts = " ".join(text for _, text in told)
     assert all(words in texts for words in ("the disk is full", "recorded in", "a page"))

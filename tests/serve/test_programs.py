@@ -34,12 +34,9 @@ def test_mavsdk_flies_by_setpoints_and_mavproxy_uploads_a_mission_and_wins(tmp_p
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         ) as run,
     ):  # fmt: skip
-        said = read_until(proxy, "parameters\n")
-        received = next(int(word) for word in said.split("Received ")[1].split() if word.isdigit())
+        received = received_parameters(proxy)
         assert run.stdout.readline() == "IN CONTROL\n", run.communicate()[1]
-        (tmp_path / "plan.txt").write_text(PLAN)
-        proxy.stdin.write(f"wp load {tmp_path / 'plan.txt'}\n")
-        read_until(proxy, "MISSION_ACK: TYPE_MISSION: ACCEPTED")
+        upload_a_mission(proxy, tmp_path)
         proxy.stdin.write("long DO_SET_MODE 1 4 5\n")
         read_until(proxy, "Mode RTL")
         out, errors = run.communicate(timeout=60)
@@ -78,6 +75,18 @@ class mavproxy:  # noqa: N801 - a context manager
         self._watchdog.cancel()
         self._process.kill()
         self._process.communicate()
+
+
+def received_parameters(proxy):
+    """How many parameters MAVProxy has received."""
+    said = read_until(proxy, "parameters\n")
+    return next(int(word) for word in said.split("Received ")[1].split() if word.isdigit())
+
+
+def upload_a_mission(proxy, folder):
+    (folder / "plan.txt").write_text(PLAN)
+    proxy.stdin.write(f"wp load {folder / 'plan.txt'}\n")
+    read_until(proxy, "MISSION_ACK: TYPE_MISSION: ACCEPTED")
 
 
 def read_until(process, words):

@@ -78,14 +78,10 @@ def test_every_targeted_message_names_its_target_where_pymavlink_puts_it():
         for name, value in (("target_system", 77), ("target_component", 88)):
             if name in fields:
                 values[kind.fieldnames.index(name)] = value
-        for at, (form, count) in enumerate(zip(kind.fieldtypes, kind.array_lengths, strict=True)):
-            name = kind.fieldnames[at]
-            length = kind.array_lengths[kind.ordered_fieldnames.index(name)]
-            if form == "char" and length:
-                values[at] = b""
-            elif length:
-                values[at] = [0] * length
-            del count
+        for at, (name, form) in enumerate(zip(kind.fieldnames, kind.fieldtypes, strict=True)):
+            length = kind.array_lengths[fields.index(name)]
+            if length:
+                values[at] = b"" if form == "char" else [0] * length
         found = target_of(frame(kind(*values), GROUND))
         assert found == Address(77, 88 if "target_component" in fields else 0), number
         checked += 1

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.serve.serving import TruthLog, free_ports, mock, serving
-from tests.serve.test_programs import PLAN, mavproxy, read_until
+from tests.serve.test_programs import mavproxy, read_until, received_parameters, upload_a_mission
 
 HOVER_AND_PARAMETER = {
     "px4": ("0.49", "MPC_THR_HOVER"),
@@ -43,12 +43,6 @@ def report_of(run, seconds):
     out, errors = run.communicate(timeout=seconds)
     assert run.returncode == 0, out + errors
     return json.loads(out.split("REPORT ")[1].splitlines()[0])
-
-
-def upload_a_mission(proxy, folder):
-    (folder / "plan.txt").write_text(PLAN)
-    proxy.stdin.write(f"wp load {folder / 'plan.txt'}\n")
-    read_until(proxy, "MISSION_ACK: TYPE_MISSION: ACCEPTED")
 
 
 def take_it(proxy, autopilot):
@@ -92,9 +86,7 @@ def test_mavsdk_flies_every_setpoint_while_mavproxy_reads_uploads_and_wins(
         TruthLog(control) as truth,
         flying(program, f"udpout://127.0.0.1:{port}", autopilot, "loses") as run,
     ):
-        said = read_until(proxy, "parameters\n")
-        received = next(int(word) for word in said.split("Received ")[1].split() if word.isdigit())
-        assert received >= LEAST_PARAMETERS[autopilot]
+        assert received_parameters(proxy) >= LEAST_PARAMETERS[autopilot]
         upload_a_mission(proxy, tmp_path)
         assert run.stdout.readline() == "TAKE IT\n", run.communicate()
         take_it(proxy, autopilot)

@@ -6,12 +6,11 @@ from itertools import pairwise
 
 import pytest
 
-from companion import testing
 from companion.cli import serve as command
 from companion.cli.terminal import FlightConsole
 from companion.flight.observer import SilentObserver
 from companion.serve import session as session_module
-from tests.serve.virtual import POSITION, MemoryClient, airborne, begin_control, mock, serving
+from tests.serve.virtual import POSITION, MemoryClient, airborne, begin_control, mock, served
 
 HOLD = {"px4": (176, 1, 4, 3), "ardupilot": (176, 1, 17)}
 
@@ -27,19 +26,18 @@ def test_a_mode_change_in_a_served_flight_is_told_once(autopilot, monkeypatch):
     monkeypatch.setattr(session_module, "SilentObserver", Observer)
     vehicle = mock(autopilot)
 
-    async def whole():
-        async with serving(vehicle, autopilot, notes=told) as session:
-            await airborne(session, vehicle, autopilot)
-            script = MemoryClient().connect(session)
-            place = vehicle.state()["position"]
-            await begin_control(session, script, autopilot, lambda _: script.local(POSITION, place))
-            script.command(*HOLD[autopilot])
-            async with asyncio.timeout(10.0):
-                while session.flights.in_control:  # noqa: ASYNC110  it sets no event
-                    await asyncio.sleep(0.1)
-            await asyncio.sleep(3.0)
+    async def scene(session):
+        await airborne(session, vehicle, autopilot)
+        script = MemoryClient().connect(session)
+        place = vehicle.state()["position"]
+        await begin_control(session, script, autopilot, lambda _: script.local(POSITION, place))
+        script.command(*HOLD[autopilot])
+        async with asyncio.timeout(10.0):
+            while session.flights.in_control:  # noqa: ASYNC110  it sets no event
+                await asyncio.sleep(0.1)
+        await asyncio.sleep(3.0)
 
-    testing.run(vehicle, whole())
+    served(vehicle, autopilot, scene, notes=told)
     modes = [text for text in told if text.startswith("mode ")]
     assert "mode OFFBOARD" in modes or autopilot == "ardupilot"
     # A flight begins by telling the present mode, so that its record has it.

@@ -148,6 +148,21 @@ async def serving(
         yield session
 
 
+def place(session):
+    """The vehicle's position as the session knows it, m NED."""
+    return session.flights._vehicle.link.state.position.position_ned
+
+
+def served(vehicle, autopilot, scene, **settings):
+    """Run `scene(session)` in the vehicle's time."""
+
+    async def whole():
+        async with serving(vehicle, autopilot, **settings) as session:
+            await scene(session)
+
+    testing.run(vehicle, whole())
+
+
 async def airborne(session, vehicle, autopilot, height=5.0):
     """Arm and take off by the autopilot's own commands, as a client would."""
     ground = MemoryClient("ground", (255, 190)).connect(session)

@@ -46,10 +46,6 @@ BOTH_WAYS = pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", 
 SHORT = {"hover": {"duration_s": 1.0}}
 
 
-def vehicle(autopilot="px4", **settings):
-    return QuickVehicle(autopilot, **settings)
-
-
 def config(mock, **changes):
     return quick_flight(mock.autopilot, {**SHORT, **changes})
 
@@ -57,7 +53,7 @@ def config(mock, **changes):
 @BOTH_WAYS
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_it_flies_lands_and_writes_nothing_that_nobody_asked_for(autopilot, lockstep, tmp_path):
-    mock = vehicle(autopilot, lockstep=lockstep)
+    mock = QuickVehicle(autopilot, lockstep=lockstep)
     threads = set(threading.enumerate())
     summary = fly(config(mock), mock)
     assert (summary.result, summary.phase, summary.log) == ("ok", "disarm", None)
@@ -76,7 +72,7 @@ def test_equal_flights_are_equal_to_the_bit(lockstep, tmp_path):
     for name in ("one", "two"):
         wind = {"speed_m_s": 2.0, "gust_m_s": 1.0}
         faults = [{"kind": "delay", "probability": 0.2, "delay_ms": 11.0}]
-        mock = vehicle(lockstep=lockstep, delay_s=0.0007, wind=wind, faults=faults, seed=5)
+        mock = QuickVehicle(lockstep=lockstep, delay_s=0.0007, wind=wind, faults=faults, seed=5)
         summary = fly(config(mock), mock, tmp_path / name)
         assert summary.result == "ok", summary.events
         logs.append((tmp_path / name / "flight.tlog").read_bytes())
@@ -88,7 +84,7 @@ def test_equal_flights_are_equal_to_the_bit(lockstep, tmp_path):
 def test_without_lockstep_a_sample_is_answered_when_it_arrives_and_a_wire_takes_its_time():
     later = {}
     for delay in (0.0, 0.003):
-        mock = vehicle(full_rate=True, lockstep=False, delay_s=delay)
+        mock = QuickVehicle(full_rate=True, lockstep=False, delay_s=delay)
         rate = {"attitude_rate_hz": attitude_rate_hz(mock)}
         assert fly(config(mock, link=rate), mock).result == "ok"
         own = [each for each in mock.setpoints if each.sample_time_boot_ms]
@@ -99,7 +95,7 @@ def test_without_lockstep_a_sample_is_answered_when_it_arrives_and_a_wire_takes_
 
 
 def test_the_pilot_takes_over_and_what_was_asked_at_a_time_or_condition_happens_once():
-    mock, done = vehicle(), []
+    mock, done = QuickVehicle(), []
     mock.at(2.0, lambda: done.append(mock.time))
     mock.when(lambda: mock.state()["setpoints"] > 240, lambda: done.append("enough"))
     mock.when(lambda: len(mock.setpoints) > 240, mock.take_over)
@@ -111,7 +107,7 @@ def test_the_pilot_takes_over_and_what_was_asked_at_a_time_or_condition_happens_
 
 
 def test_a_ground_station_commands():
-    mock = vehicle()
+    mock = QuickVehicle()
     mock.run(1.0)
     mock.command(400, 1)  # MAV_CMD_COMPONENT_ARM_DISARM
     assert mock.until(lambda state: state["armed"], 1.0)["time"] < 1.1
@@ -120,7 +116,7 @@ def test_a_ground_station_commands():
 
 
 def test_faults_begin_and_end():
-    mock = vehicle()
+    mock = QuickVehicle()
     mock.inject({"kind": "refuse_arming"})
     summary = fly(config(mock, flight={"ready_timeout_s": 2.0}), mock)
     assert (summary.phase, mock.state()["armed"]) == ("checks", False)
@@ -134,7 +130,7 @@ def test_a_clock_that_slips_and_runs_in_bursts_is_met_as_over_udp():
     """As ArduPilot's simulator on a busy computer; ages are known by TIMESYNC."""
     oldest = []
     for slips in ((), ({"kind": "slip_clock", "slip_ms": 30.0, "after_offboard_s": 0.5},)):
-        mock = vehicle("ardupilot", lockstep=False, delay_s=0.0005, burst_ms=5.6, faults=slips)
+        mock = QuickVehicle("ardupilot", lockstep=False, delay_s=0.0005, burst_ms=5.6, faults=slips)
         summary = fly(config(mock), mock)
         assert summary.result == "ok", summary.events
         oldest.append(summary.as_dict()["dead_time_s"]["sample_age_p99"])
@@ -147,13 +143,13 @@ def test_the_configuration_may_be_a_file_or_the_keys_that_differ(tmp_path):
     file.write_text("flight: {arm: true, maneuvers: [hover]}\nhover: {duration_s: 1}\n")
     hot = MockVehicle(config=CONFIG, prearm_delay_s=0.2, parameters=QUICK_PARAMETERS["px4"])
     assert fly(file, hot).result == "ok"
-    cold = vehicle()
+    cold = QuickVehicle()
     assert fly(str(file), cold, tmp_path / "log").log == tmp_path / "log"
-    assert "the pilot to arm" in fly({"flight": {"arming_timeout_s": 1.0}}, vehicle()).result
+    assert "the pilot to arm" in fly({"flight": {"arming_timeout_s": 1.0}}, QuickVehicle()).result
 
 
 def test_what_cannot_be_flown_in_memory_is_refused():
-    mock = vehicle()
+    mock = QuickVehicle()
     with pytest.raises(ConfigError, match=r"link\.backend mavsdk"):
         fly({"link": {"backend": "mavsdk"}}, mock)
     with pytest.raises(MockConfigError, match="windd"):
@@ -176,7 +172,7 @@ def test_what_cannot_be_flown_in_memory_is_refused():
 
 
 def test_a_link_of_ones_own_runs_on_the_vehicles_clock():
-    mock = vehicle("ardupilot")
+    mock = QuickVehicle("ardupilot")
 
     async def listen():
         settings = LinkSettings("udpin://127.0.0.1:1", lockstep=True)
@@ -197,7 +193,7 @@ def test_an_error_that_nobody_takes_is_raised():
         await asyncio.sleep(0.1)
 
     with pytest.raises(UnhandledError) as raised:
-        run(vehicle(), careless())
+        run(QuickVehicle(), careless())
     assert isinstance(raised.value.__cause__, ZeroDivisionError)
 
 
@@ -211,14 +207,14 @@ class Interrupts(SilentObserver):
 
 
 def test_a_session_can_be_interrupted():
-    mock, observer = vehicle(), Interrupts()
+    mock, observer = QuickVehicle(), Interrupts()
     observer.session = session(config(mock, hover={"duration_s": 9.0}), mock, observer=observer)
     assert run(mock, observer.session.fly()).result == "enough"
     assert (mock.state()["mode"], mock.state()["armed"]) == ("LOITER", True)
 
 
 def test_ctrl_c_ends_more_than_the_flight_in_which_it_comes():
-    mock = vehicle()
+    mock = QuickVehicle()
     mock.at(3.0, lambda: signal.raise_signal(signal.SIGINT))
     with pytest.raises(KeyboardInterrupt):
         fly(config(mock), mock)
@@ -227,7 +223,7 @@ def test_ctrl_c_ends_more_than_the_flight_in_which_it_comes():
 
 def test_many_flights_leave_nothing_behind():
     def once():
-        mock = vehicle()
+        mock = QuickVehicle()
         assert fly(config(mock, flight={"arming_timeout_s": 0.5, "arm": False}), mock).log is None
 
     once()
@@ -252,7 +248,7 @@ def test_a_session_of_serve_that_ends_before_its_network_is_told(monkeypatch):
             async with serving(config(mock), mock):
                 pass
 
-    mock = vehicle()
+    mock = QuickVehicle()
     monkeypatch.setattr(ServeSession, "run", ended)
     with pytest.raises(RuntimeError, match="before its network was open"):
         run(mock, main())
@@ -280,7 +276,7 @@ def test_a_client_hears_what_comes_next_until_it_disconnects():
                 await program.hears("ATTITUDE_QUATERNION", 0.5)
             assert len(program.heard) == heard
 
-    mock = vehicle()
+    mock = QuickVehicle()
     run(mock, main())
 
 
@@ -297,7 +293,7 @@ def test_a_flight_leaves_the_garbage_collector_as_it_was(collecting):
     try:
         if not collecting:
             gc.disable()
-        assert run(vehicle(), main()) is False
+        assert run(QuickVehicle(), main()) is False
         assert gc.isenabled() is collecting
     finally:
         gc.enable()

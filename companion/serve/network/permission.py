@@ -72,13 +72,10 @@ class Permission:
         self._trusted = frozenset(map(plain_host, trusted))
         self._signing = signing
 
-    def trusts(self, client: Client) -> bool:
-        """Whether a client may command without a signature."""
-        return client.is_local or (client.host or client.device) in self._trusted
-
     def refusal(self, client: Client, frame: Frame) -> str | None:
         """Why a frame is not forwarded, as a text for the client; None: it is forwarded."""
-        if reads_only(frame) or self.trusts(client):
+        is_trusted = client.is_local or (client.host or client.device) in self._trusted
+        if is_trusted or reads_only(frame):
             return None
         if self._signing is None:
             return "read-only: name your host or serial device in serve.trusted"

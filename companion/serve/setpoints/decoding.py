@@ -30,16 +30,7 @@ def decode_setpoint(
         RefusedSetpoint: the setpoint is for another vehicle, contradictory, incomplete, not finite,
             too large, or of a kind that is not flown.
     """
-    _check_target(target_of(frame), *targets)
-    message = decode(frame.message_id, frame.payload)
-    if frame.message_id == _ATTITUDE_TARGET_ID:
-        return decode_attitude_target(message)
-    if frame.message_id == _GLOBAL_TARGET_ID:
-        return decode_global_target(message, pose)
-    return decode_local_target(message, pose, body_yaw_is_relative=body_yaw_is_relative)
-
-
-def _check_target(target: Address, autopilot: Address, our_address: Address) -> None:
+    target, (autopilot, our_address) = target_of(frame), targets
     if target.system not in (0, autopilot.system):
         raise RefusedSetpoint(
             f"target_system is {target.system}; this vehicle is {autopilot.system}"
@@ -48,3 +39,9 @@ def _check_target(target: Address, autopilot: Address, our_address: Address) -> 
         raise RefusedSetpoint(
             f"target_component is {target.component}; the autopilot is {autopilot.component}"
         )
+    message = decode(frame.message_id, frame.payload)
+    if frame.message_id == _ATTITUDE_TARGET_ID:
+        return decode_attitude_target(message)
+    if frame.message_id == _GLOBAL_TARGET_ID:
+        return decode_global_target(message, pose)
+    return decode_local_target(message, pose, body_yaw_is_relative=body_yaw_is_relative)
