@@ -47,7 +47,7 @@ def _flight(folder: Path, seconds: float, busy: float | None, *, fifo: bool) -> 
         async def fly() -> None:
             async with companion.connect(config, folder=folder) as vehicle:
                 await vehicle.take_off()
-                latencies = vehicle._flight.context.loop._trace.latencies_ns
+                latencies = vehicle._flight.context.loop._recorder._trace.latencies_ns
                 before = len(latencies.rows())
                 if busy is None:
                     _compute(seconds)

@@ -1,6 +1,5 @@
 """Headless Chromium (Debian's package), driven by its DevTools protocol."""
 
-import base64
 import json
 import shutil
 import subprocess
@@ -60,21 +59,6 @@ class Tab:
 
     def click(self, name):
         self.run(f"document.getElementById('live-{name}').click()")
-
-    def picture(self, path: Path, width, height, *, dark):
-        """A picture of the whole page."""
-        self.ask(
-            "Emulation.setDeviceMetricsOverride",
-            width=width,
-            height=height,
-            deviceScaleFactor=1,
-            mobile=width < 600,
-        )
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.ask("Emulation.setEmulatedMedia", features=[scheme])
-        time.sleep(1.0)
-        data = self.ask("Page.captureScreenshot", captureBeyondViewport=True)["data"]
-        path.write_bytes(base64.b64decode(data))
 
 
 @contextmanager

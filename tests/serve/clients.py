@@ -51,9 +51,9 @@ class SocketClient:
         self.socket.close()
 
 
-async def udp_client(port, ids=GROUND, host="127.0.0.1"):
+async def udp_client(port, ids=GROUND):
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    opened.connect((host, port))
+    opened.connect(("127.0.0.1", port))
     return SocketClient(opened, ids)
 
 
@@ -78,5 +78,5 @@ async def network(*endpoints, **settings):
                 client.close()
 
 
-def heartbeat(kind=6):
-    return dialect.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3)
+def heartbeat():
+    return dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)

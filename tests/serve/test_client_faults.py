@@ -4,6 +4,7 @@ The states are those of the table in docs/serve.md. Every setpoint is judged on 
 """
 
 import asyncio
+import inspect
 import math
 import random
 import re
@@ -431,30 +432,12 @@ async def other_system(scene):
     return NOT_IN_CONTROL
 
 
-CELLS = (
-    silent,
-    frozen_motion,
-    frozen_velocity,
-    killed,
-    reconnects,
-    reconnects_all_the_time,
-    flood,
-    not_finite,
-    only_not_finite,
-    contradictions,
-    no_place,
-    clock_jumps,
-    another_id,
-    all_kinds,
-    upside_down,
-    beyond_limits,
-    two_at_once,
-    two_at_once_asking,
-    wrong_ids,
-    damaged,
-    mode_fight,
-    other_system,
-)
+CELLS = [
+    each
+    for each in tuple(globals().values())
+    if inspect.iscoroutinefunction(each) and each.__module__ == __name__
+]
+"""Every coroutine of this file, in their order."""
 
 ONE_VEHICLE = (
     flood,

@@ -27,10 +27,7 @@ from tests.serve.virtual import (
 )
 
 BOTH = pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
-HELD = {"px4": "LOITER", "ardupilot": "BRAKE"}
-UNDER_CONTROL = {"px4": "OFFBOARD", "ardupilot": "GUIDED"}
 REJECTED = dialect.MAV_RESULT_TEMPORARILY_REJECTED
-OFFBOARD = 176, 1, 6
 
 
 def fly(autopilot, scene, directory=None):
