@@ -62,20 +62,13 @@ if TYPE_CHECKING:
     from sitl_mock.control_channel import Truth as Truth
 
 _NAMES = {
-    "companion.testing.client_programs": ("Program", "serving"),
-    "companion.testing.conformance": ("check_guidance", "check_planner"),
-    "companion.testing.flying": (
-        "UnhandledError",
-        "connect",
-        "environment",
-        "fly",
-        "run",
-        "session",
-    ),
-    "companion.testing.setpoints": ("ReceivedSetpoint",),
-    "companion.testing.vehicle": ("MockVehicle",),
-    "companion.testing.virtual_loop": ("VirtualEventLoop",),
-    "companion.testing.wire": ("open_wire",),
+    ".client_programs": ("Program", "serving"),
+    ".conformance": ("check_guidance", "check_planner"),
+    ".flying": ("UnhandledError", "connect", "environment", "fly", "run", "session"),
+    ".setpoints": ("ReceivedSetpoint",),
+    ".vehicle": ("MockVehicle",),
+    ".virtual_loop": ("VirtualEventLoop",),
+    ".wire": ("open_wire",),
     "sitl_mock.control_channel": ("Truth",),
 }
 _MODULE_OF = {name: module for module, names in _NAMES.items() for name in names}
@@ -85,7 +78,7 @@ def __getattr__(name: str) -> object:
     """Import one of the public names when a program first uses it."""
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = globals()[name] = getattr(import_module(_MODULE_OF[name]), name)
+    value = globals()[name] = getattr(import_module(_MODULE_OF[name], __name__), name)
     return value
 
 

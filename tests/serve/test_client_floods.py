@@ -10,7 +10,6 @@ import pytest
 from companion.mavlink.framing import Frame
 from companion.mavlink.settings import LinkSettings
 from companion.serve.component import Component
-from companion.serve.network import tcp
 from companion.serve.network.addresses import Address
 from companion.serve.network.client import FloodDetector
 from companion.serve.network.routing import _MAX_ADDRESSES, Routing
@@ -70,20 +69,12 @@ async def test_noise_of_a_tcp_client_does_not_keep_samples_from_being_answered()
 
 
 @BOTH_LOOPS
-async def test_a_tcp_client_whose_network_is_gone_keeps_its_place_for_a_minute_only(monkeypatch):
-    accepted, attach = [], tcp.TcpClient.__init__
-
-    def init(self, name, host, transport):
-        attach(self, name, host, transport)
-        accepted.append(transport.get_extra_info("socket"))
-
-    monkeypatch.setattr(tcp.TcpClient, "__init__", init)
+async def test_a_tcp_client_whose_network_is_gone_keeps_its_place_for_a_minute_only():
     async with network("tcpin://127.0.0.1:0") as (net, _, _):
         await tcp_client(net.ports[0].local[1])
         await until(lambda: net.clients)
-        (connection,) = accepted
-        timeout = connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
-        assert timeout == 60_000
+        connection = net.clients[0]._transport.get_extra_info("socket")
+        assert connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 60_000
 
 
 @BOTH_LOOPS
