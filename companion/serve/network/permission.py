@@ -74,8 +74,7 @@ class Permission:
 
     def refusal(self, client: Client, frame: Frame) -> str | None:
         """Why a frame is not forwarded, as a text for the client; None: it is forwarded."""
-        is_trusted = client.is_local or (client.host or client.device) in self._trusted
-        if is_trusted or reads_only(frame):
+        if reads_only(frame) or client.is_local or (client.host or client.device) in self._trusted:
             return None
         if self._signing is None:
             return "read-only: name your host or serial device in serve.trusted"
