@@ -112,8 +112,9 @@ class Network:
         for port in self.ports:
             port.close()
         self.ports.clear()
-        if self._timer is not None:
-            self._timer.cancel()
+        for handle in (self._timer, self._flush_handle):
+            if handle is not None:
+                handle.cancel()
         await asyncio.sleep(0)  # lets closed connections end
 
     @property
