@@ -63,8 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m sitl_mock",
-        description="A simulated multirotor with its autopilot.",
+        prog="python -m sitl_mock", description="A simulated multirotor with its autopilot."
     )
     parser.add_argument("--config", type=Path, help="YAML file; its `mock` section is read")
     parser.add_argument("--port", type=int, help="UDP port of the companion (default 14540)")

@@ -75,13 +75,7 @@ def rotate_to_heading(cosine: float, sine: float, r_x: float, r_y: float) -> tup
 
 
 def rates_to_speed(
-    w: float,
-    x: float,
-    y: float,
-    z: float,
-    roll_rate: float,
-    pitch_rate: float,
-    yaw_rate: float,
+    w: float, x: float, y: float, z: float, roll_rate: float, pitch_rate: float, yaw_rate: float
 ) -> tuple[float, float, float]:
     """Speed of the coefficients (north, east; 1/s) and of the heading (rad/s) at given body rates.
 

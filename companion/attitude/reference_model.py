@@ -88,11 +88,7 @@ class ReferenceModel:
     """
 
     def __init__(
-        self,
-        constants: Constants,
-        lag: float,
-        acceleration: float = inf,
-        sigma: float = 0.0,
+        self, constants: Constants, lag: float, acceleration: float = inf, sigma: float = 0.0
     ) -> None:
         self._slew_limit, self._sigma = acceleration, sigma
         self.retune(constants, lag)

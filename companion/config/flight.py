@@ -23,11 +23,7 @@ class FlightConfig(Section):
     maneuvers: Annotated[
         tuple[Literal["hover", "steps", "circle", "corners", "identify", "trajectory"], ...],
         Field(min_length=1, max_length=20),
-    ] = (
-        "hover",
-        "steps",
-        "circle",
-    )
+    ] = ("hover", "steps", "circle")
     """Maneuvers in the order in which they are flown."""
     trajectory: PathKey | None = None
     """File of the maneuver `trajectory`, such as trajectories/figure8.yaml. A relative path starts

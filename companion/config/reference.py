@@ -67,11 +67,7 @@ def _descriptions() -> dict[str, dict[str, tuple[str, str, str]]]:
     for section, model in sections().items():
         schema = model.model_json_schema()["properties"]
         descriptions[section] = {
-            name: (
-                unit_of(name),
-                _allowed_values(schema[name]),
-                _one_line(field.description or ""),
-            )
+            name: (unit_of(name), _allowed_values(schema[name]), _one_line(field.description or ""))
             for name, field in model.model_fields.items()
         }
     return descriptions

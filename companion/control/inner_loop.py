@@ -149,10 +149,7 @@ def tilt_lag_and_dead_time(config: Config) -> tuple[float, float]:
     """
     axes = config.vehicle.axes
     tilt = axes["roll"], axes["pitch"]
-    return (
-        max(axis.lag or 0.0 for axis in tilt),
-        max(axis.dead_time or 0.0 for axis in tilt),
-    )
+    return (max(axis.lag or 0.0 for axis in tilt), max(axis.dead_time or 0.0 for axis in tilt))
 
 
 def tilt_damping(config: Config) -> float:

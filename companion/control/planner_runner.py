@@ -3,15 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
-from companion.attitude import (
-    BodyRates,
-    Constants,
-    LawPlanner,
-    Limits,
-    Planner,
-    Quaternion,
-    Target,
-)
+from companion.attitude import BodyRates, Constants, LawPlanner, Limits, Planner, Quaternion, Target
 from companion.attitude.history import PlannedTilt
 from companion.attitude.model_following import SHORTEST_PERIOD, ModelFollowingPlanner
 from companion.attitude.rotation import limit_rates

@@ -186,9 +186,4 @@ def _enu_from_flu(q: Quaternion) -> Quaternion:
     world, the last factor converts the axes of the body.
     """
     w, x, y, z = q
-    return (
-        _SQRT_HALF * (x + y),
-        _SQRT_HALF * (x - y),
-        _SQRT_HALF * (w - z),
-        _SQRT_HALF * (w + z),
-    )
+    return (_SQRT_HALF * (x + y), _SQRT_HALF * (x - y), _SQRT_HALF * (w - z), _SQRT_HALF * (w + z))

@@ -6,19 +6,9 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from companion.config import Config
-from companion.config.in_flight import (
-    Difference,
-    Values,
-    changed_in_flight,
-    differences,
-)
+from companion.config.in_flight import Difference, Values, changed_in_flight, differences
 from companion.config.known_drag import KnownDrag
-from companion.control.retuning import (
-    Retuning,
-    Slew,
-    loop_settings,
-    reason_against_changes,
-)
+from companion.control.retuning import Retuning, Slew, loop_settings, reason_against_changes
 from companion.files.yaml_file import ConfigError
 from companion.flight.change_bounds import require_moderate_change
 from companion.recording.recorder import FlightRecorder

@@ -41,10 +41,7 @@ class DeadTimeWatch:
     """
 
     def __init__(
-        self,
-        trace: FlightTrace,
-        axes: Mapping[str, AxisKeys],
-        note: Callable[[str], None],
+        self, trace: FlightTrace, axes: Mapping[str, AxisKeys], note: Callable[[str], None]
     ) -> None:
         self._trace = trace
         self._axes = axes

@@ -164,6 +164,5 @@ class Watch:
             )
         if state.heartbeat is None or is_outdated(now - age(state.heartbeat.received), now):
             raise FlightEnded(
-                "no heartbeat from the vehicle, so whether it is armed is not known any more",
-                exit_,
+                "no heartbeat from the vehicle, so whether it is armed is not known any more", exit_
             )

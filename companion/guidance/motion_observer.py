@@ -71,9 +71,7 @@ class ObserverSettings:
         bandwidth = (1.0 + trust * self.bandwidth_increase) * self.bandwidth
         position = 1.0 if self.position_time <= 0.0 else 1.0 - exp(-dt / self.position_time)
         return ObserverGains(
-            position,
-            1.0 - exp(-2.0 * bandwidth * dt),
-            (1.0 - exp(-bandwidth * dt)) ** 2 / dt,
+            position, 1.0 - exp(-2.0 * bandwidth * dt), (1.0 - exp(-bandwidth * dt)) ** 2 / dt
         )
 
 

@@ -57,11 +57,7 @@ class FrameScanner:
     """
 
     def __init__(
-        self,
-        *,
-        streaming: bool = False,
-        stats: LinkStats | None = None,
-        keep_unknown: bool = False,
+        self, *, streaming: bool = False, stats: LinkStats | None = None, keep_unknown: bool = False
     ) -> None:
         self._streaming = streaming
         self._keep_unknown = keep_unknown

@@ -24,10 +24,7 @@ _SHORTEST_HEADER = 6
 _V1_OVERHEAD, _V2_OVERHEAD = 8, 12  # bytes of header and checksum
 _LONGEST_DAMAGED_BEGINNING = 1 << 16
 """Largest offset of the first intact frame in a `.tlog` with a damaged beginning, bytes."""
-_OTHER_LOG_KINDS = {
-    b"ULog\x01\x12\x35": "a ULog",
-    b"\xa3\x95\x80": "a DataFlash log",
-}
+_OTHER_LOG_KINDS = {b"ULog\x01\x12\x35": "a ULog", b"\xa3\x95\x80": "a DataFlash log"}
 """First bytes of the logs that autopilots record themselves, and the kind of each log."""
 _MAGIC = re.compile(rb"[\xfd\xfe]")
 

@@ -49,10 +49,7 @@ class Survey(NamedTuple):
 
 
 async def survey_parameters(
-    link: Link,
-    rules: Iterable[ParameterRule],
-    *,
-    earlier_survey: Survey | None = None,
+    link: Link, rules: Iterable[ParameterRule], *, earlier_survey: Survey | None = None
 ) -> Survey:
     """Read the rules' parameters, several at a time; ask again if the link loses frames.
 

@@ -22,9 +22,7 @@ def with_hysteresis(limit: float, raised: bool) -> float:
 
 
 def above(
-    limit: float,
-    value_in: Callable[[Snapshot], float | None],
-    breach_of: Callable[[float], str],
+    limit: float, value_in: Callable[[Snapshot], float | None], breach_of: Callable[[float], str]
 ) -> BreachCheck:
     """A check whose breach is a value above `limit`, with hysteresis.
 
@@ -44,9 +42,7 @@ def above(
 
 
 def below(
-    limit: float,
-    value_in: Callable[[Snapshot], float | None],
-    breach_of: Callable[[float], str],
+    limit: float, value_in: Callable[[Snapshot], float | None], breach_of: Callable[[float], str]
 ) -> BreachCheck:
     """A check whose breach is a value below `limit`, with hysteresis; arguments as for `above`."""
 

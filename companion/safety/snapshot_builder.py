@@ -123,12 +123,7 @@ class SnapshotBuilder:
         return Snapshot(
             now,
             AutopilotStatus(
-                state.armed,
-                state.landed,
-                state.failsafe,
-                state.battery,
-                state.gps,
-                state.estimator,
+                state.armed, state.landed, state.failsafe, state.battery, state.gps, state.estimator
             ),
             self._motion(),
             Control(

@@ -76,11 +76,7 @@ class VehicleClient:
         return self._outbox.send(message)
 
     async def command(
-        self,
-        command: int,
-        *params: float,
-        timeout_s: float = 1.0,
-        retries: int = 3,
+        self, command: int, *params: float, timeout_s: float = 1.0, retries: int = 3
     ) -> None:
         """Send a MAV_CMD with up to seven parameters and wait until it is accepted.
 

@@ -10,23 +10,9 @@ from sitl_mock.autopilot.state import BatteryWarning, Mode, State
 from sitl_mock.link.framing import Message
 from sitl_mock.physics.vehicle import Vehicle
 
-_GCS_ACTIONS = {
-    1: Mode.RTL,
-    3: Mode.RTL,
-    4: Mode.RTL,
-    5: Mode.LAND,
-    6: Mode.RTL,
-    7: Mode.BRAKE,
-}
+_GCS_ACTIONS = {1: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL, 5: Mode.LAND, 6: Mode.RTL, 7: Mode.BRAKE}
 """Mode for each value of FS_GCS_ENABLE. SMART_RTL (3, 4) and DO_LAND_START (6) are flown as RTL."""
-_BATTERY_ACTIONS = {
-    1: Mode.LAND,
-    2: Mode.RTL,
-    3: Mode.RTL,
-    4: Mode.RTL,
-    6: Mode.RTL,
-    7: Mode.BRAKE,
-}
+_BATTERY_ACTIONS = {1: Mode.LAND, 2: Mode.RTL, 3: Mode.RTL, 4: Mode.RTL, 6: Mode.RTL, 7: Mode.BRAKE}
 """Mode for each value of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT. Termination (5) is not simulated."""
 _GCS_CONTINUE_IF_PILOT_CONTROL = 16
 """Bit of FS_OPTIONS: the loss of the ground station has no effect in a pilot's mode."""

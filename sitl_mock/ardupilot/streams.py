@@ -22,11 +22,7 @@ class ArduPilotStreams:
     """
 
     def __init__(
-        self,
-        rates: Mapping[int, float],
-        *,
-        loop_us: int,
-        booting_until_us: float,
+        self, rates: Mapping[int, float], *, loop_us: int, booting_until_us: float
     ) -> None:
         self._boot_intervals_us = {message_id: round(1e6 / hz) for message_id, hz in rates.items()}
         self._loop_us = loop_us

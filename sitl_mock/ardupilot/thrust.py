@@ -11,12 +11,7 @@ from sitl_mock.physics.rigid_body import GRAVITY
 HOVER_THRUST = 0.364
 """Normalised thrust that hovers, 0..1."""
 
-_THRUST_CURVE = (
-    (0.0, 0.045),
-    (0.1, 0.29),
-    (HOVER_THRUST, 1.0),
-    (1.0, 2.745),
-)
+_THRUST_CURVE = ((0.0, 0.045), (0.1, 0.29), (HOVER_THRUST, 1.0), (1.0, 2.745))
 """Points of the curve: (normalised thrust, specific thrust in g). From `HOVER_THRUST` on, the curve
 is a straight line through the origin, and it is close to this line from 0.1 on. In circles,
 figure-eights and steps between 0.3 and 0.6, the line is within 0.03 m/s^2 of the simulator's truth.

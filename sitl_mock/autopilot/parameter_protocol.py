@@ -5,12 +5,7 @@ from collections.abc import Iterable
 
 from pymavlink.dialects.v20 import development as dialect
 
-from sitl_mock.autopilot.parameters import (
-    UINT32,
-    Encoding,
-    ParameterRefusedError,
-    ParameterTable,
-)
+from sitl_mock.autopilot.parameters import UINT32, Encoding, ParameterRefusedError, ParameterTable
 from sitl_mock.link.framing import Message
 from sitl_mock.link.link import Link
 

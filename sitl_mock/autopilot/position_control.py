@@ -92,11 +92,7 @@ class PositionController:
         self._integral = [*acceleration, 0.0]
 
     def step(
-        self,
-        demand: PositionDemand,
-        position: Vector,
-        velocity: Vector,
-        dt: float,
+        self, demand: PositionDemand, position: Vector, velocity: Vector, dt: float
     ) -> PositionOutput:
         """Return attitude and thrust of one period of ``dt`` s for the estimated motion."""
         gains = self.gains()
@@ -192,10 +188,5 @@ def _thrust_attitude(down_axis: Vector, yaw: float) -> Quaternion:
     cos_half, sin_half = cos(0.5 * yaw_rotation), sin(0.5 * yaw_rotation)
     tw, tx, ty, _ = tilt
     return normalise(
-        (
-            tw * cos_half,
-            tx * cos_half + ty * sin_half,
-            ty * cos_half - tx * sin_half,
-            tw * sin_half,
-        )
+        (tw * cos_half, tx * cos_half + ty * sin_half, ty * cos_half - tx * sin_half, tw * sin_half)
     )

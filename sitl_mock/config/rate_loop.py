@@ -44,19 +44,12 @@ class AxisGains(Section):
 # With the 50 ms rotor lag: poles at wn 19.1 rad/s, zeta 0.70, which fit the measured response and
 # its overshoot, and a slow pole at 0.5 1/s, which the feed-forward cancels.
 TILT_GAINS = AxisGains(
-    proportional_n_m_s=0.448,
-    integral_n_m=0.228,
-    feed_forward_n_m_s=0.008,
-    damping_n_m_s2=0.0078,
+    proportional_n_m_s=0.448, integral_n_m=0.228, feed_forward_n_m_s=0.008, damping_n_m_s2=0.0078
 )
 
 # The low pass and the rotor lag make the response slow. There is no integral, so the yaw rate
 # stays 8 % below the setpoint, as measured.
-YAW_GAINS = AxisGains(
-    proportional_n_m_s=0.064,
-    feed_forward_n_m_s=0.0179,
-    torque_filter_ms=75.0,
-)
+YAW_GAINS = AxisGains(proportional_n_m_s=0.064, feed_forward_n_m_s=0.0179, torque_filter_ms=75.0)
 
 # Fitted to ATTITUDE_TARGET and the body's attitude, recorded at 200 Hz: poles at wn 125 rad/s, zeta
 # 1.2 (tilt), and 10.8, 0.82 with a third at 53 1/s (yaw). Only 6 ms of the delay lie before the

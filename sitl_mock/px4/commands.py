@@ -30,11 +30,7 @@ class Px4Commands(Commands):
     """
 
     def __init__(
-        self,
-        state: State,
-        commander: Px4Commander,
-        builders: dict[int, Builder],
-        origin: Geodetic,
+        self, state: State, commander: Px4Commander, builders: dict[int, Builder], origin: Geodetic
     ) -> None:
         super().__init__(state, commander, builders)
         self._px4_commander = commander

@@ -4,11 +4,7 @@ from math import radians
 
 from sitl_mock.autopilot.attitude_control import AttitudeGains, attitude_rates, is_usable_quaternion
 from sitl_mock.autopilot.parameters import ParameterTable
-from sitl_mock.autopilot.position_control import (
-    PositionController,
-    PositionDemand,
-    PositionGains,
-)
+from sitl_mock.autopilot.position_control import PositionController, PositionDemand, PositionGains
 from sitl_mock.autopilot.setpoints import OffboardStream, PositionSetpoint
 from sitl_mock.autopilot.state import NAN_VECTOR, Mode, PositionTarget, State
 from sitl_mock.physics.quaternion import Quaternion, Vector, from_yaw, yaw

@@ -45,10 +45,7 @@ def attitude_setpoint(message: Message) -> AttitudeSetpoint | None:
     w, x, y, z = message.q
     thrust = -_thrust_body_down(message) if mask & THRUST_BODY else message.thrust
     return AttitudeSetpoint(
-        (w, x, y, z) if with_attitude else None,
-        rates,
-        0.0 if isnan(yaw_rate) else yaw_rate,
-        thrust,
+        (w, x, y, z) if with_attitude else None, rates, 0.0 if isnan(yaw_rate) else yaw_rate, thrust
     )
 
 

@@ -84,9 +84,7 @@ class Px4SystemTelemetry(SystemTelemetry):
         """Return CURRENT_MODE, with the active mode and the mode that the user intends."""
         state = self._state
         return dialect.MAVLink_current_mode_message(
-            standard_mode(state.mode),
-            custom_mode(state.mode),
-            custom_mode(state.intended_mode),
+            standard_mode(state.mode), custom_mode(state.mode), custom_mode(state.intended_mode)
         )
 
     def sys_status(self) -> Message:

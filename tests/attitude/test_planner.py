@@ -182,10 +182,7 @@ def test_a_heading_whole_turns_away_is_the_same_heading(name):
 
 
 @given(
-    st.floats(-1e150, 1e150),
-    st.floats(-1e150, 1e150),
-    st.floats(-1e6, 1e6),
-    st.floats(0.01, 0.99),
+    st.floats(-1e150, 1e150), st.floats(-1e150, 1e150), st.floats(-1e6, 1e6), st.floats(0.01, 0.99)
 )
 def test_a_limited_target_keeps_its_direction_and_meaning(north, east, heading, longest):
     target = Target(north, east, heading, 0.3)

@@ -124,12 +124,7 @@ def test_a_jump_in_heading_is_4_degrees_and_half_of_what_the_rates_changed(
 
 @pytest.mark.parametrize(
     ("dt", "jump", "found"),
-    [
-        (0.02, 0.19, False),
-        (0.02, 0.21, True),
-        (0.4, 0.39, False),
-        (0.4, 0.41, True),
-    ],
+    [(0.02, 0.19, False), (0.02, 0.21, True), (0.4, 0.39, False), (0.4, 0.41, True)],
 )
 def test_a_jump_in_position_is_20_cm_and_what_a_change_of_acceleration_explains(dt, jump, found):
     """10 m/s² of change between two positions explain 10·dt²/8 m."""

@@ -33,8 +33,7 @@ def test_standing_it_may_idle():
 
 
 @pytest.mark.parametrize(
-    "told",
-    [{"height": 1.6}, {"height": -1.6}, {"sinks": 0.6}, {"sinks": -0.6}, {"landed": False}],
+    "told", [{"height": 1.6}, {"height": -1.6}, {"sinks": 0.6}, {"sinks": -0.6}, {"landed": False}]
 )
 def test_a_flag_that_height_or_speed_contradict_makes_no_idle_setpoint(told):
     assert not Vehicle().tell(**told).may_idle

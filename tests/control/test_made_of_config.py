@@ -33,13 +33,7 @@ from companion.control.retuning import (
 from companion.control.telemetry import GuidedVehicle
 from companion.drag import AxisDrag, Drag
 from companion.files.yaml_file import ConfigError
-from companion.guidance import (
-    GRAVITY,
-    GuidanceInput,
-    LinearGuidance,
-    ThrustSettings,
-    VehicleMotion,
-)
+from companion.guidance import GRAVITY, GuidanceInput, LinearGuidance, ThrustSettings, VehicleMotion
 from companion.recording.trace import FlightTrace
 from companion.vehicle.records import AttitudeSample, LocalPosition
 
@@ -264,8 +258,7 @@ def test_a_plugin_that_is_not_installed_is_named():
 
 
 @pytest.mark.parametrize(
-    ("section", "key", "make"),
-    [("planner", "name", planner), ("guidance", "kind", make_guidance)],
+    ("section", "key", "make"), [("planner", "name", planner), ("guidance", "kind", make_guidance)]
 )
 def test_a_plugin_that_takes_other_arguments_is_named(monkeypatch, section, key, make):
     class Theirs:

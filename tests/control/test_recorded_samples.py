@@ -14,10 +14,7 @@ from companion.guidance import HoverThrust, ThrustSettings
 from companion.recording.mcap_file.loop_channels import UNANSWERED_CODES
 from companion.recording.trace import FlightTrace
 from companion.vehicle.clock_jumps import Misfit
-from companion.vehicle.records import (
-    AttitudeSample,
-    AttitudeTarget,
-)
+from companion.vehicle.records import AttitudeSample, AttitudeTarget
 from tests.control.kept_messages import KeptMessages
 
 LIMITS = Limits(0.6, 1.5, 1.0)

@@ -9,11 +9,7 @@ from companion.control.step_rows import StepEntry, StepFlags, StepInput, StepOut
 from companion.drag import Drag
 from companion.guidance import GuidanceInput, Reference, VehicleMotion
 from companion.recording.mcap_file import cdr
-from companion.vehicle.records import (
-    AttitudeTargetThrust,
-    Battery,
-    LocalPosition,
-)
+from companion.vehicle.records import AttitudeTargetThrust, Battery, LocalPosition
 from tests.control.kept_messages import KeptMessages
 
 Q = (0.8, 0.4, -0.4, 0.2)  # of length 1

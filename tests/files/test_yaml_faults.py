@@ -62,10 +62,7 @@ def told(tmp_path, text):
             "_m.2` has 1 value; it needs 2 (got [5])",
         ),
         ("safety: {fence_polygon_m: [[0, 0, 0]]}", "_m.0` has 3 values; it needs 2 (got"),
-        (
-            "recording: {directory: 5}",
-            "`recording.directory` must name a file or a folder (got 5)",
-        ),
+        ("recording: {directory: 5}", "`recording.directory` must name a file or a folder (got 5)"),
         ("limits: {rate_limit: tigt}", "must be tight or paper (got 'tigt'); did you mean tight?"),
         ("limits: {max_tilt_deg: .nan}", "`limits.max_tilt_deg` must be a finite number (got nan)"),
         ("limits: {max_tilt_deg: [20]}", "`limits.max_tilt_deg` must be a number (got [20])"),

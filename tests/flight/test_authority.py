@@ -466,12 +466,7 @@ def test_leaving_the_fence_lands_and_leaves_the_vehicle_in_hold():
     In steady air it would stay inside the fence: open-loop steps know nothing of a gust.
     """
     with mock_vehicle(wind={"gust_m_s": 4.0, "gust_time_s": 3.0}) as mock:
-        summary = fly(
-            mock,
-            None,
-            flight={"maneuvers": ["steps"]},
-            limits={"fence_radius_m": 5.0},
-        )
+        summary = fly(mock, None, flight={"maneuvers": ["steps"]}, limits={"fence_radius_m": 5.0})
         state = mock.state()
     assert "beyond limits.fence_radius_m" in summary.result
     beside = ("autopilot: ", "the vehicle's drag")

@@ -76,8 +76,7 @@ def test_limits_that_contradict_each_other_are_refused():
 
 
 @pytest.mark.parametrize(
-    ("section", "key", "value"),
-    [("guidance", "kind", "nmpc"), ("limits", "max_climb_m_s", 2.0)],
+    ("section", "key", "value"), [("guidance", "kind", "nmpc"), ("limits", "max_climb_m_s", 2.0)]
 )
 def test_with_predictive_control_nothing_changes(section, key, value):
     start = changed(Config(), {"guidance": {"kind": "nmpc"}}, "test")

@@ -8,12 +8,7 @@ def test_what_is_unsafe_is_refused_before_arming_or_excepted_by_name():
     with mock_vehicle(parameters={"COM_OF_LOSS_T": 5.0}) as mock:
         refused = fly(mock)
         assert not mock.state()["armed"]
-        accepted = fly(
-            mock,
-            None,
-            flight={"accept": ["COM_OF_LOSS_T"]},
-            hover={"duration_s": 0.5},
-        )
+        accepted = fly(mock, None, flight={"accept": ["COM_OF_LOSS_T"]}, hover={"duration_s": 0.5})
     for name, summary in (("refused", refused), ("accepted", accepted)):
         told[name] = [text for _, text in summary.events]
     assert (refused.phase, accepted.phase, accepted.result) == ("checks", "disarm", "ok")

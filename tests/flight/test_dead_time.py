@@ -215,10 +215,7 @@ def test_a_flight_measures_what_is_configured_and_keeps_its_rates(tmp_path):
 
 @pytest.mark.parametrize(
     ("direction", "age"),
-    [
-        ("to_companion", 0.04),
-        pytest.param("from_companion", 0.0, marks=pytest.mark.slow),
-    ],
+    [("to_companion", 0.04), pytest.param("from_companion", 0.0, marks=pytest.mark.slow)],
 )
 def test_a_slow_link_shows_as_dead_time_and_is_warned_of_in_flight(direction, age):
     summary = flown(None, "corners", direction=direction)

@@ -198,10 +198,7 @@ TAKEN, UNKNOWN = "failsafe took over", "its mode is not known any more"
 @pytest.mark.parametrize(
     ("backend", "told"),
     # MAVSDK's thread reads what waited while we look already, so it may be either.
-    [
-        ("direct", (TAKEN,)),
-        pytest.param("mavsdk", (TAKEN, UNKNOWN), marks=pytest.mark.slow),
-    ],
+    [("direct", (TAKEN,)), pytest.param("mavsdk", (TAKEN, UNKNOWN), marks=pytest.mark.slow)],
     ids=["direct", "mavsdk"],
 )
 def test_frozen_in_flight_the_failsafe_takes_it_and_thawed_it_is_not_taken_back(

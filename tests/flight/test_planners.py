@@ -99,12 +99,7 @@ FIGURE_2 = {
 }
 """The step of the paper's figure 2, at several heights of its rectangle, without its rate limit."""
 
-SMALLER = {
-    "north_coefficient": 0.3,
-    "east_coefficient": 0.35,
-    "duration_s": 1.2,
-    "settle_s": 0.5,
-}
+SMALLER = {"north_coefficient": 0.3, "east_coefficient": 0.35, "duration_s": 1.2, "settle_s": 0.5}
 """Of a heavier vehicle, which has less thrust to spare."""
 
 
@@ -120,11 +115,7 @@ def test_model_following_is_five_times_as_straight_on_a_measured_rate_loop(loop)
     for name in ("model-following", "first-order", "quaternion"):
         with mock_vehicle(seed=3, rate_loop=loop) as mock:
             summary = fly(
-                mock,
-                None,
-                planner={"name": name},
-                vehicle=shipped_vehicle(loop),
-                **FIGURE_2,
+                mock, None, planner={"name": name}, vehicle=shipped_vehicle(loop), **FIGURE_2
             )
         assert summary.result == "ok", summary.events
         response = summary.as_dict()["response"]

@@ -39,8 +39,7 @@ def test_a_standing_position_is_silence():
 
 
 @pytest.mark.parametrize(
-    "delay_ms",
-    [100, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (2000, 8000))],
+    "delay_ms", [100, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (2000, 8000))]
 )
 def test_late_copies_of_positions_change_nothing(delay_ms):
     way = {"from_the_start": True, **CIRCLE}

@@ -154,10 +154,7 @@ def test_a_terminal_closed_over_its_shell_leaves_the_vehicle_holding(tmp_path):
         config.write_text(yaml.safe_dump(merged(QUICK_FLIGHT, places)))
         master, slave = pty.openpty()
         shell = subprocess.Popen(
-            ["setsid", "--ctty", "bash", "--norc", "-i"],
-            stdin=slave,
-            stdout=slave,
-            stderr=slave,
+            ["setsid", "--ctty", "bash", "--norc", "-i"], stdin=slave, stdout=slave, stderr=slave
         )
         os.close(slave)
         command = f"{sys.executable} -m companion fly --config {config} >{tmp_path}/words 2>&1\n"

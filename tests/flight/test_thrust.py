@@ -158,19 +158,13 @@ SPARSE = {"lockstep": {"period_ms": 8}}
 
 
 @pytest.mark.parametrize(
-    ("wrong_by", "faults"),
-    [(0.6, []), (1.4, []), (1.4, [SILENT]), (0.6, [NOT_A_NUMBER])],
+    ("wrong_by", "faults"), [(0.6, []), (1.4, []), (1.4, [SILENT]), (0.6, [NOT_A_NUMBER])]
 )
 def test_a_wrong_hover_thrust_costs_little_height(wrong_by, faults):
     """Acceptance 5, also where the autopilot does not tell its thrust before."""
     configured = 0.49 * wrong_by
     with mock_vehicle(faults=faults, **SPARSE) as mock:
-        summary = fly(
-            mock,
-            None,
-            thrust={"hover_thrust": configured},
-            hover={"duration_s": 4.5},
-        )
+        summary = fly(mock, None, thrust={"hover_thrust": configured}, hover={"duration_s": 4.5})
     time, error = height_errors(summary)
     assert error.max() < (0.5 if faults else 0.15)
     assert error[time > 3.5].max() < 0.1

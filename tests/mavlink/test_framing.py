@@ -122,13 +122,7 @@ def test_built_frames_are_pymavlinks_byte_for_byte(message):
     mav.seq = 200
     packed = message.pack(mav)
     full = bytes(message.get_payload()) + bytes(9)
-    built = build_frame(
-        message.get_msgId(),
-        full,
-        sequence=200,
-        system=7,
-        component=191,
-    )
+    built = build_frame(message.get_msgId(), full, sequence=200, system=7, component=191)
     assert built == packed
 
 

@@ -111,11 +111,7 @@ def test_only_a_heartbeat_of_the_autopilot_makes_a_peer(run):
 def test_a_claim_lapses_on_the_ground_and_not_in_control():
     at = {"now": 100.0, "setpoint": -inf}
     rule = PeerRule(
-        LinkStats(),
-        list,
-        lambda: at["now"],
-        lambda: at["setpoint"],
-        every_frame_claims=False,
+        LinkStats(), list, lambda: at["now"], lambda: at["setpoint"], every_frame_claims=False
     )
     rule.set_peer("vehicle")
     for now, setpoint, lapsed in (
@@ -207,10 +203,7 @@ def test_the_rule_holds_over_ipv6(run):
         async with Link(LinkSettings(endpoint="udpin://[::1]:0")) as link:
             samples = []
             link.on_attitude = lambda sample: samples.append(sample.time_boot_ms)
-            with (
-                socket(AF_INET6, SOCK_DGRAM) as vehicle,
-                socket(AF_INET6, SOCK_DGRAM) as stranger,
-            ):
+            with socket(AF_INET6, SOCK_DGRAM) as vehicle, socket(AF_INET6, SOCK_DGRAM) as stranger:
                 frames = frames_of(heartbeat(), attitude(4))
                 vehicle.sendto(frames[0], link.local_address)
                 stranger.sendto(frames_of(attitude(3))[0], link.local_address)

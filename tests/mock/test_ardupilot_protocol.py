@@ -47,8 +47,7 @@ def test_its_version_by_either_command(rig):
 
 
 @pytest.mark.parametrize(
-    ("target", "answers"),
-    [((1, 1), 1), ((1, 0), 1), ((0, 0), 1), ((1, 42), 1), ((42, 1), 0)],
+    ("target", "answers"), [((1, 1), 1), ((1, 0), 1), ((0, 0), 1), ((1, 42), 1), ((42, 1), 0)]
 )
 def test_any_component_of_the_system_is_it(rig, target, answers):
     rig.say(dialect.MAVLink_command_long_message(*target, 512, 0, 148, 0, 0, 0, 0, 0, 0))

@@ -13,11 +13,7 @@ LOOP_US = 2500
 
 
 def streams(booting_until_us=0.0):
-    return ArduPilotStreams(
-        {HEARTBEAT: 1.0},
-        loop_us=LOOP_US,
-        booting_until_us=booting_until_us,
-    )
+    return ArduPilotStreams({HEARTBEAT: 1.0}, loop_us=LOOP_US, booting_until_us=booting_until_us)
 
 
 def sent(schedule, message, seconds):

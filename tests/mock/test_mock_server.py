@@ -9,15 +9,7 @@ import time
 from itertools import pairwise
 
 import pytest
-from mock_process import (
-    HOST,
-    Client,
-    ask,
-    free_gcs_port,
-    free_port,
-    mock_process,
-    started_by_hand,
-)
+from mock_process import HOST, Client, ask, free_gcs_port, free_port, mock_process, started_by_hand
 from pymavlink.dialects.v20 import development as dialect
 
 from sitl_mock.config.settings import GCS_PORT_OFFSET, PORT_OFFSET

@@ -106,11 +106,7 @@ def test_the_health_reports_of_a_boot_are_the_recorded_ones(flown):
 def test_the_events_of_a_flight_have_the_recorded_numbers(flown):
     told = [event for event in flown.told(flown.landmarks["arm"]) if event[1] != 8]
     named = [event for event in told if event[3][-2:] not in ("14", "07", "0c")]
-    assert named[:3] == [
-        (26266355, 6, 6, "04"),
-        (20656071, 6, 6, "00004040"),
-        (21054825, 6, 6, ""),
-    ]
+    assert named[:3] == [(26266355, 6, 6, "04"), (20656071, 6, 6, "00004040"), (21054825, 6, 6, "")]
     # PX4's source: commander_failsafe_enter_generic, OFFBOARD, RTL.
     assert (31382480, 2, 4, "0000060006") in flown.told(flown.landmarks["lost"])
 

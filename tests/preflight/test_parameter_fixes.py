@@ -105,9 +105,7 @@ def test_the_old_value_is_on_the_disk_before_the_new_one_is_set(tmp_path):
     assert list(told) == ["autopilot", "system", "uid", "time", "parameters"]
 
 
-def test_the_first_value_of_a_parameter_is_kept_and_no_other_runs_file_is_touched(
-    tmp_path,
-):
+def test_the_first_value_of_a_parameter_is_kept_and_no_other_runs_file_is_touched(tmp_path):
     paths = set()
     for _ in range(3):  # within one second, most likely
         link = FakeLink(tmp_path, A=5.0)

@@ -20,9 +20,7 @@ def found_after(seconds, *, attitude=lambda _: None, rates=STILL, position=lambd
         told, place = attitude(now), position(now)
         sample = told and SimpleNamespace(received=told[0], q=told[1])
         place = place and SimpleNamespace(
-            received=place[0],
-            position_ned=(place[1], 0.0, 0.0),
-            velocity_ned=(place[2], 0.0, 0.0),
+            received=place[0], position_ned=(place[1], 0.0, 0.0), velocity_ned=(place[2], 0.0, 0.0)
         )
         found = telemetry.find_frozen(now, sample, rates, place)
         if found is not None:

@@ -64,10 +64,7 @@ def test_a_refusal_has_the_autopilots_words_before_and_after_the_ack(run):
             with pytest.raises(CommandRefused) as caught:
                 await link.command(ARM, 1.0)
             assert caught.value.result_name == "TEMPORARILY_REJECTED"
-            assert caught.value.texts == (
-                "Arming denied:",
-                "Resolve system health failures first",
-            )
+            assert caught.value.texts == ("Arming denied:", "Resolve system health failures first")
             assert "MAV_CMD_COMPONENT_ARM_DISARM" in str(caught.value)
             assert len(vehicle.of("COMMAND_LONG")) == 1
 

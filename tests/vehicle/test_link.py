@@ -20,14 +20,7 @@ from companion.mavlink.errors import (
 from companion.mavlink.settings import LinkSettings
 from companion.mavlink.transport.free_port import free_port
 from companion.vehicle.link import Link
-from tests.mavlink.fakes import (
-    FakeVehicle,
-    attitude,
-    frames_of,
-    heartbeat,
-    linked,
-    until,
-)
+from tests.mavlink.fakes import FakeVehicle, attitude, frames_of, heartbeat, linked, until
 
 LEVEL = BodyRates(0.0, 0.0, 0.0)
 

@@ -24,11 +24,7 @@ PX4_SETUP = CompanionSettings(
 )
 ARDUPILOT_SETUP = PX4_SETUP._replace(
     hover_thrust=0.364,
-    acceleration_limits={
-        "roll": radians(1100.0),
-        "pitch": radians(1100.0),
-        "yaw": radians(270.0),
-    },
+    acceleration_limits={"roll": radians(1100.0), "pitch": radians(1100.0), "yaw": radians(270.0)},
 )
 # As recorded on the ground, but for the battery's action and what that vehicle did not tell.
 GOOD_PX4 = {

@@ -159,10 +159,7 @@ def _require_no_more_values(rows: Sequence[tuple[int, Sequence[str]]], name: str
 
 
 def _numbers(
-    rows: Sequence[tuple[int, Sequence[str]]],
-    header: list[str],
-    names: tuple[str, ...],
-    name: str,
+    rows: Sequence[tuple[int, Sequence[str]]], header: list[str], names: tuple[str, ...], name: str
 ) -> Floats:
     """The values (m, k) of the k columns `names`; messages call the file `name`."""
     columns = [header.index(column) for column in names]

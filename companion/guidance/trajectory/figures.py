@@ -12,12 +12,7 @@ from companion.guidance.trajectory.curves import (
     Straight,
 )
 from companion.guidance.trajectory.sample import SMALLEST_DISTANCE, Sample, TrajectoryError, Vector
-from companion.guidance.trajectory.time_laws import (
-    SEPTIC_SLOPE,
-    Cruise,
-    LimitedJerk,
-    cosine_ramp,
-)
+from companion.guidance.trajectory.time_laws import SEPTIC_SLOPE, Cruise, LimitedJerk, cosine_ramp
 from companion.guidance.trajectory.timed_curve import HeldHeading, TangentHeading, TimedCurve
 
 _LONGEST_RAMP_FRACTION = 0.5

@@ -28,9 +28,7 @@ PEER_SILENCE_S = 2.0
 a sender at another address may become the peer."""
 
 
-async def udp_address(
-    endpoint: UdpIn | UdpOut,
-) -> tuple[socket.AddressFamily, Any, NamedPeers]:
+async def udp_address(endpoint: UdpIn | UdpOut) -> tuple[socket.AddressFamily, Any, NamedPeers]:
     """Look up the host of an endpoint, and the peers that it names.
 
     Returns:

@@ -38,11 +38,7 @@ _STICKS_IGNORED = "moving the sticks does not end offboard; only the mode switch
 
 PX4_PARAMETERS: tuple[ParameterRule, ...] = (
     ParameterRule(
-        ("COM_OF_LOSS_T",),
-        "for how long the last rates are held",
-        rate_hold,
-        _MEASURED,
-        vital=True,
+        ("COM_OF_LOSS_T",), "for how long the last rates are held", rate_hold, _MEASURED, vital=True
     ),
     ParameterRule(
         ("COM_OBL_RC_ACT",),
