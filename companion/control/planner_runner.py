@@ -122,10 +122,8 @@ class PlannerRunner:
         An ATTITUDE_TARGET from before a heading reset is ignored: its frame is not known.
         """
         if self._estimator_resets.frame != self._frame_after_reset:
-            self._frame_after_reset, self._reset_time_boot_ms = (
-                self._estimator_resets.frame,
-                sample.time_boot_ms,
-            )
+            self._frame_after_reset = self._estimator_resets.frame
+            self._reset_time_boot_ms = sample.time_boot_ms
         target = self.attitude_target()
         if target is None or target is self._planner_attitude_target:
             return

@@ -117,10 +117,8 @@ class FlightFiles:
 
     def recorder(self, observer: Observer) -> EventRecorder:
         """An observer that records phases and events (as STATUSTEXT, too) before `observer`."""
-        clock, text_frames = (
-            asyncio.get_running_loop().time,
-            TextFrames(self._config.link.source_system),
-        )
+        clock = asyncio.get_running_loop().time
+        text_frames = TextFrames(self._config.link.source_system)
 
         def write(text: str) -> None:
             if self.tap is not None:

@@ -18,16 +18,12 @@ def brake_inside_fence(context: FlightContext) -> None:
     """
     guidance = context.guidance_loop
     guidance.give_up()
-    centre, pose = (
-        context.snapshot_builder.fence_centre_without_resets(),
-        guidance.flown_source.pose,
-    )
+    centre = context.snapshot_builder.fence_centre_without_resets()
+    pose = guidance.flown_source.pose
     if not context.link.autopilot.modes_begin_level or centre is None or pose is None:
         return
-    stopping_point, wind = (
-        minus(pose.position_ned, centre.position_ned),
-        guidance.estimate.disturbance,
-    )
+    stopping_point = minus(pose.position_ned, centre.position_ned)
+    wind = guidance.estimate.disturbance
     if only_upwind_is_inside(fence_of(context.config), centre.place, stopping_point, wind):
         guidance.move_upwind()
 

@@ -100,12 +100,10 @@ class StatusReporter:
         self.battery_at_takeoff: float | None = None
         self._context, self._safety_ladder, self._trace = context, ladder, trace
         self.real_time = real_time
-        self._began, self._current_phase, self._show, self._clock = (
-            began,
-            current_phase,
-            show,
-            clock,
-        )
+        self._began = began
+        self._current_phase = current_phase
+        self._show = show
+        self._clock = clock
         self._setpoint_counts: deque[tuple[float, int]] = deque()
         self._status_rows = StatusRows(context, trace.recorder, clock)
 

@@ -152,10 +152,8 @@ class _Climb:
 
     def _require_lift_off(self) -> None:
         """Raise `FlightEnded` if the vehicle tips over, or still stands after the time allowed."""
-        elapsed, climbed_height = (
-            asyncio.get_running_loop().time() - self._began,
-            self._climbed_height(),
-        )
+        elapsed = asyncio.get_running_loop().time() - self._began
+        climbed_height = self._climbed_height()
         if climbed_height is None or climbed_height >= _SMALLEST_RISE:
             return
         tilt = self._context.tilt()

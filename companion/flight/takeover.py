@@ -197,10 +197,8 @@ def _is_held(context: FlightContext) -> bool:
     attitude_sample, position = context.loop.resets.newest_attitude, context.fresh_position()
     if attitude_sample is None or position is None:
         return False
-    tilt, speed = (
-        tilt_angle(attitude_sample.q[1], attitude_sample.q[2]),
-        hypot(*position.velocity_ned[:2]),
-    )
+    tilt = tilt_angle(attitude_sample.q[1], attitude_sample.q[2])
+    speed = hypot(*position.velocity_ned[:2])
     context.waiting_for = (
         f"the autopilot to hold the vehicle (tilt {degrees(tilt):.0f}°, speed {speed:.1f} m/s)"
     )

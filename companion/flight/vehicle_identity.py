@@ -49,10 +49,8 @@ class ReplacementDetector:
         """Begin to watch: from now on, all frames must come from the same vehicle."""
         self._has_begun, self._arming_noted = True, False
         self.uid = self._other_uid = None
-        self._peer_count, self._restart_count = (
-            self._link.stats.peers,
-            self._link.clock.restart_count,
-        )
+        self._peer_count = self._link.stats.peers
+        self._restart_count = self._link.clock.restart_count
         self._frame_count, self._updated_at = self._link.stats.frames, self._clock()
         self._silence = self._long_silence = 0.0
 

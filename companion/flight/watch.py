@@ -79,10 +79,8 @@ class Watch:
             FlightEnded: the phase must end; see `check`.
         """
         now = self._clock()
-        is_early, self._current_mode_received = (
-            now - self._current_mode_received < _CURRENT_MODE_PERIOD,
-            now,
-        )
+        is_early = now - self._current_mode_received < _CURRENT_MODE_PERIOD
+        self._current_mode_received = now
         if is_early:
             self._request_heartbeat(now)
         self.check(phase)

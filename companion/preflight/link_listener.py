@@ -53,10 +53,8 @@ class LinkListener:
         self.reset_count = 0
 
     def __enter__(self) -> "LinkListener":
-        self._previous_on_foreign, self._link.on_foreign_frame = (
-            self._link.on_foreign_frame,
-            self._on_foreign_frame,
-        )
+        self._previous_on_foreign = self._link.on_foreign_frame
+        self._link.on_foreign_frame = self._on_foreign_frame
         self._unsubscribe = [
             self._link.subscribe("ATTITUDE_QUATERNION", self._on_attitude),
             self._link.subscribe("ATTITUDE_TARGET", self._on_attitude_target),
@@ -129,9 +127,7 @@ class LinkListener:
         )
 
     def _on_odometry(self, message: Message) -> None:
-        counter_before, self._newest_reset_counter = (
-            self._newest_reset_counter,
-            message.reset_counter,
-        )
+        counter_before = self._newest_reset_counter
+        self._newest_reset_counter = message.reset_counter
         if counter_before is not None:
             self.reset_count += (message.reset_counter - counter_before) & 0xFF

@@ -150,9 +150,7 @@ def test_a_gain_above_the_sensible_one_does_not_stiffen_the_hold():
 def test_a_higher_gain_in_flight_slows_observer_and_correction():
     quick = believed(*VEHICLES[0])
     planner = quick.planner.model_copy(update={"gain_per_s": 9.0})
-    before, after = (
-        loop_settings(quick),
-        loop_settings(quick.model_copy(update={"planner": planner})),
-    )
+    before = loop_settings(quick)
+    after = loop_settings(quick.model_copy(update={"planner": planner}))
     assert before.observer.bandwidth_increase > after.observer.bandwidth_increase == 0.0
     assert before.correction.filter_time < after.correction.filter_time
